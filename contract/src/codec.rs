@@ -1,0 +1,167 @@
+//! Reading and writing `GstStructure` fields with errors that name the field.
+
+use gst::prelude::*;
+
+use crate::{ContractError, Point, Rect, Vector};
+
+/// Reads fields of one structure.
+pub(crate) struct Reader<'a>(&'a gst::StructureRef);
+
+impl<'a> Reader<'a> {
+    pub fn new(structure: &'a gst::StructureRef, expected: &'static str) -> Result<Self, ContractError> {
+        if structure.name() == expected {
+            Ok(Self(structure))
+        } else {
+            Err(ContractError::WrongName { expected, found: structure.name().to_string() })
+        }
+    }
+
+    fn field_error(&self, field: &str, reason: impl ToString) -> ContractError {
+        ContractError::Field {
+            structure: self.0.name().to_string(),
+            field: field.to_owned(),
+            reason: reason.to_string(),
+        }
+    }
+
+    fn value_error(&self, field: &str, value: impl ToString) -> ContractError {
+        ContractError::Value {
+            structure: self.0.name().to_string(),
+            field: field.to_owned(),
+            value: value.to_string(),
+        }
+    }
+
+    pub fn get<T>(&self, field: &str) -> Result<T, ContractError>
+    where
+        T: for<'v> glib::value::FromValue<'v>,
+    {
+        let value = self.0.value(field).map_err(|err| self.field_error(field, err))?;
+        value.get::<T>().map_err(|_| self.field_error(field, format!("found a {}", value.type_())))
+    }
+
+    /// `None` where the field is absent: optional fields are simply left out.
+    pub fn get_optional<T>(&self, field: &str) -> Result<Option<T>, ContractError>
+    where
+        T: for<'v> glib::value::FromValue<'v>,
+    {
+        if self.0.has_field(field) { self.get(field).map(Some) } else { Ok(None) }
+    }
+
+    /// A finite number: NaN and infinities poison every computation downstream.
+    pub fn number(&self, field: &str) -> Result<f64, ContractError> {
+        let number = self.get::<f64>(field)?;
+        if number.is_finite() { Ok(number) } else { Err(self.value_error(field, number)) }
+    }
+
+    pub fn number_optional(&self, field: &str) -> Result<Option<f64>, ContractError> {
+        if self.0.has_field(field) { self.number(field).map(Some) } else { Ok(None) }
+    }
+
+    pub fn point(&self, field: &str) -> Result<Point, ContractError> {
+        let [x, y] = self.numbers(field)?;
+        Ok(Point { x, y })
+    }
+
+    pub fn vector(&self, field: &str) -> Result<Vector, ContractError> {
+        let [x, y] = self.numbers(field)?;
+        Ok(Vector { x, y })
+    }
+
+    pub fn vector_optional(&self, field: &str) -> Result<Option<Vector>, ContractError> {
+        if self.0.has_field(field) { self.vector(field).map(Some) } else { Ok(None) }
+    }
+
+    pub fn rect(&self, field: &str) -> Result<Rect, ContractError> {
+        let [x, y, width, height] = self.numbers(field)?;
+        Ok(Rect { x, y, width, height })
+    }
+
+    pub fn rect_optional(&self, field: &str) -> Result<Option<Rect>, ContractError> {
+        if self.0.has_field(field) { self.rect(field).map(Some) } else { Ok(None) }
+    }
+
+    /// Exactly `N` finite numbers.
+    fn numbers<const N: usize>(&self, field: &str) -> Result<[f64; N], ContractError> {
+        let tuples = self.tuples::<N>(field)?;
+        match tuples.as_slice() {
+            [tuple] => Ok(*tuple),
+            other => Err(self.value_error(field, format!("{} numbers", other.len() * N))),
+        }
+    }
+
+    /// A flat list of finite numbers, `N` to an item.
+    pub fn tuples<const N: usize>(&self, field: &str) -> Result<Vec<[f64; N]>, ContractError> {
+        let array = self.get::<gst::Array>(field)?;
+        let values = array.as_slice();
+        if !values.len().is_multiple_of(N) {
+            return Err(self.value_error(field, format!("{} numbers", values.len())));
+        }
+        values
+            .chunks_exact(N)
+            .map(|chunk| {
+                let mut tuple = [0.0; N];
+                for (slot, value) in tuple.iter_mut().zip(chunk) {
+                    *slot = value
+                        .get::<f64>()
+                        .ok()
+                        .filter(|number| number.is_finite())
+                        .ok_or_else(|| self.value_error(field, format!("{value:?}")))?;
+                }
+                Ok(tuple)
+            })
+            .collect()
+    }
+
+    pub fn named<T: Named>(&self, field: &str) -> Result<T, ContractError> {
+        let name = self.get::<String>(field)?;
+        T::from_name(&name).ok_or_else(|| self.value_error(field, name))
+    }
+}
+
+/// Flattens items into the list form that [`Reader::tuples`] reads.
+pub(crate) fn flat<const N: usize>(items: impl IntoIterator<Item = [f64; N]>) -> gst::Array {
+    gst::Array::new(items.into_iter().flatten().map(|number| number.to_send_value()))
+}
+
+pub(crate) fn point(point: Point) -> gst::Array {
+    flat([[point.x, point.y]])
+}
+
+pub(crate) fn vector(vector: Vector) -> gst::Array {
+    flat([[vector.x, vector.y]])
+}
+
+pub(crate) fn rect(rect: Rect) -> gst::Array {
+    flat([[rect.x, rect.y, rect.width, rect.height]])
+}
+
+/// An enumeration whose values travel as words.
+pub(crate) trait Named: Sized + Copy + 'static {
+    const NAMES: &'static [(Self, &'static str)];
+
+    fn from_name(name: &str) -> Option<Self> {
+        Self::NAMES.iter().find(|(_, known)| *known == name).map(|(value, _)| *value)
+    }
+}
+
+/// Declares an enumeration together with the words its values travel as.
+macro_rules! named_enum {
+    ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name { $($(#[$variant_meta])* $variant),+ }
+
+        impl $name {
+            /// The word it travels as.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $word),+ }
+            }
+        }
+
+        impl crate::codec::Named for $name {
+            const NAMES: &'static [(Self, &'static str)] = &[$((Self::$variant, $word)),+];
+        }
+    };
+}
+pub(crate) use named_enum;

@@ -1,0 +1,81 @@
+use gst::prelude::*;
+
+use crate::codec::{self, Reader};
+use crate::{BufferMeta, ContractError, Point, Rect};
+
+/// `roi-type` of the standard region-of-interest meta that marks moving regions.
+pub const MOTION_ROI: &str = "motion";
+
+/// One connected moving region.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Region {
+    /// Its bounding box.
+    pub bounds: Rect,
+    /// Its outer contour, a closed polygon.
+    pub contour: Vec<Point>,
+    /// Length of the contour as a fraction of the frame's own perimeter.
+    pub perimeter: f64,
+    /// Area inside the contour as a fraction of the frame's area.
+    pub area: f64,
+    /// Centre of mass of the area inside the contour.
+    pub centroid: Point,
+}
+
+impl Region {
+    const NAME: &'static str = "region";
+
+    fn to_structure(&self) -> gst::Structure {
+        gst::Structure::builder(Self::NAME)
+            .field("box", codec::rect(self.bounds))
+            .field("contour", codec::flat(self.contour.iter().map(|p| [p.x, p.y])))
+            .field("perimeter", self.perimeter)
+            .field("area", self.area)
+            .field("centroid", codec::point(self.centroid))
+            .build()
+    }
+
+    fn from_structure(structure: &gst::StructureRef) -> Result<Self, ContractError> {
+        let reader = Reader::new(structure, Self::NAME)?;
+        Ok(Self {
+            bounds: reader.rect("box")?,
+            contour: reader.tuples::<2>("contour")?.into_iter().map(|[x, y]| Point { x, y }).collect(),
+            perimeter: reader.number("perimeter")?,
+            area: reader.number("area")?,
+            centroid: reader.point("centroid")?,
+        })
+    }
+}
+
+/// What the detector saw in one frame; absent while it sleeps or learns.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MotionMeta {
+    /// The moving regions, longest perimeter first. Empty: it looked and nothing moved.
+    pub regions: Vec<Region>,
+}
+
+impl BufferMeta for MotionMeta {
+    const NAME: &'static str = "PtzMotionMeta";
+
+    fn write(&self, structure: &mut gst::StructureRef) {
+        let regions = self.regions.iter().map(|region| region.to_structure().to_send_value());
+        structure.set("regions", gst::Array::new(regions));
+    }
+
+    fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
+        let reader = Reader::new(structure, Self::NAME)?;
+        let array = reader.get::<gst::Array>("regions")?;
+        let regions = array
+            .as_slice()
+            .iter()
+            .map(|value| match value.get::<gst::Structure>() {
+                Ok(region) => Region::from_structure(&region),
+                Err(err) => Err(ContractError::Field {
+                    structure: Self::NAME.to_owned(),
+                    field: "regions".to_owned(),
+                    reason: err.to_string(),
+                }),
+            })
+            .collect::<Result<_, _>>()?;
+        Ok(Self { regions })
+    }
+}

@@ -1,0 +1,1 @@
+//! Reads the luma of any supported video frame.

@@ -1,0 +1,5 @@
+//! Puts version, commit and date into the plugin description.
+
+fn main() {
+    gst_plugin_version_helper::info();
+}

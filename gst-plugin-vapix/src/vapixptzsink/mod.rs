@@ -1,0 +1,5 @@
+//! Element `vapixptzsink`.
+
+pub(crate) fn register(_plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
+    Ok(())
+}
