@@ -1,0 +1,187 @@
+//! Whatever the contract writes it reads back, and what it cannot read it refuses by name.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use proptest::prelude::*;
+use ptztrack_contract::*;
+
+fn number() -> impl Strategy<Value = f64> {
+    -10.0..10.0f64
+}
+
+prop_compose! {
+    fn point()(x in number(), y in number()) -> Point { Point { x, y } }
+}
+
+prop_compose! {
+    fn vector()(x in number(), y in number()) -> Vector { Vector { x, y } }
+}
+
+prop_compose! {
+    fn rect()(x in number(), y in number(), width in 0.0..2.0f64, height in 0.0..2.0f64) -> Rect {
+        Rect { x, y, width, height }
+    }
+}
+
+prop_compose! {
+    fn region()(
+        bounds in rect(),
+        contour in prop::collection::vec(point(), 0..20),
+        perimeter in number(),
+        area in number(),
+        centroid in point(),
+    ) -> Region {
+        Region { bounds, contour, perimeter, area, centroid }
+    }
+}
+
+fn clock_time() -> impl Strategy<Value = gst::ClockTime> {
+    (0..u64::MAX).prop_map(gst::ClockTime::from_nseconds)
+}
+
+fn target_state() -> impl Strategy<Value = TargetState> {
+    prop::sample::select(vec![
+        TargetState::Searching,
+        TargetState::Tracking,
+        TargetState::Occluded,
+        TargetState::Lost,
+    ])
+}
+
+prop_compose! {
+    fn target()(
+        state in target_state(),
+        id in any::<u64>(),
+        bounds in rect(),
+        centroid in point(),
+        velocity in vector(),
+        ego_velocity in prop::option::of(vector()),
+        confidence in 0.0..1.0f64,
+        features in prop::collection::vec((point(), any::<bool>()), 0..20),
+        capture_time in prop::option::of(clock_time()),
+    ) -> TargetMeta {
+        let features = features.into_iter().map(|(position, kept)| Feature { position, kept }).collect();
+        TargetMeta { state, id, bounds, centroid, velocity, ego_velocity, confidence, features, capture_time }
+    }
+}
+
+prop_compose! {
+    fn times()(
+        timestamp in prop::option::of(clock_time()),
+        running_time in prop::option::of(clock_time()),
+        stream_time in prop::option::of(clock_time()),
+    ) -> Times {
+        Times { timestamp, running_time, stream_time }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn motion_meta(regions in prop::collection::vec(region(), 0..4)) {
+        gst::init().unwrap();
+        let meta = MotionMeta { regions };
+        let mut buffer = gst::Buffer::new();
+        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        prop_assert_eq!(MotionMeta::of(&buffer).unwrap().unwrap(), meta);
+    }
+
+    #[test]
+    fn target_meta(meta in target()) {
+        gst::init().unwrap();
+        let mut buffer = gst::Buffer::new();
+        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        prop_assert_eq!(TargetMeta::of(&buffer).unwrap().unwrap(), meta);
+    }
+
+    #[test]
+    fn tracker_event(state in target_state(), bounds in prop::option::of(rect())) {
+        gst::init().unwrap();
+        let event = TrackerEvent { state, bounds };
+        prop_assert_eq!(TrackerEvent::of(&event.to_event()).unwrap().unwrap(), event.clone());
+        prop_assert!(CameraEvent::of(&event.to_event()).is_none());
+    }
+
+    #[test]
+    fn camera_event(moving: bool, known in prop::option::of(number()), rate in number()) {
+        gst::init().unwrap();
+        let event = CameraEvent {
+            moving,
+            pan_deg: known,
+            tilt_deg: known,
+            pan_rate_deg_s: rate,
+            tilt_rate_deg_s: -rate,
+            horizontal_fov_deg: known,
+            vertical_fov_deg: known,
+        };
+        prop_assert_eq!(CameraEvent::of(&event.to_event()).unwrap().unwrap(), event.clone());
+        prop_assert!(TrackerEvent::of(&event.to_event()).is_none());
+    }
+
+    #[test]
+    fn messages(times in times(), bounds in rect(), centroid in point(), velocity in vector(), id: u64) {
+        gst::init().unwrap();
+        let motion = MotionMessage { change: MotionChange::Start, times, regions: 2, bounds: Some(bounds) };
+        prop_assert_eq!(MotionMessage::from_structure(&motion.to_structure()).unwrap(), motion);
+        let target = TargetMessage {
+            change: TargetChange::Reacquired, times, state: TargetState::Tracking, id, bounds, centroid, velocity,
+            confidence: 0.5,
+        };
+        prop_assert_eq!(TargetMessage::from_structure(&target.to_structure()).unwrap(), target);
+        let camera = CameraMessage { change: CameraChange::AtLimit, times, detail: "pan 180°".into() };
+        prop_assert_eq!(CameraMessage::from_structure(&camera.to_structure()).unwrap(), camera);
+    }
+}
+
+#[test]
+fn attaching_again_replaces() {
+    gst::init().unwrap();
+    let mut buffer = gst::Buffer::new();
+    for id in [1, 2] {
+        TargetMeta { id, ..Default::default() }.attach(buffer.get_mut().unwrap()).unwrap();
+    }
+    assert_eq!(TargetMeta::of(&buffer).unwrap().unwrap().id, 2);
+    TargetMeta::detach(buffer.get_mut().unwrap());
+    assert!(TargetMeta::of(&buffer).is_none());
+}
+
+#[test]
+fn refusals_name_what_is_wrong() {
+    gst::init().unwrap();
+    let other = gst::Structure::new_empty("other");
+    assert_eq!(
+        MotionMessage::from_structure(&other),
+        Err(ContractError::WrongName { expected: "ptztrack-motion", found: "other".into() })
+    );
+    let mut buffer = gst::Buffer::new();
+    TargetMeta::default().attach(buffer.get_mut().unwrap()).unwrap();
+    let mut spoil = |field: &str, value: glib::SendValue| {
+        let buffer = buffer.get_mut().unwrap();
+        let mut meta = gst::meta::CustomMeta::from_mut_buffer(buffer, TargetMeta::NAME).unwrap();
+        meta.mut_structure().set_value(field, value);
+        TargetMeta::of(buffer).unwrap().unwrap_err().to_string()
+    };
+    use gst::prelude::*;
+    assert!(spoil("state", "dancing".to_send_value()).contains("dancing"));
+    assert!(spoil("state", 3i32.to_send_value()).contains("`state`"));
+}
+
+#[test]
+fn numbers_that_are_none_are_refused() {
+    gst::init().unwrap();
+    let event = CameraEvent { pan_rate_deg_s: f64::NAN, ..Default::default() }.to_event();
+    assert!(matches!(CameraEvent::of(&event), Some(Err(ContractError::Value { .. }))));
+}
+
+#[test]
+fn times_of_a_segment_that_started_late() {
+    gst::init().unwrap();
+    let mut segment = gst::FormattedSegment::<gst::ClockTime>::new();
+    segment.set_start(gst::ClockTime::from_seconds(2));
+    segment.set_time(gst::ClockTime::from_seconds(10));
+    let times = Times::of(segment.upcast_ref(), Some(gst::ClockTime::from_seconds(5)));
+    assert_eq!(times.running_time, Some(gst::ClockTime::from_seconds(3)));
+    assert_eq!(times.stream_time, Some(gst::ClockTime::from_seconds(13)));
+    assert_eq!(Times::of(segment.upcast_ref(), None), Times::default());
+    assert_eq!(Times::of(&gst::Segment::new(), Some(gst::ClockTime::SECOND)).running_time, None);
+}
