@@ -1,0 +1,337 @@
+use ptztrack_contract::{MotionMeta, Point, Rect, Region, TargetMeta, TargetState};
+
+use super::draw::{Colour, Shape, text_width};
+
+/// Size of a frame in pixels.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct FrameSize {
+    /// Pixels a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+/// A place in the frame, in pixels from its top left corner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Spot {
+    /// To the right.
+    pub x: f64,
+    /// Downwards.
+    pub y: f64,
+}
+
+impl FrameSize {
+    /// Normalised to pixels. Held near the frame: what lies far outside is not seen, and must not
+    /// overflow the drawing's numbers.
+    fn spot(self, point: Point) -> Spot {
+        let scale = |value: f64, size: u32| value.clamp(-2.0, 3.0) * f64::from(size);
+        Spot { x: scale(point.x, self.width), y: scale(point.y, self.height) }
+    }
+}
+
+/// Which parts of the scene to draw.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Parts {
+    /// Contours of what moves.
+    pub contours: bool,
+    /// Boxes of what moves and of the target.
+    pub boxes: bool,
+    /// Feature points.
+    pub features: bool,
+    /// Centre of mass of the target.
+    pub centroid: bool,
+    /// Where the target was lately.
+    pub trail: bool,
+    /// Middle of the frame.
+    pub cross_hair: bool,
+    /// State, number and confidence in words.
+    pub state: bool,
+    /// From the middle of the frame to the target, as line and in numbers.
+    pub offset: bool,
+}
+
+const MOTION: Colour = Colour::new(80, 200, 255);
+const KEPT: Colour = Colour::new(80, 235, 70);
+const REJECTED: Colour = Colour::new(255, 60, 50);
+const TRAIL: Colour = Colour::new(255, 220, 90);
+const WHITE: Colour = Colour::new(255, 255, 255);
+const PLATE: Colour = Colour { red: 12, green: 16, blue: 22, alpha: 0.62 };
+const CENTRE: Point = Point { x: 0.5, y: 0.5 };
+
+fn state_colour(state: TargetState) -> Colour {
+    match state {
+        TargetState::Searching => Colour::new(225, 230, 235),
+        TargetState::Tracking => Colour::new(80, 235, 120),
+        TargetState::Occluded => Colour::new(255, 165, 50),
+        TargetState::Lost => Colour::new(255, 85, 75),
+    }
+}
+
+/// Sizes that suit the frame, so that a picture looks alike at 320x240 and at 4K.
+#[derive(Debug, Clone, Copy)]
+struct Style {
+    stroke: i32,
+    dot: f64,
+    text: f64,
+}
+
+impl Style {
+    fn of(frame: FrameSize) -> Self {
+        let size = f64::from(frame.width.min(frame.height));
+        Self {
+            stroke: (size / 400.0).round().max(1.0) as i32,
+            dot: (size / 300.0).max(1.5),
+            // Below eight pixels the letters fall apart, so small frames get relatively larger ones.
+            text: (6.0 + size / 52.0).round(),
+        }
+    }
+}
+
+/// What was seen in one frame.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Seen<'a> {
+    /// By the detector.
+    pub motion: Option<&'a MotionMeta>,
+    /// By the tracker.
+    pub target: Option<&'a TargetMeta>,
+    /// Where the target was lately, oldest first.
+    pub trail: &'a [Point],
+}
+
+/// Turns what was seen into shapes, the furthest back first.
+pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<Shape>> {
+    let mut scene = Scene { frame, style: Style::of(frame), parts, shapes: Vec::new() };
+    // While the tracker searches, the target's geometry says nothing.
+    let target = seen.target.filter(|target| target.state != TargetState::Searching);
+    scene.caption(seen.target)?;
+    if parts.trail {
+        scene.trail(seen.trail);
+    }
+    for region in seen.motion.iter().flat_map(|motion| &motion.regions) {
+        scene.region(region);
+    }
+    if parts.cross_hair {
+        scene.cross_hair();
+    }
+    if let Some(target) = target {
+        scene.target(target);
+    }
+    Ok(scene.shapes)
+}
+
+struct Scene {
+    frame: FrameSize,
+    style: Style,
+    parts: Parts,
+    shapes: Vec<Shape>,
+}
+
+impl Scene {
+    fn line(&mut self, points: impl IntoIterator<Item = Point>, closed: bool, colour: Colour) {
+        let points = points.into_iter().map(|point| self.frame.spot(point)).collect();
+        self.shapes.push(Shape::Line { points, closed, width: self.style.stroke, colour });
+    }
+
+    fn dot(&mut self, point: Point, radius: f64, colour: Colour) {
+        self.shapes.push(Shape::Dot { centre: self.frame.spot(point), radius, colour });
+    }
+
+    fn bounds(&mut self, rect: Rect, colour: Colour) {
+        let (right, bottom) = (rect.x + rect.width, rect.y + rect.height);
+        let corners = [(rect.x, rect.y), (right, rect.y), (right, bottom), (rect.x, bottom)];
+        self.line(corners.map(|(x, y)| Point { x, y }), true, colour);
+    }
+
+    fn region(&mut self, region: &Region) {
+        if self.parts.boxes {
+            self.bounds(region.bounds, MOTION.with_alpha(0.55));
+        }
+        if self.parts.contours {
+            self.line(region.contour.iter().copied(), true, MOTION);
+        }
+    }
+
+    /// Older parts fade.
+    fn trail(&mut self, trail: &[Point]) {
+        let steps = trail.len().saturating_sub(1) as f64;
+        for (index, step) in trail.windows(2).enumerate() {
+            let age = (index + 1) as f64 / steps;
+            self.line(step.iter().copied(), false, TRAIL.with_alpha(0.15 + 0.75 * age));
+        }
+    }
+
+    /// Four strokes around the middle, which itself stays free.
+    fn cross_hair(&mut self) {
+        let middle = self.frame.spot(CENTRE);
+        let (near, far) = (self.style.text * 0.6, self.style.text * 1.5);
+        for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
+            let at = |length: f64| Spot { x: middle.x + dx * length, y: middle.y + dy * length };
+            let (width, points) = (self.style.stroke, vec![at(near), at(far)]);
+            self.shapes.push(Shape::Line { points, closed: false, width, colour: WHITE.with_alpha(0.9) });
+        }
+    }
+
+    fn target(&mut self, target: &TargetMeta) {
+        let colour = state_colour(target.state);
+        if self.parts.boxes {
+            self.bounds(target.bounds, colour);
+        }
+        if self.parts.features {
+            for feature in &target.features {
+                let colour = if feature.kept { KEPT } else { REJECTED };
+                self.dot(feature.position, self.style.dot, colour);
+            }
+        }
+        if self.parts.offset {
+            self.line([CENTRE, target.centroid], false, WHITE.with_alpha(0.75));
+        }
+        if self.parts.centroid {
+            self.dot(target.centroid, self.style.dot * 2.0, WHITE);
+            self.dot(target.centroid, self.style.dot, colour);
+        }
+    }
+
+    /// State and offset in words, on a plate in the corner; left out where the frame has no room for it.
+    fn caption(&mut self, target: Option<&TargetMeta>) -> opencv::Result<()> {
+        let Some(target) = target else { return Ok(()) };
+        let mut lines = Vec::new();
+        if self.parts.state {
+            lines.push((state_text(target), state_colour(target.state)));
+        }
+        if self.parts.offset && target.state != TargetState::Searching {
+            lines.push((offset_text(target.centroid), WHITE));
+        }
+        let Style { text: height, .. } = self.style;
+        let mut width = 0.0_f64;
+        for (text, _) in &lines {
+            width = width.max(text_width(text, height)?);
+        }
+        let (margin, pitch) = (height * 0.7, height * 1.75);
+        let plate_width = width + 2.0 * margin;
+        let plate_height = pitch * lines.len() as f64 + margin;
+        let room = f64::from(self.frame.width) >= plate_width + 2.0 * margin
+            && f64::from(self.frame.height) >= plate_height + 2.0 * margin;
+        if lines.is_empty() || !room {
+            return Ok(());
+        }
+        let origin = Spot { x: margin, y: margin };
+        self.shapes.push(Shape::Plate { origin, width: plate_width, height: plate_height, colour: PLATE });
+        for (index, (text, colour)) in lines.into_iter().enumerate() {
+            let baseline = margin * 2.0 + pitch * index as f64 + height;
+            let origin = Spot { x: margin * 2.0, y: baseline };
+            self.shapes.push(Shape::Text { origin, text, height, colour });
+        }
+        Ok(())
+    }
+}
+
+fn state_text(target: &TargetMeta) -> String {
+    match target.state {
+        TargetState::Searching => target.state.name().to_owned(),
+        state => format!("{} #{}  {:.0}%", state.name(), target.id, target.confidence * 100.0),
+    }
+}
+
+/// Positive: right of and below the middle, in frame widths and heights.
+fn offset_text(centroid: Point) -> String {
+    format!("dx {:+.2}  dy {:+.2}", centroid.x - CENTRE.x, centroid.y - CENTRE.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use ptztrack_contract::Feature;
+
+    const FRAME: FrameSize = FrameSize { width: 320, height: 240 };
+    const NONE: Parts = Parts {
+        contours: false,
+        boxes: false,
+        features: false,
+        centroid: false,
+        trail: false,
+        cross_hair: false,
+        state: false,
+        offset: false,
+    };
+    const ALL: Parts = Parts {
+        contours: true,
+        boxes: true,
+        features: true,
+        centroid: true,
+        trail: true,
+        cross_hair: true,
+        state: true,
+        offset: true,
+    };
+
+    fn target(state: TargetState) -> TargetMeta {
+        let position = Point { x: 0.6, y: 0.5 };
+        TargetMeta {
+            state,
+            id: 7,
+            bounds: Rect { x: 0.55, y: 0.4, width: 0.1, height: 0.2 },
+            centroid: position,
+            confidence: 0.873,
+            features: vec![Feature { position, kept: true }, Feature { position, kept: false }],
+            ..TargetMeta::default()
+        }
+    }
+
+    fn shapes(parts: Parts, target: &TargetMeta) -> Vec<Shape> {
+        let trail = [Point { x: 0.1, y: 0.1 }, Point { x: 0.2, y: 0.1 }, Point { x: 0.3, y: 0.1 }];
+        let region = Region { contour: trail.to_vec(), ..Region::default() };
+        let motion = MotionMeta { regions: vec![region] };
+        let seen = Seen { motion: Some(&motion), target: Some(target), trail: &trail };
+        scene(FRAME, parts, seen).unwrap()
+    }
+
+    fn texts(shapes: &[Shape]) -> Vec<&str> {
+        fn text(shape: &Shape) -> Option<&str> {
+            if let Shape::Text { text, .. } = shape { Some(text) } else { None }
+        }
+        shapes.iter().filter_map(text).collect()
+    }
+
+    #[test]
+    fn each_part_draws_only_itself() {
+        let target = target(TargetState::Tracking);
+        let count = |parts| shapes(parts, &target).len();
+        assert_eq!(count(NONE), 0);
+        assert_eq!(count(Parts { contours: true, ..NONE }), 1);
+        assert_eq!(count(Parts { boxes: true, ..NONE }), 2);
+        assert_eq!(count(Parts { features: true, ..NONE }), 2);
+        assert_eq!(count(Parts { centroid: true, ..NONE }), 2);
+        assert_eq!(count(Parts { trail: true, ..NONE }), 2);
+        assert_eq!(count(Parts { cross_hair: true, ..NONE }), 4);
+        assert_eq!(count(Parts { state: true, ..NONE }), 2);
+        assert_eq!(count(Parts { offset: true, ..NONE }), 3);
+        assert_eq!(count(ALL), 17, "state and offset share a plate");
+    }
+
+    #[test]
+    fn words_and_numbers() {
+        let shapes = shapes(ALL, &target(TargetState::Tracking));
+        assert_eq!(texts(&shapes), ["tracking #7  87%", "dx +0.10  dy +0.00"]);
+    }
+
+    #[test]
+    fn searching_shows_no_target() {
+        let target = target(TargetState::Searching);
+        assert_eq!(texts(&shapes(ALL, &target)), ["searching"]);
+        assert!(shapes(Parts { features: true, centroid: true, offset: true, ..NONE }, &target).is_empty());
+    }
+
+    #[test]
+    fn tiny_frames_have_no_caption() {
+        let target = target(TargetState::Tracking);
+        let seen = Seen { target: Some(&target), ..Seen::default() };
+        let shapes = scene(FrameSize { width: 16, height: 16 }, ALL, seen).unwrap();
+        assert!(texts(&shapes).is_empty() && !shapes.is_empty());
+    }
+
+    #[test]
+    fn wild_coordinates_stay_near_the_frame() {
+        let spot = FRAME.spot(Point { x: 1e300, y: -1e300 });
+        assert_eq!(spot, Spot { x: 960.0, y: -480.0 });
+    }
+}
