@@ -1,1 +1,1 @@
-//! Prediction and control: plain types in angles and seconds.
+//! stub

@@ -1,0 +1,102 @@
+use std::time::Duration;
+
+/// Why the camera did not do what it was asked.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The address is no camera address.
+    #[error("`{location}` is no camera address ({reason}); expected for example http://192.168.0.90")]
+    Location {
+        /// The address, without user and password.
+        location: String,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// TLS could not be set up.
+    #[error("TLS cannot be set up: {0}")]
+    Tls(String),
+    /// No connection came about.
+    #[error("cannot connect to the camera: {0}")]
+    Unreachable(String),
+    /// The camera did not answer in time.
+    #[error("the camera did not answer within {0:?}")]
+    Timeout(Duration),
+    /// The connection broke, or what came over it was not HTTP.
+    #[error("the connection to the camera failed: {0}")]
+    Broken(String),
+    /// The camera wants credentials and none are set.
+    #[error("the camera asks for a user and a password, and none are set")]
+    CredentialsMissing,
+    /// The camera refused user and password. Nothing more is sent, so that the account is not locked.
+    #[error("the camera refuses user `{user}` with this password")]
+    BadCredentials {
+        /// The user that was refused.
+        user: String,
+    },
+    /// The camera wants a kind of authentication that is not spoken here.
+    #[error("the camera asks for an authentication that is not supported: {0}")]
+    UnsupportedAuthentication(String),
+    /// An HTTP status that is neither success nor a challenge.
+    #[error("the camera answered HTTP {status} {reason}")]
+    Status {
+        /// The status code.
+        status: u16,
+        /// Its standard phrase.
+        reason: &'static str,
+    },
+    /// The camera answered `Error:` with this text.
+    #[error("the camera answered `Error: {0}`")]
+    Camera(String),
+    /// The answer has another form than documented.
+    #[error("the camera's answer is not understood: {0}")]
+    Unexpected(String),
+    /// The answer is longer than any answer of this kind.
+    #[error("the camera's answer is longer than {0} bytes")]
+    TooLong(usize),
+    /// The camera's answer says that it cannot pan or tilt.
+    #[error("the camera has no pan, tilt and zoom: it answered a query with nothing")]
+    NoPtz,
+    /// The camera sends us elsewhere than to its own HTTPS.
+    #[error("the camera redirects to {0}; set `location` to the address that is meant")]
+    Redirected(String),
+}
+
+impl Error {
+    /// Whether the camera may have carried out the command although no success was reported.
+    pub fn may_have_acted(&self) -> bool {
+        matches!(self, Self::Timeout(_) | Self::Broken(_) | Self::Unexpected(_) | Self::TooLong(_))
+            || matches!(self, Self::Status { status, .. } if *status >= 500)
+    }
+
+    /// Whether a camera answered and refused; otherwise there is no camera to talk to.
+    pub fn is_refusal(&self) -> bool {
+        !matches!(self, Self::Unreachable(_) | Self::Timeout(_) | Self::Broken(_))
+    }
+
+    /// Whether asking again is useless, or harmful, until a setting changes.
+    pub fn is_final(&self) -> bool {
+        matches!(self, Self::CredentialsMissing | Self::BadCredentials { .. })
+    }
+
+    /// What a person can do about it.
+    pub fn advice(&self) -> &'static str {
+        match self {
+            Self::Location { .. } | Self::Redirected(_) => "Correct `location`.",
+            Self::Tls(_) => "Check `ca-file`.",
+            Self::Unreachable(_) => {
+                "Check `location`, the cable and, with https, the certificate (`ca-file`, `insecure`); trying on."
+            }
+            Self::Timeout(_) | Self::Broken(_) => "Check camera and network; trying on.",
+            Self::CredentialsMissing => "Set `user` and `password`; nothing more is sent until then.",
+            Self::BadCredentials { .. } => {
+                "Correct `user` or `password`; nothing more is sent until then, so that the account is not locked."
+            }
+            Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
+            Self::Status { status: 403, .. } => "Give this user the right to control PTZ; trying on.",
+            Self::Status { .. } | Self::Unexpected(_) | Self::TooLong(_) => {
+                "Check that `location` is an Axis camera with VAPIX; trying on."
+            }
+            Self::Camera(_) => "Check that `camera` has pan and tilt and takes this `mode`; trying on.",
+            Self::NoPtz => "Check `camera` and the camera's PTZ settings; trying on.",
+        }
+    }
+}

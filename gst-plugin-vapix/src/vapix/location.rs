@@ -1,0 +1,134 @@
+use std::fmt;
+
+use reqwest::Url;
+
+use super::{Error, Secret};
+
+/// Where the camera is: `http://host`, `https://host:port`. Holds no user and no password.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Location(Url);
+
+/// What an address of the form `http://user:password@host` carries besides the location.
+#[derive(Debug, Default)]
+pub struct UserInfo {
+    /// The user.
+    pub user: Option<String>,
+    /// The password.
+    pub password: Option<Secret>,
+}
+
+impl Location {
+    /// Reads an address; a user and a password in it are taken out and given back apart, so that the
+    /// location can be logged.
+    ///
+    /// # Errors
+    /// [`Error::Location`] where it is no `http` or `https` address of a host.
+    pub fn parse(text: &str) -> Result<(Self, UserInfo), Error> {
+        let shown = without_user_info(text);
+        let wrong = |reason: String| Error::Location { location: shown.clone(), reason };
+        let mut url = Url::parse(text.trim()).map_err(|err| wrong(err.to_string()))?;
+        if !matches!(url.scheme(), "http" | "https") {
+            return Err(wrong("neither http nor https".to_owned()));
+        }
+        if !url.has_host() {
+            return Err(wrong("no host".to_owned()));
+        }
+        let user_info = UserInfo {
+            user: Some(decoded(url.username())).filter(|user| !user.is_empty()),
+            password: url.password().map(|password| Secret::new(decoded(password))),
+        };
+        // A cleared address has no path, query or user that could reach a log or a request.
+        if url.set_username("").and_then(|()| url.set_password(None)).is_err() {
+            return Err(wrong("user and password cannot be taken out".to_owned()));
+        }
+        url.set_path("/");
+        url.set_query(None);
+        url.set_fragment(None);
+        Ok((Self(url), user_info))
+    }
+
+    /// Whether it is spoken to over TLS.
+    pub fn is_https(&self) -> bool {
+        self.0.scheme() == "https"
+    }
+
+    /// The address of a request; `target` is path and query.
+    pub(super) fn join(&self, target: &str) -> Result<Url, Error> {
+        self.0
+            .join(target)
+            .map_err(|err| Error::Location { location: self.to_string(), reason: err.to_string() })
+    }
+
+    /// The camera's own HTTPS, where `redirect` leads there; anything else could carry off the credentials.
+    pub(super) fn upgraded_by(&self, redirect: &str) -> Option<Self> {
+        let target = self.0.join(redirect).ok()?;
+        let upgrade = !self.is_https() && target.scheme() == "https" && target.host() == self.0.host();
+        let (location, _) = upgrade.then(|| Self::parse(target.as_str()).ok())??;
+        Some(location)
+    }
+}
+
+impl fmt::Display for Location {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.0.as_str().trim_end_matches('/'))
+    }
+}
+
+/// `text` without what stands before an `@` in its authority, for messages about addresses that do not parse.
+pub(super) fn without_user_info(text: &str) -> String {
+    match text.rsplit_once('@') {
+        Some((before, host)) => {
+            let scheme = before.split_once("://").map_or("", |(scheme, _)| scheme);
+            if scheme.is_empty() { host.to_owned() } else { format!("{scheme}://{host}") }
+        }
+        None => text.to_owned(),
+    }
+}
+
+/// Undoes percent encoding.
+fn decoded(text: &str) -> String {
+    percent_encoding::percent_decode_str(text).decode_utf8_lossy().into_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn user_and_password_are_taken_out() {
+        let (location, info) = Location::parse("http://root:p%40ss@camera:8080/axis-cgi?x=1#y").unwrap();
+        assert_eq!(location.to_string(), "http://camera:8080");
+        assert_eq!(info.user.as_deref(), Some("root"));
+        assert_eq!(info.password, Some(Secret::new("p@ss")));
+        assert!(!format!("{location:?} {info:?}").contains("p@ss"));
+    }
+
+    #[test]
+    fn nonsense_is_refused_without_repeating_the_password() {
+        for text in
+            ["", "camera", "rtsp://root:geheim@camera/", "http://root:geheim@", "http://a:geheim@b:99999"]
+        {
+            let err = Location::parse(text).unwrap_err().to_string();
+            assert!(!err.contains("geheim"), "{err}");
+            assert!(err.contains("http://192.168.0.90"), "{err}");
+        }
+    }
+
+    #[test]
+    fn only_the_cameras_own_https_is_an_upgrade() {
+        let (location, _) = Location::parse("http://camera").unwrap();
+        let upgraded = location.upgraded_by("https://camera/axis-cgi/com/ptz.cgi?query=limits").unwrap();
+        assert_eq!(upgraded.to_string(), "https://camera");
+        assert_eq!(location.upgraded_by("https://elsewhere/axis-cgi"), None);
+        assert_eq!(location.upgraded_by("/login.html"), None);
+        assert_eq!(upgraded.upgraded_by("http://camera/"), None);
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(text in ".{0,64}") {
+            let _ = Location::parse(&text);
+        }
+    }
+}
