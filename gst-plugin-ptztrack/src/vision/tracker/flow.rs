@@ -1,0 +1,188 @@
+//! Sparse pyramidal Lucas-Kanade (thesis 3.5.2) between two patches, with its tests.
+
+use opencv::core::{Point2f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vector};
+use opencv::video;
+
+use super::geometry::length;
+use super::patch::Patch;
+
+/// Iterations and precision of one level of the pyramid: the residual is settled long before.
+const ITERATIONS: i32 = 20;
+const PRECISION: f64 = 0.03;
+/// Smaller eigenvalue of the gradient matrix, per pixel, below which equation 3.11 is not worth solving.
+const MIN_EIGENVALUE: f64 = 1e-4;
+
+/// How points are followed and when they count as lost.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flow {
+    /// Side of the window in patch pixels, odd.
+    pub window: i32,
+    /// Side of the larger window that lost points are tried with again.
+    pub grown_window: i32,
+    /// Mean absolute difference of the two windows, grey levels, above which a point is lost.
+    pub max_residual: f32,
+    /// Patch pixels that a point may be off after being followed forth and back; `None`: not tested.
+    pub max_return_error: Option<f32>,
+}
+
+impl Flow {
+    /// Follows `points` of `previous` (frame pixels) into `next`; `guesses` says where they may be.
+    /// `None` for a point that is lost. Both patches must be of one size.
+    pub fn follow(
+        &self,
+        previous: &Patch,
+        next: &Patch,
+        points: &[Point2f],
+        guesses: &[Point2f],
+    ) -> opencv::Result<Vec<Option<Point2f>>> {
+        let mut found = self.attempt(previous, next, points, guesses, self.window)?;
+        let lost: Vec<usize> = (0..points.len()).filter(|&index| found[index].is_none()).collect();
+        // Thesis 3.5.2: "if the feature is not found in the small window, the algorithm increases the
+        // window size". Worth it only where the motion was too large, and then most points are lost.
+        if self.grown_window > self.window && 2 * lost.len() > points.len() {
+            let pick = |from: &[Point2f]| lost.iter().map(|&index| from[index]).collect::<Vec<_>>();
+            let again = self.attempt(previous, next, &pick(points), &pick(guesses), self.grown_window)?;
+            for (index, place) in lost.into_iter().zip(again) {
+                found[index] = place;
+            }
+        }
+        Ok(found)
+    }
+
+    fn attempt(
+        &self,
+        previous: &Patch,
+        next: &Patch,
+        points: &[Point2f],
+        guesses: &[Point2f],
+        window: i32,
+    ) -> opencv::Result<Vec<Option<Point2f>>> {
+        let forth = lucas_kanade(previous, next, points, guesses, window)?;
+        let mut found: Vec<Option<Point2f>> = forth
+            .into_iter()
+            .map(|end| end.filter(|end| end.residual <= self.max_residual).map(|end| end.position))
+            .collect();
+        let Some(max_error) = self.max_return_error else { return Ok(found) };
+        let limit = max_error * previous.step() as f32;
+        let ends: Vec<Point2f> =
+            found.iter().zip(guesses).map(|(end, guess)| end.unwrap_or(*guess)).collect();
+        let back = lucas_kanade(next, previous, &ends, points, window)?;
+        for ((place, returned), start) in found.iter_mut().zip(back).zip(points) {
+            if returned.is_none_or(|returned| length(returned.position - *start) > limit) {
+                *place = None;
+            }
+        }
+        Ok(found)
+    }
+}
+
+struct End {
+    position: Point2f,
+    residual: f32,
+}
+
+fn lucas_kanade(
+    from: &Patch,
+    to: &Patch,
+    points: &[Point2f],
+    guesses: &[Point2f],
+    window: i32,
+) -> opencv::Result<Vec<Option<End>>> {
+    if points.is_empty() || from.is_empty() || !from.fits(to) {
+        return Ok(points.iter().map(|_| None).collect());
+    }
+    let starts: Vector<Point2f> = points.iter().map(|point| from.enter(*point)).collect();
+    let mut ends: Vector<Point2f> = guesses.iter().map(|guess| to.enter(*guess)).collect();
+    let (mut status, mut residuals) = (Vector::<u8>::new(), Vector::<f32>::new());
+    video::calc_optical_flow_pyr_lk(
+        from.pyramid(),
+        to.pyramid(),
+        &starts,
+        &mut ends,
+        &mut status,
+        &mut residuals,
+        Size::new(window, window),
+        from.levels().min(to.levels()),
+        TermCriteria {
+            typ: TermCriteria_COUNT | TermCriteria_EPS,
+            max_count: ITERATIONS,
+            epsilon: PRECISION,
+        },
+        video::OPTFLOW_USE_INITIAL_FLOW,
+        MIN_EIGENVALUE,
+    )?;
+    Ok(ends
+        .iter()
+        .zip(status.iter().zip(residuals.iter()))
+        .map(|(end, (status, residual))| {
+            let position = to.leave(end);
+            (status != 0 && position.x.is_finite() && position.y.is_finite())
+                .then_some(End { position, residual })
+        })
+        .collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::synthetic::Scene;
+    use super::*;
+    use crate::vision::tracker::patch::Cut;
+    use opencv::core::Rect2f;
+    use proptest::prelude::*;
+
+    const FLOW: Flow = Flow { window: 15, grown_window: 31, max_residual: 20.0, max_return_error: Some(0.5) };
+
+    fn lattice() -> Vec<Point2f> {
+        (0..16).map(|n| Point2f::new(100.0 + 12.0 * (n % 4) as f32, 90.0 + 12.0 * (n / 4) as f32)).collect()
+    }
+
+    fn flow_of(shift: (f32, f32), guess: Point2f) -> Vec<Option<Point2f>> {
+        let scene = Scene::new(320, 240);
+        let still = scene.background((0.0, 0.0));
+        let moved = scene.background(shift);
+        let area = Rect2f::new(40.0, 40.0, 180.0, 160.0);
+        let previous = Patch::cut(&still.luma(), Cut::new(&still.luma(), area, 1), 31).expect("cut");
+        let cut = previous.as_cut().moved(&moved.luma(), guess);
+        let next = Patch::cut(&moved.luma(), cut, 31).expect("cut");
+        let points = lattice();
+        let guesses: Vec<Point2f> = points.iter().map(|point| *point + guess).collect();
+        FLOW.follow(&previous, &next, &points, &guesses).expect("flow")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn sub_pixel_motion_is_measured(dx in -9.0_f32..9.0, dy in -9.0_f32..9.0) {
+            let found = flow_of((dx, dy), Point2f::default());
+            let errors: Vec<f32> = found.iter().zip(lattice()).filter_map(|(end, start)| {
+                end.map(|end| length(end - start - Point2f::new(dx, dy)))
+            }).collect();
+            prop_assert!(errors.len() >= 12, "{} of 16 points", errors.len());
+            for error in errors {
+                prop_assert!(error < 0.2, "{error} pixels off");
+            }
+        }
+    }
+
+    #[test]
+    fn a_guess_carries_over_a_large_motion() {
+        let shift = Point2f::new(63.3, -20.6);
+        let found = flow_of((shift.x, shift.y), Point2f::new(60.0, -18.0));
+        let good = found
+            .iter()
+            .zip(lattice())
+            .filter(|(end, start)| end.is_some_and(|end| length(end - *start - shift) < 0.2));
+        assert!(good.count() >= 12);
+    }
+
+    #[test]
+    fn points_that_vanish_are_lost() {
+        let scene = Scene::new(320, 240);
+        let (there, gone) = (scene.background((0.0, 0.0)), scene.flat(90));
+        let cut = Cut::new(&there.luma(), Rect2f::new(40.0, 40.0, 180.0, 160.0), 1);
+        let previous = Patch::cut(&there.luma(), cut, 31).expect("cut");
+        let next = Patch::cut(&gone.luma(), cut, 31).expect("cut");
+        let found = FLOW.follow(&previous, &next, &lattice(), &lattice()).expect("flow");
+        assert!(found.iter().all(Option::is_none));
+    }
+}

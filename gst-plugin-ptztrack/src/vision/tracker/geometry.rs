@@ -1,0 +1,143 @@
+//! Pixel geometry on OpenCV's own types, and the way between pixels and the normalised contract.
+
+use opencv::core::{Point2f, Rect2f};
+use ptztrack_contract::{Point, Rect, Vector};
+
+/// The middle of a box.
+pub(super) fn centre(bounds: Rect2f) -> Point2f {
+    Point2f::new(bounds.x + bounds.width / 2.0, bounds.y + bounds.height / 2.0)
+}
+
+/// The box of that size around a point.
+pub(super) fn around(centre: Point2f, width: f32, height: f32) -> Rect2f {
+    Rect2f::new(centre.x - width / 2.0, centre.y - height / 2.0, width, height)
+}
+
+/// The box with its sides multiplied, around its own middle.
+pub(super) fn scaled(bounds: Rect2f, horizontal: f32, vertical: f32) -> Rect2f {
+    around(centre(bounds), bounds.width * horizontal, bounds.height * vertical)
+}
+
+/// The box grown by `margin` on all sides.
+pub(super) fn grown(bounds: Rect2f, margin: f32) -> Rect2f {
+    around(centre(bounds), bounds.width + 2.0 * margin, bounds.height + 2.0 * margin)
+}
+
+/// The area that two boxes share.
+fn shared(a: Rect2f, b: Rect2f) -> f32 {
+    let width = (a.x + a.width).min(b.x + b.width) - a.x.max(b.x);
+    let height = (a.y + a.height).min(b.y + b.height) - a.y.max(b.y);
+    width.max(0.0) * height.max(0.0)
+}
+
+/// Intersection over union, 0 to 1.
+pub(super) fn overlap(a: Rect2f, b: Rect2f) -> f32 {
+    let both = shared(a, b);
+    let either = a.area() + b.area() - both;
+    if either > 0.0 { both / either } else { 0.0 }
+}
+
+/// The part of `bounds` that lies inside `frame`, 0 to 1.
+pub(super) fn share_inside(bounds: Rect2f, frame: Rect2f) -> f32 {
+    if bounds.area() > 0.0 { shared(bounds, frame) / bounds.area() } else { 0.0 }
+}
+
+/// Whether a point lies in the ellipse inscribed in the box. People fill an ellipse better than a box.
+pub(super) fn in_ellipse(bounds: Rect2f, point: Point2f) -> bool {
+    let offset = point - centre(bounds);
+    let (x, y) = (2.0 * offset.x / bounds.width.max(1.0), 2.0 * offset.y / bounds.height.max(1.0));
+    x * x + y * y <= 1.0
+}
+
+/// Length of a vector.
+pub(super) fn length(vector: Point2f) -> f32 {
+    vector.x.hypot(vector.y)
+}
+
+/// The median: 0 of nothing.
+pub(super) fn median(values: &mut [f32]) -> f32 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+}
+
+/// The median of each coordinate.
+pub(super) fn median_vector(vectors: impl Iterator<Item = Point2f>) -> Point2f {
+    let (mut x, mut y): (Vec<f32>, Vec<f32>) = vectors.map(|vector| (vector.x, vector.y)).unzip();
+    Point2f::new(median(&mut x), median(&mut y))
+}
+
+/// The mean of some vectors: `None` of nothing.
+pub(super) fn mean(vectors: impl Iterator<Item = Point2f>) -> Option<Point2f> {
+    let (sum, count) = vectors.fold((Point2f::default(), 0_u16), |(sum, n), v| (sum + v, n + 1));
+    (count > 0).then(|| sum / f32::from(count))
+}
+
+/// The size of the frame, which is all that is needed between pixels and normalised coordinates.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Frame {
+    pub width: f32,
+    pub height: f32,
+}
+
+impl Frame {
+    pub fn bounds(self) -> Rect2f {
+        Rect2f::new(0.0, 0.0, self.width, self.height)
+    }
+
+    pub fn point_to_pixels(self, point: Point) -> Point2f {
+        Point2f::new(point.x as f32 * self.width, point.y as f32 * self.height)
+    }
+
+    pub fn rect_to_pixels(self, rect: Rect) -> Rect2f {
+        let corner = self.point_to_pixels(Point { x: rect.x, y: rect.y });
+        Rect2f::new(corner.x, corner.y, rect.width as f32 * self.width, rect.height as f32 * self.height)
+    }
+
+    pub fn point(self, pixels: Point2f) -> Point {
+        Point { x: f64::from(pixels.x / self.width), y: f64::from(pixels.y / self.height) }
+    }
+
+    pub fn vector(self, pixels: Point2f) -> Vector {
+        Vector { x: f64::from(pixels.x / self.width), y: f64::from(pixels.y / self.height) }
+    }
+
+    pub fn rect(self, pixels: Rect2f) -> Rect {
+        let corner = self.point(pixels.tl());
+        let size = self.vector(pixels.br() - pixels.tl());
+        Rect { x: corner.x, y: corner.y, width: size.x, height: size.y }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn overlap_of_boxes() {
+        let a = Rect2f::new(0.0, 0.0, 10.0, 10.0);
+        assert_eq!(overlap(a, a), 1.0);
+        assert!((overlap(a, Rect2f::new(5.0, 0.0, 10.0, 10.0)) - 1.0 / 3.0).abs() < 1e-6);
+        assert_eq!(overlap(a, Rect2f::new(20.0, 0.0, 10.0, 10.0)), 0.0);
+        assert_eq!(overlap(Rect2f::default(), Rect2f::default()), 0.0);
+        assert_eq!(share_inside(Rect2f::new(-5.0, 0.0, 10.0, 10.0), a), 0.5);
+    }
+
+    #[test]
+    fn median_resists_outliers() {
+        let flow = [(1.0, 2.0), (1.1, 2.1), (0.9, 1.9), (90.0, -90.0), (1.0, 2.0)];
+        let middle = median_vector(flow.into_iter().map(|(x, y)| Point2f::new(x, y)));
+        assert_eq!(middle, Point2f::new(1.0, 2.0));
+        assert_eq!(median(&mut []), 0.0);
+    }
+
+    #[test]
+    fn pixels_and_back() {
+        let frame = Frame { width: 640.0, height: 480.0 };
+        let rect = Rect { x: 0.25, y: 0.5, width: 0.125, height: 0.25 };
+        assert_eq!(frame.rect_to_pixels(rect), Rect2f::new(160.0, 240.0, 80.0, 120.0));
+        assert_eq!(frame.rect(frame.rect_to_pixels(rect)), rect);
+    }
+}

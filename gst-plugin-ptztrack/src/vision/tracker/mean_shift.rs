@@ -1,0 +1,141 @@
+//! Centre of mass by mean-shift over the back-projected grey histogram (thesis 3.5.3, Comaniciu).
+
+use opencv::core::{
+    CV_8UC1, Mat, Point2f, Rect, Rect2f, Scalar, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS,
+};
+use opencv::prelude::*;
+use opencv::{imgproc, video};
+
+use super::geometry::centre;
+use super::patch::Patch;
+
+/// Bins of the grey histogram: few enough that light changing a little changes little.
+const BINS: usize = 32;
+const GREYS_A_BIN: usize = 256 / BINS;
+/// "This process is repeated until the mean-shift vector converges to 0."
+const ITERATIONS: i32 = 15;
+const PRECISION: f64 = 0.5;
+/// Half the side of the neighbourhood of a feature point that is counted as target, patch pixels.
+const REACH: i32 = 2;
+
+/// Share of each grey level on the target: the look-up table from pixel to probability.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct GreyModel {
+    shares: [f32; BINS],
+}
+
+impl GreyModel {
+    /// Counts the surroundings of `points` in the patch; `None` where no point lies in it.
+    ///
+    /// With `background` (the target's box) the shares are divided by how common a grey is outside of
+    /// the box too, so that what the street looks like does not pull.
+    pub fn new(
+        patch: &Patch,
+        points: &[Point2f],
+        background: Option<Rect2f>,
+    ) -> opencv::Result<Option<Self>> {
+        let mut target = [0.0; BINS];
+        for point in points {
+            count(patch, *point, &mut target)?;
+        }
+        let total: f32 = target.iter().sum();
+        if total == 0.0 {
+            return Ok(None);
+        }
+        target.iter_mut().for_each(|share| *share /= total);
+        if let Some(bounds) = background {
+            let outside = outside(patch, bounds)?;
+            target.iter_mut().zip(outside).for_each(|(share, other)| *share /= *share + other + 1e-3);
+        }
+        Ok(Some(Self { shares: target }))
+    }
+
+    /// The probability picture: 255 for the grey that is most typical of the target.
+    fn back_project(&self, patch: &Patch) -> opencv::Result<Mat> {
+        let best = self.shares.iter().copied().fold(f32::MIN_POSITIVE, f32::max);
+        let table: Vec<u8> =
+            (0..256).map(|grey| (255.0 * self.shares[grey / GREYS_A_BIN] / best).round() as u8).collect();
+        let mut probability = Mat::default();
+        opencv::core::lut(patch.grey(), &Mat::from_slice(&table)?, &mut probability)?;
+        Ok(probability)
+    }
+
+    /// The centre of mass (3.13 to 3.15) of the probability in a window the size of `start`, moved until
+    /// it stays, and then `None` where there is no mass at all.
+    pub fn centre_of_mass(&self, patch: &Patch, start: Rect2f) -> opencv::Result<Option<Point2f>> {
+        let Some(mut window) = pixels(patch, start) else { return Ok(None) };
+        let probability = self.back_project(patch)?;
+        let criteria = TermCriteria {
+            typ: TermCriteria_COUNT | TermCriteria_EPS,
+            max_count: ITERATIONS,
+            epsilon: PRECISION,
+        };
+        video::mean_shift(&probability, &mut window, criteria)?;
+        Ok(mass_centre(&probability, window)?.map(|middle| patch.leave(middle)))
+    }
+}
+
+/// Equations 3.13 to 3.15 inside a window, in pixels of the picture.
+fn mass_centre(probability: &Mat, window: Rect) -> opencv::Result<Option<Point2f>> {
+    let moments = imgproc::moments(&Mat::roi(probability, window)?, false)?;
+    Ok((moments.m00 > 0.0).then(|| {
+        let offset = Point2f::new((moments.m10 / moments.m00) as f32, (moments.m01 / moments.m00) as f32);
+        offset + Point2f::new(window.x as f32, window.y as f32)
+    }))
+}
+
+/// The box in whole pixels of the patch, cut to it; `None` where nothing of it lies inside.
+fn pixels(patch: &Patch, bounds: Rect2f) -> Option<Rect> {
+    let (first, last) = (patch.enter(bounds.tl()), patch.enter(bounds.br()));
+    let x = (first.x.round() as i32).clamp(0, patch.grey().cols());
+    let y = (first.y.round() as i32).clamp(0, patch.grey().rows());
+    let width = (last.x.round() as i32).min(patch.grey().cols()) - x;
+    let height = (last.y.round() as i32).min(patch.grey().rows()) - y;
+    (width > 0 && height > 0).then(|| Rect::new(x, y, width, height))
+}
+
+fn count(patch: &Patch, point: Point2f, counts: &mut [f32; BINS]) -> opencv::Result<()> {
+    let middle = patch.enter(point);
+    let reach = REACH as f32;
+    let window = Rect2f::new(middle.x - reach, middle.y - reach, 2.0 * reach + 1.0, 2.0 * reach + 1.0);
+    let first = (window.y.round().max(0.0) as i32).min(patch.grey().rows());
+    let last = ((window.y + window.height).round() as i32).clamp(first, patch.grey().rows());
+    let left = (window.x.round().max(0.0) as usize).min(patch.grey().cols() as usize);
+    let right =
+        ((window.x + window.width).round().max(0.0) as usize).clamp(left, patch.grey().cols() as usize);
+    for y in first..last {
+        for grey in &patch.grey().at_row::<u8>(y)?[left..right] {
+            counts[usize::from(*grey) / GREYS_A_BIN] += 1.0;
+        }
+    }
+    Ok(())
+}
+
+/// Shares of the greys of the patch outside the box.
+fn outside(patch: &Patch, bounds: Rect2f) -> opencv::Result<[f32; BINS]> {
+    let mut mask = Mat::new_size_with_default(patch.grey().size()?, CV_8UC1, Scalar::all(255.0))?;
+    if let Some(window) = pixels(patch, bounds) {
+        imgproc::rectangle(&mut mask, window, Scalar::all(0.0), imgproc::FILLED, imgproc::LINE_8, 0)?;
+    }
+    let mut histogram = Mat::default();
+    let greys = opencv::core::Vector::<Mat>::from_iter([patch.grey().clone()]);
+    imgproc::calc_hist_def(
+        &greys,
+        &vec![0].into(),
+        &mask,
+        &mut histogram,
+        &vec![BINS as i32].into(),
+        &vec![0.0, 256.0].into(),
+    )?;
+    let counts = histogram.data_typed::<f32>()?;
+    let total: f32 = counts.iter().sum::<f32>().max(1.0);
+    Ok(std::array::from_fn(|bin| counts.get(bin).map_or(0.0, |count| count / total)))
+}
+
+/// Where mass was found, kept near the middle of the box: limbs and shadows pull, a camera should not swing.
+pub(super) fn near_the_middle(mass: Point2f, bounds: Rect2f, share: f32) -> Point2f {
+    let middle = centre(bounds);
+    let (x, y) = (share * bounds.width, share * bounds.height);
+    let offset = mass - middle;
+    middle + Point2f::new(offset.x.clamp(-x, x), offset.y.clamp(-y, y))
+}

@@ -1,0 +1,248 @@
+//! Which detection becomes the target.
+
+use opencv::core::{Point2f, Rect2f};
+
+use super::geometry::{Frame, centre, grown, length, overlap, share_inside};
+
+/// Smaller regions, in pixels of either side, have no features; larger shares of the frame are no target.
+const MIN_SIDE: f32 = 6.0;
+const MAX_SHARE: f32 = 0.9;
+/// Intersection over union from which a detection continues an earlier one.
+const SAME: f32 = 0.2;
+/// Frames that a detection may be missing.
+const PATIENCE: u32 = 2;
+/// A detection at the edge may be half a person: how long it may take to walk in, seconds.
+const EDGE_WAIT_S: f64 = 1.2;
+/// Pixels from the edge of the frame that count as touching it.
+const EDGE: f32 = 2.0;
+/// How long what was released is not taken again, seconds.
+const RELEASE_HOLD_S: f64 = 3.0;
+
+/// How the target is chosen among the detections.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Choice {
+    /// The one of largest area.
+    #[default]
+    Largest,
+    /// The one that was there first.
+    First,
+    /// The one nearest to the middle of the frame.
+    NearestCentre,
+    /// None: an operator chooses.
+    Manual,
+}
+
+/// Something that a detector saw, in pixels.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(super) struct Sighting {
+    pub bounds: Rect2f,
+    /// Polygon around it; empty where only the box is known.
+    pub contour: Vec<Point2f>,
+}
+
+struct Candidate {
+    sighting: Sighting,
+    frames: u32,
+    missed: u32,
+    age_s: f64,
+}
+
+/// Follows detections until one is sure enough to become the target.
+#[derive(Default)]
+pub(super) struct Selection {
+    candidates: Vec<Candidate>,
+    released: Option<(Rect2f, f64)>,
+}
+
+impl Selection {
+    /// Forgets all detections.
+    pub fn clear(&mut self) {
+        self.candidates.clear();
+    }
+
+    /// What is at `bounds` was let go on purpose: it is not chosen again for a while.
+    pub fn release(&mut self, bounds: Rect2f) {
+        self.released = Some((bounds, RELEASE_HOLD_S));
+    }
+
+    /// Takes the detections of one frame, `dt_s` after the last.
+    pub fn update(&mut self, sightings: Vec<Sighting>, frame: Frame, dt_s: f64) {
+        for candidate in &mut self.candidates {
+            candidate.missed += 1;
+            candidate.age_s += dt_s;
+        }
+        for sighting in sightings.into_iter().filter(|sighting| is_sound(sighting, frame)) {
+            let same = self
+                .candidates
+                .iter_mut()
+                .filter(|candidate| candidate.missed > 0)
+                .map(|candidate| (overlap(candidate.sighting.bounds, sighting.bounds), candidate))
+                .filter(|(share, _)| *share >= SAME)
+                .max_by(|(a, _), (b, _)| a.total_cmp(b));
+            match same {
+                Some((_, candidate)) => {
+                    candidate.sighting = sighting;
+                    candidate.frames += 1;
+                    candidate.missed = 0;
+                }
+                None => self.candidates.push(Candidate { sighting, frames: 1, missed: 0, age_s: 0.0 }),
+            }
+        }
+        self.candidates.retain(|candidate| candidate.missed <= PATIENCE);
+        self.follow_released(dt_s);
+    }
+
+    /// The released target moves on, and so does the place that is held back.
+    fn follow_released(&mut self, dt_s: f64) {
+        self.released = self.released.filter(|(_, left)| *left > dt_s).map(|(bounds, left)| {
+            let same = self.candidates.iter().filter(|candidate| candidate.missed == 0);
+            let bounds = same
+                .map(|candidate| candidate.sighting.bounds)
+                .find(|seen| overlap(*seen, bounds) > 0.0)
+                .unwrap_or(bounds);
+            (bounds, left - dt_s)
+        });
+    }
+
+    /// The detection to follow now, seen in at least `confirm_frames` frames and in this one.
+    pub fn choose(&self, choice: Choice, confirm_frames: u32, frame: Frame) -> Option<&Sighting> {
+        let ready = self.candidates.iter().filter(|candidate| {
+            let bounds = candidate.sighting.bounds;
+            candidate.missed == 0
+                && candidate.frames >= confirm_frames
+                && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
+                && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
+        });
+        let by = |value: fn(&Candidate, Frame) -> f64| {
+            let best = move |candidate: &&Candidate| value(candidate, frame);
+            ready.max_by(|a, b| best(a).total_cmp(&best(b)))
+        };
+        let chosen = match choice {
+            Choice::Largest => by(|candidate, _| f64::from(candidate.sighting.bounds.area())),
+            Choice::First => by(|candidate, _| candidate.age_s),
+            Choice::NearestCentre => by(|candidate, frame| {
+                -f64::from(length(centre(candidate.sighting.bounds) - centre(frame.bounds())))
+            }),
+            Choice::Manual => None,
+        };
+        chosen.map(|candidate| &candidate.sighting)
+    }
+
+    /// The detections of this frame.
+    pub fn current(&self) -> impl Iterator<Item = &Sighting> {
+        self.candidates.iter().filter(|candidate| candidate.missed == 0).map(|candidate| &candidate.sighting)
+    }
+
+    /// The smallest detection of this frame that a click at `point` means, a little beside it too.
+    pub fn at(&self, point: Point2f) -> Option<&Sighting> {
+        const REACH: f32 = 12.0;
+        self.current()
+            .filter(|sighting| grown(sighting.bounds, REACH).contains(point))
+            .min_by(|a, b| a.bounds.area().total_cmp(&b.bounds.area()))
+    }
+}
+
+/// Whether a region can be a target at all.
+fn is_sound(sighting: &Sighting, frame: Frame) -> bool {
+    let bounds = sighting.bounds;
+    let sides = [bounds.x, bounds.y, bounds.width, bounds.height];
+    sides.iter().all(|side| side.is_finite())
+        && bounds.width >= MIN_SIDE
+        && bounds.height >= MIN_SIDE
+        && bounds.area() <= MAX_SHARE * frame.bounds().area()
+        && share_inside(bounds, frame.bounds()) > 0.5
+}
+
+fn touches_edge(bounds: Rect2f, frame: Frame) -> bool {
+    bounds.x < EDGE
+        || bounds.y < EDGE
+        || bounds.br().x > frame.width - EDGE
+        || bounds.br().y > frame.height - EDGE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FRAME: Frame = Frame { width: 640.0, height: 480.0 };
+    const DT: f64 = 0.1;
+
+    fn at(x: f32, y: f32, width: f32, height: f32) -> Sighting {
+        Sighting { bounds: Rect2f::new(x, y, width, height), contour: Vec::new() }
+    }
+
+    fn seen(frames: usize, sightings: &[Sighting]) -> Selection {
+        let mut selection = Selection::default();
+        for _ in 0..frames {
+            selection.update(sightings.to_vec(), FRAME, DT);
+        }
+        selection
+    }
+
+    #[test]
+    fn choices() {
+        let mut selection = seen(2, &[at(300.0, 200.0, 20.0, 50.0)]);
+        for _ in 0..3 {
+            let all =
+                [at(300.0, 200.0, 20.0, 50.0), at(30.0, 30.0, 60.0, 120.0), at(400.0, 220.0, 30.0, 60.0)];
+            selection.update(all.to_vec(), FRAME, DT);
+        }
+        let x = |choice| selection.choose(choice, 3, FRAME).map(|sighting| sighting.bounds.x);
+        assert_eq!(x(Choice::Largest), Some(30.0));
+        assert_eq!(x(Choice::First), Some(300.0));
+        assert_eq!(x(Choice::NearestCentre), Some(300.0));
+        assert_eq!(x(Choice::Manual), None);
+    }
+
+    #[test]
+    fn a_flicker_is_not_chosen() {
+        assert!(seen(2, &[at(100.0, 100.0, 40.0, 90.0)]).choose(Choice::Largest, 3, FRAME).is_none());
+        let mut selection = Selection::default();
+        for n in 0..9 {
+            selection.update(vec![at(50.0 * n as f32, 100.0, 20.0, 30.0)], FRAME, DT);
+        }
+        assert!(selection.choose(Choice::Largest, 3, FRAME).is_none());
+    }
+
+    #[test]
+    fn half_a_person_at_the_edge_is_awaited_but_not_for_ever() {
+        let edge = [at(0.0, 100.0, 30.0, 90.0)];
+        assert!(seen(5, &edge).choose(Choice::Largest, 3, FRAME).is_none());
+        assert!(seen(16, &edge).choose(Choice::Largest, 3, FRAME).is_some());
+    }
+
+    #[test]
+    fn absurd_regions_are_ignored() {
+        let absurd = [
+            at(10.0, 10.0, 0.0, 0.0),
+            at(0.0, 0.0, 640.0, 480.0),
+            at(f32::NAN, 10.0, 30.0, 60.0),
+            at(-900.0, 10.0, 30.0, 60.0),
+            at(10.0, 10.0, f32::INFINITY, 60.0),
+            at(10.0, 10.0, -30.0, -60.0),
+        ];
+        assert!(seen(20, &absurd).choose(Choice::Largest, 1, FRAME).is_none());
+    }
+
+    #[test]
+    fn what_was_released_is_held_back() {
+        let one = [at(300.0, 200.0, 30.0, 60.0)];
+        let mut selection = seen(4, &one);
+        selection.release(one[0].bounds);
+        selection.update(one.to_vec(), FRAME, DT);
+        assert!(selection.choose(Choice::Largest, 3, FRAME).is_none());
+        for _ in 0..40 {
+            selection.update(one.to_vec(), FRAME, DT);
+        }
+        assert!(selection.choose(Choice::Largest, 3, FRAME).is_some());
+    }
+
+    #[test]
+    fn a_click_means_the_smallest_region_there() {
+        let selection = seen(1, &[at(200.0, 100.0, 200.0, 300.0), at(290.0, 200.0, 30.0, 60.0)]);
+        let x = |x, y| selection.at(Point2f::new(x, y)).map(|sighting| sighting.bounds.x);
+        assert_eq!(x(300.0, 220.0), Some(290.0));
+        assert_eq!(x(220.0, 120.0), Some(200.0));
+        assert_eq!(x(600.0, 20.0), None);
+    }
+}

@@ -1,0 +1,325 @@
+use opencv::core::{Point2f, Rect2f};
+use ptztrack_contract::{Feature, Point, Rect, TargetChange, TargetState, Vector};
+
+use super::geometry::{Frame, around};
+use super::selection::{Choice, Selection, Sighting};
+use super::steps::Profile;
+use super::target::{Sight, Target};
+use crate::vision::Luma;
+
+/// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
+const MIN_DT_S: f64 = 1e-3;
+/// After a longer gap, seconds, a velocity says nothing about where the target is.
+const MAX_DT_S: f64 = 2.0;
+/// Width of a box made by a click, as a share of its height: a standing person.
+const PERSON_ASPECT: f32 = 0.4;
+
+/// How a [`Tracker`] works. Changes hold from the next target or frame on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Config {
+    /// Which steps are taken.
+    pub profile: Profile,
+    /// How the target is chosen.
+    pub choice: Choice,
+    /// Frames that a detection must be seen in before it is chosen.
+    pub confirm_frames: u32,
+    /// Seconds that a hidden target is coasted and looked for.
+    pub coast_s: f64,
+    /// Height, in frame heights, of the box that is made around a place selected by hand.
+    pub manual_size: f64,
+}
+
+/// Something that a detector saw, in frame sizes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Detection {
+    /// Its box.
+    pub bounds: Rect,
+    /// Polygon around it; empty where only the box is known.
+    pub contour: Vec<Point>,
+}
+
+/// What the tracker knows after one frame, in frame sizes (per second).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// What it does.
+    pub state: TargetState,
+    /// What happened in this frame, in order.
+    pub changes: Vec<TargetChange>,
+    /// Number of the target, from 1; 0 where there is none.
+    pub id: u64,
+    /// Box of the target; predicted while it is hidden.
+    pub bounds: Rect,
+    /// Its centre of mass (3.15).
+    pub centroid: Point,
+    /// Its motion in the picture, camera motion included.
+    pub velocity: Vector,
+    /// Motion of the background at its place, where that could be seen.
+    pub ego_velocity: Option<Vector>,
+    /// 0 to 1.
+    pub confidence: f64,
+    /// The feature points, kept and rejected.
+    pub features: Vec<Feature>,
+}
+
+enum Phase {
+    Searching,
+    Tracking(Box<Target>),
+    Occluded(Box<Target>, f64),
+}
+
+enum Command {
+    Select(Point),
+    Release,
+}
+
+/// Chooses a target and follows it. The same pictures always give the same answers.
+pub struct Tracker {
+    config: Config,
+    phase: Phase,
+    selection: Selection,
+    command: Option<Command>,
+    size: Option<(usize, usize)>,
+    last_id: u64,
+}
+
+impl Tracker {
+    /// A tracker that searches.
+    pub fn new(config: Config) -> Self {
+        Self {
+            config,
+            phase: Phase::Searching,
+            selection: Selection::default(),
+            command: None,
+            size: None,
+            last_id: 0,
+        }
+    }
+
+    /// Changes how it works from the next frame on.
+    pub fn configure(&mut self, config: Config) {
+        self.config = config;
+    }
+
+    /// With the next frame, follows what is at `place`: the detection there, or else a box of
+    /// [`Config::manual_size`] around it.
+    pub fn select(&mut self, place: Point) {
+        self.command = Some(Command::Select(place));
+    }
+
+    /// With the next frame, lets the target go.
+    pub fn release(&mut self) {
+        self.command = Some(Command::Release);
+    }
+
+    /// Looks at one frame, `dt_s` seconds after the last one.
+    ///
+    /// # Errors
+    /// Where OpenCV fails, which no picture should make it do. The target is gone then.
+    pub fn process(&mut self, luma: &Luma, dt_s: f64, detections: &[Detection]) -> opencv::Result<Report> {
+        let dt_s = if dt_s.is_finite() { dt_s.max(MIN_DT_S) } else { MAX_DT_S };
+        let frame = Frame { width: luma.width().max(1) as f32, height: luma.height().max(1) as f32 };
+        let mut changes = Vec::new();
+        let same_stream = self
+            .size
+            .replace((luma.width(), luma.height()))
+            .is_none_or(|size| size == (luma.width(), luma.height()) && dt_s <= MAX_DT_S);
+        self.watch(detections, frame, dt_s);
+        let command = self.command.take();
+        let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
+        let mut report = Report::searching();
+        if !same_stream {
+            // Another picture, or one from another time: nothing that was remembered holds.
+            self.selection.clear();
+            if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
+                report = self.report(TargetState::Lost, Some(target), frame);
+                changes.push(TargetChange::Lost);
+                phase = Phase::Searching;
+            }
+        } else {
+            phase = self.follow(phase, luma, dt_s, frame, &mut report, &mut changes)?;
+        }
+        phase = match command {
+            Some(Command::Select(place)) => {
+                self.take_over(phase, luma, place, frame, &mut report, &mut changes)?
+            }
+            Some(Command::Release) => self.let_go(phase, frame, &mut report, &mut changes),
+            None => phase,
+        };
+        if matches!(phase, Phase::Searching) && changes.is_empty() {
+            phase = self.acquire_chosen(luma, frame, &mut report, &mut changes)?;
+        }
+        self.phase = phase;
+        Ok(Report { changes, ..report })
+    }
+
+    /// Keeps account of the detections while no target is followed.
+    fn watch(&mut self, detections: &[Detection], frame: Frame, dt_s: f64) {
+        let sightings = detections.iter().map(|detection| Sighting {
+            bounds: frame.rect_to_pixels(detection.bounds),
+            contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
+        });
+        self.selection.update(sightings.collect(), frame, dt_s);
+    }
+
+    fn follow(
+        &mut self,
+        phase: Phase,
+        luma: &Luma,
+        dt_s: f64,
+        frame: Frame,
+        report: &mut Report,
+        changes: &mut Vec<TargetChange>,
+    ) -> opencv::Result<Phase> {
+        let (mut target, hidden_s) = match phase {
+            Phase::Searching => return Ok(Phase::Searching),
+            Phase::Tracking(target) => (target, None),
+            Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
+        };
+        let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
+        let sight = match hidden_s {
+            None => target.follow(luma, dt_s as f32)?,
+            Some(_) => self.look_for(&mut target, luma, dt_s as f32)?,
+        };
+        let (state, phase_of): (_, fn(Box<Target>, f64) -> Phase) = match sight {
+            Sight::Seen => (TargetState::Tracking, |target, _| Phase::Tracking(target)),
+            Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => (TargetState::Occluded, Phase::Occluded),
+            Sight::Hidden | Sight::Gone => (TargetState::Lost, |_, _| Phase::Searching),
+        };
+        match (state, hidden_s) {
+            (TargetState::Tracking, Some(_)) => changes.push(TargetChange::Reacquired),
+            (TargetState::Occluded, None) => changes.push(TargetChange::Occluded),
+            (TargetState::Lost, _) => {
+                changes.push(TargetChange::Lost);
+                self.selection.clear();
+            }
+            _ => {}
+        }
+        if let (TargetState::Occluded, Some(hidden_s)) = (state, hidden_s) {
+            target.confidence *= (1.0 - dt_s / (coast_s - hidden_s + 2.0 * dt_s)).max(0.0) as f32;
+        }
+        *report = self.report(state, Some(&target), frame);
+        Ok(phase_of(target, hidden_s.unwrap_or(0.0)))
+    }
+
+    /// Looks for a hidden target where it should be and where a detector saw something.
+    fn look_for(&self, target: &mut Target, luma: &Luma, dt_s: f32) -> opencv::Result<Sight> {
+        let sight = target.coast(luma, dt_s)?;
+        if sight != Sight::Hidden {
+            return Ok(sight);
+        }
+        for sighting in self.selection.current() {
+            if target.recognise(luma, sighting)? {
+                return Ok(Sight::Seen);
+            }
+        }
+        Ok(Sight::Hidden)
+    }
+
+    fn take_over(
+        &mut self,
+        old: Phase,
+        luma: &Luma,
+        place: Point,
+        frame: Frame,
+        report: &mut Report,
+        changes: &mut Vec<TargetChange>,
+    ) -> opencv::Result<Phase> {
+        let pixels = frame.point_to_pixels(place);
+        let sighting = self
+            .selection
+            .at(pixels)
+            .cloned()
+            .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), contour: Vec::new() });
+        let old = self.let_go(old, frame, report, changes);
+        match Target::acquire(luma, &sighting, self.config.profile.steps())? {
+            Some(target) => Ok(self.begin(target, frame, report, changes)),
+            None => Ok(old),
+        }
+    }
+
+    fn box_at(&self, place: Point2f, frame: Frame) -> Rect2f {
+        let height = self.config.manual_size as f32 * frame.height;
+        around(place, PERSON_ASPECT * height, height)
+    }
+
+    fn let_go(
+        &mut self,
+        phase: Phase,
+        frame: Frame,
+        report: &mut Report,
+        changes: &mut Vec<TargetChange>,
+    ) -> Phase {
+        if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
+            self.selection.release(target.bounds);
+            *report = self.report(TargetState::Searching, Some(&target), frame);
+            report.features.clear();
+            changes.push(TargetChange::Released);
+        }
+        Phase::Searching
+    }
+
+    fn acquire_chosen(
+        &mut self,
+        luma: &Luma,
+        frame: Frame,
+        report: &mut Report,
+        changes: &mut Vec<TargetChange>,
+    ) -> opencv::Result<Phase> {
+        let chosen = self.selection.choose(self.config.choice, self.config.confirm_frames, frame);
+        let Some(sighting) = chosen else { return Ok(Phase::Searching) };
+        match Target::acquire(luma, sighting, self.config.profile.steps())? {
+            Some(target) => Ok(self.begin(target, frame, report, changes)),
+            None => Ok(Phase::Searching),
+        }
+    }
+
+    fn begin(
+        &mut self,
+        target: Target,
+        frame: Frame,
+        report: &mut Report,
+        changes: &mut Vec<TargetChange>,
+    ) -> Phase {
+        self.last_id += 1;
+        self.selection.clear();
+        changes.push(TargetChange::Acquired);
+        *report = self.report(TargetState::Tracking, Some(&target), frame);
+        Phase::Tracking(Box::new(target))
+    }
+
+    fn report(&self, state: TargetState, target: Option<&Target>, frame: Frame) -> Report {
+        let Some(target) = target else { return Report::searching() };
+        let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
+        let kept = target.points.members().into_iter().map(feature(true));
+        let rejected = target.points.rejected().iter().copied().map(feature(false));
+        let ego = target.ego_velocity;
+        Report {
+            state,
+            changes: Vec::new(),
+            id: self.last_id,
+            bounds: frame.rect(target.bounds),
+            centroid: frame.point(target.centroid),
+            velocity: frame.vector(target.own_velocity + ego.unwrap_or_default()),
+            ego_velocity: ego.map(|ego| frame.vector(ego)),
+            confidence: f64::from(target.confidence),
+            features: kept.chain(rejected).collect(),
+        }
+    }
+}
+
+impl Report {
+    /// There is no target.
+    fn searching() -> Self {
+        Self {
+            state: TargetState::Searching,
+            changes: Vec::new(),
+            id: 0,
+            bounds: Rect::default(),
+            centroid: Point::default(),
+            velocity: Vector::default(),
+            ego_velocity: None,
+            confidence: 0.0,
+            features: Vec::new(),
+        }
+    }
+}
