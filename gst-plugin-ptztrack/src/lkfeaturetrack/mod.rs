@@ -1,5 +1,89 @@
-//! Element `lkfeaturetrack`.
+//! SECTION:element-lkfeaturetrack
+//!
+//! Follows one target by its feature points (thesis 3.5), also while the camera turns. Takes what
+//! `bgavgdetect` saw, or the `GstVideoRegionOfInterestMeta`s of any other detector (`roi-type`), chooses
+//! one of them (`selection`), and attaches a `PtzTargetMeta` to every frame and a region of interest named
+//! `target` where there is one. Pixels pass untouched and uncopied; only those around the target are looked at.
+//!
+//! ## States
+//! *Searching* → *tracking* → *occluded* (hidden: coasted for `coast-time` and looked for) → *tracking* again
+//! or *lost* for one frame → *searching*. Every change goes upstream as an event, so that the detector sleeps
+//! while the target is followed, and onto the bus as an element message named `ptztrack-target` (`change`:
+//! `acquired`, `occluded`, `reacquired`, `lost`, `released`, and every `message-interval` a `position`).
+//!
+//! A change of size, a seek (flush) or a gap of more than two seconds loses the target: another picture.
+//! Buffers that a leaky queue dropped before do not: all motion is taken over real time steps.
+//!
+//! ## Operator
+//! A left click in any video sink (`GstNavigation`) selects the detection there, or else a box of `manual-size`
+//! around it; a right click releases the target. Applications emit `select-target` (x and y in frame sizes, 0
+//! to 1) and `release-target` instead. What was released is not chosen again for three seconds.
+//!
+//! ## Profiles
+//! `profile=thesis` takes the steps of the thesis alone; `robust` adds the motion of the background, the
+//! forward-backward test, new points for lost ones, and a correlation filter that knows the target's looks.
+//!
+//! ## Pipelines
+//!
+//! Follow the largest thing that moves, and print what happens:
+//! ```text
+//! gst-launch-1.0 -m videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack message-interval=500000000 ! fakesink
+//! ```
+//! The thesis as written, the target chosen nearest to the middle:
+//! ```text
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack profile=thesis selection=nearest-centre ! fakesink
+//! ```
+//! An operator chooses with a click, the detections of another element help:
+//! ```text
+//! gst-launch-1.0 videotestsrc num-buffers=30 ! lkfeaturetrack selection=manual roi-type=person ! videoconvert ! fakesink
+//! ```
 
-pub(crate) fn register(_plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
-    Ok(())
+use glib::prelude::*;
+
+mod buffer;
+#[allow(missing_docs, reason = "the derived property accessors are described by their blurbs")]
+mod imp;
+
+/// Which detection becomes the target.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstLkFeatureTrackSelection")]
+#[repr(i32)]
+pub enum Selection {
+    /// The one of largest area.
+    #[default]
+    #[enum_value(name = "The detection of largest area", nick = "largest")]
+    Largest,
+    /// The one that was there first.
+    #[enum_value(name = "The detection that was there first", nick = "first")]
+    First,
+    /// The one nearest to the middle of the frame.
+    #[enum_value(name = "The detection nearest to the middle of the frame", nick = "nearest-centre")]
+    NearestCentre,
+    /// None until an operator or the application selects.
+    #[enum_value(name = "None until a click or select-target selects", nick = "manual")]
+    Manual,
+}
+
+/// Which steps are taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstLkFeatureTrackProfile")]
+#[repr(i32)]
+pub enum Profile {
+    /// Thesis 3.5 as written.
+    #[enum_value(name = "The thesis as written: points, optical flow, mean-shift", nick = "thesis")]
+    Thesis,
+    /// With all that makes it follow one person in a crowd.
+    #[default]
+    #[enum_value(name = "With ego-motion, appearance, new points and coasting", nick = "robust")]
+    Robust,
+}
+
+glib::wrapper! {
+    /// Element `lkfeaturetrack`: follows one target.
+    pub struct LkFeatureTrack(ObjectSubclass<imp::LkFeatureTrack>)
+        @extends gst_video::VideoFilter, gst_base::BaseTransform, gst::Element, gst::Object;
+}
+
+pub(crate) fn register(plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
+    gst::Element::register(Some(plugin), "lkfeaturetrack", gst::Rank::NONE, LkFeatureTrack::static_type())
 }

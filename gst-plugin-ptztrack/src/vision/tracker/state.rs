@@ -78,6 +78,7 @@ pub struct Tracker {
     phase: Phase,
     selection: Selection,
     command: Option<Command>,
+    /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
     last_id: u64,
 }
@@ -111,6 +112,11 @@ impl Tracker {
         self.command = Some(Command::Release);
     }
 
+    /// The next frame does not continue the last one: what was followed is lost.
+    pub fn interrupt(&mut self) {
+        self.size = None;
+    }
+
     /// Looks at one frame, `dt_s` seconds after the last one.
     ///
     /// # Errors
@@ -119,14 +125,12 @@ impl Tracker {
         let dt_s = if dt_s.is_finite() { dt_s.max(MIN_DT_S) } else { MAX_DT_S };
         let frame = Frame { width: luma.width().max(1) as f32, height: luma.height().max(1) as f32 };
         let mut changes = Vec::new();
-        let same_stream = self
-            .size
-            .replace((luma.width(), luma.height()))
-            .is_none_or(|size| size == (luma.width(), luma.height()) && dt_s <= MAX_DT_S);
+        let size = Some((luma.width(), luma.height()));
+        let same_stream = std::mem::replace(&mut self.size, size) == size && dt_s <= MAX_DT_S;
         self.watch(detections, frame, dt_s);
         let command = self.command.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
-        let mut report = Report::searching();
+        let mut report = Report::default();
         if !same_stream {
             // Another picture, or one from another time: nothing that was remembered holds.
             self.selection.clear();
@@ -288,7 +292,7 @@ impl Tracker {
     }
 
     fn report(&self, state: TargetState, target: Option<&Target>, frame: Frame) -> Report {
-        let Some(target) = target else { return Report::searching() };
+        let Some(target) = target else { return Report::default() };
         let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
         let kept = target.points.members().into_iter().map(feature(true));
         let rejected = target.points.rejected().iter().copied().map(feature(false));
@@ -307,9 +311,9 @@ impl Tracker {
     }
 }
 
-impl Report {
+impl Default for Report {
     /// There is no target.
-    fn searching() -> Self {
+    fn default() -> Self {
         Self {
             state: TargetState::Searching,
             changes: Vec::new(),

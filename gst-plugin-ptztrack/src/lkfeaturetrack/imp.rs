@@ -1,0 +1,433 @@
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+
+use glib::Properties;
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+use gst_base::prelude::*;
+use gst_base::subclass::BaseTransformMode;
+use gst_base::subclass::prelude::*;
+use gst_video::subclass::prelude::*;
+use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
+use ptztrack_contract::{MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
+
+use super::{Profile, Selection, buffer};
+use crate::luma_source::{self, LumaSource};
+use crate::vision;
+
+static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
+    gst::DebugCategory::new("lkfeaturetrack", gst::DebugColorFlags::empty(), Some("Feature point tracker"))
+});
+
+/// A frame's duration where neither timestamps nor caps tell.
+const DEFAULT_FRAME: gst::ClockTime = gst::ClockTime::from_mseconds(40);
+/// Mouse buttons as `GstNavigation` counts them.
+const LEFT_BUTTON: i32 = 1;
+const RIGHT_BUTTON: i32 = 3;
+
+#[derive(Debug, Clone)]
+struct Settings {
+    profile: Profile,
+    selection: Selection,
+    roi_type: String,
+    confirm_frames: u32,
+    coast_time_ns: u64,
+    manual_size: f64,
+    message_interval_ns: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            profile: Profile::default(),
+            selection: Selection::default(),
+            roi_type: MOTION_ROI.to_owned(),
+            confirm_frames: 3,
+            coast_time_ns: 1_500_000_000,
+            manual_size: 0.25,
+            message_interval_ns: 0,
+        }
+    }
+}
+
+impl Settings {
+    fn config(&self) -> vision::Config {
+        vision::Config {
+            profile: match self.profile {
+                Profile::Thesis => vision::Profile::Thesis,
+                Profile::Robust => vision::Profile::Robust,
+            },
+            choice: match self.selection {
+                Selection::Largest => vision::Choice::Largest,
+                Selection::First => vision::Choice::First,
+                Selection::NearestCentre => vision::Choice::NearestCentre,
+                Selection::Manual => vision::Choice::Manual,
+            },
+            confirm_frames: self.confirm_frames,
+            coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
+            manual_size: self.manual_size,
+        }
+    }
+}
+
+/// What an operator or the application asked for; carried out with the next frame.
+#[derive(Debug, Clone, Copy)]
+enum Command {
+    Select(Point),
+    Release,
+}
+
+/// What the streaming thread keeps from frame to frame.
+struct Stream {
+    info: VideoInfo,
+    luma: LumaSource,
+    tracker: vision::Tracker,
+    state: TargetState,
+    /// Running time of the last frame.
+    last_time: Option<gst::ClockTime>,
+    since_message: gst::ClockTime,
+    /// Whether a fault of this stream was already reported, so that one fault is not a flood.
+    warned: bool,
+}
+
+impl Stream {
+    fn new(info: VideoInfo, config: vision::Config) -> Self {
+        Self {
+            info,
+            luma: LumaSource::default(),
+            tracker: vision::Tracker::new(config),
+            state: TargetState::Searching,
+            last_time: None,
+            since_message: gst::ClockTime::ZERO,
+            warned: false,
+        }
+    }
+
+    /// The time since the last frame.
+    fn step(&mut self, now: Option<gst::ClockTime>) -> gst::ClockTime {
+        let last = std::mem::replace(&mut self.last_time, now);
+        let measured = now.zip(last).and_then(|(now, last)| now.checked_sub(last));
+        measured.filter(|step| !step.is_zero()).unwrap_or_else(|| self.frame_duration())
+    }
+
+    fn frame_duration(&self) -> gst::ClockTime {
+        let (frames, seconds) = (self.info.fps().numer(), self.info.fps().denom());
+        match (u64::try_from(frames), u64::try_from(seconds)) {
+            (Ok(frames), Ok(seconds)) if frames > 0 => {
+                gst::ClockTime::SECOND.mul_div_round(seconds, frames).unwrap_or(DEFAULT_FRAME)
+            }
+            _ => DEFAULT_FRAME,
+        }
+    }
+}
+
+/// The locks are never held together, nor while anything is computed, posted or pushed.
+#[derive(Properties, Default)]
+#[properties(wrapper_type = super::LkFeatureTrack)]
+pub struct LkFeatureTrack {
+    #[property(
+        name = "profile", get, set, type = Profile, member = profile, mutable_playing,
+        blurb = "Which steps are taken, from the next target on",
+        builder(Settings::default().profile)
+    )]
+    #[property(
+        name = "selection", get, set, type = Selection, member = selection, mutable_playing,
+        blurb = "Which detection becomes the target",
+        builder(Settings::default().selection)
+    )]
+    #[property(
+        name = "roi-type", get, set, type = String, member = roi_type, default = Some(MOTION_ROI), mutable_playing,
+        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect)"
+    )]
+    #[property(
+        name = "confirm-frames", get, set, type = u32, member = confirm_frames, mutable_playing,
+        minimum = 1, maximum = 100, default = Settings::default().confirm_frames,
+        blurb = "Frames in which a detection must be seen before it becomes the target"
+    )]
+    #[property(
+        name = "coast-time", get, set, type = u64, member = coast_time_ns, mutable_playing,
+        maximum = 60_000_000_000, default = Settings::default().coast_time_ns,
+        blurb = "How long a hidden target is looked for where it should be, in nanoseconds (0: it is lost at once)"
+    )]
+    #[property(
+        name = "manual-size", get, set, type = f64, member = manual_size, mutable_playing,
+        minimum = 0.02, maximum = 1.0, default = Settings::default().manual_size,
+        blurb = "Height of the box around a place selected by hand where nothing was detected, in frame heights"
+    )]
+    #[property(
+        name = "message-interval", get, set, type = u64, member = message_interval_ns, mutable_playing,
+        maximum = 3_600_000_000_000, default = Settings::default().message_interval_ns,
+        blurb = "Time between two position messages while there is a target, in nanoseconds (0: none)"
+    )]
+    settings: Mutex<Settings>,
+    /// Taken out by the streaming thread while it computes.
+    stream: Mutex<Option<Stream>>,
+    /// Width and height of the frames, for clicks from other threads.
+    size: Mutex<Option<(u32, u32)>>,
+    command: Mutex<Option<Command>>,
+}
+
+/// A panic elsewhere must not take the application with it.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[glib::object_subclass]
+impl ObjectSubclass for LkFeatureTrack {
+    const NAME: &'static str = "GstLkFeatureTrack";
+    type Type = super::LkFeatureTrack;
+    type ParentType = gst_video::VideoFilter;
+}
+
+#[glib::derived_properties]
+impl ObjectImpl for LkFeatureTrack {
+    fn constructed(&self) {
+        self.parent_constructed();
+        // Optical flow needs every frame that comes: dropping belongs to the queue in front.
+        self.obj().set_qos(false);
+    }
+
+    fn signals() -> &'static [glib::subclass::Signal] {
+        static SIGNALS: LazyLock<Vec<glib::subclass::Signal>> = LazyLock::new(|| {
+            vec![
+                // Follow what is at (x, y), in frame sizes from the left and the top, 0 to 1.
+                glib::subclass::Signal::builder("select-target")
+                    .param_types([f64::static_type(), f64::static_type()])
+                    .run_last()
+                    .action()
+                    .class_handler(|args| {
+                        let element = args[0].get::<super::LkFeatureTrack>().ok()?;
+                        let (x, y) = (args[1].get().ok()?, args[2].get().ok()?);
+                        element.imp().select(Point { x, y });
+                        None
+                    })
+                    .build(),
+                // Let the target go.
+                glib::subclass::Signal::builder("release-target")
+                    .run_last()
+                    .action()
+                    .class_handler(|args| {
+                        let element = args[0].get::<super::LkFeatureTrack>().ok()?;
+                        element.imp().release();
+                        None
+                    })
+                    .build(),
+            ]
+        });
+        &SIGNALS
+    }
+}
+
+impl GstObjectImpl for LkFeatureTrack {}
+
+impl ElementImpl for LkFeatureTrack {
+    fn metadata() -> Option<&'static gst::subclass::ElementMetadata> {
+        static METADATA: LazyLock<gst::subclass::ElementMetadata> = LazyLock::new(|| {
+            gst::subclass::ElementMetadata::new(
+                "Feature point tracker",
+                "Filter/Analyzer/Video",
+                "Follows one moving target by its feature points, also while the camera turns",
+                env!("CARGO_PKG_AUTHORS"),
+            )
+        });
+        Some(&METADATA)
+    }
+
+    fn pad_templates() -> &'static [gst::PadTemplate] {
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
+            let caps = luma_source::template_caps();
+            [("sink", gst::PadDirection::Sink), ("src", gst::PadDirection::Src)]
+                .into_iter()
+                .filter_map(|(name, direction)| {
+                    gst::PadTemplate::new(name, direction, gst::PadPresence::Always, &caps).ok()
+                })
+                .collect()
+        });
+        &TEMPLATES
+    }
+}
+
+impl BaseTransformImpl for LkFeatureTrack {
+    const MODE: BaseTransformMode = BaseTransformMode::AlwaysInPlace;
+    const PASSTHROUGH_ON_SAME_CAPS: bool = false;
+    const TRANSFORM_IP_ON_PASSTHROUGH: bool = false;
+
+    fn stop(&self) -> Result<(), gst::ErrorMessage> {
+        *lock(&self.stream) = None;
+        *lock(&self.size) = None;
+        *lock(&self.command) = None;
+        Ok(())
+    }
+
+    fn sink_event(&self, event: gst::Event) -> bool {
+        if event.type_() == gst::EventType::FlushStop
+            && let Some(stream) = lock(&self.stream).as_mut()
+        {
+            stream.tracker.interrupt();
+            stream.last_time = None;
+        }
+        self.parent_sink_event(event)
+    }
+
+    fn src_event(&self, event: gst::Event) -> bool {
+        if event.type_() == gst::EventType::Navigation {
+            self.navigate(&event);
+        }
+        self.parent_src_event(event)
+    }
+
+    /// In place of the base class's, which would map the pixels writable and so copy a shared frame.
+    fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
+        let settings = lock(&self.settings).clone();
+        let command = lock(&self.command).take();
+        let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
+        stream.tracker.configure(settings.config());
+        match command {
+            Some(Command::Select(place)) => stream.tracker.select(place),
+            Some(Command::Release) => stream.tracker.release(),
+            None => (),
+        }
+        self.track(&mut stream, &settings, buffer);
+        *lock(&self.stream) = Some(stream);
+        Ok(gst::FlowSuccess::Ok)
+    }
+}
+
+impl VideoFilterImpl for LkFeatureTrack {
+    fn set_info(
+        &self,
+        incaps: &gst::Caps,
+        in_info: &VideoInfo,
+        outcaps: &gst::Caps,
+        out_info: &VideoInfo,
+    ) -> Result<(), gst::LoggableError> {
+        self.parent_set_info(incaps, in_info, outcaps, out_info)?;
+        gst::debug!(CAT, imp = self, "{incaps}");
+        *lock(&self.size) = Some((in_info.width(), in_info.height()));
+        let config = lock(&self.settings).config();
+        let mut stream = lock(&self.stream);
+        match stream.as_mut() {
+            // The tracker stays: it tells that the target of the old picture is lost.
+            Some(stream) => stream.info = in_info.clone(),
+            None => *stream = Some(Stream::new(in_info.clone(), config)),
+        }
+        Ok(())
+    }
+}
+
+/// Operator and application.
+impl LkFeatureTrack {
+    fn select(&self, place: Point) {
+        let inside = |coordinate| (0.0..=1.0).contains(&coordinate);
+        if inside(place.x) && inside(place.y) {
+            *lock(&self.command) = Some(Command::Select(place));
+        } else {
+            gst::warning!(CAT, imp = self, "nothing to select outside the frame: {place:?}");
+        }
+    }
+
+    fn release(&self) {
+        *lock(&self.command) = Some(Command::Release);
+    }
+
+    fn navigate(&self, event: &gst::EventRef) {
+        let Some((width, height)) = *lock(&self.size) else { return };
+        match NavigationEvent::parse(event) {
+            Ok(NavigationEvent::MouseButtonPress { button: LEFT_BUTTON, x, y, .. }) => {
+                self.select(Point { x: x / f64::from(width), y: y / f64::from(height) });
+            }
+            Ok(NavigationEvent::MouseButtonPress { button: RIGHT_BUTTON, .. }) => self.release(),
+            _ => (),
+        }
+    }
+}
+
+/// One frame.
+impl LkFeatureTrack {
+    fn track(&self, stream: &mut Stream, settings: &Settings, buffer: &mut gst::BufferRef) {
+        let times = match self.obj().segment() {
+            segment if segment.format() == gst::Format::Time => Times::of(&segment, buffer.pts()),
+            _ => Times { timestamp: buffer.pts(), ..Times::default() },
+        };
+        let step = stream.step(times.running_time);
+        let report = match self.look(stream, settings, buffer, step) {
+            Ok(report) => report,
+            Err(reason) => {
+                self.warn_once(stream, &reason);
+                vision::Report::default()
+            }
+        };
+        self.announce(stream, settings, &report, times, step);
+        if let Err(err) = buffer::attach(buffer, &stream.info, report, times.running_time) {
+            self.warn_once(stream, &format!("no meta can be attached: {err}"));
+        }
+    }
+
+    /// Reads the frame and follows the target; the error says why that failed.
+    fn look(
+        &self,
+        stream: &mut Stream,
+        settings: &Settings,
+        buffer: &gst::BufferRef,
+        step: gst::ClockTime,
+    ) -> Result<vision::Report, String> {
+        let detections = buffer::detections(buffer, &stream.info, &settings.roi_type).unwrap_or_else(|err| {
+            self.warn_once(stream, &format!("the detector's meta cannot be read: {err}"));
+            Vec::new()
+        });
+        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &stream.info)
+            .map_err(|err| format!("the frame cannot be mapped: {err}"))?;
+        let luma =
+            stream.luma.luma(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
+        stream
+            .tracker
+            .process(&luma, step.seconds_f64(), &detections)
+            .map_err(|err| format!("tracking failed: {err}"))
+    }
+
+    /// Tells the bus and upstream what changed.
+    fn announce(
+        &self,
+        stream: &mut Stream,
+        settings: &Settings,
+        report: &vision::Report,
+        times: Times,
+        step: gst::ClockTime,
+    ) {
+        for change in &report.changes {
+            gst::info!(CAT, imp = self, "target {} {change:?}", report.id);
+            self.post(report, *change, times);
+        }
+        let has_target = matches!(report.state, TargetState::Tracking | TargetState::Occluded);
+        let interval = gst::ClockTime::from_nseconds(settings.message_interval_ns);
+        stream.since_message = stream.since_message.saturating_add(step);
+        if has_target && !interval.is_zero() && stream.since_message >= interval {
+            stream.since_message = gst::ClockTime::ZERO;
+            self.post(report, TargetChange::Position, times);
+        }
+        if std::mem::replace(&mut stream.state, report.state) != report.state {
+            let event = TrackerEvent { state: report.state, bounds: has_target.then_some(report.bounds) };
+            // Nobody has to listen.
+            let _ = self.obj().sink_pad().push_event(event.to_event());
+        }
+    }
+
+    fn post(&self, report: &vision::Report, change: TargetChange, times: Times) {
+        let structure = buffer::message(report, change, times).to_structure();
+        let obj = self.obj();
+        let message = gst::message::Element::builder(structure).src(&*obj).build();
+        if obj.post_message(message).is_err() {
+            gst::debug!(CAT, imp = self, "no bus to post to");
+        }
+    }
+
+    fn warn_once(&self, stream: &mut Stream, reason: &str) {
+        gst::warning!(CAT, imp = self, "{reason}");
+        if !std::mem::replace(&mut stream.warned, true) {
+            gst::element_imp_warning!(
+                self,
+                gst::StreamError::Failed,
+                ["{reason}. The video goes on; further faults of this stream are not reported."]
+            );
+        }
+    }
+}
