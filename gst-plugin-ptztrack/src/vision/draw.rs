@@ -11,7 +11,7 @@ const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;
 /// More patches than this are drawn as one: each costs a blender a pass over the rows that it covers.
 const MAX_PATCHES: usize = 8;
 /// Strokes lie on this, so that they are readable on any ground.
-const OUTLINE: Colour = Colour { red: 0, green: 0, blue: 0, alpha: 0.6 };
+const OUTLINE: Colour = Colour { red: 0, green: 0, blue: 0, alpha: 0.55 };
 
 /// A colour with opacity.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,6 +70,15 @@ pub enum Shape {
         /// Of the stroke.
         colour: Colour,
     },
+    /// An open polyline, outlined, that fades towards its first corner.
+    Fading {
+        /// Its corners, the faintest first.
+        points: Vec<Spot>,
+        /// Width of the stroke without outline.
+        width: i32,
+        /// At its last corner.
+        colour: Colour,
+    },
     /// A filled circle, outlined.
     Dot {
         /// Its middle.
@@ -99,7 +108,9 @@ impl Shape {
             Self::Plate { origin, width, height, .. } => {
                 (vec![*origin, Spot { x: origin.x + width, y: origin.y + height }], 1.0)
             }
-            Self::Line { points, width, .. } => (points.clone(), f64::from(outlined(*width)) / 2.0 + 2.0),
+            Self::Line { points, width, .. } | Self::Fading { points, width, .. } => {
+                (points.clone(), f64::from(outlined(*width)) / 2.0 + 2.0)
+            }
             Self::Dot { centre, radius, .. } => (vec![*centre], radius + outline(*radius) + 2.0),
             Self::Text { origin, text, height, .. } => {
                 let end = Spot { x: origin.x + text_width(text, *height)?, y: origin.y - height };
@@ -129,33 +140,31 @@ impl Shape {
                 imgproc::rectangle(picture, area, colour.scalar(), imgproc::FILLED, imgproc::LINE_8, 0)
             }
             Self::Line { points, closed, width, colour } => {
-                if points.len() < 2 {
-                    return Ok(());
-                }
                 let corners: Vector<Point> = points.iter().map(|point| place(point).fixed()).collect();
-                let outline = OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha);
-                for (colour, width) in [(outline, outlined(*width)), (*colour, *width)] {
-                    let colour = colour.scalar();
-                    imgproc::polylines(picture, &corners, *closed, colour, width, imgproc::LINE_AA, SHIFT)?;
+                stroke(
+                    picture,
+                    &corners,
+                    *closed,
+                    outlined(*width),
+                    OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha),
+                )?;
+                stroke(picture, &corners, *closed, *width, *colour)
+            }
+            Self::Fading { points, width, colour } => {
+                let corners: Vec<Point> = points.iter().map(|point| place(point).fixed()).collect();
+                let strength = |index: usize| (index + 1) as f64 / corners.len() as f64;
+                // All of the outline first, or that of each piece would cut off the piece before.
+                for (width, colour) in [(outlined(*width), OUTLINE), (*width, *colour)] {
+                    for (index, piece) in corners.windows(2).enumerate() {
+                        let colour = colour.with_alpha(colour.alpha * strength(index));
+                        stroke(picture, &piece.iter().copied().collect(), false, width, colour)?;
+                    }
                 }
                 Ok(())
             }
             Self::Dot { centre, radius, colour } => {
-                let centre = place(centre).fixed();
-                let outer = radius + outline(*radius);
-                for (colour, radius) in [(OUTLINE, outer), (*colour, *radius)] {
-                    let (colour, radius) = (colour.scalar(), fixed(radius));
-                    imgproc::circle(
-                        picture,
-                        centre,
-                        radius,
-                        colour,
-                        imgproc::FILLED,
-                        imgproc::LINE_AA,
-                        SHIFT,
-                    )?;
-                }
-                Ok(())
+                disc(picture, place(centre), radius + outline(*radius), OUTLINE)?;
+                disc(picture, place(centre), *radius, *colour)
             }
             Self::Text { origin, text, height, colour } => {
                 let (origin, colour) = (place(origin).rounded(), colour.scalar());
@@ -175,6 +184,36 @@ impl Spot {
         // OpenCV's positions are pixel centres.
         Point::new(fixed(self.x - 0.5), fixed(self.y - 0.5))
     }
+}
+
+fn stroke(
+    picture: &mut impl ToInputOutputArray,
+    corners: &Vector<Point>,
+    closed: bool,
+    width: i32,
+    colour: Colour,
+) -> opencv::Result<()> {
+    if corners.len() < 2 {
+        return Ok(());
+    }
+    imgproc::polylines(picture, corners, closed, colour.scalar(), width, imgproc::LINE_AA, SHIFT)
+}
+
+/// A disc as polygon: OpenCV's own small circles are diamonds.
+fn disc(
+    picture: &mut impl ToInputOutputArray,
+    centre: Spot,
+    radius: f64,
+    colour: Colour,
+) -> opencv::Result<()> {
+    const CORNERS: u32 = 24;
+    let corners: Vector<Point> = (0..CORNERS)
+        .map(|corner| {
+            let angle = std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS);
+            Spot { x: centre.x + radius * angle.cos(), y: centre.y + radius * angle.sin() }.fixed()
+        })
+        .collect();
+    imgproc::fill_convex_poly(picture, &corners, colour.scalar(), imgproc::LINE_AA, SHIFT)
 }
 
 fn fixed(value: f64) -> i32 {
