@@ -1,0 +1,67 @@
+# `make help` lists what there is. Made for Debian 12; elsewhere install the packages below by your own means.
+SHELL := /bin/bash
+.SHELLFLAGS := -eu -o pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help build test lint demo install packages-build packages-demo packages-test
+
+# Debian's packages, in this one place.
+BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
+	libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstrtspserver-1.0-dev \
+	libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev
+RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good \
+	gstreamer1.0-plugins-bad gstreamer1.0-plugins-ugly gstreamer1.0-libav
+DEMO_PACKAGES := $(RUN_PACKAGES) python3 gnuplot-nox opencv-doc
+TEST_PACKAGES := $(RUN_PACKAGES) ffmpeg chromium fonts-dejavu-core python3 python3-gi python3-venv \
+	gir1.2-gst-plugins-base-1.0
+
+# rustup puts Rust there; a cargo that is recent enough elsewhere in PATH does as well.
+export PATH := $(HOME)/.cargo/bin:$(PATH)
+CARGO ?= cargo
+# Every test has its own limits; this ends a run that hangs in spite of them.
+TEST_TIMEOUT ?= 45m
+
+CODEC ?= mjpeg
+DURATION ?= 60
+FOOTAGE ?=
+
+## help: list the targets
+help:
+	@sed -n 's/^## //p' $(MAKEFILE_LIST)
+
+## build: build the plugins (release) into target/release
+build: packages-build
+	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix
+
+## test: check formatting, lint, build, run all tests
+test: packages-test lint
+	$(CARGO) build --workspace
+	scripts/with-plugins debug timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
+
+## lint: check formatting, run clippy and shell syntax checks, warnings denied
+lint: packages-build
+	$(CARGO) fmt --all --check
+	$(CARGO) clippy --workspace --all-targets -- -D warnings
+	@for script in scripts/* pipelines/*.sh .ci/run; do if head -1 $$script | grep -q bash; then bash -n $$script; fi; done
+
+## demo: follow a person in real footage and leave video, plot and summary in target/demo
+##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
+demo: packages-demo
+	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix --package virtual-camera
+	@footage="$(FOOTAGE)"; \
+	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
+		--footage "$${footage:-$$(scripts/footage)}" --codec $(CODEC) --duration $(DURATION) --out target/demo
+
+## install: build, and copy the plugins to a GStreamer plugin folder
+##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
+install: build
+	scripts/install-plugins target/release "$(PREFIX)" "$(DESTDIR)"
+
+packages-build:
+	@scripts/install-packages $(BUILD_PACKAGES)
+	@scripts/install-rust
+
+packages-demo: packages-build
+	@scripts/install-packages $(DEMO_PACKAGES)
+
+packages-test: packages-build
+	@scripts/install-packages $(TEST_PACKAGES)
