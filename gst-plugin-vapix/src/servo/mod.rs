@@ -1,1 +1,35 @@
-//! stub
+//! Prediction and control: from where the target is in the picture to what the camera is told.
+//!
+//! Angles are degrees, positive to the right and up; times are [`Duration`](std::time::Duration)s
+//! since any fixed moment, always given by the caller, so that tests turn the clock themselves.
+//!
+//! ```text
+//! Sight ─ View (angles) ─ Aim (prediction, feed-forward) ─ Controller ─ limits ─ SpeedMap ─ Scheduler ─ Command
+//! ```
+//! [`Pilot`] is the whole of it; [`Link`] judges what the camera answers.
+
+mod aim;
+mod camera;
+mod controller;
+mod link;
+mod optics;
+mod pan_tilt;
+mod pilot;
+mod prediction;
+mod scheduler;
+mod settings;
+mod speed;
+mod steps;
+
+pub use aim::{Aim, Prediction, Sight, Visibility};
+pub use camera::{CameraModel, LimitGuard};
+pub use controller::Controller;
+pub use link::{Link, LinkChange};
+pub use optics::{Lens, View};
+pub use pan_tilt::PanTilt;
+pub use pilot::{Answer, Job, Next, Pilot, Query, Report, Status};
+pub use prediction::{CommandHistory, RateAverage};
+pub use scheduler::Scheduler;
+pub use settings::{Mode, ServoSettings};
+pub use speed::{SpeedCurve, SpeedMap};
+pub use steps::Steps;

@@ -1,0 +1,208 @@
+use std::time::Duration;
+
+use ptztrack_contract::{Point, Vector};
+
+use super::{CommandHistory, PanTilt, RateAverage, View};
+
+/// How the target's motion is carried forward over the latency.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Prediction {
+    /// With its mean over the last second (thesis 3.16): smooth, and late when the target turns.
+    Average,
+    /// With its mean over the last moments.
+    #[default]
+    Lead,
+}
+
+impl Prediction {
+    fn window(self) -> Duration {
+        match self {
+            Self::Average => Duration::from_secs(1),
+            // A walking person's sway lasts about a second, the noise of optical flow a frame.
+            Self::Lead => Duration::from_millis(300),
+        }
+    }
+}
+
+/// How the tracker knows where the target is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Visibility {
+    /// It sees it.
+    Seen,
+    /// It is hidden, and predicted.
+    Predicted,
+    /// There is none.
+    Gone,
+}
+
+/// The target in one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sight {
+    /// How the tracker knows.
+    pub visibility: Visibility,
+    /// Which target.
+    pub id: u64,
+    /// Where, in frame widths and heights from the top left.
+    pub centroid: Point,
+    /// Its motion in the picture, frames per second.
+    pub velocity: Vector,
+    /// The background's motion in the picture, same unit, where it was seen.
+    pub ego_velocity: Option<Vector>,
+    /// Size of the picture in pixels.
+    pub size: (u32, u32),
+    /// Width by height of the picture as displayed.
+    pub aspect: f64,
+    /// When the picture was taken, as far as its timestamp tells.
+    pub taken_at: Duration,
+}
+
+/// Where the target is and will be, as angles from the camera's axis.
+#[derive(Debug)]
+pub struct Aim {
+    prediction: Prediction,
+    target_rate: RateAverage,
+    id: u64,
+    error: PanTilt,
+    taken_at: Duration,
+}
+
+impl Aim {
+    /// Knows nothing yet.
+    pub fn new(prediction: Prediction) -> Self {
+        Self {
+            prediction,
+            target_rate: RateAverage::new(prediction.window()),
+            id: 0,
+            error: PanTilt::default(),
+            taken_at: Duration::ZERO,
+        }
+    }
+
+    /// How it predicts.
+    pub fn prediction(&self) -> Prediction {
+        self.prediction
+    }
+
+    /// Takes a picture of the target, seen with `view`. `latency`: a command given that long before
+    /// the picture's timestamp shows in it.
+    pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, latency: Duration) {
+        if sight.id != self.id {
+            self.target_rate.clear();
+            self.id = sight.id;
+        }
+        self.error = view.error(sight.centroid);
+        self.taken_at = sight.taken_at;
+        // The target's own motion is what is left of its motion in the picture without the camera's:
+        // seen in the background, or else known from the commands.
+        let rate = match sight.ego_velocity {
+            Some(ego) => {
+                view.rate(sight.centroid, Vector { x: sight.velocity.x - ego.x, y: sight.velocity.y - ego.y })
+            }
+            None => {
+                let commanded = history.rate_at(sight.taken_at.saturating_sub(latency));
+                view.rate(sight.centroid, sight.velocity) + commanded
+            }
+        };
+        self.target_rate.push(sight.taken_at, rate);
+    }
+
+    /// Forgets the target.
+    pub fn clear(&mut self) {
+        self.target_rate.clear();
+    }
+
+    /// The error left when a command computed `now` begins to act, `round_trip` later, if nothing new
+    /// is commanded: the target has moved on since the picture was taken, and the camera has made, or
+    /// will make, the turns it was already told and that the picture does not show yet (Smith predictor).
+    pub fn error_at_effect(
+        &self,
+        now: Duration,
+        history: &CommandHistory,
+        latency: Duration,
+        round_trip: Duration,
+    ) -> PanTilt {
+        let shown = self.taken_at.saturating_sub(latency);
+        let horizon = now.saturating_sub(self.taken_at) + latency + round_trip;
+        let under_way = history.rotation(shown, now) + history.rate_at(now) * round_trip.as_secs_f64();
+        self.error + self.target_rate() * horizon.as_secs_f64() - under_way
+    }
+
+    /// The target's own angular rate, degrees per second.
+    pub fn target_rate(&self) -> PanTilt {
+        self.target_rate.mean()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    const VIEW: View = View { horizontal_fov_deg: 60.0, aspect: 4.0 / 3.0, tilt_deg: 0.0 };
+    const LATENCY: Duration = Duration::from_millis(200);
+
+    pub fn sight(x: f64, y: f64, taken_at: Duration) -> Sight {
+        Sight {
+            visibility: Visibility::Seen,
+            id: 1,
+            centroid: Point { x, y },
+            velocity: Vector::default(),
+            ego_velocity: None,
+            size: (640, 480),
+            aspect: 4.0 / 3.0,
+            taken_at,
+        }
+    }
+
+    fn seconds(seconds: f64) -> Duration {
+        Duration::from_secs_f64(seconds)
+    }
+
+    #[test]
+    fn a_moving_target_is_led() {
+        let history = CommandHistory::default();
+        let mut aim = Aim::new(Prediction::Lead);
+        let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(1.0)) };
+        aim.see(&walking, &VIEW, &history, LATENCY);
+        let rate = aim.target_rate().pan;
+        assert!((rate - 6.616).abs() < 0.01, "{rate}");
+        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY, seconds(0.05)).pan;
+        assert!((error - rate * 0.35).abs() < 1e-9, "{error}");
+    }
+
+    #[test]
+    fn a_turn_under_way_is_not_commanded_again() {
+        let mut history = CommandHistory::default();
+        history.push(seconds(0.9), PanTilt::new(10.0, 0.0));
+        let mut aim = Aim::new(Prediction::Lead);
+        // The background moves to the left at the camera's own rate: the target stands still.
+        let still = Sight {
+            velocity: Vector { x: -0.15, y: 0.0 },
+            ego_velocity: Some(Vector { x: -0.15, y: 0.0 }),
+            ..sight(0.6, 0.5, seconds(1.0))
+        };
+        aim.see(&still, &VIEW, &history, LATENCY);
+        assert_eq!(aim.target_rate(), PanTilt::default());
+        let offset = VIEW.error(still.centroid).pan;
+        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY, Duration::ZERO).pan;
+        assert!((error - (offset - 2.0)).abs() < 1e-9, "{error} of {offset}");
+    }
+
+    #[test]
+    fn without_background_the_commands_tell_the_cameras_motion() {
+        let mut history = CommandHistory::default();
+        history.push(seconds(0.5), PanTilt::new(6.0, 0.0));
+        let mut aim = Aim::new(Prediction::Average);
+        aim.see(&sight(0.5, 0.5, seconds(1.0)), &VIEW, &history, LATENCY);
+        assert_eq!(aim.target_rate().pan, 6.0);
+    }
+
+    #[test]
+    fn another_target_has_another_motion() {
+        let history = CommandHistory::default();
+        let mut aim = Aim::new(Prediction::Average);
+        let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(1.0)) };
+        aim.see(&walking, &VIEW, &history, LATENCY);
+        aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY);
+        assert_eq!(aim.target_rate(), PanTilt::default());
+    }
+}

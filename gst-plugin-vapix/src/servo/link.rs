@@ -1,0 +1,178 @@
+use std::time::Duration;
+
+use crate::vapix::Error;
+
+/// What became of the connection to the camera.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LinkChange {
+    /// It answers (again).
+    Connected,
+    /// It does not answer.
+    Disconnected(Error),
+    /// It answers, and refuses.
+    Refused(Error),
+}
+
+/// Judges the camera's answers: one report when a fault begins, one when it is over, and longer
+/// pauses in between.
+#[derive(Debug, Default)]
+pub struct Link {
+    connected: bool,
+    fault: Option<Fault>,
+    pause: Duration,
+    retry_at: Duration,
+}
+
+#[derive(Debug)]
+struct Fault {
+    kind: FaultKind,
+    /// Met by a command: that queries are answered does not mend it.
+    of_command: bool,
+    /// The kinds already reported: a camera that reboots shows several, in any order.
+    reported: Vec<FaultKind>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FaultKind {
+    Silent,
+    Refusing,
+    /// Refusing, and to be asked nothing more.
+    LockedOut,
+}
+
+impl FaultKind {
+    fn of(err: &Error) -> Self {
+        match err {
+            err if err.is_final() => Self::LockedOut,
+            err if err.is_refusal() => Self::Refusing,
+            _ => Self::Silent,
+        }
+    }
+}
+
+impl Link {
+    const FIRST_PAUSE: Duration = Duration::from_millis(125);
+
+    /// Short enough for control to be back within two seconds of the camera's return.
+    const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+    /// Nothing may be sent before.
+    pub fn retry_at(&self) -> Duration {
+        self.retry_at
+    }
+
+    /// Whether nothing may be sent until a setting changes.
+    pub fn halted(&self) -> bool {
+        self.fault.as_ref().is_some_and(|fault| fault.kind == FaultKind::LockedOut)
+    }
+
+    /// Whether the camera answers and does as it is told.
+    pub fn connected(&self) -> bool {
+        self.connected && self.fault.is_none()
+    }
+
+    /// Whether something is wrong.
+    pub fn faulty(&self) -> bool {
+        self.fault.is_some()
+    }
+
+    /// Something was answered as it should be. `idle`: no command is waiting, so that a query may
+    /// mend what a command met.
+    pub fn succeeded(&mut self, of_command: bool, idle: bool) -> Option<LinkChange> {
+        let mended = match &self.fault {
+            Some(fault) => of_command || !fault.of_command || (idle && fault.kind == FaultKind::Silent),
+            None => !self.connected,
+        };
+        if !mended {
+            return None;
+        }
+        *self = Self { connected: true, ..Self::default() };
+        Some(LinkChange::Connected)
+    }
+
+    /// Something failed. Reports the first failure of each kind in a row only.
+    pub fn failed(&mut self, err: &Error, of_command: bool, now: Duration) -> Option<LinkChange> {
+        self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
+        self.retry_at = now + self.pause;
+        let kind = FaultKind::of(err);
+        let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
+        fault.kind = kind;
+        fault.of_command |= of_command;
+        if fault.reported.contains(&kind) {
+            return None;
+        }
+        fault.reported.push(kind);
+        Some(match kind {
+            FaultKind::Silent => LinkChange::Disconnected(err.clone()),
+            FaultKind::Refusing | FaultKind::LockedOut => LinkChange::Refused(err.clone()),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn broken() -> Error {
+        Error::Broken("reset".to_owned())
+    }
+
+    fn refused() -> Error {
+        Error::Camera("no".to_owned())
+    }
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn a_fault_is_reported_once_and_so_is_its_end() {
+        let mut link = Link::default();
+        assert_eq!(link.succeeded(false, true), Some(LinkChange::Connected));
+        assert_eq!(link.succeeded(false, true), None);
+        assert_eq!(link.failed(&broken(), true, ms(0)), Some(LinkChange::Disconnected(broken())));
+        assert_eq!(link.failed(&Error::Timeout(ms(1)), true, ms(1)), None);
+        assert!(!link.connected());
+        assert_eq!(link.succeeded(true, false), Some(LinkChange::Connected));
+        assert_eq!(link.failed(&broken(), true, ms(2)), Some(LinkChange::Disconnected(broken())));
+    }
+
+    #[test]
+    fn pauses_grow_to_a_second() {
+        let mut link = Link::default();
+        let mut pauses = Vec::new();
+        for _ in 0..6 {
+            link.failed(&broken(), true, ms(0));
+            pauses.push(link.retry_at().as_millis());
+        }
+        assert_eq!(pauses, [125, 250, 500, 1000, 1000, 1000]);
+        link.succeeded(true, false);
+        assert_eq!(link.retry_at(), Duration::ZERO);
+    }
+
+    #[test]
+    fn answered_queries_do_not_mend_a_refused_command() {
+        let mut link = Link::default();
+        link.failed(&refused(), true, ms(0));
+        assert_eq!(link.succeeded(false, true), None);
+        assert_eq!(link.failed(&refused(), true, ms(1)), None);
+        assert_eq!(link.succeeded(true, false), Some(LinkChange::Connected));
+    }
+
+    #[test]
+    fn with_nothing_to_command_a_query_shows_that_the_camera_is_back() {
+        let mut link = Link::default();
+        link.failed(&broken(), true, ms(0));
+        assert_eq!(link.succeeded(false, false), None);
+        assert_eq!(link.succeeded(false, true), Some(LinkChange::Connected));
+    }
+
+    #[test]
+    fn wrong_credentials_halt_and_are_reported_beside_an_outage() {
+        let mut link = Link::default();
+        link.failed(&broken(), false, ms(0));
+        let wrong = Error::BadCredentials { user: "root".to_owned() };
+        assert_eq!(link.failed(&wrong, false, ms(1)), Some(LinkChange::Refused(wrong)));
+        assert!(link.halted());
+    }
+}

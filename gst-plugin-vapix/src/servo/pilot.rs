@@ -1,0 +1,456 @@
+use std::collections::VecDeque;
+use std::mem;
+use std::time::Duration;
+
+use super::{
+    Aim, CameraModel, CommandHistory, Controller, LimitGuard, Link, LinkChange, Mode, PanTilt, Scheduler,
+    ServoSettings, Sight, Steps, View, Visibility,
+};
+use crate::vapix::{Command, Error, Limits, Parameters, Position};
+
+/// Something to ask the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Query {
+    /// Where it looks.
+    Position,
+    /// How far it can look.
+    Limits,
+    /// Its PTZ parameters.
+    Parameters,
+}
+
+/// One exchange with the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Job {
+    /// Tell it.
+    Command(Command),
+    /// Ask it.
+    Query(Query),
+}
+
+/// What the camera answered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// To a command: yes.
+    Accepted,
+    /// To [`Query::Position`].
+    Position(Position),
+    /// To [`Query::Limits`].
+    Limits(Limits),
+    /// To [`Query::Parameters`].
+    Parameters(Parameters),
+}
+
+/// What is to be done now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Next {
+    /// This.
+    Do(Job),
+    /// Nothing before this time, or before something new is seen.
+    Wait(Option<Duration>),
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Report {
+    /// The connection came, went, or is refused.
+    Link(LinkChange),
+    /// The camera was at rest and has accepted a move.
+    Moving,
+    /// The camera has accepted a stop, or arrived.
+    Stopped,
+    /// The target lies beyond the camera's range.
+    AtLimit,
+}
+
+/// The camera as it is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Status {
+    /// It answers and does as it is told.
+    pub connected: bool,
+    /// It may be moving on our behalf.
+    pub moving: bool,
+    /// Where it last said it looks.
+    pub position: Position,
+    /// What it was last told, degrees per second.
+    pub rate: PanTilt,
+    /// Horizontal field of view in degrees, where it is set or told.
+    pub fov_deg: Option<f64>,
+}
+
+/// Steers one camera: takes what is seen, says what to send, hears what is answered. Sends nothing
+/// itself, and has no clock: both are the caller's.
+#[derive(Debug)]
+pub struct Pilot {
+    settings: ServoSettings,
+    camera: CameraModel,
+    link: Link,
+    scheduler: Scheduler,
+    steps: Steps,
+    aim: Aim,
+    history: CommandHistory,
+    controller: Controller,
+    guard: LimitGuard,
+    target: Option<Target>,
+    /// What is still to be asked of a camera just met.
+    introduction: VecDeque<Query>,
+    next_poll: Duration,
+    round_trip: Duration,
+    /// The speed steps in force, for the quantiser's hysteresis.
+    speed_steps: (i8, i8),
+    at_limit: bool,
+    reports: Vec<Report>,
+}
+
+#[derive(Debug)]
+struct Target {
+    sight: Sight,
+    last_seen: Duration,
+}
+
+/// What the camera should do.
+enum Wish {
+    Rest,
+    Move(Command),
+    /// Whatever it does: a move to a position is under way.
+    AsIs,
+}
+
+impl Pilot {
+    /// A position is asked for this often while the camera moves, and ...
+    const POLL_MOVING: Duration = Duration::from_secs(1);
+    /// ... while it rests, so that an operator's zoom or a lost connection is noticed.
+    const POLL_RESTING: Duration = Duration::from_secs(5);
+    /// A camera that does not tell its position is asked again this much later.
+    const POLL_REFUSED: Duration = Duration::from_secs(30);
+
+    /// Knows nothing of the camera yet.
+    pub fn new(settings: ServoSettings) -> Self {
+        Self {
+            aim: Aim::new(settings.prediction),
+            settings,
+            camera: CameraModel::default(),
+            link: Link::default(),
+            scheduler: Scheduler::default(),
+            steps: Steps::default(),
+            history: CommandHistory::default(),
+            controller: Controller::default(),
+            guard: LimitGuard::default(),
+            target: None,
+            introduction: [Query::Position, Query::Limits, Query::Parameters].into(),
+            next_poll: Duration::ZERO,
+            round_trip: Duration::ZERO,
+            speed_steps: (0, 0),
+            at_limit: false,
+            reports: Vec::new(),
+        }
+    }
+
+    /// Takes new settings.
+    pub fn configure(&mut self, settings: ServoSettings) {
+        if settings.prediction != self.aim.prediction() {
+            self.aim = Aim::new(settings.prediction);
+        }
+        self.settings = settings;
+    }
+
+    /// The camera may be asked anew: who we are has changed.
+    pub fn credentials_changed(&mut self) {
+        self.link = Link::default();
+    }
+
+    /// Takes the newest picture of the target.
+    pub fn see(&mut self, sight: Sight, now: Duration) {
+        let last_seen = match (sight.visibility, &self.target) {
+            (Visibility::Seen, _) => now,
+            (Visibility::Predicted, Some(target)) => target.last_seen,
+            (Visibility::Predicted, None) | (Visibility::Gone, _) => return self.rest(),
+        };
+        self.aim.see(&sight, &self.view(&sight), &self.history, self.settings.latency);
+        self.target = Some(Target { sight, last_seen });
+    }
+
+    /// Forgets the target; the camera is to be stopped.
+    pub fn rest(&mut self) {
+        self.target = None;
+        self.aim.clear();
+        self.controller.rest();
+    }
+
+    /// What to send now, if anything.
+    pub fn next(&mut self, now: Duration) -> Next {
+        if self.link.halted() {
+            return Next::Wait(None);
+        }
+        let interval = Duration::from_secs_f64(1.0 / self.settings.max_rate_hz);
+        let retry_at = self.link.retry_at();
+        let (command, due) = match self.wish(now) {
+            Wish::Rest => (self.stop_command(), self.scheduler.stop_due(now, interval, retry_at)),
+            Wish::Move(_) if self.meeting() => (self.stop_command(), None),
+            Wish::Move(command) => (command, Some(self.scheduler.move_due(&command, interval, retry_at))),
+            Wish::AsIs => (self.stop_command(), None),
+        };
+        if due.is_some_and(|due| due <= now) {
+            return Next::Do(Job::Command(command));
+        }
+        let query = self.introduction.front().copied().unwrap_or(Query::Position);
+        let query_due = if self.introduction.is_empty() { self.next_poll.max(retry_at) } else { retry_at };
+        if query_due <= now {
+            return Next::Do(Job::Query(query));
+        }
+        let stale = self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout);
+        Next::Wait([due, Some(query_due), stale].into_iter().flatten().min())
+    }
+
+    /// Something is being sent.
+    pub fn sending(&mut self, job: &Job, now: Duration) {
+        if let Job::Command(command) = job {
+            self.scheduler.attempted(command, now);
+        }
+    }
+
+    /// The camera answered what was sent then, or did not.
+    pub fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration, now: Duration) {
+        match (job, answer) {
+            (Job::Command(command), Ok(_)) => self.command_accepted(command, sent, now),
+            (Job::Command(command), Err(err)) => {
+                self.scheduler.failed(command, err.may_have_acted(), now);
+                self.failed(&err, true, now);
+            }
+            (Job::Query(query), Ok(answer)) => self.told(*query, answer, now),
+            (Job::Query(query), Err(err)) => self.not_told(*query, &err, now),
+        }
+    }
+
+    /// Whether the camera does not move on our behalf, as far as can be known.
+    pub fn is_at_rest(&self) -> bool {
+        !self.scheduler.may_move()
+    }
+
+    /// Whether nothing may be sent until a setting changes.
+    pub fn halted(&self) -> bool {
+        self.link.halted()
+    }
+
+    /// What happened since the last call.
+    pub fn take_reports(&mut self) -> Vec<Report> {
+        mem::take(&mut self.reports)
+    }
+
+    /// The camera as it is known.
+    pub fn status(&self, now: Duration) -> Status {
+        Status {
+            connected: self.link.connected(),
+            moving: self.scheduler.may_move(),
+            position: self.camera.position,
+            rate: self.history.rate_at(now),
+            fov_deg: self.settings.fov_deg.or(self.camera.told_fov_deg()),
+        }
+    }
+
+    /// Before its first answers the camera is asked, not moved; but not for ever where it does not tell.
+    fn meeting(&self) -> bool {
+        !self.introduction.is_empty() && !self.link.faulty()
+    }
+
+    fn wish(&mut self, now: Duration) -> Wish {
+        let Some(target) = &self.target else { return Wish::Rest };
+        if now >= target.last_seen + self.settings.stale_timeout {
+            self.rest();
+            return Wish::Rest;
+        }
+        let sight = target.sight;
+        match self.settings.mode {
+            Mode::Velocity => self.velocity(&sight, now),
+            Mode::Absolute | Mode::Centre => self.step(&sight, now),
+        }
+    }
+
+    fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
+        let settings = &self.settings;
+        let view = self.view(sight);
+        let error = self.aim.error_at_effect(now, &self.history, settings.latency, self.round_trip);
+        let dead_zone_deg = settings.dead_zone * view.horizontal_fov_deg;
+        let target = self.aim.target_rate();
+        let wanted =
+            self.controller.rate(error, target, settings.gain, dead_zone_deg, settings.max_speed_deg_s);
+        let rate = self.guard.apply(wanted, &self.camera);
+        self.report_limit();
+        let map = self.speed_map(view.horizontal_fov_deg);
+        self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
+        match self.speed_steps {
+            (0, 0) => Wish::Rest,
+            (pan, tilt) => Wish::Move(Command::Velocity { pan, tilt }),
+        }
+    }
+
+    /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
+    fn step(&mut self, sight: &Sight, now: Duration) -> Wish {
+        if self.steps.under_way() || !self.steps.shows_rest(sight.taken_at, self.settings.latency) {
+            return Wish::AsIs;
+        }
+        let view = self.view(sight);
+        let error = self.aim.error_at_effect(now, &self.history, self.settings.latency, self.round_trip);
+        if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg {
+            return Wish::AsIs;
+        }
+        match self.settings.mode {
+            Mode::Centre => Wish::Move(self.centre(sight, now)),
+            _ => self.camera.pan_tilt().map_or(Wish::AsIs, |position| {
+                let turn = self.guard.apply(error, &self.camera);
+                self.report_limit();
+                if turn == PanTilt::default() { Wish::AsIs } else { Wish::Move(absolute(position + turn)) }
+            }),
+        }
+    }
+
+    /// The pixel where the target will be when the camera begins to move.
+    fn centre(&self, sight: &Sight, now: Duration) -> Command {
+        let ahead_s =
+            (now.saturating_sub(sight.taken_at) + self.settings.latency + self.round_trip).as_secs_f64();
+        let pixel = |place: f64, velocity: f64, size: u32| {
+            let last = f64::from(size.saturating_sub(1));
+            // Saturates; inside the picture by the clamp.
+            ((place + velocity * ahead_s) * f64::from(size)).round().clamp(0.0, last) as u32
+        };
+        Command::Centre {
+            x: pixel(sight.centroid.x, sight.velocity.x, sight.size.0),
+            y: pixel(sight.centroid.y, sight.velocity.y, sight.size.1),
+            width: sight.size.0,
+            height: sight.size.1,
+        }
+    }
+
+    fn stop_command(&self) -> Command {
+        match self.settings.mode {
+            Mode::Velocity => Command::Halt,
+            Mode::Absolute | Mode::Centre => Command::Stop,
+        }
+    }
+
+    fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
+        let was_moving = self.scheduler.may_move();
+        self.scheduler.accepted(command, now);
+        self.round_trip = now.saturating_sub(sent);
+        let rate = match command {
+            Command::Velocity { pan, tilt } => {
+                let map = self.speed_map(self.fov_deg());
+                PanTilt::new(map.deg_s(*pan), map.deg_s(*tilt))
+            }
+            _ => PanTilt::default(),
+        };
+        self.history.push(now, rate);
+        match command {
+            Command::Absolute { .. } | Command::Centre { .. } => {
+                self.steps.begin(now);
+                self.next_poll = now + Steps::POLL;
+            }
+            Command::Halt | Command::Stop => {
+                self.speed_steps = (0, 0);
+                self.steps.rest(now);
+                // Where it came to rest.
+                self.next_poll = now + Self::POLL_MOVING;
+            }
+            Command::Velocity { .. } if !was_moving => self.next_poll = now + Self::POLL_MOVING,
+            Command::Velocity { .. } => {}
+        }
+        self.succeeded(true);
+        match (was_moving, self.scheduler.may_move()) {
+            (false, true) => self.reports.push(Report::Moving),
+            (true, false) => self.reports.push(Report::Stopped),
+            _ => {}
+        }
+    }
+
+    fn told(&mut self, query: Query, answer: Answer, now: Duration) {
+        self.introduction.retain(|pending| *pending != query);
+        match answer {
+            Answer::Position(position) => {
+                self.camera.position = position;
+                self.positioned(self.camera.pan_tilt(), now);
+            }
+            Answer::Limits(limits) => self.camera.limits = limits,
+            Answer::Parameters(parameters) => self.camera.parameters = parameters,
+            Answer::Accepted => {}
+        }
+        self.succeeded(false);
+    }
+
+    fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
+        if query != Query::Position {
+            // Optional; a camera that is gone will be missed by the next position.
+            if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
+                self.introduction.retain(|pending| *pending != query);
+                return;
+            }
+        } else if self.link.connected()
+            && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
+        {
+            self.positioned(None, now);
+            if !self.steps.under_way() {
+                self.next_poll = now + Self::POLL_REFUSED;
+            }
+            return;
+        }
+        self.failed(err, false, now);
+    }
+
+    fn positioned(&mut self, position: Option<PanTilt>, now: Duration) {
+        if self.steps.position(position, now) {
+            self.scheduler.arrived();
+            self.reports.push(Report::Stopped);
+        }
+        self.next_poll = now
+            + match (self.steps.under_way(), self.scheduler.may_move()) {
+                (true, _) => Steps::POLL,
+                (false, true) => Self::POLL_MOVING,
+                (false, false) => Self::POLL_RESTING,
+            };
+    }
+
+    fn succeeded(&mut self, of_command: bool) {
+        let idle = self.target.is_none() && !self.scheduler.may_move();
+        self.reports.extend(self.link.succeeded(of_command, idle).map(Report::Link));
+    }
+
+    fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {
+        self.reports.extend(self.link.failed(err, of_command, now).map(Report::Link));
+    }
+
+    fn report_limit(&mut self) {
+        let at_limit = self.guard.at_limit();
+        if at_limit && !self.at_limit {
+            self.reports.push(Report::AtLimit);
+        }
+        self.at_limit = at_limit;
+    }
+
+    fn view(&self, sight: &Sight) -> View {
+        View {
+            horizontal_fov_deg: self.fov_deg(),
+            aspect: sight.aspect,
+            tilt_deg: self.camera.position.tilt_deg.unwrap_or(0.0),
+        }
+    }
+
+    fn fov_deg(&self) -> f64 {
+        self.settings.fov_deg.unwrap_or_else(|| self.camera.fov_deg())
+    }
+
+    fn speed_map(&self, fov_deg: f64) -> super::SpeedMap {
+        self.camera.speed_map(self.settings.camera_speed_deg_s, self.settings.speed_curve, fov_deg)
+    }
+}
+
+/// The command to look there, the short way round.
+fn absolute(position: PanTilt) -> Command {
+    Command::Absolute {
+        pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
+        tilt_deg: position.tilt.clamp(-180.0, 180.0),
+        speed: 100,
+    }
+}
+
+#[cfg(test)]
+#[path = "pilot_tests.rs"]
+mod tests;

@@ -1,0 +1,323 @@
+use super::*;
+use crate::servo::aim::tests::sight;
+use crate::vapix::Range;
+use proptest::prelude::*;
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+/// A camera that answers at once, and the pilot that steers it.
+struct Rig {
+    pilot: Pilot,
+    now: Duration,
+    sent: Vec<Command>,
+}
+
+impl Rig {
+    fn new(settings: ServoSettings) -> Self {
+        let mut rig = Self { pilot: Pilot::new(settings), now: ms(1000), sent: Vec::new() };
+        rig.run(|_| Ok(Answer::Accepted));
+        assert_eq!(rig.sent, [], "a camera just met is asked, not moved");
+        rig.reports();
+        rig
+    }
+
+    /// Does everything that is due now; `position` answers the commands.
+    fn run(&mut self, mut answer: impl FnMut(&Command) -> Result<Answer, Error>) {
+        while let Next::Do(job) = self.pilot.next(self.now) {
+            self.pilot.sending(&job, self.now);
+            let result = match &job {
+                Job::Command(command) => {
+                    self.sent.push(*command);
+                    answer(command)
+                }
+                Job::Query(Query::Position) => Ok(Answer::Position(Position {
+                    pan_deg: Some(0.0),
+                    tilt_deg: Some(0.0),
+                    zoom_steps: Some(1.0),
+                })),
+                Job::Query(Query::Limits) => Ok(Answer::Limits(Limits {
+                    pan_deg: Some(Range { min: -170.0, max: 170.0 }),
+                    field_angle_deg: Some(Range { min: 3.2, max: 60.0 }),
+                    ..Limits::default()
+                })),
+                Job::Query(Query::Parameters) => Err(Error::Camera("none".to_owned())),
+            };
+            self.pilot.answered(&job, result, self.now, self.now);
+        }
+    }
+
+    fn see(&mut self, x: f64, y: f64) {
+        self.pilot.see(sight(x, y, self.now), self.now);
+    }
+
+    /// Sends what is due after a while, everything accepted, and returns the commands.
+    fn after(&mut self, wait: Duration) -> Vec<Command> {
+        self.now += wait;
+        self.run(|_| Ok(Answer::Accepted));
+        mem::take(&mut self.sent)
+    }
+
+    fn reports(&mut self) -> Vec<Report> {
+        self.pilot.take_reports()
+    }
+}
+
+#[test]
+fn no_target_no_command() {
+    let mut rig = Rig::new(ServoSettings::default());
+    for _ in 0..100 {
+        rig.pilot.see(Sight { visibility: Visibility::Gone, ..sight(0.9, 0.1, rig.now) }, rig.now);
+        assert_eq!(rig.after(ms(100)), []);
+    }
+    assert_eq!(rig.reports(), []);
+}
+
+#[test]
+fn a_centred_target_moves_nothing() {
+    let mut rig = Rig::new(ServoSettings::default());
+    for _ in 0..100 {
+        rig.see(0.51, 0.49);
+        assert_eq!(rig.after(ms(100)), []);
+    }
+}
+
+#[test]
+fn the_camera_turns_towards_the_target() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.2);
+    match rig.after(ms(0))[..] {
+        [Command::Velocity { pan, tilt }] => assert!(pan > 0 && tilt > 0, "{pan}, {tilt}"),
+        ref other => panic!("{other:?}"),
+    }
+    assert_eq!(rig.reports(), [Report::Moving]);
+    assert!(rig.pilot.status(rig.now).rate.pan > 0.0);
+}
+
+#[test]
+fn a_lost_target_stops_it_at_once() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    rig.pilot.see(Sight { visibility: Visibility::Gone, ..sight(0.9, 0.5, rig.now) }, rig.now);
+    assert_eq!(rig.after(ms(1)), [Command::Halt]);
+    assert_eq!(rig.reports(), [Report::Moving, Report::Stopped]);
+    assert!(rig.pilot.is_at_rest());
+    assert_eq!(rig.after(ms(60_000)), []);
+}
+
+#[test]
+fn a_stale_target_stops_it() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    let wake = match rig.pilot.next(rig.now) {
+        Next::Wait(Some(wake)) => wake,
+        other => panic!("{other:?}"),
+    };
+    assert!(wake <= rig.now + ServoSettings::default().stale_timeout);
+    assert_eq!(rig.after(ms(1000)), [Command::Halt]);
+}
+
+#[test]
+fn a_predicted_target_is_followed_no_longer_than_a_stale_one() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    let mut commands = Vec::new();
+    for _ in 0..12 {
+        rig.pilot.see(Sight { visibility: Visibility::Predicted, ..sight(0.9, 0.5, rig.now) }, rig.now);
+        commands.extend(rig.after(ms(100)));
+    }
+    assert_eq!(commands.last(), Some(&Command::Halt));
+    assert!(commands.len() > 1, "it was followed for a while: {commands:?}");
+}
+
+#[test]
+fn commands_keep_to_the_rate() {
+    let mut rig = Rig::new(ServoSettings { max_rate_hz: 5.0, ..ServoSettings::default() });
+    let mut commands = 0;
+    for frame in 0..250u32 {
+        rig.see(0.7 + f64::from(frame % 7) * 0.04, 0.5);
+        commands += rig.after(ms(4)).len();
+    }
+    assert!((4..=6).contains(&commands), "{commands} commands in a second");
+}
+
+#[test]
+fn at_its_limit_the_camera_is_stopped_in_that_axis_and_it_is_said_once() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.pilot.camera.position.pan_deg = Some(170.0);
+    for _ in 0..5 {
+        rig.see(0.9, 0.1);
+        for command in rig.after(ms(100)) {
+            assert!(matches!(command, Command::Velocity { pan: 0, tilt: 1.. }), "{command:?}");
+        }
+    }
+    assert_eq!(rig.reports(), [Report::AtLimit, Report::Moving]);
+}
+
+#[test]
+fn a_failed_stop_is_repeated() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    rig.pilot.rest();
+    let mut failures = 3;
+    for _ in 0..100 {
+        rig.now += ms(50);
+        rig.run(|_| {
+            if failures == 0 {
+                return Ok(Answer::Accepted);
+            }
+            failures -= 1;
+            Err(Error::Timeout(ms(1)))
+        });
+    }
+    assert_eq!(mem::take(&mut rig.sent), [Command::Halt; 4]);
+    assert!(rig.pilot.is_at_rest());
+    let disconnected = rig
+        .reports()
+        .into_iter()
+        .filter(|report| matches!(report, Report::Link(LinkChange::Disconnected(_))))
+        .count();
+    assert_eq!(disconnected, 1);
+}
+
+#[test]
+fn wrong_credentials_end_all_asking_until_they_change() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.run(|_| Err(Error::BadCredentials { user: "root".to_owned() }));
+    assert_eq!(mem::take(&mut rig.sent).len(), 1);
+    for _ in 0..100 {
+        rig.see(0.9, 0.5);
+        assert_eq!(rig.after(ms(100)), []);
+    }
+    rig.pilot.credentials_changed();
+    rig.see(0.9, 0.5);
+    assert_eq!(rig.after(ms(100)).len(), 1);
+}
+
+#[test]
+fn absolute_mode_steps_from_rest_to_rest() {
+    let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
+    rig.see(1.0, 0.5);
+    match rig.after(ms(0))[..] {
+        [Command::Absolute { pan_deg, tilt_deg, speed: 100 }] => {
+            assert!((pan_deg - 30.0).abs() < 1e-6 && tilt_deg.abs() < 1e-6, "{pan_deg}, {tilt_deg}");
+        }
+        ref other => panic!("{other:?}"),
+    }
+    rig.see(1.0, 0.5);
+    assert_eq!(rig.after(ms(100)), [], "under way");
+    rig.after(ms(200));
+    rig.after(ms(200));
+    assert_eq!(rig.reports(), [Report::Moving, Report::Stopped]);
+    rig.see(1.0, 0.5);
+    assert_eq!(rig.after(ms(10)), [], "the picture does not show the rest yet");
+    rig.after(ms(300));
+    rig.see(1.0, 0.5);
+    assert_eq!(rig.after(ms(0)).len(), 1);
+}
+
+#[test]
+fn centre_mode_names_the_pixel_and_stops_with_move_stop() {
+    let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, ..ServoSettings::default() });
+    rig.see(0.75, 0.25);
+    let expected = Command::Centre { x: 480, y: 120, width: 640, height: 480 };
+    assert_eq!(rig.after(ms(0)), [expected]);
+    rig.pilot.rest();
+    assert_eq!(rig.after(ms(10)), [Command::Stop]);
+}
+
+/// A camera that turns as told, with everything late, before a person who walks.
+fn walk(settings: ServoSettings, target_deg_s: f64, delay_frames: usize) -> Vec<f64> {
+    const FRAME: Duration = Duration::from_millis(40);
+    let mut rig = Rig::new(settings);
+    let (mut camera_deg, mut target_deg, mut in_force) = (0.0, 5.0, VecDeque::from(vec![0i8; delay_frames]));
+    let (mut offsets, mut command) = (Vec::new(), 0i8);
+    let map = rig.pilot.speed_map(60.0);
+    for _ in 0..250 {
+        in_force.push_back(command);
+        let rate = map.deg_s(in_force.pop_front().unwrap());
+        camera_deg += rate * FRAME.as_secs_f64();
+        target_deg += target_deg_s * FRAME.as_secs_f64();
+        let offset_deg: f64 = target_deg - camera_deg;
+        offsets.push(offset_deg);
+        let x = |deg: f64| 0.5 + deg.to_radians().tan() / (2.0 * 30f64.to_radians().tan());
+        let velocity = (x(offset_deg) - x(offset_deg - (target_deg_s - rate) * 0.04)) / 0.04;
+        let ego = (x(offset_deg) - x(offset_deg + rate * 0.04)) / 0.04;
+        let seen = Sight {
+            velocity: ptztrack_contract::Vector { x: velocity, y: 0.0 },
+            ego_velocity: Some(ptztrack_contract::Vector { x: ego, y: 0.0 }),
+            ..sight(x(offset_deg), 0.5, rig.now)
+        };
+        rig.pilot.see(seen, rig.now);
+        for sent in rig.after(ms(0)) {
+            command = if let Command::Velocity { pan, .. } = sent { pan } else { 0 };
+        }
+        rig.now += FRAME;
+    }
+    offsets
+}
+
+#[test]
+fn a_walking_person_is_kept_in_the_middle_without_oscillation() {
+    let offsets = walk(ServoSettings::default(), 5.0, 5);
+    let settled = &offsets[100..];
+    assert!(settled.iter().all(|offset| offset.abs() < 1.5), "{settled:?}");
+    assert!(offsets.iter().all(|offset| *offset > -3.0), "overshoot: {offsets:?}");
+}
+
+#[test]
+fn a_wrong_idea_of_the_latency_does_not_make_it_swing() {
+    for delay_frames in [0, 2, 9] {
+        let offsets = walk(ServoSettings::default(), 3.0, delay_frames);
+        let worst = offsets[150..].iter().fold(0.0f64, |worst, offset| worst.max(offset.abs()));
+        assert!(worst < 3.0, "{delay_frames} frames late: {worst} deg");
+    }
+}
+
+#[test]
+fn the_camera_comes_to_rest_at_a_standing_person() {
+    let mut rig = Rig::new(ServoSettings::default());
+    let offsets = walk(ServoSettings::default(), 0.0, 5);
+    let settled = &offsets[100..];
+    assert!(settled.iter().all(|offset| (offset - settled[0]).abs() < 1e-9), "{settled:?}");
+    assert!(settled[0].abs() < 1.8);
+    rig.see(0.5, 0.5);
+    assert_eq!(rig.after(ms(500)), []);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    /// Whatever is seen and whatever is answered, after the target is gone the camera is stopped.
+    #[test]
+    fn it_always_ends_at_rest(
+        events in prop::collection::vec((0.0..1.0f64, 0.0..1.0f64, 0u8..5, 1u64..500), 1..40),
+    ) {
+        let mut rig = Rig::new(ServoSettings::default());
+        for (x, y, answer, wait) in events {
+            rig.see(x, y);
+            rig.now += ms(wait);
+            rig.run(|_| match answer {
+                0 => Err(Error::Timeout(ms(1))),
+                1 => Err(Error::Camera("no".to_owned())),
+                2 => Err(Error::Unreachable("no".to_owned())),
+                _ => Ok(Answer::Accepted),
+            });
+        }
+        rig.pilot.rest();
+        let moved = !rig.pilot.is_at_rest();
+        rig.sent.clear();
+        for _ in 0..40 {
+            rig.now += ms(250);
+            rig.run(|_| Ok(Answer::Accepted));
+        }
+        prop_assert!(rig.pilot.is_at_rest());
+        prop_assert!(rig.sent.iter().all(Command::is_stop), "{:?}", rig.sent);
+        prop_assert!(!moved || !rig.sent.is_empty());
+    }
+}

@@ -1,0 +1,136 @@
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use super::PanTilt;
+
+/// Mean of a rate over a window of time (thesis 3.16: one second), whatever the frame rate.
+#[derive(Debug)]
+pub struct RateAverage {
+    window: Duration,
+    samples: VecDeque<(Duration, PanTilt)>,
+}
+
+impl RateAverage {
+    /// An empty average.
+    pub fn new(window: Duration) -> Self {
+        Self { window, samples: VecDeque::new() }
+    }
+
+    /// Takes the rate at a time; times that go back begin anew.
+    pub fn push(&mut self, at: Duration, rate: PanTilt) {
+        if self.samples.back().is_some_and(|(last, _)| *last > at) {
+            self.samples.clear();
+        }
+        self.samples.push_back((at, rate));
+        while self.samples.front().is_some_and(|(first, _)| at - *first > self.window) {
+            self.samples.pop_front();
+        }
+    }
+
+    /// The mean; zero where nothing is known.
+    pub fn mean(&self) -> PanTilt {
+        let sum = self.samples.iter().fold(PanTilt::default(), |sum, (_, rate)| sum + *rate);
+        sum / self.samples.len().max(1) as f64
+    }
+
+    /// Forgets everything.
+    pub fn clear(&mut self) {
+        self.samples.clear();
+    }
+}
+
+/// The rates the camera was told, so that the rotation not yet visible in the picture is known.
+#[derive(Debug, Default)]
+pub struct CommandHistory(VecDeque<(Duration, PanTilt)>);
+
+impl CommandHistory {
+    /// Longer than any latency that is allowed for.
+    const SPAN: Duration = Duration::from_secs(10);
+
+    /// From `at` on the camera turns with `rate`.
+    pub fn push(&mut self, at: Duration, rate: PanTilt) {
+        self.0.push_back((at, rate));
+        // The entry before the span is still in force at its beginning.
+        while self.0.get(1).is_some_and(|(second, _)| *second + Self::SPAN < at) {
+            self.0.pop_front();
+        }
+    }
+
+    /// The rate in force at a time; zero before the first.
+    pub fn rate_at(&self, at: Duration) -> PanTilt {
+        self.0.iter().rev().find(|(since, _)| *since <= at).map_or(PanTilt::default(), |(_, rate)| *rate)
+    }
+
+    /// The rotation commanded between two times, degrees.
+    pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
+        let ends = self.0.iter().skip(1).map(|(since, _)| *since).chain([to.max(from)]);
+        self.0.iter().zip(ends).fold(PanTilt::default(), |sum, ((since, rate), end)| {
+            let overlap = end.min(to).saturating_sub((*since).max(from));
+            sum + *rate * overlap.as_secs_f64()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn the_average_covers_its_window_only() {
+        let mut average = RateAverage::new(ms(1000));
+        assert_eq!(average.mean(), PanTilt::default());
+        for i in 0..=60 {
+            let rate = if i < 30 { 100.0 } else { f64::from(i % 2) * 2.0 };
+            average.push(ms(1000 * u64::from(i as u32) / 30), PanTilt::new(rate, -1.0));
+        }
+        assert!((average.mean().pan - 1.0).abs() < 0.05, "{:?}", average.mean());
+        assert!((average.mean().tilt + 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_clock_that_goes_back_begins_anew() {
+        let mut average = RateAverage::new(ms(1000));
+        average.push(ms(5000), PanTilt::new(10.0, 0.0));
+        average.push(ms(10), PanTilt::new(2.0, 0.0));
+        assert_eq!(average.mean().pan, 2.0);
+    }
+
+    #[test]
+    fn rotation_is_the_integral_of_what_was_commanded() {
+        let mut history = CommandHistory::default();
+        assert_eq!(history.rotation(ms(0), ms(100)), PanTilt::default());
+        history.push(ms(100), PanTilt::new(10.0, 0.0));
+        history.push(ms(300), PanTilt::new(-20.0, 5.0));
+        let rotation = history.rotation(ms(0), ms(400));
+        assert!(
+            (rotation.pan - (2.0 - 2.0)).abs() < 1e-9 && (rotation.tilt - 0.5).abs() < 1e-9,
+            "{rotation:?}"
+        );
+        assert!((history.rotation(ms(200), ms(250)).pan - 0.5).abs() < 1e-9);
+        assert_eq!(history.rate_at(ms(50)).pan, 0.0);
+        assert_eq!(history.rate_at(ms(299)).pan, 10.0);
+        assert_eq!(history.rate_at(ms(900)).pan, -20.0);
+    }
+
+    proptest! {
+        #[test]
+        fn rotations_add_up(
+            rates in prop::collection::vec((1u64..400, -50.0..50.0f64), 0..20),
+            cut in 0u64..4000,
+        ) {
+            let (mut history, mut at) = (CommandHistory::default(), 0);
+            for (wait, rate) in rates {
+                at += wait;
+                history.push(ms(at), PanTilt::new(rate, 0.0));
+            }
+            let whole = history.rotation(ms(0), ms(4000)).pan;
+            let parts = history.rotation(ms(0), ms(cut)).pan + history.rotation(ms(cut), ms(4000)).pan;
+            prop_assert!((whole - parts).abs() < 1e-6);
+        }
+    }
+}

@@ -1,0 +1,60 @@
+use std::time::Duration;
+
+use super::{Prediction, SpeedCurve};
+
+/// How the camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Continuously, by speed.
+    #[default]
+    Velocity,
+    /// From position to position: look, move, wait until at rest, look again.
+    Absolute,
+    /// Like `Absolute`, but the camera itself works out the angles.
+    Centre,
+}
+
+/// Everything that can be set about the servo.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoSettings {
+    /// How the camera is moved.
+    pub mode: Mode,
+    /// Degrees per second for a degree of error, 1/s.
+    pub gain: f64,
+    /// Offset from the middle that an axis at rest tolerates, as a part of the picture's width.
+    pub dead_zone: f64,
+    /// Degrees per second that neither axis exceeds.
+    pub max_speed_deg_s: f64,
+    /// Longest stretch between commands is 1/this: commands per second at most.
+    pub max_rate_hz: f64,
+    /// From light on the sensor to the picture's timestamp, and from a command to the motion, together.
+    pub latency: Duration,
+    /// Horizontal field of view in degrees; `None`: what the camera says.
+    pub fov_deg: Option<f64>,
+    /// How the target's motion is carried forward.
+    pub prediction: Prediction,
+    /// The camera is stopped when the target was not seen for this long.
+    pub stale_timeout: Duration,
+    /// Degrees per second the camera does at speed step 100.
+    pub camera_speed_deg_s: f64,
+    /// How its speed grows up to there.
+    pub speed_curve: SpeedCurve,
+}
+
+impl Default for ServoSettings {
+    fn default() -> Self {
+        Self {
+            mode: Mode::Velocity,
+            gain: 2.0,
+            dead_zone: 0.03,
+            max_speed_deg_s: 100.0,
+            max_rate_hz: 10.0,
+            latency: Duration::from_millis(200),
+            fov_deg: None,
+            prediction: Prediction::Lead,
+            stale_timeout: Duration::from_secs(1),
+            camera_speed_deg_s: 450.0,
+            speed_curve: SpeedCurve::Cubic,
+        }
+    }
+}
