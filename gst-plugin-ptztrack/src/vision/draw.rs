@@ -196,7 +196,11 @@ fn stroke(
     if corners.len() < 2 {
         return Ok(());
     }
-    imgproc::polylines(picture, corners, closed, colour.scalar(), width, imgproc::LINE_AA, SHIFT)
+    // OpenCV spreads strokes of one pixel so far that they come out faint.
+    let passes = if width == 1 { 3 } else { 1 };
+    (0..passes).try_for_each(|_| {
+        imgproc::polylines(picture, corners, closed, colour.scalar(), width, imgproc::LINE_AA, SHIFT)
+    })
 }
 
 /// A disc as polygon: OpenCV's own small circles are diamonds.

@@ -21,9 +21,10 @@ pub struct Spot {
 }
 
 impl Spot {
-    /// In the middle of its pixel, where upright strokes are sharp.
-    fn snapped(self) -> Self {
-        Self { x: self.x.floor() + 0.5, y: self.y.floor() + 0.5 }
+    /// Where upright strokes of that width fill whole pixels, which keeps them sharp.
+    fn snapped(self, width: i32) -> Self {
+        let middle = if width % 2 == 0 { 0.0 } else { 0.5 };
+        Self { x: self.x.floor() + middle, y: self.y.floor() + middle }
     }
 }
 
@@ -86,7 +87,7 @@ impl Style {
     fn of(frame: FrameSize) -> Self {
         let size = f64::from(frame.width.min(frame.height));
         Self {
-            stroke: (size / 400.0).round().max(2.0) as i32,
+            stroke: (size / 400.0).round().max(1.0) as i32,
             dot: (size / 260.0).max(1.4),
             // Below eight or nine pixels the letters fall apart, so small frames get relatively larger ones.
             text: (4.0 + size / 48.0).round(),
@@ -146,7 +147,8 @@ impl Scene {
     fn bounds(&mut self, rect: Rect, colour: Colour) {
         let (right, bottom) = (rect.x + rect.width, rect.y + rect.height);
         let corners = [(rect.x, rect.y), (right, rect.y), (right, bottom), (rect.x, bottom)];
-        let points = corners.map(|(x, y)| self.frame.spot(Point { x, y }).snapped()).to_vec();
+        let points =
+            corners.map(|(x, y)| self.frame.spot(Point { x, y }).snapped(self.style.stroke)).to_vec();
         self.shapes.push(Shape::Line { points, closed: true, width: self.style.stroke, colour });
     }
 
@@ -166,7 +168,7 @@ impl Scene {
 
     /// Four strokes around the middle, which itself stays free.
     fn cross_hair(&mut self) {
-        let middle = self.frame.spot(CENTRE).snapped();
+        let middle = self.frame.spot(CENTRE).snapped(self.style.stroke);
         let (near, far) = (self.style.text * 0.6, self.style.text * 1.5);
         for (dx, dy) in [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)] {
             let at = |length: f64| Spot { x: middle.x + dx * length, y: middle.y + dy * length };
