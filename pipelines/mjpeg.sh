@@ -1,0 +1,7 @@
+#!/bin/bash
+# Follows with an Axis PTZ camera by MJPEG over HTTP, and shows the picture.
+. "$(dirname "$0")/common.sh"
+
+launch "${mjpeg[@]}" ! "${follow[@]}" ! tee name=followed \
+    followed. ! "${show[@]}" \
+    followed. ! "${newest[@]}" ! "${steer[@]}"

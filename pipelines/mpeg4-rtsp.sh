@@ -1,0 +1,8 @@
+#!/bin/bash
+# Follows with an Axis PTZ camera by MPEG-4 over RTSP, and shows the picture.
+. "$(dirname "$0")/common.sh"
+
+rtsp mpeg4
+launch "${stream[@]}" ! rtpmp4vdepay ! avdec_mpeg4 ! "${follow[@]}" ! tee name=followed \
+    followed. ! "${show[@]}" \
+    followed. ! "${newest[@]}" ! "${steer[@]}"
