@@ -1,1 +1,68 @@
-//! stub
+//! A virtual Axis pan-tilt-zoom camera on loopback: VAPIX over HTTP, MJPEG, RTSP, kinematics and a live page.
+//!
+//! Its world is a wide still recording; the picture is what a turning pinhole camera would see in it. What is known of
+//! the AXIS Q6034-E is its default, what is not known or differs between cameras is a setting.
+//!
+//! ```no_run
+//! use std::time::Duration;
+//! use virtual_camera::{Settings, VirtualCamera};
+//!
+//! let camera = VirtualCamera::start(Settings::default())?;
+//! println!("{}/axis-cgi/mjpg/video.cgi", camera.url());
+//! assert!(camera.wait_for(Duration::from_secs(60), |status| status.pan_deg > 5.0));
+//! # Ok::<(), virtual_camera::Error>(())
+//! ```
+
+mod camera;
+mod encode;
+mod geometry;
+mod http;
+mod kinematics;
+mod pace;
+mod picture;
+mod rtsp;
+mod settings;
+mod status;
+mod sync;
+mod vapix;
+mod world;
+
+pub use camera::VirtualCamera;
+pub use encode::EncodeError;
+pub use geometry::{Matrix, project};
+pub use kinematics::{
+    Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
+};
+pub use settings::{Auth, FootageSettings, PtzApi, Settings, Video, World};
+pub use status::{Fault, ReceivedCommand, Status};
+pub use world::{FootageError, SyntheticSettings, Waypoint};
+
+/// Why a camera does not start.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// GStreamer does not start, or lacks something.
+    #[error("GStreamer: {0}")]
+    GStreamer(#[from] glib::Error),
+    /// A part of GStreamer is missing.
+    #[error("GStreamer: {0}")]
+    Missing(#[from] glib::BoolError),
+    /// The recording cannot be shown.
+    #[error(transparent)]
+    Footage(#[from] FootageError),
+    /// A port cannot be had.
+    #[error("cannot serve {protocol} on port {port}: {reason}")]
+    Port {
+        /// HTTP or RTSP.
+        protocol: &'static str,
+        /// As asked for; 0 is any.
+        port: u16,
+        /// What the system says.
+        reason: String,
+    },
+    /// The system gives no thread.
+    #[error("cannot start a thread: {source}")]
+    Thread {
+        /// What the system says.
+        source: std::io::Error,
+    },
+}

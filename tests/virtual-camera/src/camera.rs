@@ -1,0 +1,350 @@
+//! The camera as a whole: what its servers share, and the handle that tests and programs hold.
+
+use std::{
+    net::SocketAddr,
+    sync::{
+        Arc, Condvar, Mutex, PoisonError,
+        atomic::{AtomicBool, Ordering},
+    },
+    thread::JoinHandle,
+    time::{Duration, Instant},
+};
+
+use crate::{
+    Error, Fault, ReceivedCommand, Settings, Status,
+    geometry::Matrix,
+    http::HttpServer,
+    kinematics::{Head, Limits, Pose},
+    picture::Picture,
+    rtsp::RtspServer,
+    sync::lock,
+    vapix::{Answer, Args, device::Device},
+    world::{self, Exposure, FootageError, Panorama},
+};
+
+/// How often a moving camera tells those who wait for it.
+const PULSE: Duration = Duration::from_millis(10);
+/// Commands kept for the page and for tests.
+const COMMANDS_KEPT: usize = 20_000;
+
+/// What changes; the lock is held for no longer than reading or writing it takes.
+struct State {
+    device: Device,
+    commands: Vec<ReceivedCommand>,
+    received: u64,
+    requests: u64,
+    refused: u64,
+    in_flight: u64,
+    most_in_flight: u64,
+    viewers: u64,
+}
+
+/// What all servers of one camera share.
+pub(crate) struct Camera {
+    pub settings: Settings,
+    pub world: Panorama,
+    started: Instant,
+    stopping: AtomicBool,
+    state: Mutex<State>,
+    changed: Condvar,
+    pub fault: tokio::sync::watch::Sender<Fault>,
+}
+
+/// Counts a request as in flight, or a client as watching, for as long as it lives.
+pub(crate) struct Counted {
+    camera: Arc<Camera>,
+    counter: fn(&mut State) -> &mut u64,
+}
+
+impl Drop for Counted {
+    fn drop(&mut self) {
+        *(self.counter)(&mut lock(&self.camera.state)) -= 1;
+        self.camera.changed.notify_all();
+    }
+}
+
+impl Camera {
+    fn new(settings: Settings) -> Result<Self, Error> {
+        let world = world::open(&settings)?;
+        // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
+        let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
+        let limits = world.limits();
+        let head = Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home, memory);
+        let device = Device::new(&settings, head, limits, world.view_size());
+        let state = State {
+            device,
+            commands: Vec::new(),
+            received: 0,
+            requests: 0,
+            refused: 0,
+            in_flight: 0,
+            most_in_flight: 0,
+            viewers: 0,
+        };
+        Ok(Self {
+            settings,
+            world,
+            started: Instant::now(),
+            stopping: AtomicBool::new(false),
+            state: Mutex::new(state),
+            changed: Condvar::new(),
+            fault: tokio::sync::watch::Sender::new(Fault::None),
+        })
+    }
+
+    /// Time since the start.
+    pub fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    pub fn is_stopping(&self) -> bool {
+        self.stopping.load(Ordering::Relaxed)
+    }
+
+    /// Waits until `time`, or says `false` if the camera stops before.
+    pub fn wait_until(&self, time: Duration) -> bool {
+        let mut state = lock(&self.state);
+        while !self.is_stopping() {
+            let left = time.saturating_sub(self.now());
+            if left.is_zero() {
+                return true;
+            }
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+        false
+    }
+
+    pub fn frame_rate(&self) -> f64 {
+        self.settings.video.frame_rate.unwrap_or_else(|| self.world.frame_rate())
+    }
+
+    fn update<T>(&self, change: impl FnOnce(&mut State) -> T) -> T {
+        let result = change(&mut lock(&self.state));
+        self.changed.notify_all();
+        result
+    }
+
+    /// Runs `ptz.cgi`.
+    pub fn ptz(&self, args: &Args) -> Answer {
+        self.update(|state| state.device.ptz(args, self.now()))
+    }
+
+    /// Runs `param.cgi`.
+    pub fn param(&self, args: &Args) -> Answer {
+        self.update(|state| state.device.param(args))
+    }
+
+    /// Notes a request to `ptz.cgi` and how it was answered.
+    pub fn note_command(&self, query: &str, status: u16) {
+        let time = self.now();
+        self.update(|state| {
+            if state.commands.len() == COMMANDS_KEPT {
+                state.commands.drain(..COMMANDS_KEPT / 2);
+            }
+            state.received += 1;
+            let number = state.received;
+            state.commands.push(ReceivedCommand { number, time, query: query.into(), status });
+        });
+    }
+
+    pub fn note_refused(&self) {
+        self.update(|state| state.refused += 1);
+    }
+
+    /// Counts a CGI request while it is being answered.
+    pub fn request_begins(self: &Arc<Self>) -> Counted {
+        self.update(|state| {
+            state.requests += 1;
+            state.in_flight += 1;
+            state.most_in_flight = state.most_in_flight.max(state.in_flight);
+        });
+        Counted { camera: self.clone(), counter: |state| &mut state.in_flight }
+    }
+
+    /// Counts a video client while it watches.
+    pub fn viewer_begins(self: &Arc<Self>) -> Counted {
+        self.update(|state| state.viewers += 1);
+        Counted { camera: self.clone(), counter: |state| &mut state.viewers }
+    }
+
+    pub fn status(&self) -> Status {
+        self.status_of(&mut lock(&self.state))
+    }
+
+    fn status_of(&self, state: &mut State) -> Status {
+        let now = self.now();
+        let head = &mut state.device.head;
+        head.advance(now);
+        let snapshot = head.now();
+        let optics = head.optics();
+        Status {
+            time: now,
+            pan_deg: snapshot.pose.pan_deg,
+            tilt_deg: snapshot.pose.tilt_deg,
+            zoom_step: snapshot.pose.zoom_step,
+            magnification: optics.magnification(snapshot.pose.zoom_step),
+            horizontal_fov_deg: optics.fov_deg(snapshot.pose.zoom_step),
+            pan_rate_deg_s: snapshot.pan_rate_deg_s,
+            tilt_rate_deg_s: snapshot.tilt_rate_deg_s,
+            zoom_rate_step_s: snapshot.zoom_rate_step_s,
+            moving: !head.is_at_rest(),
+            footage_frame: self.world.frame_at(now),
+            requests: state.requests,
+            commands: state.received,
+            refused: state.refused,
+            most_in_flight: state.most_in_flight,
+            viewers: state.viewers,
+        }
+    }
+
+    pub fn commands_after(&self, number: u64) -> Vec<ReceivedCommand> {
+        let state = lock(&self.state);
+        let first = state.commands.partition_point(|command| command.number <= number);
+        state.commands[first..].to_vec()
+    }
+
+    fn wait_for(&self, timeout: Duration, mut condition: impl FnMut(&Status) -> bool) -> bool {
+        let deadline = Instant::now() + timeout;
+        let mut state = lock(&self.state);
+        loop {
+            if condition(&self.status_of(&mut state)) {
+                return true;
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return false;
+            }
+            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    /// Tells those who wait while the camera moves by itself, and that it has come to rest.
+    fn pulse(&self) {
+        let mut state = lock(&self.state);
+        while !self.is_stopping() {
+            state.device.head.advance(self.now());
+            self.changed.notify_all();
+            // An hour stands for ever: at rest only a command, which notifies, changes anything.
+            let pause = if state.device.head.is_at_rest() { Duration::from_secs(3600) } else { PULSE };
+            state = self.changed.wait_timeout(state, pause).unwrap_or_else(PoisonError::into_inner).0;
+        }
+    }
+
+    fn pose_at(&self, time: Duration) -> Pose {
+        let mut state = lock(&self.state);
+        state.device.head.advance(self.now());
+        state.device.head.pose_at(time)
+    }
+
+    /// The picture whose exposure began at `time`, not later than now.
+    pub fn picture(&self, time: Duration, size: (u32, u32)) -> Result<Picture, FootageError> {
+        let opening = self.pose_at(time);
+        let closing = self.pose_at(time + self.settings.video.exposure);
+        self.world.render(&Exposure { time, opening, closing }, size)
+    }
+
+    /// When the picture leaves the sensor that leaves the camera now.
+    pub fn newest_exposure(&self) -> Duration {
+        self.now().saturating_sub(self.settings.video.delay)
+    }
+
+    fn stop(&self) {
+        self.update(|_| self.stopping.store(true, Ordering::Relaxed));
+    }
+}
+
+/// A running virtual camera on loopback. Dropping it closes its ports and ends its threads.
+pub struct VirtualCamera {
+    camera: Arc<Camera>,
+    http: HttpServer,
+    rtsp: RtspServer,
+    pulse: Option<JoinHandle<()>>,
+}
+
+impl VirtualCamera {
+    /// Opens the world and both ports; the camera answers from then on.
+    pub fn start(settings: Settings) -> Result<Self, Error> {
+        gst::init()?;
+        let camera = Arc::new(Camera::new(settings)?);
+        let http = HttpServer::start(camera.clone())?;
+        let rtsp = RtspServer::start(camera.clone())?;
+        let pulsing = camera.clone();
+        let pulse = std::thread::Builder::new()
+            .name("camera-pulse".into())
+            .spawn(move || pulsing.pulse())
+            .map_err(|source| Error::Thread { source })?;
+        Ok(Self { camera, http, rtsp, pulse: Some(pulse) })
+    }
+
+    /// Where HTTP is served.
+    pub fn http_address(&self) -> SocketAddr {
+        self.http.address()
+    }
+
+    /// `http://127.0.0.1:port`, without a slash at its end.
+    pub fn url(&self) -> String {
+        format!("http://{}", self.http_address())
+    }
+
+    /// `rtsp://127.0.0.1:port`, without a slash at its end.
+    pub fn rtsp_url(&self) -> String {
+        format!("rtsp://{}", self.rtsp.address())
+    }
+
+    /// The camera at this moment.
+    pub fn status(&self) -> Status {
+        self.camera.status()
+    }
+
+    /// Waits until the status is as wanted; `false` if that takes longer than `timeout`.
+    pub fn wait_for(&self, timeout: Duration, condition: impl FnMut(&Status) -> bool) -> bool {
+        self.camera.wait_for(timeout, condition)
+    }
+
+    /// All requests to `ptz.cgi` that passed authentication or met a fault, in order.
+    pub fn commands(&self) -> Vec<ReceivedCommand> {
+        self.camera.commands_after(0)
+    }
+
+    /// Those after the one of this [`ReceivedCommand::number`].
+    pub fn commands_after(&self, number: u64) -> Vec<ReceivedCommand> {
+        self.camera.commands_after(number)
+    }
+
+    /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is not touched.
+    pub fn set_fault(&self, fault: Fault) {
+        self.camera.fault.send_replace(fault);
+    }
+
+    /// How far it turns.
+    pub fn limits(&self) -> Limits {
+        self.camera.world.limits()
+    }
+
+    /// Width and height in pixels that it sends unless asked for others.
+    pub fn view_size(&self) -> (u32, u32) {
+        self.camera.world.view_size()
+    }
+
+    /// From a pixel of the recording to the pixel of the view of that size, for a pose.
+    pub fn recording_to_view(&self, pose: &Pose, size: (u32, u32)) -> Matrix {
+        self.camera.world.recording_to_view(pose, size)
+    }
+
+    /// Where the camera looked at a time since its start, not longer ago than its video delay and two seconds.
+    pub fn pose_at(&self, time: Duration) -> Pose {
+        self.camera.pose_at(time)
+    }
+}
+
+impl Drop for VirtualCamera {
+    fn drop(&mut self) {
+        self.camera.stop();
+        self.http.stop();
+        self.rtsp.stop();
+        if let Some(pulse) = self.pulse.take() {
+            // It ended with a panic at worst, which has been printed.
+            let _ = pulse.join();
+        }
+    }
+}

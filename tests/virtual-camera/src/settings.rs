@@ -1,0 +1,163 @@
+//! What a virtual camera is made like: every quality that differs between real cameras is a setting.
+
+use std::{fmt, path::PathBuf, time::Duration};
+
+use crate::{
+    kinematics::{Kinematics, Pose},
+    world::SyntheticSettings,
+};
+
+/// How the camera asks its clients who they are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Auth {
+    /// Anybody may do anything.
+    None,
+    /// RFC 7617, the password in clear.
+    Basic,
+    /// RFC 2617 with `qop="auth"`, or RFC 2069 without.
+    Digest {
+        /// Whether the challenge offers `qop="auth"`, as firmware from 2016 on does.
+        qop: bool,
+    },
+    /// Digest with `qop="auth"` and Basic, both offered (`Basic_Digest`).
+    Both,
+}
+
+/// Which of the optional parts of ptz.cgi the firmware has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PtzApi {
+    /// Firmware 5.41 of the Q6034-E: neither `query=attributes` nor `proportionalspeed=`.
+    Classic,
+    /// Newer firmware: both of them.
+    Extended,
+}
+
+/// What the camera looks at.
+#[derive(Debug, Clone)]
+pub enum World {
+    /// A recording by a camera that stood still: the view is cut out of its pictures.
+    Footage(FootageSettings),
+    /// A small world made up on the spot, with one person in it.
+    Synthetic(SyntheticSettings),
+}
+
+/// A recording to look around in.
+#[derive(Debug, Clone)]
+pub struct FootageSettings {
+    /// Any video file that GStreamer decodes.
+    pub file: PathBuf,
+    /// Horizontal field of view of the camera that recorded it, in degrees. Nobody notes it down, so it is assumed.
+    pub recording_fov_deg: f64,
+    /// Width of the widest view, as a part of the recording's width (0 to 1).
+    pub view_width: f64,
+    /// Where in the recording the world begins.
+    pub start: Duration,
+    /// Whether it begins again after its end; its last picture stays otherwise.
+    pub looped: bool,
+}
+
+impl FootageSettings {
+    /// The recording in `file`, looped, with everything assumed.
+    pub fn new(file: impl Into<PathBuf>) -> Self {
+        Self {
+            file: file.into(),
+            recording_fov_deg: 60.0,
+            view_width: 0.45,
+            start: Duration::ZERO,
+            looped: true,
+        }
+    }
+}
+
+/// What the camera sends where the client does not ask for something else.
+#[derive(Debug, Clone)]
+pub struct Video {
+    /// Width and height in pixels; `None` is 640 pixels by the world's own aspect ratio.
+    pub size: Option<(u32, u32)>,
+    /// Frames per second; `None` is the world's own frame rate.
+    pub frame_rate: Option<f64>,
+    /// VAPIX compression, 0 (best picture) to 100.
+    pub compression: u32,
+    /// From light on the sensor to data on the wire.
+    pub delay: Duration,
+    /// How long the shutter is open: what the camera turns meanwhile is blurred.
+    pub exposure: Duration,
+}
+
+impl Default for Video {
+    fn default() -> Self {
+        Self {
+            size: None,
+            frame_rate: None,
+            compression: 30,
+            delay: Duration::from_millis(100),
+            exposure: Duration::from_micros(16_667),
+        }
+    }
+}
+
+/// Everything about one virtual camera. The default is an AXIS Q6034-E before a synthetic world.
+#[derive(Clone)]
+pub struct Settings {
+    /// TCP port on loopback for HTTP; 0 takes a free one.
+    pub http_port: u16,
+    /// TCP port on loopback for RTSP; 0 takes a free one.
+    pub rtsp_port: u16,
+    /// What clients must know.
+    pub auth: Auth,
+    /// The only account.
+    pub user: String,
+    /// Its password.
+    pub password: String,
+    /// How long a Digest nonce is good; a later request is answered with `stale=true`.
+    pub nonce_lifetime: Duration,
+    /// MAC address without colons; the realm is `AXIS_` and this.
+    pub serial: String,
+    /// Which parts of ptz.cgi there are.
+    pub ptz_api: PtzApi,
+    /// Time that ptz.cgi and param.cgi take for a request. They take one at a time, in order of arrival.
+    pub service_time: Duration,
+    /// What it looks at.
+    pub world: World,
+    /// How it moves.
+    pub kinematics: Kinematics,
+    /// What it sends.
+    pub video: Video,
+    /// Where it looks at first, and the preset `Home`.
+    pub home: Pose,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            http_port: 0,
+            rtsp_port: 0,
+            auth: Auth::None,
+            user: "root".into(),
+            password: "pass".into(),
+            nonce_lifetime: Duration::from_secs(300),
+            serial: "ACCC8E012345".into(),
+            ptz_api: PtzApi::Classic,
+            service_time: Duration::from_millis(10),
+            world: World::Synthetic(SyntheticSettings::default()),
+            kinematics: Kinematics::default(),
+            video: Video::default(),
+            home: Pose::default(),
+        }
+    }
+}
+
+impl fmt::Debug for Settings {
+    // By hand, so that the password stays out of logs.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Settings")
+            .field("http_port", &self.http_port)
+            .field("rtsp_port", &self.rtsp_port)
+            .field("auth", &self.auth)
+            .field("user", &self.user)
+            .field("world", &self.world)
+            .field("kinematics", &self.kinematics)
+            .field("video", &self.video)
+            .finish_non_exhaustive()
+    }
+}

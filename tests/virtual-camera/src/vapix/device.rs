@@ -1,0 +1,275 @@
+//! The device behind the CGIs: head, lens, parameters, presets.
+
+use std::{collections::BTreeMap, fmt::Write, time::Duration};
+
+use super::{
+    Answer, Args, help,
+    params::Params,
+    ptz::{Adjustment, Preset, Question, Request},
+};
+use crate::{
+    kinematics::{Head, Limits, Motion, Pose, ZOOM_RANGE},
+    settings::{PtzApi, Settings},
+};
+
+/// Everything that requests change.
+pub(crate) struct Device {
+    pub head: Head,
+    pub params: Params,
+    api: PtzApi,
+    limits: Limits,
+    home: Pose,
+    view_size: (u32, u32),
+    /// Focus, iris and brightness in steps.
+    lens: BTreeMap<&'static str, f64>,
+    switches: BTreeMap<&'static str, bool>,
+}
+
+impl Device {
+    pub fn new(settings: &Settings, head: Head, limits: Limits, view_size: (u32, u32)) -> Self {
+        let home = head.now().pose;
+        Self {
+            params: Params::new(settings, &head, limits, view_size),
+            head,
+            api: settings.ptz_api,
+            limits,
+            home,
+            view_size,
+            lens: BTreeMap::from([("iris", 5748.0), ("focus", 4642.0), ("brightness", 4999.0)]),
+            switches: BTreeMap::from([("autofocus", true), ("autoiris", true)]),
+        }
+    }
+
+    /// `ptz.cgi` with `args`, arriving at `now`.
+    pub fn ptz(&mut self, args: &Args, now: Duration) -> Answer {
+        match self.try_ptz(args, now) {
+            Ok(answer) => answer,
+            Err(message) => Answer::error(message),
+        }
+    }
+
+    fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<Answer, String> {
+        let request = Request::parse(args, self.view_size)?;
+        let preset = request.preset.as_ref().map(|preset| self.preset(preset)).transpose()?;
+        self.head.advance(now);
+        for motion in request.motions.into_iter().chain(preset) {
+            self.head.command(now, motion);
+        }
+        for adjustment in request.adjustments {
+            self.adjust(adjustment);
+        }
+        let text = match request.question {
+            None => return Ok(Answer::Accepted),
+            Some(Question::Driver) => "Sony_camblock\r\n".into(),
+            Some(Question::Help) => help::commands(),
+            Some(Question::About(subject)) => self.tell(&subject)?,
+        };
+        Ok(Answer::Text(text))
+    }
+
+    fn preset(&self, preset: &Preset) -> Result<Motion, String> {
+        match preset {
+            Preset::Named(name) if name == "Home" => {}
+            Preset::Numbered(1) => {}
+            Preset::Named(name) => return Err(format!("gotoserverpresetname: no such preset: {name}")),
+            Preset::Numbered(number) => return Err(format!("gotoserverpresetno: no such preset: {number}")),
+        }
+        Ok(Motion::Absolute {
+            pan_deg: Some(self.home.pan_deg),
+            tilt_deg: Some(self.home.tilt_deg),
+            zoom_step: Some(self.home.zoom_step),
+        })
+    }
+
+    fn adjust(&mut self, adjustment: Adjustment) {
+        match adjustment {
+            Adjustment::To(name, value) => *self.lens.entry(name).or_default() = value,
+            Adjustment::By(name, value) => {
+                let step = self.lens.entry(name).or_default();
+                *step = (*step + value).clamp(ZOOM_RANGE.0, ZOOM_RANGE.1);
+            }
+            Adjustment::Switch(name, on) => *self.switches.entry(name).or_default() = on,
+        }
+    }
+
+    fn tell(&self, subject: &str) -> Result<String, String> {
+        Ok(match subject {
+            "position" => self.position(),
+            "limits" => self.limits(),
+            "speed" => format!("speed={}\r\n", self.head.move_speed()),
+            "mode" => "mode=normal\r\n".into(),
+            "presetposall" => "Preset Positions for camera 1\r\npresetposno1=Home\r\n".into(),
+            "presetposcam" => "Preset Positions for camera 1\r\npresetposno1=Home\r\n".into(),
+            "presetposcamdata" => format!(
+                "Preset Positions for camera 1\r\npresetposno1=Home\r\n\
+                 presetposno1.data=tilt={:.6}:pan={:.6}:zoom={:.6}\r\n",
+                self.home.tilt_deg, self.home.pan_deg, self.home.zoom_step
+            ),
+            "auxiliary" => "Available auxiliary commands for camera 1\r\n".into(),
+            "attributes" if self.api == PtzApi::Extended => self.attributes(),
+            _ => return Err(format!("query: unknown value: {subject}")),
+        })
+    }
+
+    fn position(&self) -> String {
+        let pose = self.head.now().pose;
+        let mut text = String::new();
+        let step = |name: &str| self.lens.get(name).copied().unwrap_or_default();
+        let switch = |name: &str| if self.switches.get(name) == Some(&true) { "on" } else { "off" };
+        for (name, value) in [
+            ("pan", format!("{:.4}", pose.pan_deg)),
+            ("tilt", format!("{:.4}", pose.tilt_deg)),
+            ("zoom", format!("{:.0}", pose.zoom_step)),
+            ("iris", format!("{:.0}", step("iris"))),
+            ("focus", format!("{:.0}", step("focus"))),
+            ("brightness", format!("{:.0}", step("brightness"))),
+            ("autofocus", switch("autofocus").into()),
+            ("autoiris", switch("autoiris").into()),
+        ] {
+            let _ = write!(text, "{name}={value}\r\n");
+        }
+        text
+    }
+
+    fn limits(&self) -> String {
+        let (wide, narrow) = field_angles(&self.head);
+        let mut text = String::new();
+        for (name, low, high) in [
+            ("Pan", self.limits.pan_deg.0, self.limits.pan_deg.1),
+            ("Tilt", self.limits.tilt_deg.0, self.limits.tilt_deg.1),
+            ("Zoom", ZOOM_RANGE.0, ZOOM_RANGE.1),
+            ("Iris", 1.0, 9999.0),
+            ("Focus", 770.0, 9999.0),
+            ("FieldAngle", f64::from(narrow), f64::from(wide)),
+            ("Brightness", 1.0, 9999.0),
+        ] {
+            let _ = write!(text, "Min{name}={low}\r\nMax{name}={high}\r\n");
+        }
+        text
+    }
+
+    /// Degrees per second of some speed steps, as newer firmware tells them.
+    fn attributes(&self) -> String {
+        let map = &self.head.kinematics().speed_map;
+        let speeds: Vec<String> = [1, 9, 14, 24, 40, 58, 80, 100]
+            .iter()
+            .map(|&step| format!("value={step} | speed={:.2}", map.deg_s(f64::from(step))))
+            .collect();
+        let magnification = self.head.optics().max_magnification;
+        format!(
+            "Attributes for camera 1\r\nspeeds={}\r\nmaxOpticalZoomMag={magnification}\r\n",
+            speeds.join(",")
+        )
+    }
+
+    /// `param.cgi` with `args`.
+    pub fn param(&mut self, args: &Args) -> Answer {
+        let answer = self.params.answer(args);
+        let proportional = &mut self.head.kinematics_mut().proportional_speed;
+        self.params.apply_to(proportional);
+        answer
+    }
+}
+
+/// Widest and narrowest horizontal field of view in tenths of a degree, as `PTZ.Limit` has them.
+pub(super) fn field_angles(head: &Head) -> (u32, u32) {
+    let tenths = |zoom_step| (head.optics().fov_deg(zoom_step) * 10.0).round() as u32;
+    (tenths(ZOOM_RANGE.0), tenths(ZOOM_RANGE.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{
+        kinematics::{Kinematics, Optics},
+        vapix::parse_args,
+    };
+
+    fn device(api: PtzApi) -> Device {
+        let settings = Settings { ptz_api: api, ..Settings::default() };
+        let limits = Limits { pan_deg: (-20.5, 20.5), tilt_deg: (-9.25, 9.25) };
+        let optics = Optics { wide_fov_deg: 55.2, max_magnification: 18.0 };
+        let head = Head::new(Kinematics::default(), optics, limits, Pose::default(), Duration::from_secs(1));
+        Device::new(&settings, head, limits, (640, 480))
+    }
+
+    fn ask(device: &mut Device, query: &str, seconds: u64) -> Answer {
+        device.ptz(&parse_args(query.as_bytes()), Duration::from_secs(seconds))
+    }
+
+    fn text(answer: Answer) -> String {
+        match answer {
+            Answer::Text(text) => text,
+            Answer::Accepted => panic!("no text"),
+        }
+    }
+
+    #[test]
+    fn positions_are_clamped_and_told() {
+        let mut device = device(PtzApi::Classic);
+        assert_eq!(
+            ask(&mut device, "pan=150&tilt=-4.5&zoom=100&focus=900&autofocus=off", 1),
+            Answer::Accepted
+        );
+        assert_eq!(
+            text(ask(&mut device, "query=position", 9)),
+            "pan=20.5000\r\ntilt=-4.5000\r\nzoom=100\r\niris=5748\r\nfocus=900\r\n\
+             brightness=4999\r\nautofocus=off\r\nautoiris=on\r\n"
+        );
+        assert_eq!(ask(&mut device, "gotoserverpresetname=Home", 9), Answer::Accepted);
+        assert!(
+            text(ask(&mut device, "query=position", 20))
+                .starts_with("pan=0.0000\r\ntilt=0.0000\r\nzoom=1\r\n")
+        );
+    }
+
+    #[test]
+    fn limits_are_told() {
+        let text = text(ask(&mut device(PtzApi::Classic), "query=limits&camera=1", 0));
+        assert!(text.starts_with("MinPan=-20.5\r\nMaxPan=20.5\r\nMinTilt=-9.25\r\nMaxTilt=9.25\r\nMinZoom=1\r\nMaxZoom=9999\r\n"), "{text}");
+        assert!(text.contains("MinFieldAngle=33\r\nMaxFieldAngle=552\r\n"), "{text}");
+    }
+
+    #[test]
+    fn attributes_come_with_newer_firmware_only() {
+        let query = "query=attributes&camera=1&format=text";
+        assert_eq!(
+            ask(&mut device(PtzApi::Classic), query, 0),
+            Answer::Text("Error:query: unknown value: attributes\r\n".into())
+        );
+        let text = text(ask(&mut device(PtzApi::Extended), query, 0));
+        assert!(text.contains("value=1 | speed=0.05,"), "{text}");
+        assert!(text.contains("value=100 | speed=450.00\r\n"), "{text}");
+    }
+
+    #[test]
+    fn errors_are_texts_and_change_nothing() {
+        let mut device = device(PtzApi::Classic);
+        for query in ["query=foo", "gotoserverpresetname=Nowhere&pan=5", "pan=5&tilt=x", "camera=2&pan=5"] {
+            assert!(text(ask(&mut device, query, 1)).starts_with("Error:"), "{query}");
+        }
+        assert!(device.head.is_at_rest());
+    }
+
+    #[test]
+    fn questions_of_all_kinds_are_answered() {
+        let mut device = device(PtzApi::Classic);
+        for (query, beginning) in [
+            ("whoami=1", "Sony_camblock\r\n"),
+            ("info=1", "Available commands\r\n:\r\n{camera=[n]}\r\n"),
+            ("query=speed", "speed=100\r\n"),
+            ("query=mode", "mode=normal\r\n"),
+            ("query=presetposall", "Preset Positions for camera 1\r\npresetposno1=Home\r\n"),
+        ] {
+            assert!(text(ask(&mut device, query, 1)).starts_with(beginning), "{query}");
+        }
+    }
+
+    #[test]
+    fn proportional_speed_is_switched_by_parameter() {
+        let mut device = device(PtzApi::Classic);
+        let update = "action=update&PTZ.Various.V1.ProportionalSpeedEnabled=false";
+        assert_eq!(device.param(&parse_args(update.as_bytes())), Answer::Text("OK\n".into()));
+        assert!(!device.head.kinematics().proportional_speed.enabled);
+    }
+}

@@ -1,0 +1,30 @@
+//! The words of VAPIX: requests understood, answers spelt. No network here.
+
+pub(crate) mod device;
+mod help;
+pub(crate) mod params;
+mod ptz;
+
+/// Name and value pairs of a request, decoded, in their order.
+pub(crate) type Args = Vec<(String, String)>;
+
+/// Takes a query or a form apart.
+pub(crate) fn parse_args(encoded: &[u8]) -> Args {
+    form_urlencoded::parse(encoded).into_owned().collect()
+}
+
+/// What a CGI says.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(crate) enum Answer {
+    /// 204: accepted.
+    Accepted,
+    /// 200 with text.
+    Text(String),
+}
+
+impl Answer {
+    /// A failure, which VAPIX reports as success with a text.
+    fn error(message: impl std::fmt::Display) -> Self {
+        Self::Text(format!("Error:{message}\r\n"))
+    }
+}
