@@ -1,13 +1,24 @@
 //! Everything that computes on pictures: plain types, tested by themselves.
 
+mod background;
+mod contours;
+mod detector;
 mod draw;
 mod luma;
+mod morphology;
+mod persistence;
+mod reduce;
 mod scene;
 mod tracker;
 mod trail;
+mod zones;
 
+pub use background::{Background, Criterion, ForegroundTest};
+pub use contours::{Grid, fill_regions, regions};
+pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, Patch, Shape, draw, text_width};
 pub use luma::{Luma, LumaError};
 pub use scene::{FrameSize, Parts, Seen, Spot, scene};
 pub use tracker::{Choice, Config, Detection, Profile, Report, Tracker};
 pub use trail::Trail;
+pub use zones::{ZoneError, Zones, zone_mask};

@@ -1,0 +1,497 @@
+use std::time::Duration;
+
+use opencv::core::{self, CV_8UC1, Mat, Scalar};
+use opencv::prelude::*;
+use ptztrack_contract::Region;
+
+use super::background::{Background, Criterion};
+use super::contours::{Grid, fill_regions, regions};
+use super::morphology::clean;
+use super::persistence::Persistence;
+use super::reduce::{divisor, with_reduced};
+use super::zones::{Zones, zone_mask};
+use super::{Luma, LumaError};
+
+/// Side of the opening, pixels of the reduced picture: specks of one or two pixels are noise.
+const AUTO_OPEN: usize = 3;
+/// The closing's side is this part of the picture's height.
+const AUTO_CLOSE: usize = 16;
+
+/// Which regions are reported.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RegionChoice {
+    /// The one whose contour is longest (thesis 3.4.1).
+    LargestPerimeter,
+    /// All of them.
+    All,
+}
+
+/// What the detector goes by; may change from picture to picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectorConfig {
+    /// Pictures wider than this many pixels are reduced before they are looked at; 0: never.
+    pub analysis_width: usize,
+    /// Weight of a new picture in the running mean (thesis 3.1), 0 to 1, ...
+    pub alpha: f64,
+    /// ... of pictures that are this far apart; scaled for others. Zero: whatever their distance.
+    pub alpha_interval: Duration,
+    /// What makes a pixel foreground.
+    pub criterion: Criterion,
+    /// Side of the opening's square in pixels of the whole picture; `None` chooses.
+    pub open_size: Option<usize>,
+    /// Side of the closing's square in pixels of the whole picture; `None` chooses.
+    pub close_size: Option<usize>,
+    /// Which regions are reported.
+    pub choice: RegionChoice,
+    /// Smallest area that counts, as a fraction of the picture.
+    pub min_area: f64,
+    /// Largest area that counts, as a fraction of the picture.
+    pub max_area: f64,
+    /// Where to look; everywhere, where there are none.
+    pub zones: Zones,
+    /// Where not to look.
+    pub exclude_zones: Zones,
+    /// Pictures from which the background is learned before anything is reported.
+    pub warm_up: u32,
+    /// When more than this fraction of the picture is foreground, the background is learned anew.
+    pub relearn_fraction: f64,
+    /// A region is reported in the picture that shows it for the so-manieth time in a row.
+    pub confirm_pictures: u32,
+}
+
+impl DetectorConfig {
+    /// The weight of a picture that comes `elapsed` after the one before: (3.1) applied as often as
+    /// `alpha_interval` fits into that time.
+    fn weight(&self, elapsed: Duration) -> f64 {
+        if self.alpha_interval.is_zero() {
+            return self.alpha;
+        }
+        1.0 - (1.0 - self.alpha).powf(elapsed.as_secs_f64() / self.alpha_interval.as_secs_f64())
+    }
+}
+
+/// A picture that could not be looked at.
+#[derive(Debug, thiserror::Error)]
+pub enum DetectorError {
+    /// OpenCV refused.
+    #[error(transparent)]
+    OpenCv(#[from] opencv::Error),
+    /// The reduced picture is not what it should be.
+    #[error(transparent)]
+    Luma(#[from] LumaError),
+}
+
+/// Finds what moves in a still picture: thesis 3.2 to 3.4 in a row.
+#[derive(Debug, Default)]
+pub struct Detector {
+    background: Background,
+    persistence: Persistence,
+    /// Pictures learned since the last start.
+    learned: u32,
+    frame: (usize, usize),
+    divisor: usize,
+    reduced: Mat,
+    /// Foreground of the last picture, cleaned; as large as the reduced picture.
+    mask: Mat,
+    zones: Option<ZoneCache>,
+}
+
+/// The mask of zones, drawn once.
+#[derive(Debug)]
+struct ZoneCache {
+    zones: Zones,
+    exclude_zones: Zones,
+    size: core::Size,
+    mask: Option<Mat>,
+}
+
+impl Detector {
+    /// Forgets the background: the next pictures are learned before anything is reported.
+    pub fn relearn(&mut self) {
+        self.background.restart();
+        self.persistence.restart();
+        self.learned = 0;
+        self.mask = Mat::default();
+    }
+
+    /// Looks at the next picture, `elapsed` after the one before. Gives the moving regions, longest
+    /// perimeter first, or `None` while it learns.
+    pub fn process(
+        &mut self,
+        luma: &Luma,
+        elapsed: Duration,
+        config: &DetectorConfig,
+    ) -> Result<Option<Vec<Region>>, DetectorError> {
+        let frame = (luma.width(), luma.height());
+        let divisor = divisor(luma.width(), config.analysis_width).min(frame.1.max(1));
+        if (self.frame, self.divisor) != (frame, divisor) {
+            self.relearn();
+            (self.frame, self.divisor) = (frame, divisor);
+        }
+        if frame.0 == 0 || frame.1 == 0 {
+            return Ok(None);
+        }
+        let mut kept = std::mem::take(&mut self.reduced);
+        let foreground =
+            with_reduced(luma, divisor, &mut kept, |small| self.subtract(small, elapsed, config));
+        self.reduced = kept;
+        if foreground? > config.relearn_fraction {
+            self.relearn();
+        }
+        if self.learned < config.warm_up.max(1) {
+            self.learned += 1;
+            self.mask = Mat::default();
+            return Ok(None);
+        }
+        self.find(config).map(Some)
+    }
+
+    /// Updates the background; leaves the foreground in `mask` and gives its fraction of the picture.
+    fn subtract(
+        &mut self,
+        luma: &Luma,
+        elapsed: Duration,
+        config: &DetectorConfig,
+    ) -> Result<f64, DetectorError> {
+        let (rows, columns) = (luma.height() as i32, luma.width() as i32);
+        if (self.mask.rows(), self.mask.cols()) != (rows, columns) {
+            self.mask = Mat::new_rows_cols_with_default(rows, columns, CV_8UC1, Scalar::all(0.0))?;
+        }
+        // While it learns, the mean is the plain average of all pictures.
+        let average = if self.learned < config.warm_up { 1.0 / f64::from(self.learned + 1) } else { 0.0 };
+        let weight = config.weight(elapsed).max(average);
+        self.background.update(luma, weight, config.criterion, self.mask.data_bytes_mut()?);
+        Ok(f64::from(core::count_non_zero(&self.mask)?) / (f64::from(rows) * f64::from(columns)))
+    }
+
+    /// The regions of the foreground in `mask`.
+    fn find(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
+        self.look_in_zones(config)?;
+        let (open_size, close_size) = self.sizes(config);
+        clean(&mut self.mask, open_size, close_size)?;
+        let mut found = regions(&self.mask, self.grid())?;
+        found.retain(|region| (config.min_area..=config.max_area).contains(&region.area));
+        let mut found = self.persistence.confirmed(found, config.confirm_pictures);
+        if config.choice == RegionChoice::LargestPerimeter {
+            found.truncate(1);
+        }
+        Ok(found)
+    }
+
+    fn look_in_zones(&mut self, config: &DetectorConfig) -> opencv::Result<()> {
+        let size = self.mask.size()?;
+        let fits = |cache: &ZoneCache| {
+            cache.size == size && cache.zones == config.zones && cache.exclude_zones == config.exclude_zones
+        };
+        let cache = match self.zones.take().filter(fits) {
+            Some(cache) => cache,
+            None => ZoneCache {
+                zones: config.zones.clone(),
+                exclude_zones: config.exclude_zones.clone(),
+                size,
+                mask: zone_mask(
+                    &config.zones,
+                    &config.exclude_zones,
+                    size.width as usize,
+                    size.height as usize,
+                )?,
+            },
+        };
+        if let Some(zone) = &cache.mask {
+            let mut inside = Mat::default();
+            core::bitwise_and_def(&self.mask, zone, &mut inside)?;
+            self.mask = inside;
+        }
+        self.zones = Some(cache);
+        Ok(())
+    }
+
+    /// Sides of opening and closing in pixels of the mask.
+    fn sizes(&self, config: &DetectorConfig) -> (usize, usize) {
+        let reduced = |size: usize| (size + self.divisor / 2) / self.divisor;
+        let height = self.frame.1 / self.divisor;
+        (
+            config.open_size.map_or(AUTO_OPEN, reduced),
+            config.close_size.map_or((height / AUTO_CLOSE).max(3), reduced),
+        )
+    }
+
+    fn grid(&self) -> Grid {
+        let in_mask = |size: usize| size as f64 / self.divisor as f64;
+        Grid { width: in_mask(self.frame.0), height: in_mask(self.frame.1) }
+    }
+
+    /// What it took for foreground in the last picture, cleaned, in the size of the frame: each row of
+    /// `out` is `stride` bytes, and every `step`th of them is set, 255 for foreground, 0 for background.
+    pub fn draw_mask(&self, out: &mut [u8], stride: usize, step: usize) -> opencv::Result<()> {
+        self.enlarge(&self.mask, out, stride, step)
+    }
+
+    /// The same of what `regions`, found in the last picture, enclose.
+    pub fn draw_regions(
+        &self,
+        regions: &[Region],
+        out: &mut [u8],
+        stride: usize,
+        step: usize,
+    ) -> opencv::Result<()> {
+        let mut filled = self.mask.try_clone()?;
+        fill_regions(&mut filled, regions, self.grid())?;
+        self.enlarge(&filled, out, stride, step)
+    }
+
+    fn enlarge(&self, mask: &Mat, out: &mut [u8], stride: usize, step: usize) -> opencv::Result<()> {
+        let columns = mask.cols().max(1) as usize;
+        let pixels = if mask.empty() { &[] } else { mask.data_bytes()? };
+        let mut rows = pixels.chunks_exact(columns);
+        for lines in out.chunks_mut(stride * self.divisor.max(1)) {
+            let row = rows.next().unwrap_or(&[]);
+            for line in lines.chunks_mut(stride) {
+                for (x, pixel) in line.iter_mut().step_by(step).enumerate() {
+                    *pixel = row.get(x / self.divisor.max(1)).copied().unwrap_or(0);
+                }
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::background::ForegroundTest;
+    use super::*;
+    use proptest::prelude::*;
+
+    const WIDTH: usize = 160;
+    const HEIGHT: usize = 120;
+    const STEP: Duration = Duration::from_millis(40);
+
+    fn config() -> DetectorConfig {
+        DetectorConfig {
+            analysis_width: 640,
+            alpha: 0.5,
+            alpha_interval: Duration::from_millis(400),
+            criterion: Criterion { test: ForegroundTest::Relative { threshold: 0.15 }, noise_floor: 12.0 },
+            open_size: None,
+            close_size: None,
+            choice: RegionChoice::LargestPerimeter,
+            min_area: 0.001,
+            max_area: 0.8,
+            zones: Zones::default(),
+            exclude_zones: Zones::default(),
+            warm_up: 4,
+            relearn_fraction: 0.5,
+            confirm_pictures: 2,
+        }
+    }
+
+    /// A grey picture with fixed noise of ±3 and bright boxes at these places (pixels).
+    fn picture(boxes: &[(usize, usize, usize, usize)]) -> Vec<u8> {
+        let mut noise = 12345u32;
+        let mut picture: Vec<u8> = std::iter::repeat_with(|| {
+            noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            97 + (noise >> 24) as u8 % 7
+        })
+        .take(WIDTH * HEIGHT)
+        .collect();
+        for (x, y, width, height) in boxes {
+            for row in picture.chunks_exact_mut(WIDTH).skip(*y).take(*height) {
+                row[*x..x + width].fill(200);
+            }
+        }
+        picture
+    }
+
+    fn look(detector: &mut Detector, picture: &[u8], config: &DetectorConfig) -> Option<Vec<Region>> {
+        let luma = Luma::new(picture, WIDTH, HEIGHT, WIDTH).unwrap();
+        detector.process(&luma, STEP, config).unwrap()
+    }
+
+    /// A detector that has learned the empty picture.
+    fn learned(config: &DetectorConfig) -> Detector {
+        let mut detector = Detector::default();
+        for _ in 0..config.warm_up {
+            assert_eq!(look(&mut detector, &picture(&[]), config), None);
+        }
+        assert_eq!(look(&mut detector, &picture(&[]), config), Some(vec![]));
+        detector
+    }
+
+    /// What is found when these boxes stay for two pictures.
+    fn found(config: &DetectorConfig, boxes: &[(usize, usize, usize, usize)]) -> Vec<Region> {
+        let mut detector = learned(config);
+        look(&mut detector, &picture(boxes), config);
+        look(&mut detector, &picture(boxes), config).unwrap()
+    }
+
+    #[test]
+    fn a_box_is_found_where_it_is() {
+        let regions = found(&config(), &[(40, 30, 20, 60)]);
+        let [region] = regions.as_slice() else { panic!("{regions:?}") };
+        assert_eq!(region.bounds.to_pixels(WIDTH as u32, HEIGHT as u32), (40, 30, 20, 60));
+        assert!((region.centroid.x - 50.0 / 160.0).abs() < 0.01);
+    }
+
+    #[test]
+    fn a_region_must_be_confirmed() {
+        let config = config();
+        let mut detector = learned(&config);
+        assert_eq!(look(&mut detector, &picture(&[(40, 30, 20, 60)]), &config), Some(vec![]));
+        assert_eq!(look(&mut detector, &picture(&[(44, 30, 20, 60)]), &config).unwrap().len(), 1);
+    }
+
+    #[test]
+    fn choice_is_the_longest_perimeter_or_all() {
+        let boxes = [(10, 10, 30, 30), (70, 100, 80, 8)];
+        let largest = found(&config(), &boxes);
+        assert_eq!(largest.len(), 1);
+        assert!(largest[0].bounds.width > 0.4);
+        assert_eq!(found(&DetectorConfig { choice: RegionChoice::All, ..config() }, &boxes).len(), 2);
+    }
+
+    #[test]
+    fn areas_outside_the_limits_do_not_count() {
+        let boxes = [(10, 10, 8, 8), (70, 20, 80, 80)];
+        let all = DetectorConfig { choice: RegionChoice::All, ..config() };
+        assert_eq!(found(&all, &boxes).len(), 2);
+        let large = found(&DetectorConfig { min_area: 0.01, ..all.clone() }, &boxes);
+        assert_eq!(large.len(), 1);
+        assert!(large[0].bounds.width > 0.4);
+        let small = found(&DetectorConfig { max_area: 0.01, ..all }, &boxes);
+        assert_eq!(small.len(), 1);
+        assert!(small[0].bounds.width < 0.1);
+    }
+
+    #[test]
+    fn only_zones_are_looked_at() {
+        let boxes = [(10, 30, 20, 60), (100, 30, 20, 60)];
+        let all = DetectorConfig { choice: RegionChoice::All, ..config() };
+        let left = "0,0 0.5,0 0.5,1 0,1".parse::<Zones>().unwrap();
+        let inside = found(&DetectorConfig { zones: left.clone(), ..all.clone() }, &boxes);
+        assert_eq!(inside.len(), 1);
+        assert!(inside[0].centroid.x < 0.5);
+        let outside = found(&DetectorConfig { exclude_zones: left, ..all }, &boxes);
+        assert_eq!(outside.len(), 1);
+        assert!(outside[0].centroid.x > 0.5);
+    }
+
+    #[test]
+    fn zones_may_change_between_pictures() {
+        let mut config = config();
+        let boxes = [(10, 30, 20, 60)];
+        let mut detector = learned(&config);
+        look(&mut detector, &picture(&boxes), &config);
+        assert_eq!(look(&mut detector, &picture(&boxes), &config).unwrap().len(), 1);
+        config.exclude_zones = "0,0 0.5,0 0.5,1 0,1".parse().unwrap();
+        assert_eq!(look(&mut detector, &picture(&boxes), &config), Some(vec![]));
+    }
+
+    #[test]
+    fn light_switched_on_is_learned_anew_and_found_nowhere() {
+        let config = config();
+        let mut detector = learned(&config);
+        let bright: Vec<u8> = picture(&[]).iter().map(|pixel| pixel + 80).collect();
+        for _ in 0..config.warm_up {
+            assert_eq!(look(&mut detector, &bright, &config), None);
+        }
+        for _ in 0..20 {
+            assert_eq!(look(&mut detector, &bright, &config).unwrap_or_default(), []);
+        }
+        assert_eq!(look(&mut detector, &bright, &config), Some(vec![]));
+    }
+
+    #[test]
+    fn another_size_is_learned_anew() {
+        let config = config();
+        let mut detector = learned(&config);
+        let data = picture(&[]);
+        let narrow = Luma::new(&data, WIDTH - 1, HEIGHT, WIDTH).unwrap();
+        assert_eq!(detector.process(&narrow, STEP, &config).unwrap(), None);
+    }
+
+    #[test]
+    fn reduced_picture_finds_the_same_place() {
+        let regions = found(&DetectorConfig { analysis_width: 50, ..config() }, &[(40, 32, 40, 60)]);
+        let [region] = regions.as_slice() else { panic!("{regions:?}") };
+        let centre = region.bounds.centre();
+        assert!(
+            (centre.x - 60.0 / 160.0).abs() < 0.02 && (centre.y - 62.0 / 120.0).abs() < 0.03,
+            "{centre:?}"
+        );
+    }
+
+    #[test]
+    fn weight_depends_on_the_time_that_passed() {
+        let config = config();
+        let after = |milliseconds| config.weight(Duration::from_millis(milliseconds));
+        assert!((after(400) - 0.5).abs() < 1e-12);
+        assert!((after(800) - 0.75).abs() < 1e-12);
+        assert_eq!(after(0), 0.0);
+        // Twice 200 ms weigh as much as once 400 ms.
+        assert!(((1.0 - after(200)).powi(2) - 0.5).abs() < 1e-12);
+        let thesis = DetectorConfig { alpha_interval: Duration::ZERO, ..config.clone() };
+        assert_eq!(thesis.weight(Duration::from_millis(7)), 0.5);
+    }
+
+    #[test]
+    fn mask_and_regions_are_drawn_in_the_size_of_the_frame() {
+        let config = DetectorConfig { analysis_width: 100, ..config() };
+        let boxes = [(40, 32, 20, 60), (100, 20, 16, 40)];
+        let mut detector = learned(&config);
+        look(&mut detector, &picture(&boxes), &config);
+        let regions = look(&mut detector, &picture(&boxes), &config).unwrap();
+        let mut mask = vec![9; (WIDTH + 3) * HEIGHT];
+        detector.draw_mask(&mut mask, WIDTH + 3, 1).unwrap();
+        let at = |drawn: &[u8], x: usize, y: usize| drawn[y * (WIDTH + 3) + x];
+        assert_eq!((at(&mask, 50, 60), at(&mask, 108, 40), at(&mask, 80, 40)), (255, 255, 0));
+        detector.draw_regions(&regions, &mut mask, WIDTH + 3, 1).unwrap();
+        assert_eq!((at(&mask, 50, 60), at(&mask, 108, 40), at(&mask, 80, 40)), (255, 0, 0));
+        let mut rgba = vec![9; WIDTH * 4 * HEIGHT];
+        detector.draw_regions(&regions, &mut rgba[3..], WIDTH * 4, 4).unwrap();
+        let pixel = |x: usize, y: usize| &rgba[(y * WIDTH + x) * 4..][..4];
+        assert_eq!((pixel(50, 60), pixel(80, 40)), (&[9, 9, 9, 255][..], &[9, 9, 9, 0][..]));
+    }
+
+    #[test]
+    fn while_it_learns_the_mask_is_black() {
+        let config = config();
+        let mut detector = learned(&config);
+        look(&mut detector, &picture(&[(40, 32, 20, 60)]), &config);
+        detector.relearn();
+        look(&mut detector, &picture(&[(40, 32, 20, 60)]), &config);
+        let mut mask = vec![9; WIDTH * HEIGHT];
+        detector.draw_mask(&mut mask, WIDTH, 1).unwrap();
+        assert!(mask.iter().all(|pixel| *pixel == 0));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(32))]
+        #[test]
+        fn any_size_and_setting_is_looked_at(
+            width in 0usize..70, height in 0usize..40, padding in 0usize..3, analysis_width in 0usize..80,
+            open_size in 0usize..90, close_size in 0usize..90, seed in any::<u64>(),
+        ) {
+            let config = DetectorConfig {
+                analysis_width, open_size: Some(open_size), close_size: Some(close_size),
+                choice: RegionChoice::All, min_area: 0.0, warm_up: 1, relearn_fraction: 1.0,
+                confirm_pictures: 1, ..config()
+            };
+            let mut detector = Detector::default();
+            let stride = width + padding;
+            for step in 0..4u64 {
+                let data: Vec<u8> = (0..stride * height)
+                    .map(|i| (seed.wrapping_mul(i as u64 * 31 + step + 1) >> 56) as u8)
+                    .collect();
+                let luma = Luma::new(&data, width, height, stride).unwrap();
+                for region in detector.process(&luma, STEP, &config).unwrap().unwrap_or_default() {
+                    prop_assert!(region.bounds.x >= 0.0 && region.bounds.x + region.bounds.width <= 1.0 + 1e-9);
+                    prop_assert!(region.bounds.contains(region.centroid));
+                }
+                let mut mask = vec![0; stride * height];
+                if stride > 0 {
+                    detector.draw_mask(&mut mask, stride, 1).unwrap();
+                }
+            }
+        }
+    }
+}
