@@ -227,6 +227,11 @@ impl Pilot {
         !self.scheduler.may_move()
     }
 
+    /// Whether there is a target to follow.
+    pub fn has_target(&self) -> bool {
+        self.target.is_some()
+    }
+
     /// Whether nothing may be sent until a setting changes.
     pub fn halted(&self) -> bool {
         self.link.halted()

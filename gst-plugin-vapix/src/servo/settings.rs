@@ -44,17 +44,17 @@ pub struct ServoSettings {
 impl Default for ServoSettings {
     fn default() -> Self {
         Self {
-            mode: Mode::Velocity,
+            mode: Mode::default(),
             gain: 2.0,
             dead_zone: 0.03,
             max_speed_deg_s: 100.0,
             max_rate_hz: 10.0,
             latency: Duration::from_millis(200),
             fov_deg: None,
-            prediction: Prediction::Lead,
+            prediction: Prediction::default(),
             stale_timeout: Duration::from_secs(1),
             camera_speed_deg_s: 450.0,
-            speed_curve: SpeedCurve::Cubic,
+            speed_curve: SpeedCurve::default(),
         }
     }
 }

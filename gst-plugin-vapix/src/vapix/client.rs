@@ -66,6 +66,13 @@ impl Client {
         &self.settings
     }
 
+    /// Takes another user or password, and asks again even where the last were refused.
+    pub fn set_credentials(&mut self, credentials: Option<Credentials>) {
+        self.authenticator = Authenticator::new(credentials.clone());
+        self.settings.credentials = credentials;
+        self.locked_out = false;
+    }
+
     /// Commands a move. `Ok` means that the camera accepted it, not that it has finished.
     ///
     /// # Errors

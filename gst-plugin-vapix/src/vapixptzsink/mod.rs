@@ -1,5 +1,125 @@
-//! Element `vapixptzsink`.
+//! SECTION:element-vapixptzsink
+//!
+//! # vapixptzsink
+//!
+//! Steers an Axis pan-tilt-zoom camera so that the target stays in the middle of the picture
+//! (thesis 3.6). Takes the video with the target meta that `lkfeaturetrack` attaches; the pixels
+//! themselves are not looked at, so that any raw video in any memory will do.
+//!
+//! Nothing here waits for the network in the streaming thread: the newest target is left for a task
+//! that talks to the camera, with one request in flight, the newest target first and at most
+//! `max-rate` commands a second. `sync` and `async` are off by default: a late target is worth
+//! nothing, and a pipeline must not wait for this sink to preroll.
+//!
+//! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a
+//! flush, when leaving PLAYING, and when the element goes to READY or NULL. A stop is repeated until
+//! the camera says yes; leaving PLAYING waits for that at most 1 s, the end at most 2.5 s.
+//!
+//! User and password are taken from `user` and `password`, from `location`
+//! (`http://user:password@host`, where they are taken out at once), or from the environment variables
+//! `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process lists and of the parser's log.
+//! `user`, `password` and everything about the servo can be changed while playing; `location`,
+//! `camera`, `timeout`, `ca-file` and `insecure` count from the next READY to PAUSED on.
+//!
+//! ## Messages and events
+//! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
+//! `at-limit`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end.
+//! Upstream events `ptztrack-camera-state` tell detector and tracker what the camera does.
+//!
+//! ## Example pipelines
+//! ```sh
+//! gst-launch-1.0 videotestsrc num-buffers=25 ! video/x-raw,width=320,height=240 ! vapixptzsink location=http://192.168.0.90 user=root password=pass
+//! ```
+//! A camera that is spoken to over HTTPS with a certificate of its own making, and never faster than 30 degrees a second:
+//! ```sh
+//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 insecure=true max-speed=30 mode=velocity
+//! ```
 
-pub(crate) fn register(_plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
-    Ok(())
+use glib::prelude::*;
+
+use crate::servo;
+
+#[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
+mod imp;
+mod inbox;
+mod settings;
+mod worker;
+
+/// How the camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstVapixPtzSinkMode")]
+pub enum Mode {
+    /// `continuouspantiltmove`
+    #[default]
+    #[enum_value(name = "Continuously, by speed (continuouspantiltmove)", nick = "velocity")]
+    Velocity,
+    /// `pan` and `tilt`
+    #[enum_value(name = "From position to position (pan, tilt)", nick = "absolute")]
+    Absolute,
+    /// `center`
+    #[enum_value(name = "By pixels, the camera works out the angles (center)", nick = "centre")]
+    Centre,
+}
+
+/// How the target's motion is carried forward.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstVapixPtzSinkPrediction")]
+pub enum Prediction {
+    /// Thesis 3.16.
+    #[enum_value(name = "With its mean over the last second (thesis 3.16)", nick = "average")]
+    Average,
+    /// Over the last moments.
+    #[default]
+    #[enum_value(name = "With its mean over the last 0.3 s", nick = "lead")]
+    Lead,
+}
+
+/// How the camera's speed grows with the speed step.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstVapixPtzSinkSpeedCurve")]
+pub enum SpeedCurve {
+    /// In proportion.
+    #[enum_value(name = "In proportion to the step", nick = "linear")]
+    Linear,
+    /// By the cube.
+    #[default]
+    #[enum_value(name = "By the cube of the step (Axis' example table)", nick = "cubic")]
+    Cubic,
+}
+
+impl From<Mode> for servo::Mode {
+    fn from(mode: Mode) -> Self {
+        match mode {
+            Mode::Velocity => Self::Velocity,
+            Mode::Absolute => Self::Absolute,
+            Mode::Centre => Self::Centre,
+        }
+    }
+}
+
+impl From<Prediction> for servo::Prediction {
+    fn from(prediction: Prediction) -> Self {
+        match prediction {
+            Prediction::Average => Self::Average,
+            Prediction::Lead => Self::Lead,
+        }
+    }
+}
+
+impl From<SpeedCurve> for servo::SpeedCurve {
+    fn from(curve: SpeedCurve) -> Self {
+        match curve {
+            SpeedCurve::Linear => Self::Linear,
+            SpeedCurve::Cubic => Self::Cubic,
+        }
+    }
+}
+
+glib::wrapper! {
+    /// The element `vapixptzsink`.
+    pub struct VapixPtzSink(ObjectSubclass<imp::VapixPtzSink>) @extends gst_base::BaseSink, gst::Element, gst::Object;
+}
+
+pub(crate) fn register(plugin: &gst::Plugin) -> Result<(), glib::BoolError> {
+    gst::Element::register(Some(plugin), "vapixptzsink", gst::Rank::NONE, VapixPtzSink::static_type())
 }

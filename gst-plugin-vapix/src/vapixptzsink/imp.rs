@@ -1,0 +1,559 @@
+use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+use glib::Properties;
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+use gst_base::prelude::*;
+use gst_base::subclass::prelude::*;
+use ptztrack_contract::{
+    BufferMeta, CameraChange, CameraEvent, CameraMessage, TargetMeta, TargetState, Times,
+};
+
+use super::settings::Settings;
+use super::worker::{Event, Worker};
+use super::{Mode, Prediction, SpeedCurve};
+use crate::servo::{Job, LinkChange, Report, Sight, Status, View, Visibility};
+use crate::vapix::{Location, Secret};
+
+static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
+    gst::DebugCategory::new("vapixptzsink", gst::DebugColorFlags::empty(), Some("VAPIX PTZ servo"))
+});
+
+/// Longest wait for the camera's yes when leaving PLAYING and at EOS.
+const REST_WAIT: Duration = Duration::from_secs(1);
+
+/// A picture older than this tells nothing: rather its timestamps are wrong.
+const OLDEST_PICTURE: gst::ClockTime = gst::ClockTime::from_seconds(2);
+
+/// What a picture is like, from its caps.
+#[derive(Debug, Clone, Copy)]
+struct Picture {
+    size: (u32, u32),
+    aspect: f64,
+}
+
+/// What render keeps from buffer to buffer.
+#[derive(Debug, Default)]
+struct Stream {
+    picture: Option<Picture>,
+    /// Whether unreadable metas were already warned of.
+    warned: bool,
+}
+
+/// The locks are never held together, nor while anything is posted, pushed or waited for.
+#[derive(Default, Properties)]
+#[properties(wrapper_type = super::VapixPtzSink)]
+pub struct VapixPtzSink {
+    #[property(
+        name = "location", type = Option<String>, get = Self::location, set = Self::set_location, mutable_ready,
+        blurb = "Address of the camera, for example http://192.168.0.90; a user and a password in it are moved to the properties of that name"
+    )]
+    #[property(
+        name = "camera", get, set, type = u32, member = camera, mutable_ready,
+        default = Settings::default().camera, minimum = 1, maximum = 64,
+        blurb = "Video channel of the camera"
+    )]
+    #[property(
+        name = "user", get, set = Self::set_user, type = Option<String>, member = user, mutable_playing,
+        blurb = "User, with the right to control PTZ; where user and password are unset, VAPIX_USER of the environment"
+    )]
+    #[property(
+        name = "password", set = Self::set_password, type = Option<String>, mutable_playing,
+        blurb = "Password (cannot be read); where user and password are unset, VAPIX_PASSWORD of the environment"
+    )]
+    #[property(
+        name = "timeout", get, set, type = u32, member = timeout_ms, mutable_ready,
+        default = Settings::default().timeout_ms, minimum = 100, maximum = 60_000,
+        blurb = "Longest wait for one of the camera's answers, in milliseconds"
+    )]
+    #[property(
+        name = "insecure", get, set, type = bool, member = insecure, mutable_ready,
+        default = Settings::default().insecure,
+        blurb = "With https believe any certificate: who sits on the wire can then take the camera"
+    )]
+    #[property(
+        name = "ca-file", get, set, type = Option<String>, member = ca_file, mutable_ready,
+        blurb = "With https believe only certificates signed by an authority in this PEM file (unset: those the system trusts)"
+    )]
+    #[property(
+        name = "mode", get, set = Self::set_mode, type = Mode, member = mode, mutable_playing,
+        blurb = "How the camera is moved",
+        builder(Settings::default().mode)
+    )]
+    #[property(
+        name = "gain", get, set = Self::set_gain, type = f64, member = gain, mutable_playing,
+        default = Settings::default().gain, minimum = 0.0, maximum = 20.0,
+        blurb = "Degrees per second for each degree off the middle, in 1/s"
+    )]
+    #[property(
+        name = "dead-zone", get, set = Self::set_dead_zone, type = f64, member = dead_zone, mutable_playing,
+        default = Settings::default().dead_zone, minimum = 0.0, maximum = 0.5,
+        blurb = "Offset from the middle at which a camera at rest stays at rest, as a part of the picture's width"
+    )]
+    #[property(
+        name = "max-speed", get, set = Self::set_max_speed, type = f64, member = max_speed_deg_s, mutable_playing,
+        default = Settings::default().max_speed_deg_s, minimum = 0.1, maximum = 1000.0,
+        blurb = "Pan and tilt never turn faster than this, in degrees per second"
+    )]
+    #[property(
+        name = "max-rate", get, set = Self::set_max_rate, type = f64, member = max_rate_hz, mutable_playing,
+        default = Settings::default().max_rate_hz, minimum = 0.1, maximum = 50.0,
+        blurb = "Commands per second at most; stops are sent at once"
+    )]
+    #[property(
+        name = "latency", get, set = Self::set_latency, type = u32, member = latency_ms, mutable_playing,
+        default = Settings::default().latency_ms, maximum = 5000,
+        blurb = "Delay of the camera: from a command it has accepted until a picture that shows it arrives, in milliseconds"
+    )]
+    #[property(
+        name = "field-of-view", get, set = Self::set_field_of_view, type = f64, member = field_of_view_deg, mutable_playing,
+        default = Settings::default().field_of_view_deg, minimum = 0.0, maximum = 179.0,
+        blurb = "Horizontal field of view in degrees (0: as the camera says)"
+    )]
+    #[property(
+        name = "prediction", get, set = Self::set_prediction, type = Prediction, member = prediction, mutable_playing,
+        blurb = "How the target's motion is carried forward",
+        builder(Settings::default().prediction)
+    )]
+    #[property(
+        name = "stale-timeout", get, set = Self::set_stale_timeout, type = u32, member = stale_timeout_ms, mutable_playing,
+        default = Settings::default().stale_timeout_ms, minimum = 50, maximum = 60_000,
+        blurb = "The camera is stopped when the target was not seen for this long, in milliseconds"
+    )]
+    #[property(
+        name = "camera-speed", get, set = Self::set_camera_speed, type = f64, member = camera_speed_deg_s, mutable_playing,
+        default = Settings::default().camera_speed_deg_s, minimum = 1.0, maximum = 1000.0,
+        blurb = "What the camera does at speed step 100, in degrees per second"
+    )]
+    #[property(
+        name = "speed-curve", get, set = Self::set_speed_curve, type = SpeedCurve, member = speed_curve, mutable_playing,
+        blurb = "How the camera's speed grows with the speed step",
+        builder(Settings::default().speed_curve)
+    )]
+    settings: Mutex<Settings>,
+    worker: Mutex<Option<Worker>>,
+    stream: Mutex<Stream>,
+    /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
+    news: Mutex<Option<Status>>,
+}
+
+#[glib::object_subclass]
+impl ObjectSubclass for VapixPtzSink {
+    const NAME: &'static str = "GstVapixPtzSink";
+    type Type = super::VapixPtzSink;
+    type ParentType = gst_base::BaseSink;
+}
+
+impl ObjectImpl for VapixPtzSink {
+    fn properties() -> &'static [glib::ParamSpec] {
+        // The macro has no notion of a structure.
+        static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
+            let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
+                .blurb("State, commands sent, failed and coalesced, round-trip times in nanoseconds, position and field of view in degrees, last error")
+                .read_only()
+                .build();
+            VapixPtzSink::derived_properties().iter().cloned().chain([stats]).collect()
+        });
+        &PROPERTIES
+    }
+
+    fn set_property(&self, id: usize, value: &glib::Value, pspec: &glib::ParamSpec) {
+        self.derived_set_property(id, value, pspec);
+    }
+
+    fn property(&self, id: usize, pspec: &glib::ParamSpec) -> glib::Value {
+        match pspec.name() {
+            "stats" => self.stats().to_value(),
+            _ => self.derived_property(id, pspec),
+        }
+    }
+
+    fn constructed(&self) {
+        self.parent_constructed();
+        let sink = self.obj();
+        // A late target is worth nothing, and a pipeline must not wait for this sink to preroll.
+        sink.set_sync(false);
+        sink.set_async(false);
+        sink.set_qos(false);
+    }
+
+    fn dispose(&self) {
+        // Stops the camera without waiting: this may be the worker's own thread.
+        drop(lock(&self.worker).take());
+    }
+}
+
+impl GstObjectImpl for VapixPtzSink {}
+
+impl ElementImpl for VapixPtzSink {
+    fn metadata() -> Option<&'static gst::subclass::ElementMetadata> {
+        static METADATA: LazyLock<gst::subclass::ElementMetadata> = LazyLock::new(|| {
+            gst::subclass::ElementMetadata::new(
+                "VAPIX PTZ servo",
+                "Sink/Network",
+                "Steers an Axis pan-tilt-zoom camera after the tracked target",
+                "The ptztrack developers",
+            )
+        });
+        Some(&METADATA)
+    }
+
+    fn pad_templates() -> &'static [gst::PadTemplate] {
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
+            let caps = gst::Caps::builder("video/x-raw").any_features().build();
+            gst::PadTemplate::new("sink", gst::PadDirection::Sink, gst::PadPresence::Always, &caps)
+                .into_iter()
+                .collect()
+        });
+        &TEMPLATES
+    }
+
+    fn change_state(
+        &self,
+        transition: gst::StateChange,
+    ) -> Result<gst::StateChangeSuccess, gst::StateChangeError> {
+        let success = self.parent_change_state(transition)?;
+        if transition == gst::StateChange::PlayingToPaused {
+            // After the parent: from here on no buffer is rendered that could set the camera going again.
+            self.rest();
+        }
+        Ok(success)
+    }
+}
+
+impl BaseSinkImpl for VapixPtzSink {
+    fn start(&self) -> Result<(), gst::ErrorMessage> {
+        let settings = lock(&self.settings).clone();
+        let client = settings.client(environment).ok_or_else(|| {
+            gst::error_msg!(
+                gst::ResourceError::NotFound,
+                ["no camera: set `location`, for example location=http://192.168.0.90"]
+            )
+        })?;
+        *lock(&self.stream) = Stream::default();
+        *lock(&self.news) = None;
+        let element = self.obj().downgrade();
+        let worker = Worker::start(client, settings.servo(), move |event| {
+            if let Some(element) = element.upgrade() {
+                element.imp().happened(event);
+            }
+        })
+        .map_err(|reason| gst::error_msg!(gst::ResourceError::Settings, ["{reason}"]))?;
+        *lock(&self.worker) = Some(worker);
+        Ok(())
+    }
+
+    fn stop(&self) -> Result<(), gst::ErrorMessage> {
+        let worker = lock(&self.worker).take();
+        // Whether it came to rest the worker itself reports.
+        worker.map(Worker::finish);
+        Ok(())
+    }
+
+    fn set_caps(&self, caps: &gst::Caps) -> Result<(), gst::LoggableError> {
+        let picture =
+            picture_of(caps).ok_or_else(|| gst::loggable_error!(CAT, "caps without a size: {caps}"))?;
+        lock(&self.stream).picture = Some(picture);
+        Ok(())
+    }
+
+    fn event(&self, event: gst::Event) -> bool {
+        match event.view() {
+            gst::EventView::Eos(_) => self.rest(),
+            // Comes from the seeking thread, which shall not wait.
+            gst::EventView::FlushStart(_) => self.with_worker(|worker| drop(worker.inbox().rest())),
+            _ => {}
+        }
+        self.parent_event(event)
+    }
+
+    fn render(&self, buffer: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
+        self.push_news();
+        match TargetMeta::of(buffer) {
+            Some(Ok(target)) => self.see(&target, buffer.pts()),
+            Some(Err(err)) => self.warn_of_meta(&err),
+            None => {}
+        }
+        Ok(gst::FlowSuccess::Ok)
+    }
+}
+
+impl VapixPtzSink {
+    /// Leaves the target for the worker.
+    fn see(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) {
+        let Some(picture) = lock(&self.stream).picture else { return };
+        let age = self.age(target, pts);
+        self.with_worker(|worker| {
+            let inbox = worker.inbox();
+            inbox.see(Sight {
+                visibility: match target.state {
+                    TargetState::Tracking => Visibility::Seen,
+                    TargetState::Occluded => Visibility::Predicted,
+                    TargetState::Searching | TargetState::Lost => Visibility::Gone,
+                },
+                id: target.id,
+                centroid: target.centroid,
+                velocity: target.velocity,
+                ego_velocity: target.ego_velocity,
+                size: picture.size,
+                aspect: picture.aspect,
+                taken_at: inbox.now().saturating_sub(age),
+            });
+        });
+    }
+
+    /// How long ago the picture was taken, as far as its timestamp tells.
+    fn age(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) -> Duration {
+        let sink = self.obj();
+        let captured = target.capture_time.or_else(|| {
+            sink.segment().downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_running_time(pts))
+        });
+        let age =
+            sink.current_running_time().zip(captured).map(|(now, captured)| now.saturating_sub(captured));
+        age.filter(|age| *age <= OLDEST_PICTURE).unwrap_or_default().into()
+    }
+
+    fn rest(&self) {
+        // The wait is for the worker's answer, not under the lock that everybody else needs.
+        let waiting = lock(&self.worker).as_ref().map(|worker| worker.inbox().rest());
+        if waiting.is_some_and(|waiting| waiting.recv_timeout(REST_WAIT).is_err()) {
+            gst::warning!(
+                CAT,
+                imp = self,
+                "The camera has not confirmed its stop within {REST_WAIT:?}; trying on"
+            );
+        }
+    }
+
+    fn with_worker(&self, action: impl FnOnce(&Worker)) {
+        if let Some(worker) = &*lock(&self.worker) {
+            action(worker);
+        }
+    }
+
+    fn warn_of_meta(&self, err: &ptztrack_contract::ContractError) {
+        if !std::mem::replace(&mut lock(&self.stream).warned, true) {
+            gst::element_imp_warning!(
+                self,
+                gst::StreamError::Format,
+                ["a target meta cannot be read ({err}); are all plugins of the same version?"]
+            );
+        }
+    }
+
+    /// Called by the worker.
+    fn happened(&self, event: Event) {
+        match event {
+            Event::Exchanged { job, failure: None, round_trip } => {
+                gst::log!(CAT, imp = self, "{} answered in {round_trip:?}", described(&job));
+            }
+            Event::Exchanged { job, failure: Some(err), round_trip } => {
+                gst::debug!(CAT, imp = self, "{} failed after {round_trip:?}: {err}", described(&job));
+            }
+            Event::Report(Report::Link(change)) => self.link_changed(&change),
+            Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
+            Event::Report(Report::Stopped) => self.post(CameraChange::Stopped, "the camera has stopped"),
+            Event::Report(Report::AtLimit) => {
+                self.post(
+                    CameraChange::AtLimit,
+                    "the target is beyond the end of the camera's pan or tilt range",
+                );
+            }
+            Event::Status(status) => *lock(&self.news) = Some(status),
+            Event::GaveUp => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Write,
+                ["the camera has not confirmed its stop in time and may still be moving; stop it by hand"]
+            ),
+            Event::Died(reason) => gst::element_imp_error!(
+                self,
+                gst::LibraryError::Failed,
+                ["the camera's task broke ({reason}); the camera may still be moving; restart the pipeline"]
+            ),
+        }
+    }
+
+    fn link_changed(&self, change: &LinkChange) {
+        match change {
+            LinkChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
+            LinkChange::Disconnected(err) => {
+                self.post(CameraChange::Disconnected, &err.to_string());
+                gst::element_imp_warning!(self, gst::ResourceError::Write, ["{err}. {}", err.advice()]);
+            }
+            LinkChange::Refused(err) => {
+                self.post(CameraChange::Refused, &err.to_string());
+                gst::element_imp_warning!(
+                    self,
+                    gst::ResourceError::NotAuthorized,
+                    ["{err}. {}", err.advice()]
+                );
+            }
+        }
+    }
+
+    fn post(&self, change: CameraChange, detail: &str) {
+        gst::info!(CAT, imp = self, "{}: {detail}", change.name());
+        let sink = self.obj();
+        let times = Times { running_time: sink.current_running_time(), ..Times::default() };
+        let message = CameraMessage { change, times, detail: detail.to_owned() };
+        let message = gst::message::Element::builder(message.to_structure()).src(&*sink).build();
+        // Without a bus there is nobody to tell.
+        let _ = sink.post_message(message);
+    }
+
+    /// Tells upstream what the camera does, if that has changed.
+    fn push_news(&self) {
+        let Some(status) = lock(&self.news).take() else { return };
+        let picture = lock(&self.stream).picture;
+        let vertical_fov_deg = status.fov_deg.zip(picture).map(|(horizontal_fov_deg, picture)| {
+            View { horizontal_fov_deg, aspect: picture.aspect, tilt_deg: 0.0 }.vertical_fov_deg()
+        });
+        let event = CameraEvent {
+            moving: status.moving,
+            pan_deg: status.position.pan_deg,
+            tilt_deg: status.position.tilt_deg,
+            pan_rate_deg_s: status.rate.pan,
+            tilt_rate_deg_s: status.rate.tilt,
+            horizontal_fov_deg: status.fov_deg,
+            vertical_fov_deg,
+        };
+        // Nobody upstream needs to care.
+        let _ = self.obj().sink_pad().push_event(event.to_event());
+    }
+
+    fn location(&self) -> Option<String> {
+        lock(&self.settings).location.as_ref().map(ToString::to_string)
+    }
+
+    fn set_location(&self, text: Option<String>) {
+        let parsed = text.filter(|text| !text.is_empty()).map(|text| Location::parse(&text)).transpose();
+        match parsed {
+            Ok(None) => lock(&self.settings).location = None,
+            Ok(Some((location, info))) => {
+                let mut settings = lock(&self.settings);
+                settings.location = Some(location);
+                settings.user = info.user.or(settings.user.take());
+                settings.password = info.password.or(settings.password.take());
+            }
+            Err(err) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ["{err}; `location` stays as it was"]
+            ),
+        }
+    }
+
+    fn set_user(&self, user: Option<String>) {
+        lock(&self.settings).user = user;
+        self.credentials_changed();
+    }
+
+    fn set_password(&self, password: Option<String>) {
+        lock(&self.settings).password = password.map(Secret::new);
+        self.credentials_changed();
+    }
+
+    fn credentials_changed(&self) {
+        let credentials = lock(&self.settings).credentials(environment);
+        self.with_worker(|worker| worker.inbox().set_credentials(credentials));
+    }
+
+    /// Changes a setting of the servo, also of one that runs.
+    fn change_servo(&self, change: impl FnOnce(&mut Settings)) {
+        let servo = {
+            let mut settings = lock(&self.settings);
+            change(&mut settings);
+            settings.servo()
+        };
+        self.with_worker(|worker| worker.inbox().configure(servo));
+    }
+
+    fn stats(&self) -> gst::Structure {
+        let worker = lock(&self.worker);
+        let (statistics, coalesced) = worker
+            .as_ref()
+            .map(|worker| (worker.statistics(), worker.inbox().coalesced()))
+            .unwrap_or_default();
+        let state = match &*worker {
+            None => "stopped",
+            Some(_) if statistics.halted => "refused",
+            Some(_) if !statistics.status.connected => "disconnected",
+            Some(_) if statistics.status.moving => "moving",
+            Some(_) => "at-rest",
+        };
+        drop(worker);
+        let status = statistics.status;
+        gst::Structure::builder("application/x-vapixptzsink-stats")
+            .field("state", state)
+            .field("commands-sent", statistics.sent)
+            .field("commands-failed", statistics.failed)
+            .field("commands-coalesced", coalesced)
+            .field("round-trip", nanoseconds(statistics.round_trip))
+            .field("round-trip-average", nanoseconds(statistics.round_trip_average))
+            .field("pan-rate", status.rate.pan)
+            .field("tilt-rate", status.rate.tilt)
+            .field_if_some("pan", status.position.pan_deg)
+            .field_if_some("tilt", status.position.tilt_deg)
+            .field_if_some("zoom", status.position.zoom_steps)
+            .field_if_some("field-of-view", status.fov_deg)
+            .field_if_some("last-error", statistics.last_error)
+            .build()
+    }
+}
+
+/// Setters of properties that a running servo takes at once.
+macro_rules! servo_setters {
+    ($($setter:ident: $field:ident, $type:ty;)+) => {
+        impl VapixPtzSink {
+            $(fn $setter(&self, value: $type) {
+                self.change_servo(|settings| settings.$field = value);
+            })+
+        }
+    };
+}
+
+servo_setters! {
+    set_mode: mode, Mode;
+    set_gain: gain, f64;
+    set_dead_zone: dead_zone, f64;
+    set_max_speed: max_speed_deg_s, f64;
+    set_max_rate: max_rate_hz, f64;
+    set_latency: latency_ms, u32;
+    set_field_of_view: field_of_view_deg, f64;
+    set_prediction: prediction, Prediction;
+    set_stale_timeout: stale_timeout_ms, u32;
+    set_camera_speed: camera_speed_deg_s, f64;
+    set_speed_curve: speed_curve, SpeedCurve;
+}
+
+fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok()
+}
+
+fn described(job: &Job) -> String {
+    match job {
+        Job::Command(command) => command.to_string(),
+        Job::Query(query) => format!("query for {query:?}"),
+    }
+}
+
+/// Size and shape of the picture, whatever memory it lies in.
+fn picture_of(caps: &gst::Caps) -> Option<Picture> {
+    let structure = caps.structure(0)?;
+    let pixels = |field| structure.get::<i32>(field).ok().and_then(|size| u32::try_from(size).ok());
+    let size = (pixels("width")?, pixels("height")?);
+    let pixel = structure.get::<gst::Fraction>("pixel-aspect-ratio").unwrap_or(gst::Fraction::new(1, 1));
+    let aspect =
+        f64::from(size.0) * f64::from(pixel.numer()) / (f64::from(size.1) * f64::from(pixel.denom()));
+    (aspect.is_finite() && aspect > 0.0).then_some(Picture { size, aspect })
+}
+
+fn nanoseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
+
+/// A panic elsewhere must not take the application with it.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}

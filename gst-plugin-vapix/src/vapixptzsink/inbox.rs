@@ -1,0 +1,105 @@
+//! What the streaming thread leaves for the worker. Nothing here ever waits for the network.
+
+use std::mem;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use tokio::sync::Notify;
+
+use crate::servo::{ServoSettings, Sight};
+use crate::vapix::Credentials;
+
+/// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
+#[derive(Debug, Default)]
+pub struct Mail {
+    pub credentials: Option<Option<Credentials>>,
+    pub servo: Option<ServoSettings>,
+    /// Forget the target and stop; before `sight`.
+    pub rest: bool,
+    pub sight: Option<Sight>,
+    /// Who waits for the camera to be at rest.
+    pub waiting: Vec<SyncSender<()>>,
+    /// The last thing to do is to stop the camera.
+    pub finish: bool,
+}
+
+/// A letter box with one place for each kind of mail.
+#[derive(Debug)]
+pub struct Inbox {
+    mail: Mutex<Mail>,
+    arrived: Notify,
+    epoch: Instant,
+    coalesced: AtomicU64,
+}
+
+impl Inbox {
+    pub fn new() -> Self {
+        Self {
+            mail: Mutex::default(),
+            arrived: Notify::new(),
+            epoch: Instant::now(),
+            coalesced: AtomicU64::new(0),
+        }
+    }
+
+    /// The clock of everything that is timed here and in the servo.
+    pub fn now(&self) -> Duration {
+        self.epoch.elapsed()
+    }
+
+    /// Leaves the newest picture of the target, in place of one not looked at yet.
+    pub fn see(&self, sight: Sight) {
+        if self.mail().sight.replace(sight).is_some() {
+            self.coalesced.fetch_add(1, Ordering::Relaxed);
+        }
+        self.arrived.notify_one();
+    }
+
+    /// Asks for rest; what was seen before is void. The receiver hears when the camera is at rest.
+    pub fn rest(&self) -> Receiver<()> {
+        let (sender, receiver) = sync_channel(1);
+        let mut mail = self.mail();
+        mail.rest = true;
+        mail.sight = None;
+        mail.waiting.push(sender);
+        drop(mail);
+        self.arrived.notify_one();
+        receiver
+    }
+
+    /// Asks for rest, and for an end.
+    pub fn finish(&self) -> Receiver<()> {
+        self.mail().finish = true;
+        self.rest()
+    }
+
+    pub fn configure(&self, servo: ServoSettings) {
+        self.mail().servo = Some(servo);
+        self.arrived.notify_one();
+    }
+
+    pub fn set_credentials(&self, credentials: Option<Credentials>) {
+        self.mail().credentials = Some(credentials);
+        self.arrived.notify_one();
+    }
+
+    /// Pictures that were replaced by newer ones before anybody looked.
+    pub fn coalesced(&self) -> u64 {
+        self.coalesced.load(Ordering::Relaxed)
+    }
+
+    pub(super) fn take(&self) -> Mail {
+        mem::take(&mut *self.mail())
+    }
+
+    /// Resolves when something arrives, or has arrived since the last time.
+    pub(super) async fn arrived(&self) {
+        self.arrived.notified().await;
+    }
+
+    fn mail(&self) -> MutexGuard<'_, Mail> {
+        self.mail.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}

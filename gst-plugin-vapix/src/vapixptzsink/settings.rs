@@ -1,0 +1,140 @@
+//! The values of the properties, and what they mean to servo and client.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::{Mode, Prediction, SpeedCurve};
+use crate::servo::ServoSettings;
+use crate::vapix::{ClientSettings, Credentials, Location, Secret, Trust};
+
+/// One field for one property, in the property's unit. The servo's defaults are the servo's own.
+#[derive(Debug, Clone)]
+pub struct Settings {
+    pub location: Option<Location>,
+    pub camera: u32,
+    pub user: Option<String>,
+    pub password: Option<Secret>,
+    pub timeout_ms: u32,
+    pub insecure: bool,
+    pub ca_file: Option<String>,
+    pub mode: Mode,
+    pub gain: f64,
+    pub dead_zone: f64,
+    pub max_speed_deg_s: f64,
+    pub max_rate_hz: f64,
+    pub latency_ms: u32,
+    pub field_of_view_deg: f64,
+    pub prediction: Prediction,
+    pub stale_timeout_ms: u32,
+    pub camera_speed_deg_s: f64,
+    pub speed_curve: SpeedCurve,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        let servo = ServoSettings::default();
+        Self {
+            location: None,
+            camera: 1,
+            user: None,
+            password: None,
+            timeout_ms: 2000,
+            insecure: false,
+            ca_file: None,
+            mode: Mode::default(),
+            gain: servo.gain,
+            dead_zone: servo.dead_zone,
+            max_speed_deg_s: servo.max_speed_deg_s,
+            max_rate_hz: servo.max_rate_hz,
+            latency_ms: servo.latency.as_millis() as u32,
+            field_of_view_deg: servo.fov_deg.unwrap_or(0.0),
+            prediction: Prediction::default(),
+            stale_timeout_ms: servo.stale_timeout.as_millis() as u32,
+            camera_speed_deg_s: servo.camera_speed_deg_s,
+            speed_curve: SpeedCurve::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// What the servo is to know.
+    pub fn servo(&self) -> ServoSettings {
+        ServoSettings {
+            mode: self.mode.into(),
+            gain: self.gain,
+            dead_zone: self.dead_zone,
+            max_speed_deg_s: self.max_speed_deg_s,
+            max_rate_hz: self.max_rate_hz,
+            latency: milliseconds(self.latency_ms),
+            fov_deg: Some(self.field_of_view_deg).filter(|degrees| *degrees > 0.0),
+            prediction: self.prediction.into(),
+            stale_timeout: milliseconds(self.stale_timeout_ms),
+            camera_speed_deg_s: self.camera_speed_deg_s,
+            speed_curve: self.speed_curve.into(),
+        }
+    }
+
+    /// What the client is to know; `None` without a location.
+    pub fn client(&self, environment: impl Fn(&str) -> Option<String>) -> Option<ClientSettings> {
+        let trust = match &self.ca_file {
+            _ if self.insecure => Trust::Anyone,
+            Some(path) => Trust::Authority(PathBuf::from(path)),
+            None => Trust::System,
+        };
+        Some(ClientSettings {
+            location: self.location.clone()?,
+            camera: self.camera,
+            credentials: self.credentials(environment),
+            timeout: milliseconds(self.timeout_ms),
+            trust,
+        })
+    }
+
+    /// Who we are: as set, or as the environment says where neither user nor password is set.
+    pub fn credentials(&self, environment: impl Fn(&str) -> Option<String>) -> Option<Credentials> {
+        let (user, password) = match (&self.user, &self.password) {
+            (None, None) => (environment("VAPIX_USER"), environment("VAPIX_PASSWORD").map(Secret::new)),
+            (user, password) => (user.clone(), password.clone()),
+        };
+        Some(Credentials { user: user?, password: password.unwrap_or_else(|| Secret::new("")) })
+    }
+}
+
+fn milliseconds(milliseconds: u32) -> Duration {
+    Duration::from_millis(milliseconds.into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn environment(name: &str) -> Option<String> {
+        matches!(name, "VAPIX_USER" | "VAPIX_PASSWORD").then(|| format!("{name} value"))
+    }
+
+    #[test]
+    fn the_environment_serves_where_nothing_is_set() {
+        let mut settings = Settings::default();
+        assert_eq!(settings.credentials(|_| None), None);
+        let expected = Credentials {
+            user: "VAPIX_USER value".to_owned(),
+            password: Secret::new("VAPIX_PASSWORD value"),
+        };
+        assert_eq!(settings.credentials(environment), Some(expected));
+        settings.user = Some("root".to_owned());
+        let expected = Credentials { user: "root".to_owned(), password: Secret::new("") };
+        assert_eq!(settings.credentials(environment), Some(expected));
+    }
+
+    #[test]
+    fn insecure_outweighs_an_authority() {
+        let (location, _) = Location::parse("https://camera").unwrap();
+        let mut settings =
+            Settings { location: Some(location), ca_file: Some("ca.pem".to_owned()), ..Settings::default() };
+        let trust = |settings: &Settings| settings.client(|_| None).unwrap().trust;
+        assert_eq!(trust(&settings), Trust::Authority("ca.pem".into()));
+        settings.insecure = true;
+        assert_eq!(trust(&settings), Trust::Anyone);
+        assert!(Settings::default().client(|_| None).is_none());
+    }
+}
