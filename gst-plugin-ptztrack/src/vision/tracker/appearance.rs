@@ -72,13 +72,14 @@ impl Appearance {
         Ok(Self { template, filter, ..appearance })
     }
 
-    /// Looks for the target around `bounds`, at its size.
-    pub fn look(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Answer> {
+    /// Looks for the target around `bounds`, at its size. It is expected in the middle, with a deviation of
+    /// `spread` times its sides: of two that look alike the nearer one is meant.
+    pub fn look(&self, luma: &Luma, bounds: Rect2f, spread: f32) -> opencv::Result<Answer> {
         let seen = self.describe(luma, bounds)?;
         let mut response = correlate(&seen, &self.template);
         response.iter_mut().zip(&self.filter).for_each(|(value, filter)| *value = product(*value, *filter));
         let response = self.inverse(&response)?;
-        let (offset, peak) = self.peak(&response);
+        let (offset, peak) = self.peak(&response, spread);
         let cell = CELL as f32;
         let across = bounds.width * CONTEXT.0 / (self.columns as f32 * cell);
         let down = bounds.height * CONTEXT.1 / (self.rows as f32 * cell);
@@ -131,15 +132,22 @@ impl Appearance {
     }
 
     /// Place (in cells, wrapped around 0) and height of the response's peak, finer than a cell.
-    fn peak(&self, response: &[f32]) -> (Point2f, f32) {
-        let best = (0..response.len()).max_by(|&a, &b| response[a].total_cmp(&response[b])).unwrap_or(0);
+    fn peak(&self, response: &[f32], spread: f32) -> (Point2f, f32) {
+        let wrap = |cell: usize, size: usize| {
+            if cell > size / 2 { cell as f32 - size as f32 } else { cell as f32 }
+        };
+        let (across, down) =
+            (spread * self.columns as f32 / CONTEXT.0, spread * self.rows as f32 / CONTEXT.1);
+        let expected = |cell: usize| {
+            let x = wrap(cell % self.columns, self.columns) / across;
+            let y = wrap(cell / self.columns, self.rows) / down;
+            response[cell] * (-0.5 * (x * x + y * y)).exp()
+        };
+        let best = (0..response.len()).max_by(|&a, &b| expected(a).total_cmp(&expected(b))).unwrap_or(0);
         let (x, y) = (best % self.columns, best / self.columns);
         let at = |x: usize, y: usize| response[(y % self.rows) * self.columns + x % self.columns];
         let (left, right) = (at(x + self.columns - 1, y), at(x + 1, y));
         let (above, below) = (at(x, y + self.rows - 1), at(x, y + 1));
-        let wrap = |cell: usize, size: usize| {
-            if cell > size / 2 { cell as f32 - size as f32 } else { cell as f32 }
-        };
         let place = Point2f::new(
             wrap(x, self.columns) + vertex(left, response[best], right),
             wrap(y, self.rows) + vertex(above, response[best], below),
@@ -303,7 +311,7 @@ mod tests {
         fn finds_the_person_nearby(dx in -16.0_f32..16.0, dy in -16.0_f32..16.0) {
             let appearance = Appearance::new(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("learn");
             let moved = person_at(PERSON.x + dx, PERSON.y + dy);
-            let answer = appearance.look(&moved.luma(), PERSON).expect("look");
+            let answer = appearance.look(&moved.luma(), PERSON, 1.0).expect("look");
             prop_assert!((answer.offset.x - dx).abs() < 2.0 && (answer.offset.y - dy).abs() < 2.0, "{answer:?}");
             prop_assert!(answer.peak > 0.25, "{answer:?}");
         }
@@ -312,10 +320,10 @@ mod tests {
     #[test]
     fn knows_the_person_from_another() {
         let appearance = Appearance::new(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("learn");
-        let same = appearance.look(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("look");
+        let same = appearance.look(&person_at(PERSON.x, PERSON.y).luma(), PERSON, 1.0).expect("look");
         let mut other = Scene::new(320, 240).background((33.0, 57.0));
         other.paint(PERSON, 1234);
-        let other = appearance.look(&other.luma(), PERSON).expect("look");
+        let other = appearance.look(&other.luma(), PERSON, 1.0).expect("look");
         assert!(same.peak > 0.9, "{same:?}");
         assert!(other.peak < 0.3, "{other:?}");
     }
@@ -328,7 +336,7 @@ mod tests {
         for _ in 0..10 {
             appearance.learn(&other.luma(), PERSON, 0.5).expect("learn");
         }
-        assert!(appearance.look(&other.luma(), PERSON).expect("look").peak > 0.8);
+        assert!(appearance.look(&other.luma(), PERSON, 1.0).expect("look").peak > 0.8);
     }
 
     #[test]
@@ -341,7 +349,7 @@ mod tests {
             Rect2f::new(0.0, 0.0, 900.0, 3.0),
         ] {
             let appearance = Appearance::new(&picture.luma(), bounds).expect("learn");
-            assert!(appearance.look(&picture.luma(), bounds).expect("look").peak.is_finite());
+            assert!(appearance.look(&picture.luma(), bounds, 1.0).expect("look").peak.is_finite());
         }
     }
 }

@@ -127,13 +127,15 @@ impl Tracker {
         let mut changes = Vec::new();
         let size = Some((luma.width(), luma.height()));
         let same_stream = std::mem::replace(&mut self.size, size) == size && dt_s <= MAX_DT_S;
+        if !same_stream {
+            // Another picture, or one from another time: nothing that was remembered holds.
+            self.selection.clear();
+        }
         self.watch(detections, frame, dt_s);
         let command = self.command.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
         let mut report = Report::default();
         if !same_stream {
-            // Another picture, or one from another time: nothing that was remembered holds.
-            self.selection.clear();
             if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
                 report = self.report(TargetState::Lost, Some(target), frame);
                 changes.push(TargetChange::Lost);

@@ -20,6 +20,8 @@ const MAX_POINTS: usize = 64;
 /// New points are looked for when fewer than this share of them is left, every so many frames.
 const REPLENISH_SHARE: f32 = 0.7;
 const REPLENISH_FRAMES: u32 = 4;
+/// With fewer points the target starts with new ones.
+const MIN_MEMBERS: usize = 4;
 /// Window for lost points in the second attempt; the pyramids are built for it.
 const GROWN_WINDOW: i32 = 25;
 /// Pixels of the patch that a target has at most: a larger one is looked at more coarsely.
@@ -33,6 +35,20 @@ const VELOCITY_TIME_S: f32 = 0.35;
 const SURE: f32 = 0.55;
 const POSSIBLE: f32 = 0.35;
 const FOUND: f32 = 0.6;
+/// How far from where it should be a target is looked for, in sides of it: next to it, and after it was hidden.
+const SPREAD: f32 = 0.35;
+const WIDE_SPREAD: f32 = 1.0;
+/// How much larger or smaller a box is tried, by how much it must fit better, and what is then made of it.
+const TRIED_GROWTH: f32 = 0.06;
+const BETTER: f32 = 1.0;
+const GROWTH_GAIN: f32 = 0.35;
+/// Share of the usual peak from which the appearance is learned, and below which points that stop may lie
+/// on something in front.
+const LEARNT: f32 = 0.7;
+const UNHIDDEN: f32 = 0.8;
+/// Pixels in [`VELOCITY_TIME_S`] from which a target is moving; share of its velocity that is staying behind.
+const MOVING: f32 = 3.0;
+const STAYING: f32 = 0.4;
 /// How far the box follows the appearance where points say otherwise.
 const PULL: f32 = 0.4;
 /// How fast the appearance learns, per second, and never more in one frame.
@@ -75,6 +91,8 @@ pub(super) struct Target {
     appearance: Appearance,
     usual_peak: f32,
     sightings_in_a_row: u32,
+    sure: bool,
+    larger: bool,
     frames_since_replenished: u32,
 }
 
@@ -112,6 +130,8 @@ impl Target {
             appearance: Appearance::new(luma, bounds)?,
             usual_peak: 0.6,
             sightings_in_a_row: 0,
+            sure: true,
+            larger: false,
             frames_since_replenished: 0,
         };
         target.centroid = target.centre_of_mass()?;
@@ -161,7 +181,7 @@ impl Target {
     pub fn recognise(&mut self, luma: &Luma, sighting: &Sighting) -> opencv::Result<bool> {
         let place = around(centre(sighting.bounds), self.bounds.width, self.bounds.height);
         let near = length(centre(place) - centre(self.bounds)) < self.bounds.height;
-        let answer = self.appearance.look(luma, place)?;
+        let answer = self.appearance.look(luma, place, WIDE_SPREAD)?;
         if !near || answer.peak < FOUND * self.usual_peak {
             return Ok(false);
         }
@@ -178,11 +198,15 @@ impl Target {
             self.ego = EgoMotion::translation(Point2f::default());
             return Ok(());
         }
-        let pairs = self.background.follow(luma, self.ego)?;
-        // A background without features says nothing; the camera probably goes on as it did.
-        if let Some(ego) = ego_motion::estimate(&pairs) {
-            self.ego = ego;
-            self.ego_velocity = Some(ego.at(centre(self.bounds)) / dt_s);
+        // The camera goes on as it did, or it has stopped; a blank background says nothing at all.
+        let still = EgoMotion::translation(Point2f::default());
+        for expected in [self.ego, still] {
+            let pairs = self.background.follow(luma, expected)?;
+            if let Some(ego) = ego_motion::estimate(&pairs) {
+                self.ego = ego;
+                self.ego_velocity = Some(ego.at(centre(self.bounds)) / dt_s);
+                break;
+            }
         }
         Ok(())
     }
@@ -223,26 +247,52 @@ impl Target {
         expected: Point2f,
         dt_s: f32,
     ) -> opencv::Result<Sight> {
-        match consensus {
-            Some(consensus) => {
-                self.bounds += consensus.motion;
-                self.grow(consensus.growth);
-            }
-            None => self.carry(expected),
-        }
+        let start = centre(self.bounds);
+        let carried = self.ego.at(start) + expected;
+        let answer = self.appearance.look(luma, self.bounds + carried, SPREAD)?;
+        let hidden_behind = consensus.is_some_and(|consensus| {
+            self.stays_behind(consensus.motion - self.ego.at(start), dt_s)
+                && answer.peak < UNHIDDEN * self.usual_peak
+        });
+        let consensus = consensus.filter(|_| !hidden_behind);
         let share = consensus.map_or(0.0, |consensus| consensus.share);
-        let answer = self.appearance.look(luma, self.bounds)?;
+        self.carry(expected);
+        if let Some(consensus) = consensus {
+            // The fewer points agree, the more counts where it was going.
+            self.bounds += (consensus.motion - carried) * (share / BELIEVED_SHARE).min(1.0);
+        }
+        let answer = self.appearance.look(luma, self.bounds, SPREAD)?;
         let likeness = answer.peak / self.usual_peak;
         self.confidence = (0.5 * share + 0.5 * likeness.min(1.0)).clamp(0.0, 1.0);
-        if likeness >= SURE {
-            self.bounds += answer.offset * if share >= BELIEVED_SHARE { PULL } else { 1.0 };
-            self.learn(luma, answer.peak, dt_s)?;
-            Ok(Sight::Seen)
-        } else if share >= BELIEVED_SHARE && likeness >= POSSIBLE {
-            Ok(Sight::Seen)
-        } else {
-            Ok(Sight::Hidden)
+        self.sure = likeness >= SURE;
+        let believed = share >= BELIEVED_SHARE;
+        if self.sure || (believed && likeness >= POSSIBLE) {
+            self.bounds += answer.offset * if believed { PULL } else { 1.0 };
         }
+        if likeness >= LEARNT {
+            self.resize(luma, answer.peak)?;
+            self.learn(luma, answer.peak, dt_s)?;
+        }
+        let seen = self.sure || (believed && likeness >= POSSIBLE);
+        Ok(if seen { Sight::Seen } else { Sight::Hidden })
+    }
+
+    /// Whether points that moved by `own` against the background stay behind the target: they lie on a post
+    /// or a sign in front of it.
+    fn stays_behind(&self, own: Point2f, dt_s: f32) -> bool {
+        let usual = length(self.own_velocity);
+        usual * VELOCITY_TIME_S > MOVING && length(own) < STAYING * usual * dt_s
+    }
+
+    /// Tries a larger and a smaller box in turn.
+    fn resize(&mut self, luma: &Luma, peak: f32) -> opencv::Result<()> {
+        self.larger = !self.larger;
+        let growth = if self.larger { 1.0 + TRIED_GROWTH } else { 1.0 / (1.0 + TRIED_GROWTH) };
+        let other = self.appearance.look(luma, scaled(self.bounds, growth, growth), SPREAD)?;
+        if other.peak > BETTER * peak {
+            self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
+        }
+        Ok(())
     }
 
     fn learn(&mut self, luma: &Luma, peak: f32, dt_s: f32) -> opencv::Result<()> {
@@ -262,7 +312,9 @@ impl Target {
             return Ok(sight);
         }
         let own = (centre(self.bounds) - start - self.ego.at(start)) / dt_s;
-        self.own_velocity += (own - self.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+        if self.sure {
+            self.own_velocity += (own - self.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+        }
         self.take_stock(luma)?;
         self.centroid = self.centre_of_mass()?;
         if self.steps.recentre {
@@ -296,6 +348,14 @@ impl Target {
 
     fn replenish(&mut self) -> opencv::Result<()> {
         self.frames_since_replenished += 1;
+        if !self.sure {
+            // What is there now may be whoever passes in front.
+            return Ok(());
+        }
+        if self.points.members().len() < MIN_MEMBERS {
+            // Too few to vouch for new ones; the appearance did.
+            return self.seed();
+        }
         let few = (self.points.len() as f32) < REPLENISH_SHARE * MAX_POINTS as f32;
         if few && self.frames_since_replenished >= REPLENISH_FRAMES {
             self.frames_since_replenished = 0;
@@ -326,7 +386,7 @@ impl Target {
         let mut best: Option<(Point2f, f32)> = None;
         for sideways in [0.0, -reach, reach] {
             let shift = Point2f::new(sideways, 0.0);
-            let answer = self.appearance.look(luma, self.bounds + shift)?;
+            let answer = self.appearance.look(luma, self.bounds + shift, WIDE_SPREAD)?;
             if best.is_none_or(|(_, peak)| answer.peak > peak) {
                 best = Some((shift + answer.offset, answer.peak));
             }
