@@ -24,7 +24,9 @@ mod rtsp;
 mod settings;
 mod status;
 mod sync;
+mod threads;
 mod vapix;
+mod wish;
 mod world;
 
 pub use camera::VirtualCamera;

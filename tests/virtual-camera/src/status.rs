@@ -2,12 +2,13 @@
 
 use std::time::Duration;
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
 /// A camera at one moment.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Status {
-    /// Since the camera's start.
+    /// Since the camera's start; seconds in JSON.
+    #[serde(serialize_with = "seconds")]
     pub time: Duration,
     /// Degrees, growing to the right.
     pub pan_deg: f64,
@@ -46,7 +47,8 @@ pub struct Status {
 pub struct ReceivedCommand {
     /// From 1, in order of arrival.
     pub number: u64,
-    /// When it was answered, since the camera's start.
+    /// When it was answered, since the camera's start; seconds in JSON.
+    #[serde(serialize_with = "seconds")]
     pub time: Duration,
     /// The query or form as it was on the wire.
     pub query: String,
@@ -78,4 +80,8 @@ pub enum Fault {
     EmptyOk,
     /// A right answer, then the connection closes without having said so.
     CloseAfterResponse,
+}
+
+fn seconds<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_f64(time.as_secs_f64())
 }

@@ -18,7 +18,7 @@ use super::Site;
 use crate::settings::{Auth, Settings};
 
 /// Lets in whoever knows the password.
-pub(crate) struct Guard {
+pub(super) struct Guard {
     auth: Auth,
     user: String,
     password: String,

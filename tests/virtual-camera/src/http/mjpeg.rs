@@ -1,11 +1,6 @@
 //! MJPEG: one JPEG after the other in a response that never ends.
 
-use std::{
-    io::Write,
-    sync::{Arc, Mutex},
-    thread::JoinHandle,
-    time::Duration,
-};
+use std::{io::Write, sync::Arc, time::Duration};
 
 use axum::{
     body::{Body, Bytes},
@@ -16,36 +11,17 @@ use axum::{
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
-use super::{
-    Site,
-    picture::{PictureError, Wish, argument},
+use super::Site;
+use crate::{
+    camera::Camera,
+    encode::JpegEncoder,
+    pace::Pace,
+    vapix::parse_args,
+    wish::{PictureError, Wish, argument},
 };
-use crate::{camera::Camera, encode::JpegEncoder, pace::Pace, sync::lock, vapix::parse_args};
 
 /// Pictures under way to a slow client; further ones are dropped, as the camera does.
 const QUEUED: usize = 2;
-
-/// The threads that draw, one for each client.
-#[derive(Default)]
-pub(super) struct Streams(Mutex<Vec<JoinHandle<()>>>);
-
-impl Streams {
-    fn spawn(&self, work: impl FnOnce() + Send + 'static) -> std::io::Result<()> {
-        let thread = std::thread::Builder::new().name("camera-mjpeg".into()).spawn(work)?;
-        let mut threads = lock(&self.0);
-        threads.retain(|thread| !thread.is_finished());
-        threads.push(thread);
-        Ok(())
-    }
-
-    /// Waits for all of them; their clients must be gone or the camera stopping.
-    pub fn join(&self) {
-        for thread in std::mem::take(&mut *lock(&self.0)) {
-            // It ended with a panic at worst, which has been printed.
-            let _ = thread.join();
-        }
-    }
-}
 
 /// What ends a stream early.
 struct End {
@@ -65,7 +41,7 @@ pub(super) async fn video(
     let (sender, receiver) = mpsc::channel(QUEUED);
     let camera = site.camera.clone();
     site.streams
-        .spawn(move || stream(&camera, wish, &end, &encoder, &sender))
+        .spawn("camera-mjpeg", move || stream(&camera, wish, &end, &encoder, &sender))
         .map_err(|_| PictureError::Encode(crate::EncodeError::Nothing))?;
     let body = Body::from_stream(ReceiverStream::new(receiver));
     let headers = [

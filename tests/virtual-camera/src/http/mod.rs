@@ -16,24 +16,23 @@ use axum::{
 };
 use tokio::{net::TcpSocket, sync::oneshot};
 
-use crate::{Error, camera::Camera};
-pub(crate) use auth::Guard;
+use crate::{Error, camera::Camera, threads::Threads};
+use auth::Guard;
 use connection::{Connection, Door};
-use mjpeg::Streams;
 
 /// What the handlers share.
-pub(crate) struct Site {
+struct Site {
     camera: Arc<Camera>,
     guard: Guard,
     /// CGIs run one at a time.
     turn: tokio::sync::Mutex<()>,
-    streams: Arc<Streams>,
+    streams: Arc<Threads>,
 }
 
 /// The running server.
 pub(crate) struct HttpServer {
     address: SocketAddr,
-    streams: Arc<Streams>,
+    streams: Arc<Threads>,
     stop: Option<oneshot::Sender<()>>,
     thread: Option<JoinHandle<()>>,
 }
@@ -51,7 +50,7 @@ impl HttpServer {
                 .map_err(unavailable)?
         };
         let address = door.address();
-        let streams = Arc::new(Streams::default());
+        let streams = Arc::new(Threads::default());
         let site = Arc::new(Site {
             guard: Guard::new(&camera.settings),
             camera,

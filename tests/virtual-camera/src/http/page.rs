@@ -9,14 +9,12 @@ use axum::{
 };
 use serde::Serialize;
 
-use super::{
-    Site,
-    picture::{PictureError, Wish, argument, jpeg},
-};
+use super::{Site, picture::jpeg};
 use crate::{
     Limits, ReceivedCommand, Status,
     kinematics::Pose,
     vapix::{Answer, parse_args},
+    wish::{PictureError, Wish, argument},
 };
 
 /// Commands shown.

@@ -1,0 +1,268 @@
+//! The command line.
+
+use std::{path::PathBuf, time::Duration};
+
+use clap::{Parser, ValueEnum};
+use virtual_camera::{
+    Auth, FootageSettings, Kinematics, Pose, PtzApi, Settings, SpeedMap, SyntheticSettings, Video, World,
+};
+
+/// A virtual Axis pan-tilt-zoom camera on loopback.
+///
+/// Serves VAPIX, MJPEG, snapshots and RTSP, and a page to look at and steer by hand at /. Its picture is cut out of a
+/// recording by a camera that stood still, as a turning camera in the same place would have seen it. Prints one line
+/// "ready http=URL rtsp=URL" once it serves, and ends on SIGINT or SIGTERM.
+#[derive(Parser)]
+#[command(name = "virtual-camera", version)]
+pub struct Options {
+    /// Recording to look around in; without it the world is a small synthetic one
+    #[arg(long, value_name = "FILE")]
+    footage: Option<PathBuf>,
+    /// Which world; footage needs --footage
+    #[arg(long, value_enum)]
+    world: Option<WorldName>,
+    /// Where in the recording to begin, in seconds
+    #[arg(long, default_value_t = 0.0, value_name = "SECONDS", value_parser = not_negative)]
+    start: f64,
+    /// Show the recording once and hold its last picture, instead of again and again
+    #[arg(long)]
+    once: bool,
+    /// Horizontal field of view of the recording, in degrees (assumed)
+    #[arg(long, default_value_t = 60.0, value_name = "DEGREES", value_parser = field_of_view)]
+    recording_fov: f64,
+    /// Width of the widest view, as a part of the recording's width
+    #[arg(long, default_value_t = 0.45, value_name = "PART", value_parser = part)]
+    view_width: f64,
+
+    /// TCP port for HTTP; 0 takes a free one
+    #[arg(long, default_value_t = 8080)]
+    http_port: u16,
+    /// TCP port for RTSP; 0 takes a free one
+    #[arg(long, default_value_t = 8554)]
+    rtsp_port: u16,
+    /// How clients say who they are
+    #[arg(long, value_enum, default_value = "digest")]
+    auth: AuthName,
+    /// The account
+    #[arg(long, default_value = "root")]
+    user: String,
+    /// Its password
+    #[arg(long, default_value = "pass", hide_default_value = true)]
+    password: String,
+
+    /// Size of the picture, as 640x480; by default 640 wide and of the recording's shape
+    #[arg(long, value_parser = size)]
+    size: Option<(u32, u32)>,
+    /// Frames per second; by default the recording's
+    #[arg(long, value_parser = frame_rate)]
+    fps: Option<f64>,
+    /// JPEG compression, 0 (best) to 100
+    #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=100))]
+    compression: u32,
+    /// Exposure time in milliseconds: what moves meanwhile is blurred
+    #[arg(long, default_value_t = 16.7, value_name = "MS", value_parser = not_negative)]
+    exposure: f64,
+    /// From light to wire, in milliseconds
+    #[arg(long, default_value_t = 100.0, value_name = "MS", value_parser = not_negative)]
+    video_delay: f64,
+
+    /// From a command's arrival to the first movement, in milliseconds
+    #[arg(long, default_value_t = 60.0, value_name = "MS", value_parser = not_negative)]
+    command_delay: f64,
+    /// Time that ptz.cgi takes for a request, in milliseconds
+    #[arg(long, default_value_t = 10.0, value_name = "MS", value_parser = not_negative)]
+    service_time: f64,
+    /// How speed steps become speeds
+    #[arg(long, value_enum, default_value = "cubic")]
+    speed_map: SpeedMapName,
+    /// Degrees per second at speed step 100
+    #[arg(long, default_value_t = 450.0, value_name = "DEG/S", value_parser = positive)]
+    max_speed: f64,
+    /// Degrees per second squared
+    #[arg(long, default_value_t = 400.0, value_name = "DEG/S2", value_parser = positive)]
+    acceleration: f64,
+    /// Do not limit the speed by the field of view (PTZ.Various.V1.ProportionalSpeedEnabled=false)
+    #[arg(long)]
+    no_proportional_speed: bool,
+    /// Speak ptz.cgi as newer firmware does: query=attributes, proportionalspeed=
+    #[arg(long)]
+    extended_api: bool,
+
+    /// Pan at the start and of the preset Home, in degrees to the right
+    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", allow_hyphen_values = true)]
+    pan: f64,
+    /// Tilt at the start and of the preset Home, in degrees upwards
+    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", allow_hyphen_values = true)]
+    tilt: f64,
+    /// Zoom step at the start and of the preset Home, 1 to 9999
+    #[arg(long, default_value_t = 1.0, value_name = "STEP", value_parser = not_negative)]
+    zoom: f64,
+
+    /// Write position, speeds, footage frame and commands to this CSV file, 50 lines a second
+    #[arg(long, value_name = "FILE")]
+    pub log: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum WorldName {
+    Footage,
+    Synthetic,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum AuthName {
+    None,
+    Basic,
+    /// As firmware from 2016 on, with qop
+    Digest,
+    /// As older firmware (RFC 2069)
+    DigestNoQop,
+    Both,
+}
+
+#[derive(Clone, Copy, ValueEnum)]
+enum SpeedMapName {
+    Linear,
+    Cubic,
+}
+
+impl TryFrom<Options> for Settings {
+    type Error = String;
+
+    fn try_from(options: Options) -> Result<Self, String> {
+        Ok(Self {
+            http_port: options.http_port,
+            rtsp_port: options.rtsp_port,
+            auth: match options.auth {
+                AuthName::None => Auth::None,
+                AuthName::Basic => Auth::Basic,
+                AuthName::Digest => Auth::Digest { qop: true },
+                AuthName::DigestNoQop => Auth::Digest { qop: false },
+                AuthName::Both => Auth::Both,
+            },
+            ptz_api: if options.extended_api { PtzApi::Extended } else { PtzApi::Classic },
+            service_time: milliseconds(options.service_time),
+            world: options.world()?,
+            kinematics: options.kinematics(),
+            video: Video {
+                size: options.size,
+                frame_rate: options.fps,
+                compression: options.compression,
+                delay: milliseconds(options.video_delay),
+                exposure: milliseconds(options.exposure),
+            },
+            home: Pose { pan_deg: options.pan, tilt_deg: options.tilt, zoom_step: options.zoom },
+            user: options.user,
+            password: options.password,
+            ..Self::default()
+        })
+    }
+}
+
+impl Options {
+    fn world(&self) -> Result<World, String> {
+        match (&self.footage, self.world) {
+            (Some(_), Some(WorldName::Synthetic)) => Err("--world synthetic takes no --footage".into()),
+            (None, Some(WorldName::Footage)) => Err("--world footage needs --footage FILE".into()),
+            (None, _) => Ok(World::Synthetic(SyntheticSettings::default())),
+            (Some(file), _) => Ok(World::Footage(FootageSettings {
+                recording_fov_deg: self.recording_fov,
+                view_width: self.view_width,
+                start: Duration::from_secs_f64(self.start),
+                looped: !self.once,
+                ..FootageSettings::new(file)
+            })),
+        }
+    }
+
+    fn kinematics(&self) -> Kinematics {
+        let max_deg_s = self.max_speed;
+        let mut kinematics = Kinematics {
+            speed_map: match self.speed_map {
+                SpeedMapName::Linear => SpeedMap::Linear { max_deg_s },
+                SpeedMapName::Cubic => SpeedMap::Cubic { max_deg_s, floor_deg_s: 0.05 },
+            },
+            acceleration_deg_s2: self.acceleration,
+            command_delay: milliseconds(self.command_delay),
+            ..Kinematics::default()
+        };
+        kinematics.proportional_speed.enabled = !self.no_proportional_speed;
+        kinematics
+    }
+}
+
+fn milliseconds(milliseconds: f64) -> Duration {
+    Duration::from_secs_f64(milliseconds / 1000.0)
+}
+
+fn number(text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, String> {
+    let number: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if range.contains(&number) {
+        Ok(number)
+    } else {
+        Err(format!("must be from {} to {}", range.start(), range.end()))
+    }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=1e6)
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text, 0.01..=1e6)
+}
+
+fn field_of_view(text: &str) -> Result<f64, String> {
+    number(text, 1.0..=150.0)
+}
+
+fn part(text: &str) -> Result<f64, String> {
+    number(text, 0.05..=1.0)
+}
+
+fn frame_rate(text: &str) -> Result<f64, String> {
+    number(text, 0.1..=120.0)
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let length =
+        |text: &str| text.parse().ok().filter(|length| (32..=4096).contains(length) && length % 2 == 0);
+    text.split_once('x')
+        .and_then(|(width, height)| Some((length(width)?, length(height)?)))
+        .ok_or_else(|| "must be like 640x480, even, from 32x32 to 4096x4096".into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Options::command().debug_assert();
+    }
+
+    #[test]
+    fn options_become_settings() {
+        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250";
+        let settings = Settings::try_from(Options::parse_from(line.split(' '))).unwrap();
+        assert_eq!(settings.auth, Auth::Digest { qop: false });
+        assert_eq!(settings.video.size, Some((320, 240)));
+        assert_eq!(settings.video.delay, Duration::from_millis(250));
+        assert_eq!(settings.home.pan_deg, -5.0);
+        let World::Footage(footage) = settings.world else { panic!("no footage") };
+        assert_eq!((footage.start, footage.looped), (Duration::from_millis(12_500), true));
+    }
+
+    #[test]
+    fn nonsense_is_refused() {
+        for line in
+            ["--size 640", "--size 641x480", "--fps 0", "--view-width 2", "--auth maybe", "--start -1"]
+        {
+            let words = std::iter::once("virtual-camera").chain(line.split(' '));
+            assert!(Options::try_parse_from(words).is_err(), "{line}");
+        }
+        let options = Options::parse_from(["virtual-camera", "--world", "footage"]);
+        assert!(Settings::try_from(options).is_err());
+    }
+}

@@ -1,0 +1,56 @@
+//! What travels over RTP.
+
+use crate::wish::Wish;
+
+/// `videocodec=`
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Codec {
+    H264,
+    Mpeg4,
+    Jpeg,
+}
+
+impl Codec {
+    pub fn parse(name: &str) -> Option<Self> {
+        match name {
+            "h264" => Some(Self::H264),
+            "mpeg4" => Some(Self::Mpeg4),
+            "jpeg" => Some(Self::Jpeg),
+            _ => None,
+        }
+    }
+
+    /// A bin that takes pictures in at `video` and gives RTP.
+    pub fn launch(self, wish: &Wish) -> String {
+        let encoder = match self {
+            Self::H264 => format!(
+                "x264enc tune=zerolatency speed-preset=ultrafast key-int-max={} bitrate={} \
+                 ! video/x-h264,profile=constrained-baseline ! rtph264pay config-interval=-1 pt=96",
+                Self::key_interval(wish),
+                Self::bits_per_second(wish) / 1000
+            ),
+            Self::Mpeg4 => format!(
+                "avenc_mpeg4 gop-size={} bitrate={} ! rtpmp4vpay config-interval=1 pt=96",
+                Self::key_interval(wish),
+                Self::bits_per_second(wish)
+            ),
+            Self::Jpeg => format!("jpegenc quality={} ! rtpjpegpay pt=26", 100 - wish.compression.min(99)),
+        };
+        format!(
+            "( appsrc name=video is-live=true format=time max-buffers=4 leaky-type=downstream \
+             ! {encoder} name=pay0 )"
+        )
+    }
+
+    /// A key frame a second: who joins or loses a packet soon sees again.
+    fn key_interval(wish: &Wish) -> u32 {
+        wish.frame_rate.round().max(1.0) as u32
+    }
+
+    /// A fifth of a bit for a pixel at compression 0, a tenth at 50.
+    fn bits_per_second(wish: &Wish) -> u64 {
+        let pixels = f64::from(wish.size.0) * f64::from(wish.size.1) * wish.frame_rate;
+        let share = (100.0 - f64::from(wish.compression.min(95))) / 100.0;
+        (pixels * 0.2 * share).max(64_000.0) as u64
+    }
+}
