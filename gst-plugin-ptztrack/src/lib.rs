@@ -8,6 +8,7 @@
 
 pub mod bgavgdetect;
 pub mod lkfeaturetrack;
+mod lock;
 pub mod luma_source;
 pub mod ptzoverlay;
 pub mod vision;

@@ -1,3 +1,4 @@
+use std::iter;
 use std::time::Duration;
 
 use opencv::core::{self, CV_8UC1, Mat, Scalar};
@@ -241,15 +242,15 @@ impl Detector {
     }
 
     fn enlarge(&self, mask: &Mat, out: &mut [u8], stride: usize, step: usize) -> opencv::Result<()> {
-        let columns = mask.cols().max(1) as usize;
+        let (divisor, columns) = (self.divisor.max(1), mask.cols().max(1) as usize);
         let pixels = if mask.empty() { &[] } else { mask.data_bytes()? };
         let mut rows = pixels.chunks_exact(columns);
-        for lines in out.chunks_mut(stride * self.divisor.max(1)) {
+        for lines in out.chunks_mut(stride * divisor) {
             let row = rows.next().unwrap_or(&[]);
             for line in lines.chunks_mut(stride) {
-                for (x, pixel) in line.iter_mut().step_by(step).enumerate() {
-                    *pixel = row.get(x / self.divisor.max(1)).copied().unwrap_or(0);
-                }
+                let enlarged = row.iter().flat_map(|pixel| iter::repeat_n(*pixel, divisor));
+                let slots = line.iter_mut().step_by(step);
+                slots.zip(enlarged.chain(iter::repeat(0))).for_each(|(slot, pixel)| *slot = pixel);
             }
         }
         Ok(())

@@ -1,0 +1,107 @@
+use std::time::Duration;
+
+use super::{Output, Selection, Test};
+use crate::vision::{Criterion, DetectorConfig, ForegroundTest, RegionChoice, ZoneError, Zones};
+
+/// Polygons as written and as read.
+#[derive(Debug, Clone, Default)]
+pub(super) struct ZoneSetting {
+    pub text: String,
+    zones: Zones,
+}
+
+impl std::str::FromStr for ZoneSetting {
+    type Err = ZoneError;
+
+    fn from_str(text: &str) -> Result<Self, ZoneError> {
+        Ok(Self { text: text.to_owned(), zones: text.parse()? })
+    }
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Settings {
+    pub analysis_width: u32,
+    pub alpha: f64,
+    pub alpha_interval_ns: u64,
+    pub test: Test,
+    pub threshold: f64,
+    pub noise_floor: f64,
+    pub spread_factor: f64,
+    pub window: u32,
+    pub open_size: i32,
+    pub close_size: i32,
+    pub selection: Selection,
+    pub min_area: f64,
+    pub max_area: f64,
+    pub zones: ZoneSetting,
+    pub exclude_zones: ZoneSetting,
+    pub warm_up: u32,
+    pub relearn_fraction: f64,
+    pub confirm_frames: u32,
+    pub settle_time_ns: u64,
+    pub max_gap_ns: u64,
+    pub end_delay_ns: u64,
+    pub post_messages: bool,
+    pub output: Output,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            analysis_width: 640,
+            alpha: 0.5,
+            alpha_interval_ns: 300_000_000,
+            test: Test::default(),
+            threshold: 0.15,
+            noise_floor: 12.0,
+            spread_factor: 3.0,
+            window: 25,
+            open_size: -1,
+            close_size: -1,
+            selection: Selection::default(),
+            min_area: 0.001,
+            max_area: 0.8,
+            zones: ZoneSetting::default(),
+            exclude_zones: ZoneSetting::default(),
+            warm_up: 10,
+            relearn_fraction: 0.5,
+            confirm_frames: 3,
+            settle_time_ns: 500_000_000,
+            max_gap_ns: 1_000_000_000,
+            end_delay_ns: 1_000_000_000,
+            post_messages: true,
+            output: Output::default(),
+        }
+    }
+}
+
+impl Settings {
+    /// What the detector goes by.
+    pub fn detector(&self) -> DetectorConfig {
+        let test = match self.test {
+            Test::Relative => ForegroundTest::Relative { threshold: self.threshold },
+            Test::Spread => {
+                ForegroundTest::Spread { factor: self.spread_factor, window: self.window as usize }
+            }
+        };
+        DetectorConfig {
+            analysis_width: self.analysis_width as usize,
+            alpha: self.alpha,
+            alpha_interval: Duration::from_nanos(self.alpha_interval_ns),
+            criterion: Criterion { test, noise_floor: self.noise_floor },
+            open_size: usize::try_from(self.open_size).ok(),
+            close_size: usize::try_from(self.close_size).ok(),
+            choice: match self.selection {
+                Selection::LargestPerimeter => RegionChoice::LargestPerimeter,
+                Selection::All => RegionChoice::All,
+            },
+            min_area: self.min_area,
+            max_area: self.max_area,
+            zones: self.zones.zones.clone(),
+            exclude_zones: self.exclude_zones.zones.clone(),
+            warm_up: self.warm_up,
+            relearn_fraction: self.relearn_fraction,
+            confirm_pictures: self.confirm_frames,
+        }
+    }
+}

@@ -1,0 +1,161 @@
+use std::time::Duration;
+
+use gst_video::prelude::*;
+use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
+use ptztrack_contract::{MotionChange, Region};
+
+use super::Output;
+use super::settings::Settings;
+use crate::luma_source::{LumaSource, LumaSourceError};
+use crate::vision::{Detector, DetectorError, Presence};
+
+/// Distance of pictures whose timestamps and caps tell none.
+const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
+
+/// A frame that could not be looked at or drawn.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum StreamError {
+    #[error("the buffer does not hold a frame of the negotiated caps")]
+    Buffer,
+    #[error("the luma cannot be read: {0}")]
+    Luma(#[from] LumaSourceError),
+    #[error("detection failed: {0}")]
+    Detector(#[from] DetectorError),
+    #[error("the output cannot be drawn: {0}")]
+    Drawing(#[from] opencv::Error),
+    #[error("the output cannot be converted: {0}")]
+    Conversion(#[from] glib::BoolError),
+}
+
+/// One stream of frames of the same caps.
+pub(super) struct Stream {
+    pub in_info: VideoInfo,
+    out_info: VideoInfo,
+    source: LumaSource,
+    detector: Detector,
+    presence: Presence,
+    converter: Option<VideoConverter>,
+    last_pts: Option<gst::ClockTime>,
+    /// Something is missing before the next picture.
+    interrupted: bool,
+    /// Whether a fault was reported since the last good frame: one warning, not a flood.
+    pub warned: bool,
+}
+
+impl Stream {
+    /// Caps that change do not end the motion that `before` has reported.
+    pub fn new(in_info: VideoInfo, out_info: VideoInfo, before: Option<Self>) -> Self {
+        Self {
+            in_info,
+            out_info,
+            source: LumaSource::default(),
+            detector: Detector::default(),
+            presence: before.map(|before| before.presence).unwrap_or_default(),
+            converter: None,
+            last_pts: None,
+            interrupted: false,
+            warned: false,
+        }
+    }
+
+    /// The next picture has nothing to do with those before.
+    pub fn flush(&mut self) {
+        self.detector.relearn();
+        self.last_pts = None;
+        self.interrupted = false;
+    }
+
+    /// Pictures are missing before the next one.
+    pub fn interrupt(&mut self) {
+        self.interrupted = true;
+    }
+
+    /// Time since the last picture. Forgets the background where too much of it passed unseen.
+    pub fn advance(&mut self, pts: Option<gst::ClockTime>, max_gap: Duration) -> Duration {
+        let since = self.last_pts.zip(pts).map(|(last, pts)| pts.nseconds().checked_sub(last.nseconds()));
+        let interrupted = std::mem::take(&mut self.interrupted);
+        let (relearn, elapsed) = match since {
+            Some(Some(since)) => {
+                let since = Duration::from_nanos(since);
+                (interrupted && since > max_gap, since)
+            }
+            // Time runs backwards: another stream.
+            Some(None) => (true, self.nominal_distance()),
+            None => (interrupted, self.nominal_distance()),
+        };
+        if relearn {
+            self.detector.relearn();
+        }
+        self.last_pts = pts;
+        elapsed
+    }
+
+    fn nominal_distance(&self) -> Duration {
+        let fps = self.in_info.fps();
+        if fps.numer() <= 0 || fps.denom() <= 0 {
+            return NOMINAL_DISTANCE;
+        }
+        Duration::from_secs_f64(f64::from(fps.denom()) / f64::from(fps.numer()))
+    }
+
+    /// Lets a picture pass unseen; the background will have changed when it looks again.
+    pub fn skip(&mut self) {
+        self.detector.relearn();
+    }
+
+    /// The moving regions of a frame; `None` while it learns.
+    pub fn look(
+        &mut self,
+        buffer: &gst::BufferRef,
+        elapsed: Duration,
+        settings: &Settings,
+    ) -> Result<Option<Vec<Region>>, StreamError> {
+        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
+            .map_err(|_| StreamError::Buffer)?;
+        let luma = self.source.luma(&frame)?;
+        Ok(self.detector.process(&luma, elapsed, &settings.detector())?)
+    }
+
+    /// Whether motion starts or ends with these regions.
+    pub fn change(
+        &mut self,
+        regions: &[Region],
+        elapsed: Duration,
+        settings: &Settings,
+    ) -> Option<MotionChange> {
+        let end_delay = Duration::from_nanos(settings.end_delay_ns);
+        self.presence.update(!regions.is_empty(), elapsed, end_delay)
+    }
+
+    /// Whether motion ends as the stream does, and the timestamp of its last picture.
+    pub fn finish(&mut self) -> (Option<MotionChange>, Option<gst::ClockTime>) {
+        (self.presence.finish(), self.last_pts)
+    }
+
+    /// Draws what `output` asks for of the frame in `inbuf`, in which `regions` were found, into `outbuf`.
+    pub fn draw(
+        &mut self,
+        inbuf: &gst::BufferRef,
+        outbuf: &mut gst::BufferRef,
+        regions: &[Region],
+        output: Output,
+    ) -> Result<(), StreamError> {
+        let mut out = VideoFrameRef::from_buffer_ref_writable(outbuf, &self.out_info)
+            .map_err(|_| StreamError::Buffer)?;
+        let stride = out.plane_stride().first().copied().unwrap_or(0).unsigned_abs() as usize;
+        if output != Output::Foreground {
+            self.detector.draw_mask(out.plane_data_mut(0)?, stride, 1)?;
+            return Ok(());
+        }
+        let frame =
+            VideoFrameRef::from_buffer_ref_readable(inbuf, &self.in_info).map_err(|_| StreamError::Buffer)?;
+        let converter = match self.converter.take() {
+            Some(converter) => converter,
+            None => VideoConverter::new(&self.in_info, &self.out_info, None)?,
+        };
+        converter.frame_ref(&frame, &mut out);
+        self.converter = Some(converter);
+        let alpha = out.plane_data_mut(0)?.get_mut(3..).unwrap_or_default();
+        Ok(self.detector.draw_regions(regions, alpha, stride, 4)?)
+    }
+}
