@@ -99,6 +99,7 @@ pub struct Pilot {
     /// The speed steps in force, for the quantiser's hysteresis.
     speed_steps: (i8, i8),
     at_limit: bool,
+    overtaken: u64,
     reports: Vec<Report>,
 }
 
@@ -106,6 +107,8 @@ pub struct Pilot {
 struct Target {
     sight: Sight,
     last_seen: Duration,
+    /// Whether it was looked at when there was time to send something.
+    considered: bool,
 }
 
 /// What the camera should do.
@@ -142,6 +145,7 @@ impl Pilot {
             round_trip: Duration::ZERO,
             speed_steps: (0, 0),
             at_limit: false,
+            overtaken: 0,
             reports: Vec::new(),
         }
     }
@@ -167,7 +171,8 @@ impl Pilot {
             (Visibility::Predicted, None) | (Visibility::Gone, _) => return self.rest(),
         };
         self.aim.see(&sight, &self.view(&sight), &self.history, self.settings.latency);
-        self.target = Some(Target { sight, last_seen });
+        self.overtaken += u64::from(self.target.as_ref().is_some_and(|target| !target.considered));
+        self.target = Some(Target { sight, last_seen, considered: false });
     }
 
     /// Forgets the target; the camera is to be stopped.
@@ -227,6 +232,11 @@ impl Pilot {
         !self.scheduler.may_move()
     }
 
+    /// Pictures of the target that came while a request was in flight, and were followed by newer ones in that time.
+    pub fn overtaken(&self) -> u64 {
+        self.overtaken
+    }
+
     /// Whether there is a target to follow.
     pub fn has_target(&self) -> bool {
         self.target.is_some()
@@ -259,7 +269,8 @@ impl Pilot {
     }
 
     fn wish(&mut self, now: Duration) -> Wish {
-        let Some(target) = &self.target else { return Wish::Rest };
+        let Some(target) = &mut self.target else { return Wish::Rest };
+        target.considered = true;
         if now >= target.last_seen + self.settings.stale_timeout {
             self.rest();
             return Wish::Rest;

@@ -228,7 +228,7 @@ impl BaseSinkImpl for VapixPtzSink {
         let client = settings.client(environment).ok_or_else(|| {
             gst::error_msg!(
                 gst::ResourceError::NotFound,
-                ["no camera: set `location`, for example location=http://192.168.0.90"]
+                ("no camera: set `location`, for example location=http://192.168.0.90")
             )
         })?;
         *lock(&self.stream) = Stream::default();
@@ -239,7 +239,7 @@ impl BaseSinkImpl for VapixPtzSink {
                 element.imp().happened(event);
             }
         })
-        .map_err(|reason| gst::error_msg!(gst::ResourceError::Settings, ["{reason}"]))?;
+        .map_err(|reason| gst::error_msg!(gst::ResourceError::Settings, ("{reason}")))?;
         *lock(&self.worker) = Some(worker);
         Ok(())
     }
@@ -337,7 +337,7 @@ impl VapixPtzSink {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Format,
-                ["a target meta cannot be read ({err}); are all plugins of the same version?"]
+                ("a target meta cannot be read ({err}); are all plugins of the same version?")
             );
         }
     }
@@ -364,12 +364,12 @@ impl VapixPtzSink {
             Event::GaveUp => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
-                ["the camera has not confirmed its stop in time and may still be moving; stop it by hand"]
+                ("the camera has not confirmed its stop in time and may still be moving; stop it by hand")
             ),
             Event::Died(reason) => gst::element_imp_error!(
                 self,
                 gst::LibraryError::Failed,
-                ["the camera's task broke ({reason}); the camera may still be moving; restart the pipeline"]
+                ("the camera's task broke ({reason}); the camera may still be moving; restart the pipeline")
             ),
         }
     }
@@ -379,14 +379,14 @@ impl VapixPtzSink {
             LinkChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
             LinkChange::Disconnected(err) => {
                 self.post(CameraChange::Disconnected, &err.to_string());
-                gst::element_imp_warning!(self, gst::ResourceError::Write, ["{err}. {}", err.advice()]);
+                gst::element_imp_warning!(self, gst::ResourceError::Write, ("{err}. {}", err.advice()));
             }
             LinkChange::Refused(err) => {
                 self.post(CameraChange::Refused, &err.to_string());
                 gst::element_imp_warning!(
                     self,
                     gst::ResourceError::NotAuthorized,
-                    ["{err}. {}", err.advice()]
+                    ("{err}. {}", err.advice())
                 );
             }
         }
@@ -439,7 +439,7 @@ impl VapixPtzSink {
             Err(err) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ["{err}; `location` stays as it was"]
+                ("{err}; `location` stays as it was")
             ),
         }
     }
@@ -471,10 +471,7 @@ impl VapixPtzSink {
 
     fn stats(&self) -> gst::Structure {
         let worker = lock(&self.worker);
-        let (statistics, coalesced) = worker
-            .as_ref()
-            .map(|worker| (worker.statistics(), worker.inbox().coalesced()))
-            .unwrap_or_default();
+        let statistics = worker.as_ref().map(Worker::statistics).unwrap_or_default();
         let state = match &*worker {
             None => "stopped",
             Some(_) if statistics.halted => "refused",
@@ -488,7 +485,7 @@ impl VapixPtzSink {
             .field("state", state)
             .field("commands-sent", statistics.sent)
             .field("commands-failed", statistics.failed)
-            .field("commands-coalesced", coalesced)
+            .field("commands-coalesced", statistics.coalesced)
             .field("round-trip", nanoseconds(statistics.round_trip))
             .field("round-trip-average", nanoseconds(statistics.round_trip_average))
             .field("pan-rate", status.rate.pan)

@@ -31,7 +31,7 @@ pub struct Inbox {
     mail: Mutex<Mail>,
     arrived: Notify,
     epoch: Instant,
-    coalesced: AtomicU64,
+    overtaken: AtomicU64,
 }
 
 impl Inbox {
@@ -40,7 +40,7 @@ impl Inbox {
             mail: Mutex::default(),
             arrived: Notify::new(),
             epoch: Instant::now(),
-            coalesced: AtomicU64::new(0),
+            overtaken: AtomicU64::new(0),
         }
     }
 
@@ -52,7 +52,7 @@ impl Inbox {
     /// Leaves the newest picture of the target, in place of one not looked at yet.
     pub fn see(&self, sight: Sight) {
         if self.mail().sight.replace(sight).is_some() {
-            self.coalesced.fetch_add(1, Ordering::Relaxed);
+            self.overtaken.fetch_add(1, Ordering::Relaxed);
         }
         self.arrived.notify_one();
     }
@@ -86,8 +86,8 @@ impl Inbox {
     }
 
     /// Pictures that were replaced by newer ones before anybody looked.
-    pub fn coalesced(&self) -> u64 {
-        self.coalesced.load(Ordering::Relaxed)
+    pub fn overtaken(&self) -> u64 {
+        self.overtaken.load(Ordering::Relaxed)
     }
 
     pub(super) fn take(&self) -> Mail {

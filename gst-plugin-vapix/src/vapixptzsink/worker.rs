@@ -40,6 +40,8 @@ pub struct Statistics {
     pub status: Status,
     pub sent: u64,
     pub failed: u64,
+    /// Pictures of the target that were overtaken by newer ones before they could be steered by.
+    pub coalesced: u64,
     pub round_trip: Duration,
     pub round_trip_average: Duration,
     pub last_error: Option<String>,
@@ -261,6 +263,7 @@ impl<O: Fn(Event)> Desk<O> {
             let mut statistics = lock(&self.statistics);
             statistics.status = status;
             statistics.halted = self.pilot.halted();
+            statistics.coalesced = self.pilot.overtaken() + self.inbox.overtaken();
         }
         for report in self.pilot.take_reports() {
             (self.observer)(Event::Report(report));

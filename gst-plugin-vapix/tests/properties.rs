@@ -1,0 +1,123 @@
+//! What can be set, what cannot, and that no password comes out.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use common::{Heard, Rig, camera, init, target};
+use gst::prelude::*;
+use ptztrack_contract::TargetState;
+use virtual_camera::Auth;
+
+#[test]
+fn without_a_location_it_says_what_to_set() {
+    init();
+    let rig = Rig::ready("");
+    assert!(rig.sink.set_state(gst::State::Paused).is_err());
+    match &rig.heard()[..] {
+        // The base class adds a general one.
+        [Heard::Error(text), ..] => assert!(text.contains("location=http://192.168.0.90"), "{text}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_location_that_is_none_is_refused_and_the_old_one_stays() {
+    let rig = Rig::ready("http://192.168.0.90").with("location", "rtsp://root:geheim@camera/media");
+    assert_eq!(rig.sink.property::<Option<String>>("location").as_deref(), Some("http://192.168.0.90"));
+    match &rig.heard()[..] {
+        [Heard::Warning(text)] => {
+            assert!(text.contains("rtsp://camera") && !text.contains("geheim"), "{text}")
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn user_and_password_of_a_location_are_used_and_taken_out() {
+    let camera = camera(Auth::Digest { qop: true });
+    let location = camera.url().replace("http://", "http://root:pass@");
+    let mut rig = Rig::playing(&location);
+    rig.set_going(&camera);
+    assert_eq!(rig.sink.property::<Option<String>>("location"), Some(camera.url()));
+    assert_eq!(rig.sink.property::<Option<String>>("user").as_deref(), Some("root"));
+}
+
+#[test]
+fn the_password_cannot_be_read() {
+    let rig = Rig::ready("http://192.168.0.90");
+    let password = rig.sink.find_property("password").unwrap();
+    assert!(!password.flags().contains(glib::ParamFlags::READABLE));
+}
+
+#[test]
+fn every_property_says_what_it_is() {
+    let rig = Rig::ready("http://192.168.0.90");
+    let properties = rig.sink.list_properties();
+    let own = properties.iter().filter(|property| property.owner_type() == rig.sink.type_());
+    let own: Vec<_> = own.map(|property| (property.name(), property.blurb())).collect();
+    assert_eq!(own.len(), 19, "{own:?}");
+    assert!(own.iter().all(|(_, blurb)| blurb.is_some_and(|blurb| blurb.len() > 10)), "{own:?}");
+}
+
+#[test]
+fn it_prerolls_nothing_and_waits_for_no_clock() {
+    let rig = Rig::ready("http://192.168.0.90");
+    for property in ["sync", "async", "qos"] {
+        assert!(!rig.sink.property::<bool>(property), "{property}");
+    }
+}
+
+#[test]
+fn no_password_in_log_or_graph() {
+    init();
+    let log = std::sync::Arc::new(std::sync::Mutex::new(String::new()));
+    let sink = log.clone();
+    let function = gst::log::add_log_function(move |category, level, file, _, _, object, message| {
+        // The log function itself may log.
+        if let Ok(mut log) = sink.try_lock() {
+            let object = object.map(|object| object.to_string()).unwrap_or_default();
+            *log += &format!("{} {level:?} {file} {object} {:?}\n", category.name(), message.get());
+        }
+    });
+    gst::log::set_default_threshold(gst::DebugLevel::Trace);
+    let camera = camera(Auth::Basic);
+    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    rig.set_going(&camera);
+    rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
+    let bin = gst::Bin::new();
+    let other = Rig::ready(&camera.url()).with("password", "geheimwort");
+    bin.add(&other.sink).unwrap();
+    let graph = bin.debug_to_dot_data(gst::DebugGraphDetails::ALL);
+    gst::log::set_default_threshold(gst::DebugLevel::None);
+    gst::log::remove_log_function(function);
+    let log = log.lock().unwrap();
+    assert!(log.contains("continuouspantiltmove"), "the log is of this element");
+    // "root:pass" in base64, as Basic sends it.
+    assert!(!log.contains("cm9vdDpwYXNz") && !log.contains("geheimwort"));
+    assert!(!graph.contains("geheimwort"));
+}
+
+/// The pipelines in the element's documentation, with the address replaced by the camera's.
+#[test]
+fn the_documented_pipelines_run() {
+    init();
+    let camera = camera(Auth::Digest { qop: true });
+    let documentation = include_str!("../src/vapixptzsink/mod.rs");
+    let lines: Vec<_> =
+        documentation.lines().filter_map(|line| line.strip_prefix("//! gst-launch-1.0 ")).collect();
+    assert_eq!(lines.len(), 2);
+    for line in lines {
+        let launch = line.replace("http://192.168.0.90", &camera.url());
+        assert_ne!(launch, line);
+        let pipeline = gst::parse::launch(&launch).unwrap();
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let bus = pipeline.bus().unwrap();
+        let end = bus.timed_pop_filtered(
+            gst::ClockTime::from_seconds(20),
+            &[gst::MessageType::Eos, gst::MessageType::Error],
+        );
+        assert_eq!(end.map(|message| message.type_()), Some(gst::MessageType::Eos), "{line}");
+        pipeline.set_state(gst::State::Null).unwrap();
+    }
+    assert!(common::moves(&camera).is_empty(), "a test picture has no target");
+}

@@ -1,0 +1,212 @@
+//! What the camera is told, and that it is never left moving.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use common::{Heard, PATIENCE, Rig, camera, moves, target};
+use gst::prelude::*;
+use ptztrack_contract::{CameraChange, CameraEvent, TargetState};
+use virtual_camera::{Auth, Settings, VirtualCamera};
+
+const STATES_WITHOUT_TARGET: [TargetState; 2] = [TargetState::Searching, TargetState::Lost];
+
+#[test]
+fn it_turns_towards_the_target_and_tells() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    let first = moves(&camera).remove(0);
+    assert!(first.starts_with("camera=1&continuouspantiltmove="), "{first}");
+    rig.push_until(&target(TargetState::Lost, 0.9, 0.4), &camera, |status| !status.moving);
+    assert_eq!(moves(&camera).last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+    let mut heard = rig.heard();
+    heard.dedup();
+    let expected = [CameraChange::Connected, CameraChange::Moving, CameraChange::Stopped].map(Heard::Camera);
+    assert_eq!(heard, expected);
+
+    let stats = rig.stats();
+    assert!(stats.get::<u64>("commands-sent").unwrap() >= 2);
+    assert_eq!(stats.get::<u64>("commands-failed").unwrap(), 0);
+    assert!(stats.get::<u64>("round-trip").unwrap() > 0);
+    assert!((stats.get::<f64>("field-of-view").unwrap() - 36.0).abs() < 0.2, "{stats}");
+    assert_eq!(stats.get::<&str>("state").unwrap(), "at-rest");
+}
+
+#[test]
+fn upstream_hears_what_the_camera_does() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    rig.push_until(&target(TargetState::Searching, 0.0, 0.0), &camera, |status| !status.moving);
+    let (mut moved, mut stopped) = (false, false);
+    while !stopped {
+        rig.push(&target(TargetState::Searching, 0.0, 0.0));
+        while let Some(event) = rig.harness().try_pull_upstream_event() {
+            let Some(event) = CameraEvent::of(&event) else { continue };
+            let event = event.unwrap();
+            moved |= event.moving && event.pan_rate_deg_s > 0.0 && event.horizontal_fov_deg.is_some();
+            stopped |= moved && !event.moving && event.pan_rate_deg_s == 0.0;
+        }
+    }
+}
+
+#[test]
+fn without_a_target_it_commands_nothing() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    for state in STATES_WITHOUT_TARGET {
+        // Until it has asked all it wants to know.
+        rig.push_until(&target(state, 0.9, 0.1), &camera, |status| status.requests >= 3);
+    }
+    drop(rig);
+    assert_eq!(moves(&camera), [] as [&str; 0]);
+}
+
+#[test]
+fn a_target_in_the_middle_moves_nothing() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.push_until(&target(TargetState::Tracking, 0.5, 0.5), &camera, |status| status.requests >= 3);
+    for _ in 0..20 {
+        rig.push(&target(TargetState::Tracking, 0.51, 0.49));
+    }
+    drop(rig);
+    assert_eq!(moves(&camera), [] as [&str; 0]);
+}
+
+/// Sets a camera going, ends it in some way, and expects rest.
+#[track_caller]
+fn comes_to_rest(end: impl FnOnce(&mut Rig)) {
+    let camera = camera(Auth::Digest { qop: true });
+    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    rig.set_going(&camera);
+    end(&mut rig);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.status());
+    let last = moves(&camera).pop().unwrap();
+    assert!(last.ends_with("continuouspantiltmove=0,0"), "{last}");
+}
+
+#[test]
+fn eos_stops_the_camera() {
+    comes_to_rest(|rig| assert!(rig.harness().push_event(gst::event::Eos::new())));
+}
+
+#[test]
+fn a_flush_stops_the_camera() {
+    comes_to_rest(|rig| {
+        assert!(rig.harness().push_event(gst::event::FlushStart::new()));
+        assert!(rig.harness().push_event(gst::event::FlushStop::new(true)));
+    });
+}
+
+#[test]
+fn paused_stops_the_camera() {
+    comes_to_rest(|rig| assert!(rig.sink.set_state(gst::State::Paused).is_ok()));
+}
+
+#[test]
+fn ready_stops_the_camera() {
+    comes_to_rest(|rig| assert!(rig.sink.set_state(gst::State::Ready).is_ok()));
+}
+
+#[test]
+fn null_stops_the_camera() {
+    comes_to_rest(|rig| assert!(rig.sink.set_state(gst::State::Null).is_ok()));
+}
+
+#[test]
+fn a_stream_that_dries_up_stops_the_camera() {
+    comes_to_rest(|_| {});
+}
+
+#[test]
+fn pictures_without_target_meta_stop_the_camera() {
+    comes_to_rest(|rig| {
+        for _ in 0..5 {
+            let buffer = gst::Buffer::with_size(320 * 240).unwrap();
+            assert_eq!(rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+        }
+    });
+}
+
+#[test]
+fn a_long_occlusion_stops_the_camera() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("stale-timeout", 300u32).play();
+    rig.set_going(&camera);
+    rig.push_until(&target(TargetState::Occluded, 0.9, 0.4), &camera, |status| !status.moving);
+}
+
+#[test]
+fn it_resumes_after_a_pause() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    rig.sink.set_state(gst::State::Paused).unwrap();
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    rig.sink.set_state(gst::State::Playing).unwrap();
+    rig.push_until(&target(TargetState::Tracking, 0.1, 0.5), &camera, |status| status.pan_rate_deg_s < 0.0);
+}
+
+#[test]
+fn absolute_and_centre_bring_the_target_to_the_middle() {
+    for (mode, argument) in [("absolute", "&pan="), ("centre", "&center=")] {
+        let camera = camera(Auth::None);
+        let mut rig = Rig::ready(&camera.url()).with_str("mode", mode).play();
+        rig.push_until(&target(TargetState::Tracking, 0.9, 0.5), &camera, |status| status.pan_deg > 10.0);
+        rig.push_until(&target(TargetState::Tracking, 0.5, 0.5), &camera, |status| !status.moving);
+        let moves = moves(&camera);
+        assert!(moves[0].contains(argument), "{moves:?}");
+        assert!(!moves.iter().any(|command| command.contains("continuous")), "{moves:?}");
+    }
+}
+
+#[test]
+fn at_its_limit_it_says_so_once_and_rests() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    let beyond = target(TargetState::Tracking, 0.9, 0.5);
+    let heard = rig.push_until_message(&beyond, |heard| *heard == Heard::Camera(CameraChange::AtLimit));
+    assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
+    rig.push_until(&beyond, &camera, |status| !status.moving);
+    assert!((camera.status().pan_deg - camera.limits().pan_deg.1).abs() < 0.2);
+    for _ in 0..50 {
+        rig.push(&beyond);
+    }
+    assert!(!rig.heard().contains(&Heard::Camera(CameraChange::AtLimit)));
+}
+
+#[test]
+fn a_slow_camera_gets_the_newest_target_and_one_request_at_a_time() {
+    let settings = Settings { service_time: std::time::Duration::from_millis(250), ..Settings::default() };
+    let camera = VirtualCamera::start(settings).unwrap();
+    let mut rig = Rig::playing(&camera.url());
+    for frame in 0..60u32 {
+        let x = 0.7 + f64::from(frame % 10) * 0.03;
+        rig.push(&target(TargetState::Tracking, x, 0.5));
+    }
+    // The newest is on the left: whatever was queued would go to the right first.
+    rig.push_until(&target(TargetState::Tracking, 0.05, 0.5), &camera, |status| status.pan_rate_deg_s < 0.0);
+    assert!(moves(&camera).len() <= 2, "{:?}", moves(&camera));
+    assert!(rig.stats().get::<u64>("commands-coalesced").unwrap() > 0);
+    drop(rig);
+    assert_eq!(camera.status().most_in_flight, 1);
+}
+
+#[test]
+fn starting_and_stopping_leaves_nothing_behind() {
+    let camera = camera(Auth::None);
+    for _ in 0..50 {
+        let mut rig = Rig::playing(&camera.url());
+        rig.push(&target(TargetState::Tracking, 0.9, 0.5));
+        let weak = rig.sink.downgrade();
+        drop(rig);
+        assert!(weak.upgrade().is_none(), "the sink is still referred to");
+    }
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    let threads = std::fs::read_dir("/proc/self/task").unwrap().filter(|task| {
+        let name = std::fs::read_to_string(task.as_ref().unwrap().path().join("comm"));
+        name.is_ok_and(|name| name.trim() == "vapix")
+    });
+    assert_eq!(threads.count(), 1, "one thread for the whole plugin");
+}
