@@ -316,7 +316,7 @@ impl VideoFilterImpl for BgAvgDetect {
         out_info: &VideoInfo,
     ) -> Result<(), gst::LoggableError> {
         let before = lock(&self.stream).take();
-        *lock(&self.stream) = Some(Stream::new(in_info.clone(), out_info.clone(), before));
+        *lock(&self.stream) = Some(Stream::negotiated(before, in_info.clone(), out_info.clone()));
         Ok(())
     }
 }
@@ -333,7 +333,7 @@ impl BgAvgDetect {
             Err(error) => gst::element_imp_warning!(
                 self,
                 gst::LibraryError::Settings,
-                ["{name} stays as it was: {error}. Write {}", Zones::GRAMMAR]
+                ("{name} stays as it was: {error}. Write {}", Zones::GRAMMAR)
             ),
         }
     }
@@ -416,14 +416,14 @@ impl BgAvgDetect {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Failed,
-                ["A frame passes unseen: {error}. Faults are reported again after the next good frame"]
+                ("A frame passes unseen: {error}. Faults are reported again after the next good frame")
             );
         }
     }
 
     fn posted(&self, attached: Result<(), glib::BoolError>) -> Result<gst::FlowSuccess, gst::FlowError> {
         attached.map(|()| gst::FlowSuccess::Ok).map_err(|error| {
-            gst::element_imp_error!(self, gst::StreamError::Failed, ["Motion cannot be attached: {error}"]);
+            gst::element_imp_error!(self, gst::StreamError::Failed, ("Motion cannot be attached: {error}"));
             gst::FlowError::Error
         })
     }

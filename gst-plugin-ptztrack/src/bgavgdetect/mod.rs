@@ -46,9 +46,9 @@
 //! ```text
 //! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=mask threshold=0.1 noise-floor=8 ! videoconvert ! autovideosink
 //! ```
-//! Only the moving region, on a transparent ground:
+//! Only the moving region, the rest transparent (before a chequered ground):
 //! ```text
-//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=foreground ! videoconvert ! pngenc snapshot=true ! fakesink
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=foreground ! compositor background=checker ! videoconvert ! autovideosink
 //! ```
 //! Everything that moves in the left half, but not where the trees are:
 //! ```text

@@ -43,18 +43,27 @@ pub(super) struct Stream {
 }
 
 impl Stream {
-    /// Caps that change do not end the motion that `before` has reported.
-    pub fn new(in_info: VideoInfo, out_info: VideoInfo, before: Option<Self>) -> Self {
+    fn new(in_info: VideoInfo, out_info: VideoInfo) -> Self {
         Self {
             in_info,
             out_info,
             source: LumaSource::default(),
             detector: Detector::default(),
-            presence: before.map(|before| before.presence).unwrap_or_default(),
+            presence: Presence::default(),
             converter: None,
             last_pts: None,
             interrupted: false,
             warned: false,
+        }
+    }
+
+    /// The stream after negotiation. Where only the output changed, what was learned still holds; other
+    /// frames are learned anew, which does not end the motion reported so far.
+    pub fn negotiated(before: Option<Self>, in_info: VideoInfo, out_info: VideoInfo) -> Self {
+        match before {
+            Some(before) if before.in_info == in_info => Self { out_info, converter: None, ..before },
+            Some(before) => Self { presence: before.presence, ..Self::new(in_info, out_info) },
+            None => Self::new(in_info, out_info),
         }
     }
 

@@ -1,0 +1,527 @@
+//! `bgavgdetect` in a harness and in pipelines: what it reports, when it does not, and what it leaves alone.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use gst::prelude::*;
+use gst_check::Harness;
+use gst_video::prelude::*;
+use gst_video::{VideoFormat, VideoInfo, VideoRegionOfInterestMeta};
+use gstptztrack::luma_source::FORMATS;
+use ptztrack_contract::{
+    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, TargetState, TrackerEvent,
+};
+
+const STEP: gst::ClockTime = gst::ClockTime::from_mseconds(100);
+const BOX: (u32, u32, u32, u32) = (40, 30, 20, 40);
+
+fn init() {
+    gst::init().unwrap();
+    gstptztrack::plugin_register_static().unwrap();
+}
+
+fn info(format: VideoFormat, width: u32, height: u32) -> VideoInfo {
+    init();
+    VideoInfo::builder(format, width, height).fps(gst::Fraction::new(10, 1)).build().unwrap()
+}
+
+fn grey() -> VideoInfo {
+    info(VideoFormat::Gray8, 160, 120)
+}
+
+/// A detector that learns from two frames and reports what two frames show.
+struct Detector {
+    harness: Harness,
+    element: gst::Element,
+    bus: gst::Bus,
+    info: VideoInfo,
+    /// Number of the next frame.
+    frame: u64,
+}
+
+impl Detector {
+    fn new(info: &VideoInfo) -> Self {
+        init();
+        let element = gst::ElementFactory::make("bgavgdetect")
+            .property("warm-up", 2u32)
+            .property("confirm-frames", 2u32)
+            .build()
+            .unwrap();
+        let bus = gst::Bus::new();
+        element.set_bus(Some(&bus));
+        let mut harness = Harness::with_element(&element, Some("sink"), Some("src"));
+        harness.set_src_caps(info.to_caps().unwrap());
+        Self { harness, element, bus, info: info.clone(), frame: 0 }
+    }
+
+    /// One that has learned the empty picture and looks.
+    fn learned(info: &VideoInfo) -> Self {
+        let mut detector = Self::new(info);
+        assert_eq!(detector.see(&[], 2), [None, None]);
+        assert_eq!(detector.see(&[], 1), [Some(0)]);
+        detector
+    }
+
+    fn buffer(&mut self, boxes: &[(u32, u32, u32, u32)]) -> gst::Buffer {
+        let mut buffer = picture(&self.info, boxes);
+        buffer.get_mut().unwrap().set_pts(STEP * self.frame);
+        self.frame += 1;
+        buffer
+    }
+
+    fn push(&mut self, buffer: gst::Buffer) -> gst::Buffer {
+        self.harness.push_and_pull(buffer).unwrap()
+    }
+
+    /// How many regions each of `frames` frames with these boxes is said to have; `None` where nobody looked.
+    fn see(&mut self, boxes: &[(u32, u32, u32, u32)], frames: usize) -> Vec<Option<usize>> {
+        (0..frames)
+            .map(|_| {
+                let buffer = self.buffer(boxes);
+                regions(&self.push(buffer))
+            })
+            .collect()
+    }
+
+    fn messages(&self) -> Vec<MotionMessage> {
+        let messages = std::iter::from_fn(|| self.bus.pop_filtered(&[gst::MessageType::Element]));
+        messages.map(|message| MotionMessage::from_structure(message.structure().unwrap()).unwrap()).collect()
+    }
+
+    fn changes(&self) -> Vec<MotionChange> {
+        self.messages().into_iter().map(|message| message.change).collect()
+    }
+
+    fn warnings(&self) -> Vec<String> {
+        let messages = std::iter::from_fn(|| self.bus.pop_filtered(&[gst::MessageType::Warning]));
+        messages
+            .map(|message| match message.view() {
+                gst::MessageView::Warning(warning) => warning.error().to_string(),
+                _ => unreachable!(),
+            })
+            .collect()
+    }
+
+    fn tracker(&mut self, state: TargetState) {
+        self.harness.push_upstream_event(TrackerEvent { state, bounds: None }.to_event());
+    }
+
+    fn camera(&mut self, moving: bool) {
+        self.harness.push_upstream_event(CameraEvent { moving, ..CameraEvent::default() }.to_event());
+    }
+}
+
+fn regions(buffer: &gst::BufferRef) -> Option<usize> {
+    let meta = MotionMeta::of(buffer)?.unwrap();
+    let rois = buffer.iter_meta::<VideoRegionOfInterestMeta>();
+    let motion = rois.filter(|roi| roi.roi_type() == MOTION_ROI).count();
+    assert_eq!(motion, meta.regions.len());
+    Some(meta.regions.len())
+}
+
+/// A dark picture with bright boxes, in any format.
+fn picture(info: &VideoInfo, boxes: &[(u32, u32, u32, u32)]) -> gst::Buffer {
+    let buffer = gst::Buffer::from_mut_slice(vec![80u8; info.size()]);
+    let mut frame = gst_video::VideoFrame::from_buffer_writable(buffer, info).unwrap();
+    let components = if info.is_rgb() { 3 } else { 1 };
+    for component in 0..components {
+        let (stride, step) = (frame.comp_stride(component) as usize, frame.comp_pstride(component) as usize);
+        let (plane, first) = (frame.comp_plane(component), frame.comp_poffset(component) as usize);
+        let data = frame.plane_data_mut(plane).unwrap();
+        for &(x, y, width, height) in boxes {
+            for y in y..y + height {
+                for x in x..x + width {
+                    data[y as usize * stride + first + x as usize * step] = 200;
+                }
+            }
+        }
+    }
+    frame.into_buffer()
+}
+
+#[test]
+fn stillness_is_reported_as_no_regions_and_no_messages() {
+    let mut detector = Detector::learned(&grey());
+    assert_eq!(detector.see(&[], 30), [Some(0); 30]);
+    assert_eq!(detector.changes(), []);
+}
+
+#[test]
+fn motion_is_reported_with_box_region_of_interest_and_messages() {
+    let mut detector = Detector::learned(&grey());
+    assert_eq!(detector.see(&[BOX], 1), [Some(0)]);
+    let buffer = detector.buffer(&[BOX]);
+    let seen = detector.push(buffer);
+    let meta = MotionMeta::of(&seen).unwrap().unwrap();
+    assert_eq!(meta.regions[0].bounds.to_pixels(160, 120), BOX);
+    let roi = seen.iter_meta::<VideoRegionOfInterestMeta>().next().unwrap();
+    assert_eq!((roi.roi_type(), roi.rect()), (MOTION_ROI, BOX));
+    let [start] = detector.messages().try_into().unwrap();
+    assert_eq!((start.change, start.regions), (MotionChange::Start, 1));
+    assert_eq!(start.times.timestamp, seen.pts());
+    assert_eq!(start.times.running_time, seen.pts());
+    assert_eq!(start.bounds, Some(meta.regions[0].bounds));
+    // What stays becomes background; motion ends a second after.
+    detector.see(&[BOX], 60);
+    assert_eq!(detector.changes(), [MotionChange::End]);
+}
+
+#[test]
+fn the_end_of_the_stream_ends_motion() {
+    let mut detector = Detector::learned(&grey());
+    detector.see(&[BOX], 3);
+    assert_eq!(detector.changes(), [MotionChange::Start]);
+    detector.harness.push_event(gst::event::Eos::new());
+    let [end] = detector.messages().try_into().unwrap();
+    assert_eq!((end.change, end.times.timestamp), (MotionChange::End, Some(STEP * 5)));
+    // Nothing moved in another stream: nothing to end.
+    let mut still = Detector::learned(&grey());
+    still.harness.push_event(gst::event::Eos::new());
+    assert_eq!(still.changes(), []);
+}
+
+#[test]
+fn messages_can_be_switched_off() {
+    let mut detector = Detector::learned(&grey());
+    detector.element.set_property("post-messages", false);
+    assert_eq!(detector.see(&[BOX], 3), [Some(0), Some(1), Some(1)]);
+    assert_eq!(detector.changes(), []);
+}
+
+#[test]
+fn every_format_is_looked_at_and_left_untouched() {
+    for &format in FORMATS {
+        let mut detector = Detector::learned(&info(format, 161, 121));
+        detector.see(&[BOX], 1);
+        let buffer = detector.buffer(&[BOX]);
+        let before = buffer.map_readable().unwrap().to_vec();
+        let seen = detector.push(buffer);
+        assert_eq!(regions(&seen), Some(1), "{format}");
+        assert_eq!(seen.map_readable().unwrap().as_slice(), before, "{format}");
+        assert_eq!(seen.flags() & gst::BufferFlags::DISCONT, gst::BufferFlags::empty());
+    }
+}
+
+#[test]
+fn any_size_passes() {
+    for (width, height) in [(1, 1), (2, 3), (16, 16), (17, 9), (641, 7), (4096, 2160)] {
+        let mut detector = Detector::new(&info(VideoFormat::I420, width, height));
+        assert_eq!(detector.see(&[], 3), [None, None, Some(0)], "{width}x{height}");
+    }
+}
+
+#[test]
+fn shared_buffers_are_not_copied() {
+    let mut detector = Detector::learned(&grey());
+    // As behind a tee: somebody else holds the buffer, too.
+    let ours = detector.buffer(&[]);
+    let theirs = ours.clone();
+    let seen = detector.push(ours);
+    assert_eq!(regions(&seen), Some(0));
+    assert_eq!(regions(&theirs), None);
+    let address = |buffer: &gst::BufferRef| buffer.map_readable().unwrap().as_ptr();
+    assert_eq!(address(&seen), address(&theirs));
+    assert_ne!(seen.as_ptr(), theirs.as_ptr());
+}
+
+#[test]
+fn own_buffers_pass_as_they_are() {
+    let mut detector = Detector::learned(&grey());
+    let buffer = detector.buffer(&[]);
+    let address = buffer.as_ptr();
+    assert_eq!(detector.push(buffer).as_ptr(), address);
+}
+
+#[test]
+fn sleeps_while_the_tracker_follows_and_relearns_when_it_ceases() {
+    for (sleeping, waking) in
+        [(TargetState::Tracking, TargetState::Lost), (TargetState::Occluded, TargetState::Searching)]
+    {
+        let mut detector = Detector::learned(&grey());
+        detector.tracker(sleeping);
+        assert_eq!(detector.see(&[BOX], 4), [None; 4]);
+        assert_eq!(detector.changes(), []);
+        detector.tracker(waking);
+        // The box is background by now, and found when it goes.
+        assert_eq!(detector.see(&[BOX], 5), [None, None, Some(0), Some(0), Some(0)]);
+        assert_eq!(detector.see(&[], 2), [Some(0), Some(1)]);
+    }
+}
+
+#[test]
+fn a_tracker_that_searches_anyway_disturbs_nothing() {
+    let mut detector = Detector::learned(&grey());
+    detector.tracker(TargetState::Searching);
+    assert_eq!(detector.see(&[], 1), [Some(0)]);
+}
+
+#[test]
+fn events_travel_on_upstream() {
+    let mut detector = Detector::learned(&grey());
+    detector.tracker(TargetState::Tracking);
+    detector.camera(true);
+    let events: Vec<gst::Event> = std::iter::from_fn(|| detector.harness.try_pull_upstream_event()).collect();
+    assert!(events.iter().any(|event| TrackerEvent::of(event).is_some()));
+    assert!(events.iter().any(|event| CameraEvent::of(event).is_some()));
+}
+
+#[test]
+fn does_not_look_while_the_camera_moves_and_pictures_settle() {
+    let mut detector = Detector::learned(&grey());
+    detector.element.set_property("settle-time", STEP.nseconds() * 3);
+    detector.camera(true);
+    assert_eq!(detector.see(&[BOX], 3), [None; 3]);
+    detector.camera(false);
+    // Three to settle, two to learn.
+    assert_eq!(detector.see(&[BOX], 6), [None, None, None, None, None, Some(0)]);
+}
+
+#[test]
+fn zones_choose_where_to_look() {
+    let mut detector = Detector::learned(&grey());
+    detector.element.set_property("zones", "0.5,0 1,0 1,1 0.5,1");
+    assert_eq!(detector.see(&[BOX], 3), [Some(0); 3]);
+    let mut detector = Detector::learned(&grey());
+    detector.element.set_property("exclude-zones", "0.5,0 1,0 1,1 0.5,1");
+    assert_eq!(detector.see(&[BOX], 3), [Some(0), Some(1), Some(1)]);
+}
+
+#[test]
+fn zones_that_cannot_be_read_are_refused_with_a_warning() {
+    let detector = Detector::learned(&grey());
+    let good = "0,0 0.5,0 0.5,0.5";
+    for property in ["zones", "exclude-zones"] {
+        detector.element.set_property(property, good);
+        assert_eq!(detector.warnings(), Vec::<String>::new());
+        detector.element.set_property(property, "0,0 0.5,0 2,2");
+        let [warning] = detector.warnings().try_into().unwrap();
+        assert!(warning.contains("`2,2`") && warning.contains("separated by `;`"), "{warning}");
+        assert_eq!(detector.element.property::<String>(property), good);
+        detector.element.set_property(property, "");
+        assert_eq!(detector.element.property::<String>(property), "");
+    }
+}
+
+#[test]
+fn new_caps_relearn() {
+    let mut detector = Detector::learned(&grey());
+    for format in [VideoFormat::Gray8, VideoFormat::Nv12, VideoFormat::Bgrx] {
+        detector.info = info(format, 200, 150);
+        detector.harness.set_src_caps(detector.info.to_caps().unwrap());
+        assert_eq!(detector.see(&[], 3), [None, None, Some(0)], "{format}");
+        assert_eq!(detector.see(&[BOX], 2), [Some(0), Some(1)], "{format}");
+    }
+}
+
+#[test]
+fn a_flush_relearns() {
+    let mut detector = Detector::learned(&grey());
+    detector.harness.push_event(gst::event::FlushStart::new());
+    detector.harness.push_event(gst::event::FlushStop::new(true));
+    detector.harness.push_event(gst::event::Segment::new(&gst::FormattedSegment::<gst::ClockTime>::new()));
+    assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+}
+
+#[test]
+fn an_interruption_relearns_where_it_was_long() {
+    let mut detector = Detector::learned(&grey());
+    let discont = |detector: &mut Detector, lost: u64| {
+        detector.frame += lost;
+        let mut buffer = detector.buffer(&[]);
+        buffer.get_mut().unwrap().set_flags(gst::BufferFlags::DISCONT);
+        regions(&detector.push(buffer))
+    };
+    // As a leaky queue marks it.
+    assert_eq!(discont(&mut detector, 2), Some(0));
+    assert_eq!(discont(&mut detector, 20), None);
+    assert_eq!(detector.see(&[], 2), [None, Some(0)]);
+    detector.element.set_property("max-gap", 0u64);
+    assert_eq!(discont(&mut detector, 0), None);
+}
+
+#[test]
+fn a_gap_relearns_where_it_was_long_and_holds_no_picture() {
+    let mut detector = Detector::learned(&grey());
+    let gap = gst::event::Gap::builder(STEP * detector.frame).duration(STEP * 20).build();
+    detector.harness.push_event(gap);
+    detector.frame += 20;
+    assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+    let mut empty = detector.buffer(&[BOX]);
+    empty.get_mut().unwrap().set_flags(gst::BufferFlags::GAP);
+    assert_eq!(regions(&detector.push(empty)), None);
+    assert_eq!(detector.see(&[], 1), [Some(0)]);
+}
+
+#[test]
+fn time_that_runs_backwards_relearns_and_time_that_jumps_does_not() {
+    let mut detector = Detector::learned(&grey());
+    detector.frame += 1000;
+    assert_eq!(detector.see(&[], 1), [Some(0)]);
+    detector.frame = 0;
+    assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+}
+
+#[test]
+fn frames_without_timestamps_are_looked_at() {
+    init();
+    let info =
+        VideoInfo::builder(VideoFormat::Gray8, 160, 120).fps(gst::Fraction::new(0, 1)).build().unwrap();
+    let mut detector = Detector::new(&info);
+    let mut see = |boxes: &[_]| regions(&detector.push(picture(&info, boxes)));
+    assert_eq!(
+        [see(&[]), see(&[]), see(&[]), see(&[BOX]), see(&[BOX])],
+        [None, None, Some(0), Some(0), Some(1)]
+    );
+    let [start] = detector.messages().try_into().unwrap();
+    assert_eq!(start.times.timestamp, None);
+}
+
+#[test]
+fn a_change_of_most_of_the_picture_relearns() {
+    let mut detector = Detector::learned(&grey());
+    assert_eq!(detector.see(&[(0, 0, 160, 100)], 4), [None, None, Some(0), Some(0)]);
+    assert_eq!(detector.changes(), []);
+}
+
+#[test]
+fn a_short_buffer_passes_unseen_with_one_warning() {
+    let mut detector = Detector::learned(&grey());
+    for _ in 0..3 {
+        let seen = detector.push(gst::Buffer::with_size(10).unwrap());
+        assert_eq!((regions(&seen), seen.size()), (None, 10));
+    }
+    assert_eq!(detector.warnings().len(), 1);
+    assert_eq!(detector.see(&[], 1), [Some(0)]);
+}
+
+#[test]
+fn all_regions_or_the_longest_contour() {
+    let boxes = [BOX, (100, 20, 30, 60)];
+    let mut detector = Detector::learned(&grey());
+    assert_eq!(detector.see(&boxes, 2), [Some(0), Some(1)]);
+    detector.element.set_property_from_str("selection", "all");
+    assert_eq!(detector.see(&boxes, 1), [Some(2)]);
+    detector.element.set_property("min-area", 0.05);
+    assert_eq!(detector.see(&boxes, 1), [Some(1)]);
+}
+
+#[test]
+fn spread_test_finds_what_exceeds_the_noise() {
+    let mut detector = Detector::new(&grey());
+    detector.element.set_property_from_str("test", "spread");
+    assert_eq!(detector.see(&[], 4), [None, None, Some(0), Some(0)]);
+    assert_eq!(detector.see(&[BOX], 2)[0], Some(0));
+}
+
+fn pixel(buffer: &gst::BufferRef, info: &VideoInfo, x: usize, y: usize) -> Vec<u8> {
+    let frame = gst_video::VideoFrameRef::from_buffer_ref_readable(buffer, info).unwrap();
+    let (stride, step) = (frame.plane_stride()[0] as usize, frame.comp_pstride(0) as usize);
+    frame.plane_data(0).unwrap()[y * stride + x * step..][..step].to_vec()
+}
+
+#[test]
+fn mask_shows_the_foreground_and_foreground_the_region() {
+    for format in [VideoFormat::I420, VideoFormat::Gray8, VideoFormat::Rgba] {
+        let boxes = [BOX, (100, 20, 30, 60)];
+        let mut detector = Detector::new(&info(format, 161, 121));
+        detector.element.set_property_from_str("output", "mask");
+        detector.see(&[], 3);
+        let mask = info(VideoFormat::Gray8, 161, 121);
+        let buffer = detector.buffer(&boxes);
+        let seen = detector.push(buffer);
+        let caps = detector.harness.sinkpad().unwrap().current_caps().unwrap();
+        assert_eq!(VideoInfo::from_caps(&caps).unwrap().format(), VideoFormat::Gray8);
+        let (pts, at) = (seen.pts(), [(50, 50), (110, 50), (80, 50)]);
+        assert_eq!(pts, Some(STEP * 3));
+        assert_eq!(at.map(|(x, y)| pixel(&seen, &mask, x, y)), [vec![255], vec![255], vec![0]], "{format}");
+        assert_eq!(regions(&seen), Some(0));
+
+        detector.element.set_property_from_str("output", "foreground");
+        let buffer = detector.buffer(&boxes);
+        let seen = detector.push(buffer);
+        let rgba = info(VideoFormat::Rgba, 161, 121);
+        assert_eq!(regions(&seen), Some(1));
+        assert_eq!(at.map(|(x, y)| pixel(&seen, &rgba, x, y)[3]), [0, 255, 0], "{format}");
+        let red = pixel(&seen, &rgba, 110, 50)[0];
+        assert!(red > pixel(&seen, &rgba, 80, 50)[0] + 80, "{format}: {red}");
+
+        detector.element.set_property_from_str("output", "frame");
+        let buffer = detector.buffer(&boxes);
+        let before = buffer.map_readable().unwrap().as_ptr();
+        let seen = detector.push(buffer);
+        assert_eq!(seen.map_readable().unwrap().as_ptr(), before);
+        assert_eq!(regions(&seen), Some(1));
+    }
+}
+
+#[test]
+fn while_it_sleeps_the_mask_is_black() {
+    let mut detector = Detector::new(&grey());
+    detector.element.set_property_from_str("output", "mask");
+    detector.see(&[], 3);
+    detector.see(&[BOX], 1);
+    detector.tracker(TargetState::Tracking);
+    let buffer = detector.buffer(&[BOX]);
+    let seen = detector.push(buffer);
+    assert!(seen.map_readable().unwrap().iter().all(|pixel| *pixel == 0));
+}
+
+#[test]
+fn late_quality_of_service_drops_nothing() {
+    let mut detector = Detector::learned(&grey());
+    assert!(!detector.element.property::<bool>("qos"));
+    let late = gst::event::Qos::new(gst::QOSType::Underflow, 5.0, 10_000_000_000i64, STEP * 100);
+    detector.harness.push_upstream_event(late);
+    assert_eq!(detector.see(&[], 3), [Some(0); 3]);
+}
+
+#[test]
+fn every_property_has_a_blurb_and_may_change_while_playing() {
+    init();
+    let element = gst::ElementFactory::make("bgavgdetect").build().unwrap();
+    let own = element.list_properties().into_iter().filter(|spec| spec.owner_type() == element.type_());
+    for spec in own {
+        assert!(spec.blurb().is_some_and(|blurb| blurb.len() > 10), "{}", spec.name());
+        assert!(spec.flags().contains(gst::PARAM_FLAG_MUTABLE_PLAYING), "{}", spec.name());
+    }
+}
+
+#[test]
+fn starting_and_stopping_again_starts_afresh() {
+    let mut detector = Detector::learned(&grey());
+    for _ in 0..20 {
+        detector.tracker(TargetState::Tracking);
+        detector.element.set_state(gst::State::Null).unwrap();
+        detector.element.set_state(gst::State::Playing).unwrap();
+        detector.harness.push_event(gst::event::StreamStart::new("again"));
+        detector.harness.set_src_caps(detector.info.to_caps().unwrap());
+        assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+    }
+}
+
+#[test]
+fn pipelines_of_the_documentation_run() {
+    init();
+    let docs = include_str!("../src/bgavgdetect/mod.rs");
+    let lines: Vec<&str> = docs.lines().filter_map(|line| line.strip_prefix("//! gst-launch-1.0 ")).collect();
+    assert_eq!(lines.len(), 5);
+    for line in lines {
+        let description = line.trim_start_matches("-m ").replace("autovideosink", "fakesink");
+        let pipeline = gst::parse::launch(&description).unwrap_or_else(|error| panic!("{line}: {error}"));
+        let bus = pipeline.bus().unwrap();
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let mut started = false;
+        loop {
+            let message = bus.timed_pop(gst::ClockTime::from_seconds(60)).expect(line);
+            match message.view() {
+                gst::MessageView::Eos(_) => break,
+                gst::MessageView::Error(error) => panic!("{line}: {error}"),
+                gst::MessageView::Warning(warning) => panic!("{line}: {warning}"),
+                gst::MessageView::Element(element) => {
+                    started |= element.structure().is_some_and(|s| MotionMessage::from_structure(s).is_ok());
+                }
+                _ => (),
+            }
+        }
+        pipeline.set_state(gst::State::Null).unwrap();
+        assert!(started, "{line}: the ball was not found");
+    }
+}
