@@ -1,0 +1,399 @@
+//! `lkfeaturetrack` in a harness and in pipelines.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use gst::prelude::*;
+use gst_check::Harness;
+use gst_video::{NavigationEvent, VideoRegionOfInterestMeta};
+use gstptztrack::luma_source::FORMATS;
+use ptztrack_contract::{
+    BufferMeta, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMessage, TargetMeta, TargetState,
+    TrackerEvent,
+};
+
+const WIDTH: usize = 320;
+const HEIGHT: usize = 240;
+const FRAME_MS: u64 = 40;
+/// Size of the person in pixels.
+const PERSON: (usize, usize) = (32, 72);
+
+fn init() {
+    static ONCE: std::sync::Once = std::sync::Once::new();
+    ONCE.call_once(|| {
+        gst::init().unwrap();
+        gstptztrack::plugin_register_static().unwrap();
+    });
+}
+
+/// Blocks of 5x5 pixels of any grey, the same for the same place and seed.
+fn texture(seed: usize, x: usize, y: usize) -> u8 {
+    let mut hash = seed.wrapping_mul(0x9e37_79b9)
+        ^ (x / 5).wrapping_mul(0x85eb_ca6b)
+        ^ (y / 5).wrapping_mul(0xc2b2_ae35);
+    hash ^= hash >> 13;
+    hash = hash.wrapping_mul(0x27d4_eb2f);
+    (hash >> 9) as u8
+}
+
+/// The street with a person whose left upper corner is at `person`, behind a wall where `wall` says.
+fn picture(person: Option<(i32, i32)>, wall: Option<std::ops::Range<usize>>) -> Vec<u8> {
+    let mut pixels: Vec<u8> =
+        (0..WIDTH * HEIGHT).map(|index| 64 + texture(1, index % WIDTH, index / WIDTH) / 4).collect();
+    if let Some((left, top)) = person {
+        for v in 0..PERSON.1 {
+            for u in 0..PERSON.0 {
+                let (x, y) = (left + u as i32, top + v as i32);
+                if (0..WIDTH as i32).contains(&x) && (0..HEIGHT as i32).contains(&y) {
+                    pixels[y as usize * WIDTH + x as usize] = texture(7, u, v);
+                }
+            }
+        }
+    }
+    for y in wall.iter().flat_map(|_| 0..HEIGHT) {
+        pixels[y * WIDTH..][wall.clone().unwrap()].fill(150);
+    }
+    pixels
+}
+
+struct Bench {
+    harness: Harness,
+    frames: u64,
+    bus: gst::Bus,
+}
+
+impl Bench {
+    fn new(configure: impl Fn(&gst::Element)) -> Self {
+        init();
+        let mut harness = Harness::new("lkfeaturetrack");
+        let element = harness.element().unwrap();
+        configure(&element);
+        let bus = gst::Bus::new();
+        element.set_bus(Some(&bus));
+        harness.set_src_caps_str("video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1");
+        harness.set_sink_caps_str("video/x-raw");
+        Self { harness, frames: 0, bus }
+    }
+
+    fn push(&mut self, pixels: Vec<u8>, detections: &[(&str, (u32, u32, u32, u32))]) -> TargetMeta {
+        let out = self.push_through(pixels, detections);
+        TargetMeta::of(&out).expect("a meta on every frame").expect("readable")
+    }
+
+    fn push_through(&mut self, pixels: Vec<u8>, detections: &[(&str, (u32, u32, u32, u32))]) -> gst::Buffer {
+        let mut buffer = gst::Buffer::from_mut_slice(pixels);
+        {
+            let buffer = buffer.get_mut().unwrap();
+            buffer.set_pts(gst::ClockTime::from_mseconds(self.frames * FRAME_MS));
+            for (name, bounds) in detections {
+                VideoRegionOfInterestMeta::add(buffer, name, *bounds);
+            }
+        }
+        self.frames += 1;
+        self.harness.push_and_pull(buffer).unwrap()
+    }
+
+    /// Shows a person at `place` who is detected.
+    fn detected(&mut self, place: (i32, i32)) -> TargetMeta {
+        let bounds = (place.0 as u32, place.1 as u32, PERSON.0 as u32, PERSON.1 as u32);
+        self.push(picture(Some(place), None), &[("motion", bounds)])
+    }
+
+    /// A person who stands still until the tracker has them.
+    fn acquire(&mut self, place: (i32, i32)) -> TargetMeta {
+        (0..2).for_each(|_| assert_eq!(self.detected(place).state, TargetState::Searching));
+        let meta = self.detected(place);
+        assert_eq!((meta.state, meta.id), (TargetState::Tracking, 1));
+        meta
+    }
+
+    fn messages(&self) -> Vec<TargetMessage> {
+        self.bus
+            .iter()
+            .filter_map(|message| TargetMessage::from_structure(message.structure()?).ok())
+            .collect()
+    }
+
+    fn changes(&self) -> Vec<TargetChange> {
+        self.messages().into_iter().map(|message| message.change).collect()
+    }
+
+    fn events(&mut self) -> Vec<TargetState> {
+        std::iter::from_fn(|| self.harness.try_pull_upstream_event())
+            .filter_map(|event| TrackerEvent::of(&event)?.ok())
+            .map(|event| event.state)
+            .collect()
+    }
+}
+
+#[track_caller]
+fn assert_box_at(meta: &TargetMeta, place: (i32, i32)) {
+    let (x, y) = (meta.bounds.x * WIDTH as f64, meta.bounds.y * HEIGHT as f64);
+    assert!(
+        (x - f64::from(place.0)).abs() < 6.0 && (y - f64::from(place.1)).abs() < 8.0,
+        "{x} {y} {place:?}"
+    );
+}
+
+#[test]
+fn a_walking_person_is_followed() {
+    let mut bench = Bench::new(|_| ());
+    let meta = bench.acquire((60, 80));
+    assert_box_at(&meta, (60, 80));
+    let mut last = meta;
+    for step in 1..=40 {
+        let place = (60 + 3 * step, 80 + step / 4);
+        let out = bench.push_through(picture(Some(place), None), &[]);
+        let roi = out.iter_meta::<VideoRegionOfInterestMeta>().find(|roi| roi.roi_type() == TARGET_ROI);
+        assert!(roi.is_some());
+        last = TargetMeta::of(&out).unwrap().unwrap();
+        assert_eq!((last.state, last.id), (TargetState::Tracking, 1), "step {step}");
+        assert_box_at(&last, place);
+    }
+    // 3 pixels in 40 ms, to the right.
+    assert!((last.velocity.x - 3.0 / 320.0 / 0.04).abs() < 0.05, "{:?}", last.velocity);
+    assert!(last.ego_velocity.is_some_and(|ego| ego.x.abs() < 0.01 && ego.y.abs() < 0.01));
+    assert!(last.confidence > 0.5 && last.features.iter().any(|feature| feature.kept));
+    assert_eq!(last.capture_time, Some(gst::ClockTime::from_mseconds(42 * FRAME_MS)));
+    let messages = bench.messages();
+    assert_eq!(messages.len(), 1);
+    assert_eq!((messages[0].change, messages[0].id), (TargetChange::Acquired, 1));
+    assert_eq!(messages[0].times.running_time, Some(gst::ClockTime::from_mseconds(2 * FRAME_MS)));
+    assert_eq!(bench.events(), [TargetState::Tracking]);
+}
+
+#[test]
+fn nothing_to_follow_is_silence() {
+    let mut bench = Bench::new(|_| ());
+    for step in 0..20 {
+        let meta = bench.push(picture(Some((60 + 3 * step, 80)), None), &[("motion", (9, 9, 0, 0))]);
+        assert_eq!(meta.state, TargetState::Searching);
+    }
+    assert_eq!((bench.changes(), bench.events()), (vec![], vec![]));
+}
+
+#[test]
+fn the_contour_of_the_motion_meta_is_used() {
+    let mut bench = Bench::new(|_| ());
+    let bounds = Rect::from_pixels((60, 80, 32, 72), 320, 240);
+    let mut last = None;
+    for _ in 0..3 {
+        let mut buffer = gst::Buffer::from_mut_slice(picture(Some((60, 80)), None));
+        let region = Region { bounds, contour: vec![bounds.centre(); 3], ..Region::default() };
+        let whole = Region { contour: Vec::new(), ..region.clone() };
+        // The contour of the first has no area, so no corner; the largest is taken, and it is the second.
+        let small = Region { bounds: Rect { width: bounds.width / 2.0, ..bounds }, ..region };
+        MotionMeta { regions: vec![small, whole] }.attach(buffer.get_mut().unwrap()).unwrap();
+        let out = bench.harness.push_and_pull(buffer).unwrap();
+        last = TargetMeta::of(&out).map(Result::unwrap);
+    }
+    let last = last.unwrap();
+    assert_eq!(last.state, TargetState::Tracking);
+    assert!((last.bounds.width - bounds.width).abs() < 1e-6);
+}
+
+#[test]
+fn leaving_the_frame_is_a_loss() {
+    let mut bench = Bench::new(|element| element.set_property("coast-time", 0_u64));
+    bench.acquire((230, 80));
+    let states: Vec<_> =
+        (1..40).map(|step| bench.push(picture(Some((230 + 4 * step, 80)), None), &[]).state).collect();
+    assert_eq!(states.iter().filter(|state| **state == TargetState::Lost).count(), 1);
+    assert_eq!(states.last(), Some(&TargetState::Searching));
+    assert_eq!(bench.changes(), [TargetChange::Acquired, TargetChange::Lost]);
+    assert_eq!(bench.events(), [TargetState::Tracking, TargetState::Lost, TargetState::Searching]);
+}
+
+#[test]
+fn behind_a_wall_and_back() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((30, 80));
+    let mut metas = Vec::new();
+    for step in 1..=70 {
+        let place = (30 + 3 * step, 80);
+        metas.push(bench.push(picture(Some(place), Some(120..180)), &[]));
+    }
+    let states: Vec<_> = metas.iter().map(|meta| meta.state).collect();
+    assert!(states.contains(&TargetState::Occluded), "{states:?}");
+    let last = metas.last().unwrap();
+    assert_eq!((last.state, last.id), (TargetState::Tracking, 1), "{states:?}");
+    assert_box_at(last, (240, 80));
+    assert_eq!(bench.changes(), [TargetChange::Acquired, TargetChange::Occluded, TargetChange::Reacquired]);
+}
+
+#[test]
+fn never_back_is_a_loss_after_the_coast_time() {
+    let mut bench = Bench::new(|element| element.set_property("coast-time", 400_000_000_u64));
+    bench.acquire((100, 80));
+    let states: Vec<_> = (0..30).map(|_| bench.push(picture(None, None), &[]).state).collect();
+    let hidden = states.iter().filter(|state| **state == TargetState::Occluded).count();
+    assert!((9..=12).contains(&hidden), "{states:?}");
+    assert_eq!(bench.changes(), [TargetChange::Acquired, TargetChange::Occluded, TargetChange::Lost]);
+}
+
+#[test]
+fn any_detector_will_do() {
+    let mut bench = Bench::new(|element| element.set_property("roi-type", "person"));
+    let mut states = Vec::new();
+    for _ in 0..4 {
+        let others = [("car", (10, 10, 120, 100)), ("person", (60, 80, 32, 72))];
+        states.push(bench.push(picture(Some((60, 80)), None), &others));
+    }
+    let last = states.last().unwrap();
+    assert_eq!(last.state, TargetState::Tracking);
+    assert_box_at(last, (60, 80));
+}
+
+#[test]
+fn clicks_select_and_release() {
+    let mut bench = Bench::new(|element| element.set_property_from_str("selection", "manual"));
+    for _ in 0..5 {
+        assert_eq!(bench.detected((60, 80)).state, TargetState::Searching);
+    }
+    let click = |bench: &mut Bench, button, x, y| {
+        bench.harness.push_upstream_event(NavigationEvent::new_mouse_button_press(button, x, y).build());
+    };
+    click(&mut bench, 1, 76.0, 110.0);
+    let meta = bench.detected((60, 80));
+    assert_eq!(meta.state, TargetState::Tracking);
+    assert_box_at(&meta, (60, 80));
+    click(&mut bench, 3, 0.0, 0.0);
+    assert_eq!(bench.detected((60, 80)).state, TargetState::Searching);
+    assert_eq!(bench.detected((60, 80)).state, TargetState::Searching);
+    assert_eq!(bench.changes(), [TargetChange::Acquired, TargetChange::Released]);
+}
+
+#[test]
+fn an_application_selects_and_releases() {
+    let mut bench = Bench::new(|element| {
+        element.set_property_from_str("selection", "manual");
+        element.set_property("manual-size", 0.3);
+    });
+    bench.push(picture(Some((60, 80)), None), &[]);
+    let element = bench.harness.element().unwrap();
+    element.emit_by_name::<()>("select-target", &[&2.0, &f64::NAN]);
+    assert_eq!(bench.push(picture(Some((60, 80)), None), &[]).state, TargetState::Searching);
+    element.emit_by_name::<()>("select-target", &[&(76.0 / 320.0), &(116.0 / 240.0)]);
+    let meta = bench.push(picture(Some((60, 80)), None), &[]);
+    assert_eq!(meta.state, TargetState::Tracking);
+    assert!((meta.bounds.height - 0.3).abs() < 1e-6 && meta.bounds.contains(meta.centroid));
+    element.emit_by_name::<()>("release-target", &[]);
+    assert_eq!(bench.push(picture(Some((60, 80)), None), &[]).state, TargetState::Searching);
+}
+
+#[test]
+fn what_was_released_is_not_taken_again_at_once() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    bench.harness.element().unwrap().emit_by_name::<()>("release-target", &[]);
+    for _ in 0..20 {
+        assert_eq!(bench.detected((60, 80)).state, TargetState::Searching);
+    }
+}
+
+#[test]
+fn positions_are_reported_at_the_interval() {
+    let mut bench = Bench::new(|element| element.set_property("message-interval", 200_000_000_u64));
+    bench.acquire((60, 80));
+    for _ in 0..20 {
+        bench.push(picture(Some((60, 80)), None), &[]);
+    }
+    let positions = bench.changes().into_iter().filter(|change| *change == TargetChange::Position).count();
+    assert_eq!(positions, 4);
+}
+
+#[test]
+fn another_size_loses_the_target_and_video_goes_on() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    bench.harness.set_src_caps_str("video/x-raw,format=GRAY8,width=17,height=9,framerate=25/1");
+    let meta = bench.push(vec![80; 20 * 9], &[]);
+    assert_eq!(meta.state, TargetState::Lost);
+    assert_eq!(bench.push(vec![80; 20 * 9], &[]).state, TargetState::Searching);
+    assert_eq!(bench.changes(), [TargetChange::Acquired, TargetChange::Lost]);
+}
+
+#[test]
+fn a_seek_loses_the_target() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    bench.harness.push_event(gst::event::FlushStart::new());
+    bench.harness.push_event(gst::event::FlushStop::new(true));
+    bench.harness.push_event(gst::event::Segment::new(&gst::FormattedSegment::<gst::ClockTime>::new()));
+    assert_eq!(bench.push(picture(None, None), &[]).state, TargetState::Lost);
+}
+
+#[test]
+fn frames_without_timestamps_are_followed_too() {
+    let mut bench = Bench::new(|_| ());
+    let mut last = None;
+    for step in 0..20 {
+        let place = (60 + 2 * step, 80);
+        let mut buffer = gst::Buffer::from_mut_slice(picture(Some(place), None));
+        let bounds = (place.0 as u32, 80, PERSON.0 as u32, PERSON.1 as u32);
+        VideoRegionOfInterestMeta::add(buffer.get_mut().unwrap(), "motion", bounds);
+        let out = bench.harness.push_and_pull(buffer).unwrap();
+        last = TargetMeta::of(&out).map(Result::unwrap);
+    }
+    let last = last.unwrap();
+    assert_eq!((last.state, last.capture_time), (TargetState::Tracking, None));
+    // By the caps, a frame takes 40 ms.
+    assert!((last.velocity.x - 2.0 / 320.0 / 0.04).abs() < 0.06, "{:?}", last.velocity);
+}
+
+#[test]
+fn pixels_pass_untouched_and_uncopied() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    let pixels = picture(Some((62, 80)), None);
+    let buffer = gst::Buffer::from_slice(pixels.clone());
+    let shared = buffer.clone();
+    let out = bench.harness.push_and_pull(buffer).unwrap();
+    assert_eq!(out.peek_memory(0).as_ptr(), shared.peek_memory(0).as_ptr());
+    assert_eq!(out.map_readable().unwrap().as_slice(), pixels);
+}
+
+#[test]
+fn every_format_and_size_is_survived() {
+    init();
+    for &format in FORMATS {
+        for (width, height) in [(1, 1), (16, 16), (33, 17), (321, 241)] {
+            survives(format, width, height);
+        }
+    }
+    survives(gst_video::VideoFormat::I420, 4096, 2160);
+}
+
+fn survives(format: gst_video::VideoFormat, width: u32, height: u32) {
+    let mut harness = Harness::new("lkfeaturetrack");
+    let info = gst_video::VideoInfo::builder(format, width, height).build().unwrap();
+    harness.set_src_caps(info.to_caps().unwrap());
+    harness.element().unwrap().set_property("confirm-frames", 1_u32);
+    for frame in 0..3_usize {
+        let bytes = (0..info.size()).map(|index| texture(frame, index, index / 640)).collect::<Vec<_>>();
+        let mut buffer = gst::Buffer::from_mut_slice(bytes);
+        let bounds = (width / 5, height / 5, width / 2, height / 2);
+        VideoRegionOfInterestMeta::add(buffer.get_mut().unwrap(), "motion", bounds);
+        let out = harness.push_and_pull(buffer).unwrap();
+        TargetMeta::of(&out).expect("a meta on every frame").expect("readable");
+    }
+}
+
+#[test]
+fn the_pipelines_of_the_documentation_run() {
+    init();
+    let pipelines: Vec<_> = include_str!("../src/lkfeaturetrack/mod.rs")
+        .lines()
+        .filter_map(|line| line.strip_prefix("//! gst-launch-1.0 "))
+        .map(|line| line.trim_start_matches("-m "))
+        .collect();
+    assert_eq!(pipelines.len(), 3);
+    for description in pipelines {
+        let pipeline = gst::parse::launch(description).expect(description);
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let message = pipeline.bus().unwrap().timed_pop_filtered(
+            gst::ClockTime::from_seconds(60),
+            &[gst::MessageType::Eos, gst::MessageType::Error, gst::MessageType::Warning],
+        );
+        pipeline.set_state(gst::State::Null).unwrap();
+        assert_eq!(message.map(|message| message.type_()), Some(gst::MessageType::Eos), "{description}");
+    }
+}
