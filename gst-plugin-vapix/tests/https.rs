@@ -76,7 +76,6 @@ fn try_client(location: &str, trust: Trust) -> Result<Client, Error> {
     let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
     let timeout = Duration::from_secs(10);
     Client::new(ClientSettings { location, camera: 1, credentials: Some(credentials), timeout, trust })
-        .unwrap()
 }
 
 fn halt(client: &mut Client) -> Result<(), Error> {
