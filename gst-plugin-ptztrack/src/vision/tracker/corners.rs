@@ -68,10 +68,15 @@ pub(super) fn reject_outliers(corners: Vec<Point2f>, range: f32) -> Corners {
     let variance = mean(squares).unwrap_or_default();
     // Half a pixel of grace: corners on one line have no deviation across it.
     let limit = Point2f::new(range * variance.x.sqrt() + 0.5, range * variance.y.sqrt() + 0.5);
-    let (kept, rejected) = corners.into_iter().partition(|corner| {
+    let is_near = |corner: &Point2f| {
         let offset = *corner - middle;
         offset.x.abs() <= limit.x && offset.y.abs() <= limit.y
-    });
+    };
+    if !corners.iter().any(is_near) {
+        // A few points spread evenly are no outliers of each other.
+        return Corners { kept: corners, rejected: Vec::new() };
+    }
+    let (kept, rejected) = corners.into_iter().partition(is_near);
     Corners { kept, rejected }
 }
 

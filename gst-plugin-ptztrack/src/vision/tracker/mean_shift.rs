@@ -139,3 +139,65 @@ pub(super) fn near_the_middle(mass: Point2f, bounds: Rect2f, share: f32) -> Poin
     let offset = mass - middle;
     middle + Point2f::new(offset.x.clamp(-x, x), offset.y.clamp(-y, y))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::patch::Cut;
+    use super::super::synthetic::Scene;
+    use super::*;
+
+    #[test]
+    fn centre_of_mass_by_hand() {
+        // Two pixels of weight 10 at (2, 1) and one of 20 at (4, 3): M00 = 30, M10 = 100, M01 = 70.
+        let mut pixels = vec![0_u8; 48];
+        (pixels[8 + 2], pixels[3 * 8 + 4]) = (10, 20);
+        let probability = Mat::from_slice_2d(&pixels.chunks(8).collect::<Vec<_>>()).expect("plane");
+        let middle = mass_centre(&probability, Rect::new(0, 0, 8, 6)).expect("moments").expect("mass");
+        assert!((middle.x - 100.0 / 30.0).abs() < 1e-4 && (middle.y - 70.0 / 30.0).abs() < 1e-4);
+        let beside = mass_centre(&probability, Rect::new(1, 1, 2, 2)).expect("moments").expect("mass");
+        assert!((beside.x - 2.0).abs() < 1e-4 && (beside.y - 1.0).abs() < 1e-4);
+        assert_eq!(mass_centre(&probability, Rect::new(5, 4, 3, 2)).expect("moments"), None);
+    }
+
+    /// A bright square of 20 pixels at (40, 30) on a dark wall.
+    fn square() -> Patch {
+        let mut pixels = vec![30_u8; 120 * 90];
+        for y in 30..50 {
+            pixels[y * 120 + 40..y * 120 + 60].fill(200);
+        }
+        let mut picture = Scene::new(120, 90).flat(0);
+        picture.replace(pixels);
+        let area = Rect2f::new(0.0, 0.0, 120.0, 90.0);
+        Patch::cut(&picture.luma(), Cut::new(&picture.luma(), area, 1), 15).expect("cut")
+    }
+
+    #[test]
+    fn the_window_climbs_onto_the_target() {
+        let patch = square();
+        let on_square = [Point2f::new(48.0, 38.0), Point2f::new(52.0, 44.0)];
+        for background in [None, Some(Rect2f::new(38.0, 28.0, 24.0, 24.0))] {
+            let model =
+                GreyModel::new(&patch, &on_square, background).expect("counts").expect("points inside");
+            let start = Rect2f::new(28.0, 22.0, 24.0, 24.0);
+            let mass = model.centre_of_mass(&patch, start).expect("shift").expect("mass");
+            assert!((mass.x - 49.5).abs() < 1.0 && (mass.y - 39.5).abs() < 1.0, "{mass:?}");
+        }
+    }
+
+    #[test]
+    fn no_points_and_no_window_are_no_model_and_no_mass() {
+        let patch = square();
+        let outside = [Point2f::new(-60.0, 900.0)];
+        assert_eq!(GreyModel::new(&patch, &outside, None).expect("counts"), None);
+        let model =
+            GreyModel::new(&patch, &[Point2f::new(48.0, 38.0)], None).expect("counts").expect("inside");
+        let away = Rect2f::new(500.0, 22.0, 24.0, 24.0);
+        assert_eq!(model.centre_of_mass(&patch, away).expect("shift"), None);
+    }
+
+    #[test]
+    fn mass_is_kept_near_the_middle() {
+        let bounds = Rect2f::new(100.0, 100.0, 40.0, 80.0);
+        assert_eq!(near_the_middle(Point2f::new(900.0, 141.0), bounds, 0.1), Point2f::new(124.0, 141.0));
+    }
+}
