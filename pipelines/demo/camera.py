@@ -43,15 +43,16 @@ class VirtualCamera:
             self.process.kill()
             self.process.wait()
 
-    def status(self):
-        """Position and motion as the camera knows them."""
+    def report(self):
+        """Status (position, motion, counters) and limits, as the camera knows them."""
         with urllib.request.urlopen(f"{self.http}/api/status", timeout=5) as answer:
-            return json.load(answer)["status"]
+            report = json.load(answer)
+        return report["status"], report["limits"]
 
     def comes_to_rest(self, patience=3.0):
         """Whether it stands still within `patience` seconds; a head that was told to stop still brakes."""
         deadline = time.monotonic() + patience
-        while self.status()["moving"]:
+        while self.report()[0]["moving"]:
             if time.monotonic() > deadline:
                 return False
             time.sleep(0.1)

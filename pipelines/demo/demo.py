@@ -64,7 +64,7 @@ def follow(camera, command, duration):
         reader = threading.Thread(target=read_messages, args=(launch.stdout, progress), daemon=True)
         reader.start()
         while launch.poll() is None and progress.seconds() < duration:
-            progress.sample(camera.status())
+            progress.sample(*camera.report())
             time.sleep(0.1)
         # Ctrl-C ends the stream (-e): the recording is completed and the camera told to stop.
         if launch.poll() is None:
@@ -109,7 +109,7 @@ def main():
         print(shlex.join(command), "\n", flush=True)
         progress = follow(camera, command, arguments.duration)
         at_rest = camera.comes_to_rest()
-        status = camera.status()
+        status, _ = camera.report()
 
     summary = report.summarise(progress, status, at_rest, arguments)
     report.write(progress, summary, arguments.out)

@@ -24,7 +24,7 @@ def value(kind, word):
         return float(word)
     if kind.startswith(("int", "uint", "gint", "guint")):
         return int(word)
-    return word.strip('"')
+    return re.sub(r"\\(.)", r"\1", word.strip('"'))
 
 
 class Progress:
@@ -44,9 +44,11 @@ class Progress:
     def seconds(self):
         return time.monotonic() - self.started
 
-    def sample(self, camera):
-        """Notes the present together with the camera's `status`."""
+    def sample(self, camera, limits):
+        """Notes the present together with the camera's status and the limits of its pan and tilt."""
         self.camera = camera
+        angles = {"pan_deg": camera["pan_deg"], "tilt_deg": camera["tilt_deg"]}
+        at_limit = any(abs(angle - end) < 0.1 for key, angle in angles.items() for end in limits[key])
         self.samples.append(
             {
                 "seconds": self.seconds(),
@@ -55,6 +57,7 @@ class Progress:
                 "offset": self.offset,
                 "pan": camera["pan_deg"],
                 "tilt": camera["tilt_deg"],
+                "at_limit": at_limit,
             }
         )
 
@@ -85,8 +88,9 @@ class Progress:
 
     def _event(self, text, fields):
         self.events.append({"seconds": self.seconds(), "running_time": fields.get("running-time"), "text": text})
-        # Motion comes and goes all the time; only in the summary does it count.
-        return None if text.startswith("motion") else f"{self.seconds():6.1f} s  {text}"
+        # Motion comes and goes all the time, and the camera moves as long as it follows: only the summary has them.
+        usual = text.startswith(("motion", "camera moving", "camera stopped"))
+        return None if usual else f"{self.seconds():6.1f} s  {text}"
 
     def _second(self, frames):
         rate, self.frames = frames - self.frames, frames

@@ -11,7 +11,8 @@ STATES = {"tracking": "#c9efd2", "occluded": "#ffe3b8"}
 def summarise(progress, status, at_rest, arguments):
     """The figures of the run; times in seconds, offsets in frame widths and heights."""
     followed = [sample for sample in progress.samples if sample["state"] == "tracking" and sample["offset"]]
-    distances = [math.hypot(*sample["offset"]) for sample in followed]
+    # Where the camera cannot turn any further, the offset says nothing about how well it follows.
+    distances = [math.hypot(*sample["offset"]) for sample in followed if not sample["at_limit"]]
     first = next((index for index, sample in enumerate(progress.samples) if sample["target"]), None)
     since_first = progress.samples[first:] if first is not None else []
     targets = {sample["target"] for sample in progress.samples if sample["target"]}
@@ -23,7 +24,7 @@ def summarise(progress, status, at_rest, arguments):
         "targets": len(targets),
         "time_to_acquire_s": time_to_acquire(progress.events),
         "tracked_share_since_acquired": rounded(len(followed) / len(since_first) if since_first else None),
-        "mean_offset": rounded(sum(distances) / len(distances) if distances else None),
+        "mean_offset_within_reach": rounded(sum(distances) / len(distances) if distances else None),
         "commands": status["commands"],
         "camera_at_rest": at_rest,
         "pipeline_exit_code": progress.exit_code,
@@ -42,7 +43,7 @@ def time_to_acquire(events):
         if event["text"] == "motion start":
             start = time
         elif event["text"].startswith("target acquired"):
-            return rounded((time - start) / 1e9 if start is not None else 0.0)
+            return None if start is None else rounded((time - start) / 1e9)
     return None
 
 
@@ -55,15 +56,15 @@ def in_words(summary):
 
     def shown(key, unit="", scale=1):
         number = summary[key]
-        return "never" if number is None else f"{number * scale:.3g}{unit}"
+        return "unknown" if number is None else f"{number * scale:.3g}{unit}"
 
     return "\n".join(
         [
             "",
-            f"acquired after        {shown('time_to_acquire_s', ' s of motion')}",
-            f"tracked since         {shown('tracked_share_since_acquired', ' % of the time', 100)}",
+            f"acquired              {shown('time_to_acquire_s', ' s after motion began')}",
+            f"tracked since then    {shown('tracked_share_since_acquired', ' % of the time', 100)}",
             f"targets in turn       {summary['targets']}",
-            f"mean offset           {shown('mean_offset', ' of the frame')}",
+            f"mean offset           {shown('mean_offset_within_reach', ' of the frame, within reach')}",
             f"commands sent         {summary['commands']}",
             f"frames                {summary['frames']} in {summary['duration_s']} s",
             f"camera afterwards     {'at rest' if summary['camera_at_rest'] else 'STILL MOVING'}",
@@ -110,9 +111,8 @@ def plot(samples, out):
 set terminal pngcairo size 1200, 800 font "DejaVu Sans,11" background "white"
 set output "plot.png"
 set datafile separator ","
-set datafile missing "nan"
 set multiplot layout 2, 1 title "The target in the picture, and what the camera did (ground: green tracking, orange occluded)"
-set key top right horizontal
+set key outside top right horizontal
 set grid back linecolor rgb "#dddddd"
 set xrange [0:{samples[-1]["seconds"]:.3f}]
 set xlabel "seconds"
