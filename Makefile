@@ -17,7 +17,7 @@ TEST_PACKAGES := $(RUN_PACKAGES) ffmpeg chromium fonts-dejavu-core python3 pytho
 # rustup puts Rust there; a cargo that is recent enough elsewhere in PATH does as well.
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 CARGO ?= cargo
-# Every test has its own limits; this ends a run that hangs in spite of them.
+# Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 45m
 
 CODEC ?= mjpeg
@@ -34,8 +34,8 @@ build: packages-build
 
 ## test: check formatting, lint, build, run all tests
 test: packages-test lint
-	$(CARGO) build --workspace
-	scripts/with-plugins debug timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
+	$(CARGO) build --workspace --examples --lib --bins
+	G_DEBUG=fatal-criticals scripts/with-plugins debug timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
 
 ## lint: check formatting, run clippy and shell syntax checks, warnings denied
 lint: packages-build
