@@ -1,1 +1,15 @@
-//! stub
+//! What the whole-system tests share: finding the built plugins, running `gst-launch-1.0`, pipelines
+//! inside the test, and waiting for something to happen without sleeping.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod launch;
+mod pipeline;
+pub mod scene;
+
+pub use launch::{GstLaunch, plugin_folder, tool};
+pub use pipeline::{Running, init};
+
+use std::time::Duration;
+
+/// How long a test waits for something that must happen; only a failure takes this long.
+pub const PATIENCE: Duration = Duration::from_secs(30);

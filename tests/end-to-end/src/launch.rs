@@ -1,0 +1,130 @@
+//! `gst-launch-1.0` and friends as a user starts them, with the freshly built plugins.
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc;
+use std::time::{Duration, Instant};
+
+/// The folder that holds the built `libgst*.so`: the one that this test was built into.
+///
+/// # Panics
+/// Where the plugins were not built: `cargo test` alone does not build them.
+pub fn plugin_folder() -> PathBuf {
+    let test = std::env::current_exe().expect("a running test has a path");
+    let folder = test.parent().and_then(|deps| deps.parent()).expect("target/<profile>/deps").to_owned();
+    for library in ["libgstptztrack.so", "libgstvapix.so"] {
+        assert!(folder.join(library).exists(), "{library} is not built: run `cargo build` first");
+    }
+    folder
+}
+
+/// A GStreamer or other tool with the plugins and a registry of our own, so that a user's stays as it is.
+pub fn tool(program: &str) -> Command {
+    let folder = plugin_folder();
+    let mut command = Command::new(program);
+    command
+        .env("GST_PLUGIN_PATH", &folder)
+        .env("GST_REGISTRY", folder.join("registry.bin"))
+        .env_remove("DISPLAY")
+        .env_remove("WAYLAND_DISPLAY");
+    command
+}
+
+/// A running `gst-launch-1.0` (or a script that ends in one) whose output can be waited for.
+pub struct GstLaunch {
+    child: Child,
+    lines: mpsc::Receiver<String>,
+    seen: Vec<String>,
+}
+
+impl GstLaunch {
+    /// Starts `gst-launch-1.0 <options> <pipeline>`.
+    pub fn start(options: &[&str], pipeline: &str) -> Self {
+        let mut command = tool("gst-launch-1.0");
+        command.args(options).args(pipeline.split_whitespace());
+        Self::spawn(command)
+    }
+
+    /// Starts any command whose output is to be read.
+    pub fn spawn(mut command: Command) -> Self {
+        let mut child =
+            command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()).spawn().unwrap();
+        let (sender, lines) = mpsc::channel();
+        let streams: [Box<dyn Read + Send>; 2] =
+            [Box::new(child.stdout.take().unwrap()), Box::new(child.stderr.take().unwrap())];
+        for stream in streams {
+            let sender = sender.clone();
+            std::thread::spawn(move || {
+                for line in BufReader::new(stream).split(b'\n').map_while(Result::ok) {
+                    if sender.send(String::from_utf8_lossy(&line).into_owned()).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        Self { child, lines, seen: Vec::new() }
+    }
+
+    /// Waits for a line that contains `text`, and gives it.
+    #[track_caller]
+    pub fn wait_for_line(&mut self, text: &str) -> String {
+        let deadline = Instant::now() + crate::PATIENCE;
+        loop {
+            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => {
+                    self.seen.push(line.clone());
+                    if line.contains(text) {
+                        return line;
+                    }
+                }
+                Err(_) => panic!("`{text}` never came; output so far:\n{}", self.seen.join("\n")),
+            }
+        }
+    }
+
+    /// Sends a signal by name (`INT`, `TERM`).
+    pub fn signal(&self, name: &str) {
+        let status = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().unwrap();
+        assert!(status.success());
+    }
+
+    /// Waits until it has ended by itself; gives the exit status and everything it printed.
+    #[track_caller]
+    pub fn finish(mut self) -> (ExitStatus, String) {
+        let deadline = Instant::now() + crate::PATIENCE;
+        // The channel closes when both streams do, which is when the process and its children end.
+        loop {
+            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => self.seen.push(line),
+                Err(mpsc::RecvTimeoutError::Disconnected) => break,
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    panic!("it did not end; output so far:\n{}", self.seen.join("\n"))
+                }
+            }
+        }
+        let status = self.child.wait().unwrap();
+        (status, std::mem::take(&mut self.seen).join("\n"))
+    }
+
+    /// The lines seen so far.
+    pub fn seen(&self) -> &[String] {
+        &self.seen
+    }
+
+    /// Reads lines for `duration` of real time: for tests that something does *not* come.
+    pub fn read_for(&mut self, duration: Duration) {
+        let deadline = Instant::now() + duration;
+        while let Ok(line) = self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            self.seen.push(line);
+        }
+    }
+}
+
+impl Drop for GstLaunch {
+    fn drop(&mut self) {
+        // A failed test must not leave processes behind; one that has ended already is no error.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}

@@ -1,0 +1,57 @@
+//! The scene that most tests play: a virtual camera, a person who crosses its world, a pipeline that follows.
+
+use std::time::Duration;
+
+use virtual_camera::{Settings, SyntheticSettings, Video, VirtualCamera, World};
+
+/// Name and password that the cameras of these tests ask for.
+pub const USER: &str = "operator";
+/// A word that appears nowhere else, so that a leak of it can be found.
+pub const PASSWORD: &str = "xyzzy-plugh-42";
+
+/// A camera before a person who walks up and down for minutes: there is always somebody to follow.
+pub fn walking_person() -> Settings {
+    let turn = |seconds: u64| Duration::from_secs(seconds);
+    let mut path = Vec::new();
+    for lap in 0..20 {
+        path.extend(SyntheticSettings::walk((-22.0, -2.0), (22.0, -2.0), 5.0, turn(1 + lap * 18)));
+        path.extend(SyntheticSettings::walk((22.0, -2.0), (-22.0, -2.0), 5.0, turn(10 + lap * 18)));
+    }
+    path.dedup_by_key(|point| point.time);
+    world(path)
+}
+
+/// A camera before an empty wall.
+pub fn nobody() -> Settings {
+    world(Vec::new())
+}
+
+fn world(path: Vec<virtual_camera::Waypoint>) -> Settings {
+    Settings {
+        user: USER.into(),
+        password: PASSWORD.into(),
+        auth: virtual_camera::Auth::Digest { qop: true },
+        world: World::Synthetic(SyntheticSettings { path, ..Default::default() }),
+        video: Video { size: Some((320, 240)), frame_rate: Some(15.0), ..Default::default() },
+        ..Default::default()
+    }
+}
+
+/// The source part of a pipeline: MJPEG as a camera's user receives it.
+pub fn mjpeg(camera: &VirtualCamera) -> String {
+    format!(
+        "souphttpsrc location={}/axis-cgi/mjpg/video.cgi user-id={USER} user-pw={PASSWORD} is-live=true \
+         do-timestamp=true ! multipartdemux ! jpegdec ! queue leaky=downstream max-size-buffers=1",
+        camera.url()
+    )
+}
+
+/// The sink part.
+pub fn servo(camera: &VirtualCamera) -> String {
+    format!("vapixptzsink name=servo location={} user={USER} password={PASSWORD}", camera.url())
+}
+
+/// The whole: source, detector, tracker, servo.
+pub fn follow(camera: &VirtualCamera) -> String {
+    format!("{} ! bgavgdetect ! lkfeaturetrack ! {}", mjpeg(camera), servo(camera))
+}

@@ -1,0 +1,191 @@
+//! Every file in `pipelines/` as a user runs it, against the virtual camera.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use end_to_end::{GstLaunch, PATIENCE, plugin_folder, scene, tool};
+use virtual_camera::VirtualCamera;
+
+fn pipelines() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines")
+}
+
+/// A command that finds the camera by the pipelines' environment variables.
+fn against(camera: &VirtualCamera, program: impl AsRef<Path>) -> Command {
+    let mut command = tool(program.as_ref().to_str().unwrap());
+    command
+        .env("CAMERA", camera.url())
+        .env("RTSP", camera.rtsp_url())
+        .env("CAMERA_USER", scene::USER)
+        .env("CAMERA_PASSWORD", scene::PASSWORD)
+        .env("SIZE", "320x240");
+    command
+}
+
+/// Runs it until the camera follows somebody, then presses Ctrl-C: it ends well and the camera stands still.
+#[track_caller]
+fn follows_until_interrupted(camera: &VirtualCamera, command: Command) -> String {
+    let launch = GstLaunch::spawn(command);
+    let moved = camera.wait_for(PATIENCE, |status| status.moving);
+    launch.signal("INT");
+    let (status, output) = launch.finish();
+    assert!(moved, "the camera never moved:\n{output}");
+    assert!(status.success(), "{output}");
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "left moving:\n{output}");
+    output
+}
+
+#[track_caller]
+fn follows(file: &str) {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let output = follows_until_interrupted(&camera, against(&camera, pipelines().join(file)));
+    assert!(output.contains("ptztrack-target, change=(string)acquired"), "{output}");
+}
+
+#[test]
+fn mjpeg() {
+    follows("mjpeg.sh");
+}
+
+#[test]
+fn mpeg4_over_rtsp() {
+    follows("mpeg4-rtsp.sh");
+}
+
+#[test]
+fn h264_over_rtsp() {
+    follows("h264-rtsp.sh");
+}
+
+#[test]
+fn headless() {
+    follows("headless.sh");
+}
+
+#[test]
+fn recording_is_complete_and_playable() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let recording = plugin_folder().join(format!("recording-{}.mkv", std::process::id()));
+    let mut command = against(&camera, pipelines().join("record-overlay.sh"));
+    command.env("OUT", &recording);
+    follows_until_interrupted(&camera, command);
+    let probe = Command::new("ffprobe")
+        .args([
+            "-v",
+            "error",
+            "-count_frames",
+            "-show_entries",
+            "stream=codec_name,width,height,nb_read_frames",
+        ])
+        .args(["-of", "csv=p=0"])
+        .arg(&recording)
+        .output()
+        .unwrap();
+    std::fs::remove_file(&recording).unwrap();
+    let found = String::from_utf8_lossy(&probe.stdout);
+    let frames = found.trim().strip_prefix("h264,320,240,").and_then(|frames| frames.parse().ok());
+    assert!(frames.is_some_and(|frames: u32| frames > 5), "{probe:?}");
+    assert!(probe.stderr.is_empty(), "{probe:?}");
+}
+
+#[test]
+fn detection_alone_tells_of_motion_and_moves_nothing() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut launch = GstLaunch::spawn(against(&camera, pipelines().join("detect-only.sh")));
+    launch.wait_for_line("ptztrack-motion, change=(string)start");
+    launch.signal("INT");
+    let (status, output) = launch.finish();
+    assert!(status.success(), "{output}");
+    assert!(camera.commands().is_empty());
+}
+
+#[test]
+fn without_a_camera_each_says_how_it_is_used() {
+    for file in scripts() {
+        let output = Command::new(&file).env_remove("CAMERA").output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{file:?}: {said}");
+        assert!(said.contains("CAMERA is not set") && said.contains("CAMERA_PASSWORD"), "{file:?}: {said}");
+    }
+}
+
+#[test]
+fn no_file_is_left_out_here() {
+    let this = include_str!("pipelines.rs");
+    for file in scripts() {
+        let name = file.file_name().unwrap().to_str().unwrap();
+        assert!(this.contains(&format!("\"{name}\"")), "{name} has no test");
+    }
+}
+
+fn scripts() -> Vec<PathBuf> {
+    let files = std::fs::read_dir(pipelines()).unwrap().map(|entry| entry.unwrap().path());
+    files
+        .filter(|file| {
+            file.extension().is_some_and(|extension| extension == "sh") && !file.ends_with("common.sh")
+        })
+        .collect()
+}
+
+#[test]
+fn embedded_in_python() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    // Debian's GStreamer bindings belong to Debian's Python, which another one may hide in PATH.
+    let mut command = against(&camera, "/usr/bin/python3");
+    command.arg(pipelines().join("embed/follow.py")).args([&camera.url(), scene::USER]);
+    let output = follows_until_interrupted(&camera, command);
+    assert!(output.contains("target 1 acquired"), "{output}");
+}
+
+#[test]
+fn embedded_in_rust() {
+    let example = plugin_folder().join("examples/follow");
+    assert!(example.exists(), "the example is not built: run `cargo build --examples` first");
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut command = against(&camera, example);
+    command.args([&camera.url(), scene::USER]);
+    let output = follows_until_interrupted(&camera, command);
+    assert!(output.contains("target 1 acquired"), "{output}");
+}
+
+/// A striped box that walks through a picture which otherwise stands still, five seconds to and five seconds fro.
+fn footage(folder: &Path) -> PathBuf {
+    let file = folder.join("walker.mkv");
+    let walker = "[1]crop=40:110:20:20[walker];[0]trim=end_frame=1,loop=-1:1,setpts=N/10/TB[still];\
+                  [still][walker]overlay=x='60+120*abs(mod(t\\,10)-5)':y=260:shortest=1";
+    let status = Command::new("ffmpeg")
+        .args(["-v", "error", "-y", "-f", "lavfi", "-i", "mandelbrot=size=768x576:rate=10:start_scale=0.3"])
+        .args(["-f", "lavfi", "-i", "testsrc2=size=200x200:rate=10:duration=20", "-filter_complex", walker])
+        .args(["-r", "10", "-c:v", "mjpeg", "-q:v", "3"])
+        .arg(&file)
+        .status()
+        .unwrap();
+    assert!(status.success());
+    file
+}
+
+#[test]
+fn the_demonstration_leaves_video_plot_and_summary() {
+    let camera = plugin_folder().join("virtual-camera");
+    assert!(camera.exists(), "the virtual camera is not built: run `cargo build` first");
+    let out = plugin_folder().join(format!("demo-{}", std::process::id()));
+    std::fs::create_dir_all(&out).unwrap();
+    let mut command = tool("python3");
+    command
+        .arg(pipelines().join("demo/demo.py"))
+        .args(["--codec", "mjpeg", "--duration", "8", "--footage"])
+        .arg(footage(&out))
+        .arg("--camera")
+        .arg(camera)
+        .arg("--out")
+        .arg(&out);
+    let (status, output) = GstLaunch::spawn(command).finish();
+    assert!(status.success(), "{output}");
+    assert!(output.contains("target acquired: #1") && output.contains("at rest"), "{output}");
+    assert!(output.lines().filter(|line| line.ends_with(" fps")).count() >= 5, "a line a second:\n{output}");
+    for file in ["followed.mkv", "plot.png", "samples.csv", "summary.json", "summary.txt"] {
+        assert!(out.join(file).metadata().unwrap().len() > 100, "{file} is empty");
+    }
+    std::fs::remove_dir_all(&out).unwrap();
+}
