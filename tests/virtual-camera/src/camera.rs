@@ -339,9 +339,10 @@ impl VirtualCamera {
 
 impl Drop for VirtualCamera {
     fn drop(&mut self) {
+        self.rtsp.close();
         self.camera.stop();
         self.http.stop();
-        self.rtsp.stop();
+        self.rtsp.join();
         if let Some(pulse) = self.pulse.take() {
             // It ended with a panic at worst, which has been printed.
             let _ = pulse.join();

@@ -107,7 +107,7 @@ fn routes(site: Arc<Site>) -> Router {
         .route("/api/status", get(page::status))
         .route("/api/picture.jpg", get(picture::snapshot))
         .route("/api/overview.jpg", get(page::overview))
-        .route("/api/ptz", get(page::steer));
+        .route("/api/ptz", any(page::steer));
     guarded.merge(faulty).merge(page).with_state(site)
 }
 

@@ -25,6 +25,8 @@ pub enum Motion {
         /// Positive upwards.
         tilt: f64,
     },
+    /// The continuous move just begun is free of proportional speed (`proportionalspeed=disabled`).
+    Unlimited,
     /// Zoom at this speed step (−100 to 100) until told otherwise; 0 stops.
     Zoom(f64),
     /// Go there; what is `None` stays as it is.
@@ -93,6 +95,7 @@ pub struct Head {
     zoom: Motor,
     /// Speed steps of the continuous pan/tilt move in force: its speed depends on the zoom.
     continuous: Option<(f64, f64)>,
+    unlimited: bool,
     move_speed: f64,
     pending: VecDeque<(u64, Motion)>,
     history: VecDeque<Snapshot>,
@@ -111,6 +114,7 @@ impl Head {
             optics,
             ticks: 0,
             continuous: None,
+            unlimited: false,
             move_speed: 100.0,
             pending: VecDeque::new(),
             history: VecDeque::new(),
@@ -159,6 +163,9 @@ impl Head {
 
     fn continuous_deg_s(&self, step: f64) -> f64 {
         let map = &self.kinematics.speed_map;
+        if self.unlimited {
+            return map.deg_s(step);
+        }
         let fov_deg = self.optics.fov_deg(self.zoom.position);
         self.kinematics.proportional_speed.apply(map.deg_s(step), map.deg_s(100.0), fov_deg)
     }
@@ -166,7 +173,8 @@ impl Head {
     fn start(&mut self, motion: Motion) {
         match motion {
             Motion::PanTilt { pan, tilt } if pan == 0.0 && tilt == 0.0 => self.stop_pan_tilt(),
-            Motion::PanTilt { pan, tilt } => self.continuous = Some((pan, tilt)),
+            Motion::PanTilt { pan, tilt } => (self.continuous, self.unlimited) = (Some((pan, tilt)), false),
+            Motion::Unlimited => self.unlimited = true,
             Motion::Zoom(step) => {
                 self.zoom.drive = Drive::Rate(self.kinematics.zoom_speed_step_s * step / 100.0);
             }
@@ -342,6 +350,10 @@ mod tests {
         head.command(ms(8000), Motion::PanTilt { pan: -100.0, tilt: 0.0 });
         head.advance(ms(9000));
         assert!((head.now().pan_rate_deg_s + 6.654).abs() < 0.01, "{}", head.now().pan_rate_deg_s);
+        head.command(ms(9000), Motion::PanTilt { pan: 40.0, tilt: 0.0 });
+        head.command(ms(9000), Motion::Unlimited);
+        head.advance(ms(9500));
+        assert!((head.now().pan_rate_deg_s - 28.8).abs() < 1e-6, "{}", head.now().pan_rate_deg_s);
     }
 
     #[test]

@@ -24,20 +24,20 @@ impl Codec {
     pub fn launch(self, wish: &Wish) -> String {
         let encoder = match self {
             Self::H264 => format!(
-                "x264enc tune=zerolatency speed-preset=ultrafast key-int-max={} bitrate={} \
+                "x264enc tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max={} bitrate={} \
                  ! video/x-h264,profile=constrained-baseline ! rtph264pay config-interval=-1 pt=96",
                 Self::key_interval(wish),
                 Self::bits_per_second(wish) / 1000
             ),
             Self::Mpeg4 => format!(
-                "avenc_mpeg4 gop-size={} bitrate={} ! rtpmp4vpay config-interval=1 pt=96",
+                "avenc_mpeg4 name=encoder gop-size={} pass=quant quantizer={} ! rtpmp4vpay config-interval=1 pt=96",
                 Self::key_interval(wish),
-                Self::bits_per_second(wish)
+                2 + wish.compression / 10
             ),
             Self::Jpeg => format!("jpegenc quality={} ! rtpjpegpay pt=26", 100 - wish.compression.min(99)),
         };
         format!(
-            "( appsrc name=video is-live=true format=time max-buffers=4 leaky-type=downstream \
+            "( appsrc name=video is-live=true format=time max-buffers=4 max-bytes=0 leaky-type=downstream \
              ! {encoder} name=pay0 )"
         )
     }

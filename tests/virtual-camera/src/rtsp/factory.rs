@@ -5,7 +5,7 @@ use std::sync::{Arc, Once};
 use gst::subclass::prelude::*;
 use gst_rtsp_server::{gst_rtsp, prelude::*, subclass::prelude::*};
 
-use super::codec::Codec;
+use super::{codec::Codec, stamp};
 use crate::{
     camera::Camera,
     pace::Pace,
@@ -85,7 +85,11 @@ fn element(
     wish: Wish,
 ) -> Result<gst::Element, glib::Error> {
     let element = gst::parse::launch(&codec.launch(&wish))?;
-    let source = element.downcast_ref::<gst::Bin>().and_then(|bin| bin.by_name("video"));
+    let child = |name| element.downcast_ref::<gst::Bin>().and_then(|bin| bin.by_name(name));
+    if let Some(encoder) = child("encoder") {
+        stamp::correct(&encoder);
+    }
+    let source = child("video");
     if let Some(source) = source.and_downcast::<gst_app::AppSrc>() {
         let info = video_info(wish.size, wish.frame_rate).ok();
         source.set_caps(info.and_then(|info| info.to_caps().ok()).as_ref());

@@ -2,6 +2,7 @@
 
 mod codec;
 mod factory;
+mod stamp;
 
 use std::{
     net::{Ipv4Addr, SocketAddr},
@@ -70,8 +71,8 @@ impl RtspServer {
         self.address
     }
 
-    /// Closes the port and all sessions, and waits for its threads. The camera must be stopping already.
-    pub fn stop(&mut self) {
+    /// Closes the port and all sessions. Pictures must still be coming: a session just being set up waits for one.
+    pub fn close(&mut self) {
         let (server, door, main_loop) = (self.server.clone(), self.door.clone(), self.main_loop.clone());
         self.context.invoke(move || {
             door.destroy();
@@ -85,6 +86,10 @@ impl RtspServer {
             // It ended with a panic at worst, which has been printed.
             let _ = thread.join();
         }
+    }
+
+    /// Waits for the threads that drew for its clients, once the camera is stopping.
+    pub fn join(&self) {
         self.feeders.join();
     }
 }

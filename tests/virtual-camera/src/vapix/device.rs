@@ -49,7 +49,9 @@ impl Device {
     }
 
     fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<Answer, String> {
-        let request = Request::parse(args, self.view_size)?;
+        let known = |arg: &&(String, String)| self.api == PtzApi::Extended || arg.0 != "proportionalspeed";
+        let args = args.iter().filter(known).cloned().collect();
+        let request = Request::parse(&args, self.view_size)?;
         let preset = request.preset.as_ref().map(|preset| self.preset(preset)).transpose()?;
         self.head.advance(now);
         for motion in request.motions.into_iter().chain(preset) {
@@ -181,7 +183,7 @@ pub(super) fn field_angles(head: &Head) -> (u32, u32) {
 mod tests {
     use super::*;
     use crate::{
-        kinematics::{Kinematics, Optics},
+        kinematics::{Kinematics, Optics, SpeedMap},
         vapix::parse_args,
     };
 
@@ -240,6 +242,19 @@ mod tests {
         let text = text(ask(&mut device(PtzApi::Extended), query, 0));
         assert!(text.contains("value=1 | speed=0.05,"), "{text}");
         assert!(text.contains("value=100 | speed=450.00\r\n"), "{text}");
+    }
+
+    #[test]
+    fn proportional_speed_is_left_out_where_the_firmware_knows_the_word() {
+        for (api, expected) in [(PtzApi::Classic, 110.4), (PtzApi::Extended, 225.0)] {
+            let mut device = device(api);
+            device.head.kinematics_mut().speed_map = SpeedMap::Linear { max_deg_s: 450.0 };
+            device.head.kinematics_mut().acceleration_deg_s2 = 1e6;
+            let query = "continuouspantiltmove=0,50&proportionalspeed=disabled";
+            assert_eq!(ask(&mut device, query, 1), Answer::Accepted);
+            device.head.advance(Duration::from_millis(1064));
+            assert!((device.head.now().tilt_rate_deg_s - expected).abs() < 1e-6, "{:?}", device.head.now());
+        }
     }
 
     #[test]

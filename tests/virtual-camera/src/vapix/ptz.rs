@@ -53,6 +53,7 @@ impl Request {
         let mut request = Self::default();
         let mut absolute = [None; 3];
         let mut relative = [None; 3];
+        let mut unlimited = false;
         for (name, value) in args {
             match name.as_str() {
                 "camera" => channel(value)?,
@@ -81,6 +82,8 @@ impl Request {
                     }
                     request.motions.push(centre(args, size, x, y, zoom / 100.0)?);
                 }
+                "proportionalspeed" if value == "disabled" => unlimited = true,
+                "proportionalspeed" => return Err(invalid(name, value)),
                 "gotoserverpresetname" => request.preset = Some(Preset::Named(value.clone())),
                 "gotoserverpresetno" | "gotodevicepreset" => {
                     request.preset = Some(Preset::Numbered(value.parse().map_err(|_| invalid(name, value))?));
@@ -93,6 +96,7 @@ impl Request {
             }
         }
         request.add_positions(absolute, relative);
+        request.motions.extend(unlimited.then_some(Motion::Unlimited));
         Ok(request)
     }
 
