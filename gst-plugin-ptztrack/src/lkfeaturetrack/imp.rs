@@ -1,4 +1,4 @@
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex};
 
 use glib::Properties;
 use gst::prelude::*;
@@ -11,6 +11,7 @@ use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
 use ptztrack_contract::{MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
 
 use super::{Profile, Selection, buffer};
+use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::vision;
 
@@ -164,11 +165,6 @@ pub struct LkFeatureTrack {
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
     command: Mutex<Option<Command>>,
-}
-
-/// A panic elsewhere must not take the application with it.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[glib::object_subclass]
@@ -426,7 +422,7 @@ impl LkFeatureTrack {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Failed,
-                ["{reason}. The video goes on; further faults of this stream are not reported."]
+                ("{reason}. The video goes on; further faults of this stream are not reported.")
             );
         }
     }

@@ -1,4 +1,4 @@
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex};
 
 use glib::Properties;
 use gst::prelude::*;
@@ -7,6 +7,7 @@ use gst_video::{VideoFormat, VideoOverlayComposition, VideoOverlayCompositionMet
 use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, TargetState};
 
 use super::caps;
+use crate::lock::lock;
 use crate::vision::{self, FrameSize, Parts, Patch, Seen, Shape, Trail};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
@@ -115,11 +116,6 @@ pub struct PtzOverlay {
     memory: Mutex<Memory>,
     sinkpad: gst::Pad,
     srcpad: gst::Pad,
-}
-
-/// A panic elsewhere must not take the pipeline's remaining threads with it.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[glib::object_subclass]
@@ -320,7 +316,7 @@ impl PtzOverlay {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Failed,
-                ["Frame not drawn on: {reason}. Further ones of this stream are not reported."]
+                ("Frame not drawn on: {reason}. Further ones of this stream are not reported.")
             );
         }
         *lock(&self.memory) = memory;
