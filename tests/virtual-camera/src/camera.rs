@@ -24,6 +24,8 @@ use crate::{
 
 /// How often a moving camera tells those who wait for it.
 const PULSE: Duration = Duration::from_millis(10);
+/// How often a resting camera is looked at by those who wait.
+const LOOK: Duration = Duration::from_millis(50);
 /// Commands kept for the page and for tests.
 const COMMANDS_KEPT: usize = 20_000;
 
@@ -214,7 +216,9 @@ impl Camera {
             if left.is_zero() {
                 return false;
             }
-            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+            // The footage goes on without telling anybody.
+            let pause = left.min(LOOK);
+            state = self.changed.wait_timeout(state, pause).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
 

@@ -41,12 +41,16 @@ fn run(options: Options) -> Result<(), Box<dyn std::error::Error>> {
                 () = signals.next() => break,
                 () = tick => {}
             }
-            if let Some(log) = &mut log {
-                log.write(&camera)?;
-            }
+            write(&mut log, &camera)?;
         }
-        Ok(())
-    })
+        // Also what happened since the last look.
+        write(&mut log, &camera)
+    })?;
+    Ok(())
+}
+
+fn write(log: &mut Option<Log>, camera: &VirtualCamera) -> std::io::Result<()> {
+    log.as_mut().map_or(Ok(()), |log| log.write(camera))
 }
 
 /// What tells the program to end.

@@ -27,13 +27,7 @@ pub(super) async fn ptz(
     ConnectInfo(connection): ConnectInfo<Connection>,
     request: Request,
 ) -> Response {
-    let _counted = site.camera.request_begins();
-    let (response, query) = answer(&site, &connection, request, Camera::ptz).await;
-    if let Some(query) = query {
-        site.camera.note_command(&query, response.status().as_u16());
-    }
-    late(&site).await;
-    response
+    answer(&site, &connection, request, Camera::ptz, Camera::note_command).await
 }
 
 pub(super) async fn param(
@@ -41,39 +35,64 @@ pub(super) async fn param(
     ConnectInfo(connection): ConnectInfo<Connection>,
     request: Request,
 ) -> Response {
-    let _counted = site.camera.request_begins();
-    let (response, _) = answer(&site, &connection, request, Camera::param).await;
-    late(&site).await;
-    response
+    answer(&site, &connection, request, Camera::param, |_, _, _| {}).await
 }
 
-/// The answer, and the arguments as they came unless the client had to be refused.
 async fn answer(
     site: &Site,
     connection: &Connection,
     request: Request,
     run: fn(&Camera, &Args) -> Answer,
-) -> (Response, Option<String>) {
+    note: fn(&Camera, &str, u16),
+) -> Response {
+    let camera = &site.camera;
+    let _counted = camera.request_begins();
     let refusal = site.guard.refuse(&request);
     let query = match arguments(request).await {
         Ok(query) => query,
-        Err(response) => return (response, None),
+        Err(response) => return response,
     };
-    let fault = site.camera.fault.borrow().clone();
-    if let Some(response) = faulty(fault, connection).await {
-        return (response, Some(query));
+    let fault = camera.fault.borrow().clone();
+    match trouble(&fault) {
+        Trouble::None => {}
+        Trouble::Answer(response) => {
+            note(camera, &query, response.status().as_u16());
+            return response;
+        }
+        Trouble::Cut(ending) => {
+            connection.end(ending);
+            note(camera, &query, 0);
+            return Response::new(Body::empty());
+        }
+        Trouble::Silence => {
+            note(camera, &query, 0);
+            pending::<()>().await;
+        }
     }
     if let Some(refusal) = refusal {
-        site.camera.note_refused();
-        return (refusal, None);
+        camera.note_refused();
+        return refusal;
     }
-    let _turn = site.turn.lock().await;
-    tokio::time::sleep(site.camera.settings.service_time).await;
-    let response = match run(&site.camera, &parse_args(query.as_bytes())) {
-        Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
-        Answer::Text(text) => ([(header::CONTENT_TYPE, "text/plain")], text).into_response(),
+    let response = {
+        let _turn = site.turn.lock().await;
+        tokio::time::sleep(camera.settings.service_time).await;
+        match run(camera, &parse_args(query.as_bytes())) {
+            Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
+            Answer::Text(text) => plain(text),
+        }
     };
-    (response, Some(query))
+    note(camera, &query, response.status().as_u16());
+    match fault {
+        // Commands act at once; it is the answer that is late.
+        Fault::Delay(delay) => tokio::time::sleep(delay).await,
+        Fault::CloseAfterResponse => connection.end(Ending::Closed),
+        _ => {}
+    }
+    response
+}
+
+fn plain(text: String) -> Response {
+    ([(header::CONTENT_TYPE, "text/plain")], text).into_response()
 }
 
 /// The query, or the form of a POST.
@@ -91,34 +110,25 @@ async fn arguments(request: Request) -> Result<String, Response> {
     Ok(query)
 }
 
-/// What comes instead of the right answer, if anything.
-async fn faulty(fault: Fault, connection: &Connection) -> Option<Response> {
-    match fault {
-        Fault::None | Fault::Delay(_) => return None,
-        Fault::CloseAfterResponse => {
-            connection.end(Ending::Closed);
-            return None;
-        }
-        Fault::Refuse | Fault::Reset => connection.end(Ending::Reset),
-        Fault::Garbage(bytes) => connection.end(Ending::Garbage(bytes)),
-        Fault::Hang => pending().await,
-        Fault::Status(code) => {
-            return Some(
-                StatusCode::from_u16(code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR).into_response(),
-            );
-        }
-        Fault::ErrorBody(text) => {
-            return Some(([(header::CONTENT_TYPE, "text/plain")], text).into_response());
-        }
-        Fault::EmptyOk => {}
-    }
-    Some(Response::new(Body::empty()))
+/// What a fault does instead of answering.
+enum Trouble {
+    None,
+    Answer(Response),
+    Cut(Ending),
+    Silence,
 }
 
-/// Commands act at once; it is the answer that is late.
-async fn late(site: &Site) {
-    let fault = site.camera.fault.borrow().clone();
-    if let Fault::Delay(delay) = fault {
-        tokio::time::sleep(delay).await;
+fn trouble(fault: &Fault) -> Trouble {
+    match fault {
+        Fault::None | Fault::Delay(_) | Fault::CloseAfterResponse => Trouble::None,
+        Fault::Refuse | Fault::Reset => Trouble::Cut(Ending::Reset),
+        Fault::Garbage(bytes) => Trouble::Cut(Ending::Garbage(bytes.clone())),
+        Fault::Hang => Trouble::Silence,
+        Fault::Status(code) => {
+            let status = StatusCode::from_u16(*code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
+            Trouble::Answer(status.into_response())
+        }
+        Fault::ErrorBody(text) => Trouble::Answer(plain(text.clone())),
+        Fault::EmptyOk => Trouble::Answer(Response::new(Body::empty())),
     }
 }

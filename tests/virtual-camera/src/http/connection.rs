@@ -66,7 +66,7 @@ impl AsyncRead for Wire {
         buf: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let ended = self.answered && lock(&self.connection.0).is_some();
-        // Nothing more to read: the server closes.
+        // What a client still sends after that is not read any more.
         if ended { Poll::Ready(Ok(())) } else { Pin::new(&mut self.stream).poll_read(cx, buf) }
     }
 }
@@ -93,6 +93,9 @@ impl AsyncWrite for Wire {
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
+        if self.answered {
+            return Pin::new(&mut self.stream).poll_shutdown(cx);
+        }
         Pin::new(&mut self.stream).poll_flush(cx)
     }
 

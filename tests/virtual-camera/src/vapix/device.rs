@@ -188,10 +188,14 @@ mod tests {
     };
 
     fn device(api: PtzApi) -> Device {
+        device_with(api, Kinematics::default())
+    }
+
+    fn device_with(api: PtzApi, kinematics: Kinematics) -> Device {
         let settings = Settings { ptz_api: api, ..Settings::default() };
         let limits = Limits { pan_deg: (-20.5, 20.5), tilt_deg: (-9.25, 9.25) };
         let optics = Optics { wide_fov_deg: 55.2, max_magnification: 18.0 };
-        let head = Head::new(Kinematics::default(), optics, limits, Pose::default(), Duration::from_secs(1));
+        let head = Head::new(kinematics, optics, limits, Pose::default(), Duration::from_secs(1));
         Device::new(&settings, head, limits, (640, 480))
     }
 
@@ -247,9 +251,14 @@ mod tests {
     #[test]
     fn proportional_speed_is_left_out_where_the_firmware_knows_the_word() {
         for (api, expected) in [(PtzApi::Classic, 110.4), (PtzApi::Extended, 225.0)] {
-            let mut device = device(api);
-            device.head.kinematics_mut().speed_map = SpeedMap::Linear { max_deg_s: 450.0 };
-            device.head.kinematics_mut().acceleration_deg_s2 = 1e6;
+            let mut device = device_with(
+                api,
+                Kinematics {
+                    speed_map: SpeedMap::Linear { max_deg_s: 450.0 },
+                    acceleration_deg_s2: 1e6,
+                    ..Kinematics::default()
+                },
+            );
             let query = "continuouspantiltmove=0,50&proportionalspeed=disabled";
             assert_eq!(ask(&mut device, query, 1), Answer::Accepted);
             device.head.advance(Duration::from_millis(1064));

@@ -88,7 +88,7 @@ impl Params {
             ],
         );
         self.add_limits(head, limits);
-        const ABILITIES: [(&str, bool); 32] = [
+        const ABILITIES: [(&str, bool); 35] = [
             ("AbsoluteBrightness", false),
             ("AbsoluteFocus", true),
             ("AbsoluteIris", true),
@@ -112,6 +112,9 @@ impl Params {
             ("DigitalZoom", false),
             ("GenericHTTP", false),
             ("IrCutFilter", true),
+            ("JoyStickEmulation", false),
+            ("LensOffset", false),
+            ("OSDMenu", false),
             ("ProportionalSpeed", true),
             ("RelativeBrightness", false),
             ("RelativeFocus", true),

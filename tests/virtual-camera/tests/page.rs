@@ -1,0 +1,171 @@
+//! The live page, in a headless Chromium.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::{
+    io::{BufRead, BufReader, Write},
+    path::{Path, PathBuf},
+    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+};
+
+use common::{PATIENCE, settings};
+use serde_json::{Value, json};
+use virtual_camera::{Settings, VirtualCamera};
+
+/// A browser that is spoken to through pipes (Chrome DevTools Protocol, messages end in a zero byte).
+struct Browser {
+    child: Child,
+    commands: ChildStdin,
+    answers: BufReader<ChildStdout>,
+    profile: PathBuf,
+    page: Option<String>,
+    sent: u64,
+}
+
+impl Browser {
+    /// `None`, and a line that says so, where there is no Chromium.
+    fn start() -> Option<Self> {
+        if Command::new("chromium").arg("--version").output().is_err() {
+            eprintln!("SKIPPED: chromium is not installed (`make test` installs it)");
+            return None;
+        }
+        let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("chromium-{}", std::process::id()));
+        // The browser reads commands from descriptor 3 and answers on 4.
+        let mut child = Command::new("sh")
+            .args(["-c", r#"exec chromium "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#, "chromium"])
+            .args(["--headless", "--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run"])
+            .args(["--disable-background-networking", "--disable-component-update", "--disable-sync"])
+            .args(["--disable-dev-shm-usage", "--window-size=1300,900", "--remote-debugging-pipe"])
+            .arg(format!("--user-data-dir={}", profile.display()))
+            .arg("about:blank")
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let commands = child.stdin.take().unwrap();
+        let answers = BufReader::new(child.stdout.take().unwrap());
+        Some(Self { child, commands, answers, profile, page: None, sent: 0 })
+    }
+
+    fn call(&mut self, method: &str, params: Value) -> Value {
+        self.sent += 1;
+        let mut command = json!({"id": self.sent, "method": method, "params": params});
+        if let Some(page) = &self.page {
+            command["sessionId"] = json!(page);
+        }
+        self.commands.write_all(format!("{command}\0").as_bytes()).unwrap();
+        loop {
+            let mut message = Vec::new();
+            self.answers.read_until(0, &mut message).unwrap();
+            assert!(!message.is_empty(), "the browser is gone");
+            let message: Value = serde_json::from_slice(message.strip_suffix(&[0]).unwrap()).unwrap();
+            if message["id"] == json!(self.sent) {
+                assert!(message["error"].is_null(), "{method}: {message}");
+                return message["result"].clone();
+            }
+        }
+    }
+
+    fn open(&mut self, url: &str) {
+        let target = self.call("Target.createTarget", json!({"url": "about:blank"}));
+        let attach = json!({"targetId": target["targetId"], "flatten": true});
+        let session = self.call("Target.attachToTarget", attach);
+        self.page = session["sessionId"].as_str().map(Into::into);
+        // It returns when the new document is there, so that no expression meets the old one.
+        self.call("Page.navigate", json!({"url": url}));
+    }
+
+    /// The value of a JavaScript expression, awaited.
+    fn value(&mut self, expression: &str) -> Value {
+        let params = json!({"expression": expression, "awaitPromise": true, "returnByValue": true});
+        let result = self.call("Runtime.evaluate", params);
+        assert!(result["exceptionDetails"].is_null(), "{expression}: {result}");
+        result["result"]["value"].clone()
+    }
+
+    /// Waits until an expression is true.
+    #[track_caller]
+    fn wait_for(&mut self, condition: &str) {
+        let seconds = PATIENCE.as_secs();
+        let came = self.value(&format!(
+            "(async () => {{ for (let i = 0; i < {seconds} * 20; i++) {{ \
+               if ({condition}) return true; await new Promise(r => setTimeout(r, 50)); }} return false; }})()"
+        ));
+        if came != json!(true) {
+            let page = self.value("document.body.innerText");
+            panic!("never came: {condition}\n{page}");
+        }
+    }
+
+    fn mouse(&mut self, kind: &str, element: &str) {
+        let place = self.value(&format!(
+            "(() => {{ const r = document.getElementById('{element}').getBoundingClientRect(); \
+             return [r.x + r.width / 2, r.y + r.height / 2]; }})()"
+        ));
+        let event = json!({"type": kind, "x": place[0], "y": place[1], "button": "left", "clickCount": 1});
+        self.call("Input.dispatchMouseEvent", event);
+    }
+
+    fn click(&mut self, element: &str) {
+        self.mouse("mousePressed", element);
+        self.mouse("mouseReleased", element);
+    }
+}
+
+impl Drop for Browser {
+    fn drop(&mut self) {
+        // It may be gone already; its folder is only litter.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        let _ = std::fs::remove_dir_all(&self.profile);
+    }
+}
+
+#[test]
+fn the_page_shows_the_camera_and_steers_it() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let auth = virtual_camera::Auth::Digest { qop: true };
+    let camera = VirtualCamera::start(Settings { auth, ..settings() }).unwrap();
+    browser.open(&camera.url());
+
+    // It shows the picture, the overview with the view drawn in, and the numbers, and asks for no password.
+    browser.wait_for("typeof $ == 'function' && $('picture').naturalWidth == 160");
+    browser.wait_for("$('overview').naturalWidth == 512");
+    browser.wait_for("$('pan').textContent == '0.00°' && $('state').textContent == 'at rest'");
+    browser.wait_for(
+        "$('outline').getContext('2d').getImageData(0, 0, $('outline').width, $('outline').height) \
+         .data.some(value => value > 200)",
+    );
+    assert_eq!(browser.value("$('commands').children.length"), json!(0));
+
+    // A button held moves the camera, released it stops.
+    browser.mouse("mousePressed", "right");
+    assert!(camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s > 1.0));
+    browser.wait_for("$('state').textContent == 'moving' && parseFloat($('pan').textContent) > 0.5");
+    browser.mouse("mouseReleased", "right");
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    browser.wait_for("$('commands').children.length == 2");
+    browser.wait_for("$('commands').firstChild.textContent.endsWith('204  continuouspantiltmove=0,0')");
+    browser.wait_for("$('commands').lastChild.textContent.endsWith('204  continuouspantiltmove=25,0')");
+
+    // Zoom, and the way home.
+    browser.mouse("mousePressed", "zoom-in");
+    assert!(camera.wait_for(PATIENCE, |status| status.magnification > 1.2));
+    browser.mouse("mouseReleased", "zoom-in");
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
+    let png = glib::base64_decode(shot["data"].as_str().unwrap());
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("live-page.png"), png).unwrap();
+    browser.click("home");
+    assert!(camera.wait_for(PATIENCE, |status| status.pan_deg == 0.0 && status.zoom_step == 1.0));
+    browser.wait_for("$('pan').textContent == '0.00°' && $('zoom').textContent.startsWith('1 (')");
+
+    // A page that is closed while a button is held leaves no camera moving.
+    browser.mouse("mousePressed", "left");
+    assert!(camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s < -1.0));
+    browser.call("Page.navigate", json!({"url": "about:blank"}));
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
