@@ -19,7 +19,8 @@ pub trait BufferMeta: Sized {
 
     /// Makes the meta known to GStreamer; calling it again does nothing.
     fn register() {
-        // Both plugins carry this code: the lock serialises one, the question the other.
+        // Each plugin carries this code and a lock of its own; only who attaches registers, and a meta is attached by
+        // one plugin only.
         static REGISTERING: Mutex<()> = Mutex::new(());
         let _guard = REGISTERING.lock();
         if !gst::meta::CustomMeta::is_registered(Self::NAME) {
@@ -38,7 +39,6 @@ pub trait BufferMeta: Sized {
 
     /// Removes it from `buffer`, if it is there.
     fn detach(buffer: &mut gst::BufferRef) {
-        Self::register();
         while let Ok(meta) = gst::meta::CustomMeta::from_mut_buffer(buffer, Self::NAME) {
             if meta.remove().is_err() {
                 return;
@@ -48,7 +48,6 @@ pub trait BufferMeta: Sized {
 
     /// The meta on `buffer`: `None` where there is none, an error where it cannot be read.
     fn of(buffer: &gst::BufferRef) -> Option<Result<Self, ContractError>> {
-        Self::register();
         let meta = gst::meta::CustomMeta::from_buffer(buffer, Self::NAME).ok()?;
         Some(Self::read(meta.structure()))
     }
