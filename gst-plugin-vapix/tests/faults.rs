@@ -5,7 +5,7 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Heard, Rig, camera, moves, target};
+use common::{Heard, PATIENCE, Rig, camera, moves, target};
 use gst::prelude::*;
 use ptztrack_contract::{CameraChange, TargetState};
 use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
@@ -103,6 +103,17 @@ fn connections_closed_after_each_answer_are_no_fault() {
     rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
     let heard = rig.heard();
     assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
+}
+
+#[test]
+fn at_rest_a_silent_camera_is_left_without_complaint() {
+    let camera = camera(Auth::None);
+    camera.set_fault(Fault::Hang);
+    let rig = Rig::ready(&camera.url()).with("timeout", 60_000u32).play();
+    assert!(camera.wait_for(PATIENCE, |status| status.requests > 0));
+    rig.sink.set_state(gst::State::Paused).unwrap();
+    rig.sink.set_state(gst::State::Null).unwrap();
+    assert_eq!(rig.heard(), []);
 }
 
 #[test]

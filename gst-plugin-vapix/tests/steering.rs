@@ -5,7 +5,7 @@ mod common;
 
 use common::{Heard, PATIENCE, Rig, camera, moves, target};
 use gst::prelude::*;
-use ptztrack_contract::{CameraChange, CameraEvent, TargetState};
+use ptztrack_contract::{BufferMeta, CameraChange, CameraEvent, TargetState};
 use virtual_camera::{Auth, Settings, VirtualCamera};
 
 const STATES_WITHOUT_TARGET: [TargetState; 2] = [TargetState::Searching, TargetState::Lost];
@@ -149,6 +149,57 @@ fn it_resumes_after_a_pause() {
 }
 
 #[test]
+fn paused_commands_nothing() {
+    let camera = camera(Auth::None);
+    let rig = Rig::ready(&camera.url());
+    let source = gst::ElementFactory::make("videotestsrc").build().unwrap();
+    let pipeline = gst::Pipeline::new();
+    pipeline.add_many([&source, &rig.sink]).unwrap();
+    source.link(&rig.sink).unwrap();
+    let (rendered, to_render) = std::sync::mpsc::channel();
+    rig.sink.static_pad("sink").unwrap().add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        let Some(buffer) = info.buffer_mut() else { return gst::PadProbeReturn::Ok };
+        target(TargetState::Tracking, 0.9, 0.5).attach(buffer.make_mut()).unwrap();
+        let _ = rendered.send(());
+        gst::PadProbeReturn::Ok
+    });
+    pipeline.set_state(gst::State::Paused).unwrap();
+    to_render.recv_timeout(PATIENCE).unwrap();
+    // It has got to know the camera, and could move it.
+    assert!(camera.wait_for(PATIENCE, |status| status.requests >= 3));
+    assert_eq!(moves(&camera), [] as [&str; 0]);
+    pipeline.set_state(gst::State::Playing).unwrap();
+    assert!(camera.wait_for(PATIENCE, |status| status.moving));
+    for _ in 0..10 {
+        pipeline.set_state(gst::State::Paused).unwrap();
+        pipeline.set_state(gst::State::Playing).unwrap();
+    }
+    pipeline.set_state(gst::State::Paused).unwrap();
+    assert!(!camera.status().moving || camera.wait_for(PATIENCE, |status| !status.moving));
+    let commanded = moves(&camera).len();
+    // Its next look at the position comes after all there was to command.
+    let requests = camera.status().requests;
+    assert!(camera.wait_for(PATIENCE, |status| status.requests > requests));
+    assert_eq!(moves(&camera).len(), commanded);
+    pipeline.set_state(gst::State::Null).unwrap();
+}
+
+/// Where blocking on a runtime would panic.
+#[test]
+fn it_is_stopped_from_within_an_applications_own_task() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+    runtime.block_on(async {
+        rig.sink.set_state(gst::State::Null).unwrap();
+        rig.sink.set_state(gst::State::Playing).unwrap();
+        rig.sink.set_state(gst::State::Null).unwrap();
+    });
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
+
+#[test]
 fn absolute_and_centre_bring_the_target_to_the_middle() {
     for (mode, argument) in [("absolute", "&pan="), ("centre", "&center=")] {
         let camera = camera(Auth::None);
@@ -209,4 +260,14 @@ fn starting_and_stopping_leaves_nothing_behind() {
         name.is_ok_and(|name| name.trim() == "vapix")
     });
     assert_eq!(threads.count(), 1, "one thread for the whole plugin");
+}
+
+#[test]
+fn a_location_set_in_ready_counts() {
+    let (old, new) = (camera(Auth::None), camera(Auth::None));
+    let rig = Rig::ready(&old.url());
+    rig.sink.set_state(gst::State::Ready).unwrap();
+    let mut rig = rig.with("location", new.url()).play();
+    rig.set_going(&new);
+    assert_eq!(old.status().requests, 0);
 }

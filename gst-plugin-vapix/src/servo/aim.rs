@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use ptztrack_contract::{Point, Vector};
+use ptztrack_contract::{Point, TargetState, Vector};
 
 use super::{CommandHistory, PanTilt, RateAverage, View};
 
@@ -33,6 +33,16 @@ pub enum Visibility {
     Predicted,
     /// There is none.
     Gone,
+}
+
+impl From<TargetState> for Visibility {
+    fn from(state: TargetState) -> Self {
+        match state {
+            TargetState::Tracking => Self::Seen,
+            TargetState::Occluded => Self::Predicted,
+            TargetState::Searching | TargetState::Lost => Self::Gone,
+        }
+    }
 }
 
 /// The target in one picture.

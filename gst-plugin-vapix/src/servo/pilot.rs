@@ -3,80 +3,10 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, CameraModel, CommandHistory, Controller, LimitGuard, Link, LinkChange, Mode, PanTilt, Scheduler,
-    ServoSettings, Sight, Steps, View, Visibility,
+    Aim, Answer, CameraModel, CommandHistory, Controller, Job, LimitGuard, Link, Mode, Next, PanTilt, Query,
+    Report, Scheduler, ServoSettings, Sight, Status, Steps, View, Visibility,
 };
-use crate::vapix::{Command, Error, Limits, Parameters, Position};
-
-/// Something to ask the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Query {
-    /// Where it looks.
-    Position,
-    /// How far it can look.
-    Limits,
-    /// Its PTZ parameters.
-    Parameters,
-}
-
-/// One exchange with the camera.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Job {
-    /// Tell it.
-    Command(Command),
-    /// Ask it.
-    Query(Query),
-}
-
-/// What the camera answered.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Answer {
-    /// To a command: yes.
-    Accepted,
-    /// To [`Query::Position`].
-    Position(Position),
-    /// To [`Query::Limits`].
-    Limits(Limits),
-    /// To [`Query::Parameters`].
-    Parameters(Parameters),
-}
-
-/// What is to be done now.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Next {
-    /// This.
-    Do(Job),
-    /// Nothing before this time, or before something new is seen.
-    Wait(Option<Duration>),
-}
-
-/// Something that happened.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Report {
-    /// The connection came, went, or is refused.
-    Link(LinkChange),
-    /// The camera was at rest and has accepted a move.
-    Moving,
-    /// The camera has accepted a stop, or arrived.
-    Stopped,
-    /// The target lies beyond the camera's range.
-    AtLimit,
-}
-
-/// The camera as it is known.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Status {
-    /// It answers and does as it is told.
-    pub connected: bool,
-    /// It may be moving on our behalf.
-    pub moving: bool,
-    /// Where it last said it looks.
-    pub position: Position,
-    /// What it was last told, degrees per second.
-    pub rate: PanTilt,
-    /// Horizontal field of view in degrees, where it is set or told.
-    pub fov_deg: Option<f64>,
-}
+use crate::vapix::{Command, Error};
 
 /// Steers one camera: takes what is seen, says what to send, hears what is answered. Sends nothing
 /// itself, and has no clock: both are the caller's.
@@ -98,6 +28,8 @@ pub struct Pilot {
     round_trip: Duration,
     /// The speed steps in force, for the quantiser's hysteresis.
     speed_steps: (i8, i8),
+    /// The words that end the last move, whatever the mode is by now.
+    stop: Command,
     at_limit: bool,
     overtaken: u64,
     reports: Vec<Report>,
@@ -144,6 +76,7 @@ impl Pilot {
             next_poll: Duration::ZERO,
             round_trip: Duration::ZERO,
             speed_steps: (0, 0),
+            stop: Command::Halt,
             at_limit: false,
             overtaken: 0,
             reports: Vec::new(),
@@ -190,10 +123,10 @@ impl Pilot {
         let interval = Duration::from_secs_f64(1.0 / self.settings.max_rate_hz);
         let retry_at = self.link.retry_at();
         let (command, due) = match self.wish(now) {
-            Wish::Rest => (self.stop_command(), self.scheduler.stop_due(now, interval, retry_at)),
-            Wish::Move(_) if self.meeting() => (self.stop_command(), None),
+            Wish::Rest => (self.stop, self.scheduler.stop_due(now, interval, retry_at)),
+            Wish::Move(_) if self.meeting() => (self.stop, None),
             Wish::Move(command) => (command, Some(self.scheduler.move_due(&command, interval, retry_at))),
-            Wish::AsIs => (self.stop_command(), None),
+            Wish::AsIs => (self.stop, None),
         };
         if due.is_some_and(|due| due <= now) {
             return Next::Do(Job::Command(command));
@@ -203,14 +136,24 @@ impl Pilot {
         if query_due <= now {
             return Next::Do(Job::Query(query));
         }
-        let stale = self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout);
-        Next::Wait([due, Some(query_due), stale].into_iter().flatten().min())
+        Next::Wait([due, Some(query_due), self.stale_at()].into_iter().flatten().min())
     }
 
     /// Something is being sent.
     pub fn sending(&mut self, job: &Job, now: Duration) {
+        let Job::Command(command) = job else { return };
+        self.scheduler.attempted(command, now);
+        match command {
+            Command::Velocity { .. } => self.stop = Command::Halt,
+            Command::Absolute { .. } | Command::Centre { .. } => self.stop = Command::Stop,
+            Command::Halt | Command::Stop => {}
+        }
+    }
+
+    /// The answer is waited for no longer, as something else is more urgent: no fault of the camera's.
+    pub fn abandoned(&mut self, job: &Job, now: Duration) {
         if let Job::Command(command) = job {
-            self.scheduler.attempted(command, now);
+            self.scheduler.failed(command, true, now);
         }
     }
 
@@ -238,8 +181,13 @@ impl Pilot {
     }
 
     /// Whether there is a target to follow.
-    pub fn has_target(&self) -> bool {
-        self.target.is_some()
+    pub fn has_target(&self, now: Duration) -> bool {
+        self.stale_at().is_some_and(|at| now < at)
+    }
+
+    /// When the target will not have been seen for too long, where there is one.
+    pub fn stale_at(&self) -> Option<Duration> {
+        self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout)
     }
 
     /// Whether nothing may be sent until a setting changes.
@@ -269,12 +217,11 @@ impl Pilot {
     }
 
     fn wish(&mut self, now: Duration) -> Wish {
+        if !self.has_target(now) {
+            self.rest();
+        }
         let Some(target) = &mut self.target else { return Wish::Rest };
         target.considered = true;
-        if now >= target.last_seen + self.settings.stale_timeout {
-            self.rest();
-            return Wish::Rest;
-        }
         let sight = target.sight;
         match self.settings.mode {
             Mode::Velocity => self.velocity(&sight, now),
@@ -302,7 +249,11 @@ impl Pilot {
 
     /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
     fn step(&mut self, sight: &Sight, now: Duration) -> Wish {
-        if self.steps.under_way() || !self.steps.shows_rest(sight.taken_at, self.settings.latency) {
+        if self.scheduler.may_move() && !self.steps.under_way() {
+            // By speed, before the mode was changed; or who knows, as a step went unanswered.
+            return Wish::Rest;
+        }
+        if !self.steps.shows_rest(sight.taken_at, self.settings.latency) {
             return Wish::AsIs;
         }
         let view = self.view(sight);
@@ -337,13 +288,6 @@ impl Pilot {
         }
     }
 
-    fn stop_command(&self) -> Command {
-        match self.settings.mode {
-            Mode::Velocity => Command::Halt,
-            Mode::Absolute | Mode::Centre => Command::Stop,
-        }
-    }
-
     fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
         let was_moving = self.scheduler.may_move();
         self.scheduler.accepted(command, now);
@@ -367,8 +311,13 @@ impl Pilot {
                 // Where it came to rest.
                 self.next_poll = now + Self::POLL_MOVING;
             }
-            Command::Velocity { .. } if !was_moving => self.next_poll = now + Self::POLL_MOVING,
-            Command::Velocity { .. } => {}
+            Command::Velocity { .. } => {
+                // A step under way, from before the mode was changed, is over.
+                self.steps.rest(now);
+                if !was_moving {
+                    self.next_poll = now + Self::POLL_MOVING;
+                }
+            }
         }
         self.succeeded(true);
         match (was_moving, self.scheduler.may_move()) {

@@ -1,6 +1,7 @@
 use super::*;
+use crate::servo::LinkChange;
 use crate::servo::aim::tests::sight;
-use crate::vapix::Range;
+use crate::vapix::{Limits, Position, Range};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Duration {
@@ -230,6 +231,68 @@ fn centre_mode_names_the_pixel_and_stops_with_move_stop() {
     assert_eq!(rig.after(ms(0)), [expected]);
     rig.pilot.rest();
     assert_eq!(rig.after(ms(10)), [Command::Stop]);
+}
+
+#[test]
+fn a_move_by_speed_is_stopped_when_the_mode_becomes_one_of_steps() {
+    for mode in [Mode::Absolute, Mode::Centre] {
+        let mut rig = Rig::new(ServoSettings::default());
+        rig.see(0.9, 0.5);
+        rig.after(ms(0));
+        rig.pilot.configure(ServoSettings { mode, ..ServoSettings::default() });
+        // In the middle: no step is due that would end the move.
+        rig.see(0.5, 0.5);
+        assert_eq!(rig.after(ms(100)), [Command::Halt], "{mode:?}");
+        assert!(rig.pilot.is_at_rest());
+    }
+}
+
+#[test]
+fn a_step_under_way_is_forgotten_when_the_mode_becomes_speed() {
+    let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
+    rig.see(1.0, 0.5);
+    rig.after(ms(0));
+    rig.pilot.configure(ServoSettings::default());
+    for _ in 0..50 {
+        rig.see(0.9, 0.5);
+        rig.after(ms(100));
+    }
+    assert!(!rig.pilot.is_at_rest(), "a position that stays the same is no arrival of a move by speed");
+    rig.pilot.rest();
+    assert_eq!(rig.after(ms(10)), [Command::Halt]);
+}
+
+#[test]
+fn a_step_is_ended_by_the_words_for_steps_whatever_the_mode_is_by_then() {
+    let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
+    rig.see(1.0, 0.5);
+    rig.after(ms(0));
+    rig.pilot.configure(ServoSettings::default());
+    rig.pilot.rest();
+    assert_eq!(rig.after(ms(10)), [Command::Stop]);
+}
+
+#[test]
+fn a_target_goes_stale_while_an_answer_is_waited_for() {
+    let mut rig = Rig::new(ServoSettings::default());
+    assert_eq!(rig.pilot.stale_at(), None);
+    rig.see(0.9, 0.5);
+    let stale_at = rig.now + ServoSettings::default().stale_timeout;
+    assert_eq!(rig.pilot.stale_at(), Some(stale_at));
+    assert!(rig.pilot.has_target(stale_at - ms(1)) && !rig.pilot.has_target(stale_at));
+}
+
+#[test]
+fn what_was_abandoned_for_a_stop_is_no_fault_but_may_have_acted() {
+    let mut rig = Rig::new(ServoSettings::default());
+    let job = Job::Command(Command::Velocity { pan: 10, tilt: 0 });
+    rig.pilot.sending(&job, rig.now);
+    rig.pilot.abandoned(&job, rig.now);
+    rig.pilot.abandoned(&Job::Query(Query::Position), rig.now);
+    assert!(!rig.pilot.is_at_rest());
+    assert_eq!(rig.reports(), []);
+    assert_eq!(rig.after(ms(1)), [Command::Halt]);
+    assert!(rig.pilot.is_at_rest());
 }
 
 /// A camera that turns as told, with everything late, before a person who walks.

@@ -25,7 +25,7 @@ pub struct ServoSettings {
     pub dead_zone: f64,
     /// Degrees per second that neither axis exceeds.
     pub max_speed_deg_s: f64,
-    /// Longest stretch between commands is 1/this: commands per second at most.
+    /// Commands per second at most; a stop does not wait for its turn.
     pub max_rate_hz: f64,
     /// From light on the sensor to the picture's timestamp, and from a command to the motion, together.
     pub latency: Duration,

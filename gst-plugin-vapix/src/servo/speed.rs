@@ -41,7 +41,8 @@ impl SpeedMap {
     /// The step for a speed, given the step in force.
     pub fn step(&self, deg_s: f64, in_force: i8) -> i8 {
         let speed = deg_s.abs().min(self.cap_deg_s);
-        if speed < self.deg_s(1) / 2.0 {
+        // What is no number compares with nothing, and shall move nothing.
+        if deg_s.is_nan() || speed < self.deg_s(1) / 2.0 {
             return 0;
         }
         let share = (speed / self.full_deg_s).min(1.0);
@@ -75,6 +76,7 @@ mod tests {
         }
         assert_eq!(AXIS_EXAMPLE.deg_s(0), 0.0);
         assert_eq!(AXIS_EXAMPLE.step(0.0, 5), 0);
+        assert_eq!(AXIS_EXAMPLE.step(f64::NAN, 5), 0);
     }
 
     #[test]

@@ -4,6 +4,7 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use digest_auth::{AuthContext, WwwAuthenticateHeader};
 use reqwest::header::{HeaderMap, HeaderValue, WWW_AUTHENTICATE};
 
+use super::text::excerpt;
 use super::{Error, Secret};
 
 /// A user and the password.
@@ -84,7 +85,7 @@ impl Authenticator {
             self.challenge = Some(Challenge::Basic);
             return Ok(false);
         }
-        Err(Error::UnsupportedAuthentication(offers.join("; ")))
+        Err(Error::UnsupportedAuthentication(excerpt(&offers.join("; "))))
     }
 
     /// Forgets the challenge: what was asked over HTTP says nothing of what HTTPS will ask.

@@ -4,7 +4,8 @@ use reqwest::header::{AUTHORIZATION, LOCATION};
 use reqwest::{Response, StatusCode, redirect};
 
 use super::auth::Authenticator;
-use super::text::{complaint, unexpected};
+use super::location::without_user_info;
+use super::text::{complaint, excerpt, unexpected};
 use super::{Command, Credentials, Error, Limits, Location, Parameters, Position, Trust};
 
 /// Longest answer that is read; a full PTZ parameter list is a few kilobytes.
@@ -188,7 +189,7 @@ impl Client {
         let redirect = response.headers().get(LOCATION).and_then(|value| value.to_str().ok()).unwrap_or("");
         let Some(location) = self.settings.location.upgraded_by(redirect) else {
             let target = redirect.split('?').next().unwrap_or("");
-            return Err(Error::Redirected(super::location::without_user_info(target)));
+            return Err(Error::Redirected(excerpt(&without_user_info(target))));
         };
         self.settings.location = location;
         self.http = http_client(&self.settings)?;

@@ -150,7 +150,7 @@ pub(super) fn unexpected(body: &str) -> Error {
 }
 
 /// The beginning of `text` on one line, harmless to print.
-fn excerpt(text: &str) -> String {
+pub(super) fn excerpt(text: &str) -> String {
     let words: Vec<&str> = text.split_whitespace().take(EXCERPT_CHARS).collect();
     words.join(" ").chars().filter(|c| !c.is_control()).take(EXCERPT_CHARS).collect()
 }

@@ -6,14 +6,15 @@ use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
-use ptztrack_contract::{
-    BufferMeta, CameraChange, CameraEvent, CameraMessage, TargetMeta, TargetState, Times,
-};
+use ptztrack_contract::{BufferMeta, CameraChange, CameraMessage, TargetMeta, Times};
 
+use super::news::camera_event;
+use super::picture::Picture;
 use super::settings::Settings;
-use super::worker::{Event, Worker};
+use super::statistics::Statistics;
+use super::worker::{self, Event, Worker};
 use super::{Mode, Prediction, SpeedCurve};
-use crate::servo::{Job, LinkChange, Report, Sight, Status, View, Visibility};
+use crate::servo::{LinkChange, Report, Sight, Status};
 use crate::vapix::{Location, Secret};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
@@ -25,13 +26,6 @@ const REST_WAIT: Duration = Duration::from_secs(1);
 
 /// A picture older than this tells nothing: rather its timestamps are wrong.
 const OLDEST_PICTURE: gst::ClockTime = gst::ClockTime::from_seconds(2);
-
-/// What a picture is like, from its caps.
-#[derive(Debug, Clone, Copy)]
-struct Picture {
-    size: (u32, u32),
-    aspect: f64,
-}
 
 /// What render keeps from buffer to buffer.
 #[derive(Debug, Default)]
@@ -179,8 +173,8 @@ impl ObjectImpl for VapixPtzSink {
     }
 
     fn dispose(&self) {
-        // Stops the camera without waiting: this may be the worker's own thread.
-        drop(lock(&self.worker).take());
+        // There is one if the element was never brought to NULL.
+        self.finish_worker();
     }
 }
 
@@ -213,56 +207,40 @@ impl ElementImpl for VapixPtzSink {
         &self,
         transition: gst::StateChange,
     ) -> Result<gst::StateChangeSuccess, gst::StateChangeError> {
-        let success = self.parent_change_state(transition)?;
-        if transition == gst::StateChange::PlayingToPaused {
-            // After the parent: from here on no buffer is rendered that could set the camera going again.
-            self.rest();
+        // Not in the base class' start() and stop(): those are at NULL to READY and back, and
+        // what can be set in READY shall count.
+        if transition == gst::StateChange::ReadyToPaused {
+            self.start_worker()?;
         }
-        Ok(success)
+        let result = self.parent_change_state(transition);
+        match transition {
+            // After the parent: from here on no buffer is rendered that could set the camera going again.
+            gst::StateChange::PlayingToPaused => self.rest(),
+            gst::StateChange::PausedToReady => self.finish_worker(),
+            gst::StateChange::ReadyToPaused if result.is_err() => self.finish_worker(),
+            _ => {}
+        }
+        result
     }
 }
 
 impl BaseSinkImpl for VapixPtzSink {
-    fn start(&self) -> Result<(), gst::ErrorMessage> {
-        let settings = lock(&self.settings).clone();
-        let client = settings.client(environment).ok_or_else(|| {
-            gst::error_msg!(
-                gst::ResourceError::NotFound,
-                ("no camera: set `location`, for example location=http://192.168.0.90")
-            )
-        })?;
-        *lock(&self.stream) = Stream::default();
-        *lock(&self.news) = None;
-        let element = self.obj().downgrade();
-        let worker = Worker::start(client, settings.servo(), move |event| {
-            if let Some(element) = element.upgrade() {
-                element.imp().happened(event);
-            }
-        })
-        .map_err(|reason| gst::error_msg!(gst::ResourceError::Settings, ("{reason}")))?;
-        *lock(&self.worker) = Some(worker);
-        Ok(())
-    }
-
-    fn stop(&self) -> Result<(), gst::ErrorMessage> {
-        let worker = lock(&self.worker).take();
-        // Whether it came to rest the worker itself reports.
-        worker.map(Worker::finish);
-        Ok(())
-    }
-
     fn set_caps(&self, caps: &gst::Caps) -> Result<(), gst::LoggableError> {
         let picture =
-            picture_of(caps).ok_or_else(|| gst::loggable_error!(CAT, "caps without a size: {caps}"))?;
+            Picture::of(caps).ok_or_else(|| gst::loggable_error!(CAT, "caps without a size: {caps}"))?;
         lock(&self.stream).picture = Some(picture);
         Ok(())
     }
 
     fn event(&self, event: gst::Event) -> bool {
-        match event.view() {
-            gst::EventView::Eos(_) => self.rest(),
-            // Comes from the seeking thread, which shall not wait.
-            gst::EventView::FlushStart(_) => self.with_worker(|worker| drop(worker.inbox().rest())),
+        match event.type_() {
+            gst::EventType::Eos => self.rest(),
+            gst::EventType::FlushStart => {
+                let handled = self.parent_event(event);
+                // After the parent, see above; and without a wait, as this is the seeking thread.
+                self.with_worker(|worker| drop(worker.inbox().rest()));
+                return handled;
+            }
             _ => {}
         }
         self.parent_event(event)
@@ -280,6 +258,38 @@ impl BaseSinkImpl for VapixPtzSink {
 }
 
 impl VapixPtzSink {
+    fn start_worker(&self) -> Result<(), gst::StateChangeError> {
+        let settings = lock(&self.settings).clone();
+        let Some(client) = settings.client(environment) else {
+            gst::element_imp_error!(
+                self,
+                gst::ResourceError::NotFound,
+                ("no camera: set `location`, for example location=http://192.168.0.90")
+            );
+            return Err(gst::StateChangeError);
+        };
+        *lock(&self.stream) = Stream::default();
+        *lock(&self.news) = None;
+        let element = self.obj().downgrade();
+        let worker = Worker::start(client, settings.servo(), move |event| {
+            if let Some(element) = element.upgrade() {
+                element.imp().happened(event);
+            }
+        })
+        .map_err(|reason| {
+            gst::element_imp_error!(self, gst::ResourceError::Settings, ("{reason}"));
+            gst::StateChangeError
+        })?;
+        *lock(&self.worker) = Some(worker);
+        Ok(())
+    }
+
+    fn finish_worker(&self) {
+        // Waited for without the lock.
+        let worker = lock(&self.worker).take();
+        drop(worker);
+    }
+
     /// Leaves the target for the worker.
     fn see(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) {
         let Some(picture) = lock(&self.stream).picture else { return };
@@ -287,11 +297,7 @@ impl VapixPtzSink {
         self.with_worker(|worker| {
             let inbox = worker.inbox();
             inbox.see(Sight {
-                visibility: match target.state {
-                    TargetState::Tracking => Visibility::Seen,
-                    TargetState::Occluded => Visibility::Predicted,
-                    TargetState::Searching | TargetState::Lost => Visibility::Gone,
-                },
+                visibility: target.state.into(),
                 id: target.id,
                 centroid: target.centroid,
                 velocity: target.velocity,
@@ -316,13 +322,9 @@ impl VapixPtzSink {
 
     fn rest(&self) {
         // The wait is for the worker's answer, not under the lock that everybody else needs.
-        let waiting = lock(&self.worker).as_ref().map(|worker| worker.inbox().rest());
-        if waiting.is_some_and(|waiting| waiting.recv_timeout(REST_WAIT).is_err()) {
-            gst::warning!(
-                CAT,
-                imp = self,
-                "The camera has not confirmed its stop within {REST_WAIT:?}; trying on"
-            );
+        let rest = lock(&self.worker).as_ref().map(|worker| worker.inbox().rest());
+        if rest.is_some_and(|rest| !worker::wait_for(&rest, REST_WAIT)) {
+            gst::warning!(CAT, imp = self, "no stop confirmed within {REST_WAIT:?}; trying on");
         }
     }
 
@@ -346,10 +348,10 @@ impl VapixPtzSink {
     fn happened(&self, event: Event) {
         match event {
             Event::Exchanged { job, failure: None, round_trip } => {
-                gst::log!(CAT, imp = self, "{} answered in {round_trip:?}", described(&job));
+                gst::log!(CAT, imp = self, "{} answered in {round_trip:?}", job);
             }
             Event::Exchanged { job, failure: Some(err), round_trip } => {
-                gst::debug!(CAT, imp = self, "{} failed after {round_trip:?}: {err}", described(&job));
+                gst::debug!(CAT, imp = self, "{} failed after {round_trip:?}: {err}", job);
             }
             Event::Report(Report::Link(change)) => self.link_changed(&change),
             Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
@@ -405,19 +407,8 @@ impl VapixPtzSink {
     /// Tells upstream what the camera does, if that has changed.
     fn push_news(&self) {
         let Some(status) = lock(&self.news).take() else { return };
-        let picture = lock(&self.stream).picture;
-        let vertical_fov_deg = status.fov_deg.zip(picture).map(|(horizontal_fov_deg, picture)| {
-            View { horizontal_fov_deg, aspect: picture.aspect, tilt_deg: 0.0 }.vertical_fov_deg()
-        });
-        let event = CameraEvent {
-            moving: status.moving,
-            pan_deg: status.position.pan_deg,
-            tilt_deg: status.position.tilt_deg,
-            pan_rate_deg_s: status.rate.pan,
-            tilt_rate_deg_s: status.rate.tilt,
-            horizontal_fov_deg: status.fov_deg,
-            vertical_fov_deg,
-        };
+        let aspect = lock(&self.stream).picture.map(|picture| picture.aspect);
+        let event = camera_event(&status, aspect);
         // Nobody upstream needs to care.
         let _ = self.obj().sink_pad().push_event(event.to_event());
     }
@@ -470,32 +461,8 @@ impl VapixPtzSink {
     }
 
     fn stats(&self) -> gst::Structure {
-        let worker = lock(&self.worker);
-        let statistics = worker.as_ref().map(Worker::statistics).unwrap_or_default();
-        let state = match &*worker {
-            None => "stopped",
-            Some(_) if statistics.halted => "refused",
-            Some(_) if !statistics.status.connected => "disconnected",
-            Some(_) if statistics.status.moving => "moving",
-            Some(_) => "at-rest",
-        };
-        drop(worker);
-        let status = statistics.status;
-        gst::Structure::builder("application/x-vapixptzsink-stats")
-            .field("state", state)
-            .field("commands-sent", statistics.sent)
-            .field("commands-failed", statistics.failed)
-            .field("commands-coalesced", statistics.coalesced)
-            .field("round-trip", nanoseconds(statistics.round_trip))
-            .field("round-trip-average", nanoseconds(statistics.round_trip_average))
-            .field("pan-rate", status.rate.pan)
-            .field("tilt-rate", status.rate.tilt)
-            .field_if_some("pan", status.position.pan_deg)
-            .field_if_some("tilt", status.position.tilt_deg)
-            .field_if_some("zoom", status.position.zoom_steps)
-            .field_if_some("field-of-view", status.fov_deg)
-            .field_if_some("last-error", statistics.last_error)
-            .build()
+        let statistics = lock(&self.worker).as_ref().map(Worker::statistics);
+        statistics.map_or_else(Statistics::stopped, |statistics| statistics.to_structure())
     }
 }
 
@@ -526,28 +493,6 @@ servo_setters! {
 
 fn environment(name: &str) -> Option<String> {
     std::env::var(name).ok()
-}
-
-fn described(job: &Job) -> String {
-    match job {
-        Job::Command(command) => command.to_string(),
-        Job::Query(query) => format!("query for {query:?}"),
-    }
-}
-
-/// Size and shape of the picture, whatever memory it lies in.
-fn picture_of(caps: &gst::Caps) -> Option<Picture> {
-    let structure = caps.structure(0)?;
-    let pixels = |field| structure.get::<i32>(field).ok().and_then(|size| u32::try_from(size).ok());
-    let size = (pixels("width")?, pixels("height")?);
-    let pixel = structure.get::<gst::Fraction>("pixel-aspect-ratio").unwrap_or(gst::Fraction::new(1, 1));
-    let aspect =
-        f64::from(size.0) * f64::from(pixel.numer()) / (f64::from(size.1) * f64::from(pixel.denom()));
-    (aspect.is_finite() && aspect > 0.0).then_some(Picture { size, aspect })
-}
-
-fn nanoseconds(duration: Duration) -> u64 {
-    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// A panic elsewhere must not take the application with it.

@@ -12,8 +12,9 @@
 //! nothing, and a pipeline must not wait for this sink to preroll.
 //!
 //! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a
-//! flush, when leaving PLAYING, and when the element goes to READY or NULL. A stop is repeated until
-//! the camera says yes; leaving PLAYING waits for that at most 1 s, the end at most 2.5 s.
+//! flush, when leaving PLAYING, when the element goes to READY or NULL, and when it is disposed of. A
+//! stop is repeated until the camera says yes; EOS and leaving PLAYING wait for that at most 1 s, READY
+//! at most 2.5 s. In PAUSED the camera is asked, never moved; in READY nothing is connected.
 //!
 //! User and password are taken from `user` and `password`, from `location`
 //! (`http://user:password@host`, where they are taken out at once), or from the environment variables
@@ -42,7 +43,10 @@ use crate::servo;
 #[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
 mod imp;
 mod inbox;
+mod news;
+mod picture;
 mod settings;
+mod statistics;
 mod worker;
 
 /// How the camera is moved.

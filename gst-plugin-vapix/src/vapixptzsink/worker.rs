@@ -1,7 +1,8 @@
 //! The one task that talks to the camera: takes what the streaming thread left, asks the pilot, sends.
 
+use std::cell::Cell;
 use std::pin::pin;
-use std::sync::mpsc::SyncSender;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -10,14 +11,15 @@ use tokio::runtime::{Builder, Runtime};
 use tokio::time::sleep;
 
 use super::inbox::{Inbox, Mail};
+use super::statistics::Statistics;
 use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Status};
 use crate::vapix::{Client, ClientSettings, Credentials, Error};
 
-/// A request in flight when a stop is due gets this much longer before it is given up for the stop.
+/// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 const STOP_GRACE: Duration = Duration::from_millis(500);
 
 /// At the end the camera is tried to be stopped for this long.
-pub const FINISH_BUDGET: Duration = Duration::from_secs(2);
+const FINISH_BUDGET: Duration = Duration::from_secs(2);
 
 /// Something the element tells the world.
 #[derive(Debug)]
@@ -34,21 +36,17 @@ pub enum Event {
     Died(String),
 }
 
-/// Numbers for the `stats` property.
-#[derive(Debug, Clone, Default)]
-pub struct Statistics {
-    pub status: Status,
-    pub sent: u64,
-    pub failed: u64,
-    /// Pictures of the target that were overtaken by newer ones before they could be steered by.
-    pub coalesced: u64,
-    pub round_trip: Duration,
-    pub round_trip_average: Duration,
-    pub last_error: Option<String>,
-    pub halted: bool,
+thread_local! {
+    static IS_OURS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// A running worker; dropping it stops camera and worker without waiting.
+/// Waits for the worker to answer; but not in the plugin's own thread, where nobody would: what is
+/// posted from there may make an application change the state, or drop the last reference, right there.
+pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
+    !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
+}
+
+/// A running worker; dropping it stops the camera and ends the worker, and waits for that within bounds.
 #[derive(Debug)]
 pub struct Worker {
     inbox: Arc<Inbox>,
@@ -98,16 +96,12 @@ impl Worker {
     pub fn statistics(&self) -> Statistics {
         lock(&self.statistics).clone()
     }
-
-    /// Stops the camera for good, with all the time there is for it.
-    pub fn finish(self) -> bool {
-        self.inbox.finish().recv_timeout(FINISH_BUDGET + STOP_GRACE).is_ok()
-    }
 }
 
 impl Drop for Worker {
     fn drop(&mut self) {
-        drop(self.inbox.finish());
+        // Whether the camera came to rest the worker itself reports.
+        wait_for(&self.inbox.finish(), FINISH_BUDGET + STOP_GRACE);
     }
 }
 
@@ -116,7 +110,9 @@ impl Drop for Worker {
 fn runtime() -> Result<&'static Runtime, std::io::Error> {
     static RUNTIME: OnceCell<Runtime> = OnceCell::new();
     RUNTIME.get_or_try_init(|| {
-        Builder::new_multi_thread().worker_threads(1).thread_name("vapix").enable_all().build()
+        let mut builder = Builder::new_multi_thread();
+        builder.worker_threads(1).thread_name("vapix").on_thread_start(|| IS_OURS.set(true));
+        builder.enable_all().build()
     })
 }
 
@@ -175,21 +171,23 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         desk.pilot.sending(&job, sent);
         let mut exchange = pin!(exchange(client, &job));
         let mut give_up_at = None;
-        let answer = loop {
-            if desk.stop_waits_behind(&job) {
-                give_up_at.get_or_insert(inbox.now() + STOP_GRACE);
+        loop {
+            let now = inbox.now();
+            if desk.stop_waits_behind(&job, now) {
+                give_up_at.get_or_insert(now + STOP_GRACE);
             }
-            let until = give_up_at.into_iter().chain(desk.deadline).min();
+            if desk.is_in_vain(&job, now) || give_up_at.is_some_and(|at| at <= now) {
+                return desk.abandoned(&job, sent);
+            }
+            let stale_at = desk.pilot.stale_at().filter(|at| *at > now);
+            let until = [give_up_at, stale_at, desk.deadline].into_iter().flatten().min();
             tokio::select! {
                 biased;
-                answer = &mut exchange => break answer,
+                answer = &mut exchange => return desk.answered(&job, answer, sent),
                 () = inbox.arrived() => desk.take_mail(),
-                () = sleep_until(until, inbox.now()) => {
-                    break Err(Error::Timeout(inbox.now().saturating_sub(sent)));
-                }
+                () = sleep_until(until, now) => {}
             }
-        };
-        desk.answered(&job, answer, sent);
+        }
     }
 }
 
@@ -220,43 +218,55 @@ impl<O: Fn(Event)> Desk<O> {
         self.waiting.extend(waiting);
     }
 
-    /// Whether something else than a stop is in flight while a stop is what the camera needs.
-    fn stop_waits_behind(&self, job: &Job) -> bool {
-        let may_move = match job {
-            Job::Command(command) => !command.is_stop(),
-            Job::Query(_) => !self.pilot.is_at_rest(),
-        };
-        may_move && !self.pilot.has_target()
-    }
-
-    fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration) {
-        let now = self.inbox.now();
-        let round_trip = now.saturating_sub(sent);
-        let failure = answer.as_ref().err().cloned();
-        self.count(job, failure.as_ref(), round_trip);
-        (self.observer)(Event::Exchanged { job: *job, failure, round_trip });
-        self.pilot.answered(job, answer, sent, now);
-    }
-
-    fn count(&self, job: &Job, failure: Option<&Error>, round_trip: Duration) {
-        let mut statistics = lock(&self.statistics);
-        if let Some(err) = failure {
-            statistics.last_error = Some(err.to_string());
-        }
-        match (job, failure) {
-            (Job::Query(_), _) => {}
-            (Job::Command(_), Some(_)) => statistics.failed += 1,
-            (Job::Command(_), None) => {
-                statistics.sent += 1;
-                statistics.round_trip = round_trip;
-                // Over about the last eight.
-                let average = if statistics.sent == 1 { round_trip } else { statistics.round_trip_average };
-                statistics.round_trip_average = (average * 7 + round_trip) / 8;
+    /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
+    fn is_in_vain(&mut self, job: &Job, now: Duration) -> bool {
+        match job {
+            Job::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
+            Job::Query(_) => {
+                self.tell_rest();
+                self.is_over()
             }
         }
     }
 
-    /// Tells what has changed: reports, status, and those who wait for rest.
+    /// Whether something else than a stop is in flight while a stop is what the camera needs.
+    fn stop_waits_behind(&self, job: &Job, now: Duration) -> bool {
+        let may_move = match job {
+            Job::Command(command) => !command.is_stop(),
+            Job::Query(_) => !self.pilot.is_at_rest(),
+        };
+        may_move && !self.pilot.has_target(now)
+    }
+
+    fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration) {
+        let now = self.inbox.now();
+        self.count(job, answer.as_ref().err().cloned(), now.saturating_sub(sent));
+        self.pilot.answered(job, answer, sent, now);
+    }
+
+    fn abandoned(&mut self, job: &Job, sent: Duration) {
+        let now = self.inbox.now();
+        let waited = now.saturating_sub(sent);
+        self.count(job, Some(Error::Timeout(waited)), waited);
+        self.pilot.abandoned(job, now);
+    }
+
+    fn count(&self, job: &Job, failure: Option<Error>, round_trip: Duration) {
+        {
+            let mut statistics = lock(&self.statistics);
+            if let Some(err) = &failure {
+                statistics.last_error = Some(err.to_string());
+            }
+            match (job, &failure) {
+                (Job::Query(_), _) => {}
+                (Job::Command(_), Some(_)) => statistics.failed += 1,
+                (Job::Command(_), None) => statistics.succeeded(round_trip),
+            }
+        }
+        (self.observer)(Event::Exchanged { job: *job, failure, round_trip });
+    }
+
+    /// Tells what has changed: reports and status; and those who wait for rest.
     fn publish(&mut self) {
         let status = self.pilot.status(self.inbox.now());
         {
@@ -272,6 +282,10 @@ impl<O: Fn(Event)> Desk<O> {
             self.last_status = status;
             (self.observer)(Event::Status(status));
         }
+        self.tell_rest();
+    }
+
+    fn tell_rest(&mut self) {
         if self.pilot.is_at_rest() {
             // Who waits no longer is not there to be told.
             for waiting in self.waiting.drain(..) {
@@ -281,6 +295,7 @@ impl<O: Fn(Event)> Desk<O> {
     }
 }
 
+/// The answer to a job.
 async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
     match job {
         Job::Command(command) => client.send(command).await.map(|()| Answer::Accepted),
@@ -300,4 +315,77 @@ async fn sleep_until(until: Option<Duration>, now: Duration) {
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::{Sight, Visibility};
+    use crate::vapix::{Location, Trust};
+    use ptztrack_contract::{Point, Vector};
+    use virtual_camera::VirtualCamera;
+
+    const PATIENCE: Duration = Duration::from_secs(20);
+
+    fn start(camera: &VirtualCamera, observer: impl Fn(Event) + Clone + Send + Sync + 'static) -> Worker {
+        let (location, _) = Location::parse(&camera.url()).unwrap();
+        let client = ClientSettings {
+            location,
+            camera: 1,
+            credentials: None,
+            timeout: Duration::from_secs(2),
+            trust: Trust::System,
+        };
+        Worker::start(client, ServoSettings::default(), observer).unwrap()
+    }
+
+    fn see(worker: &Worker) {
+        worker.inbox().see(Sight {
+            visibility: Visibility::Seen,
+            id: 1,
+            centroid: Point { x: 0.9, y: 0.5 },
+            velocity: Vector::default(),
+            ego_velocity: None,
+            size: (320, 240),
+            aspect: 4.0 / 3.0,
+            taken_at: worker.inbox().now(),
+        });
+    }
+
+    fn camera() -> VirtualCamera {
+        VirtualCamera::start(virtual_camera::Settings::default()).unwrap()
+    }
+
+    /// As an element does that is disposed of without having been brought to NULL.
+    #[test]
+    fn dropped_it_stops_the_camera() {
+        let camera = camera();
+        let worker = start(&camera, |_| {});
+        see(&worker);
+        assert!(camera.wait_for(PATIENCE, |status| status.moving));
+        drop(worker);
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    }
+
+    #[test]
+    fn it_can_be_dropped_in_its_own_thread() {
+        let camera = camera();
+        let worker = Arc::new(Mutex::new(None));
+        let (events, seen) = std::sync::mpsc::channel();
+        let held = worker.clone();
+        let started = start(&camera, move |event| {
+            if matches!(event, Event::Report(Report::Moving)) {
+                drop(lock(&held).take());
+            }
+            let _ = events.send(format!("{event:?}"));
+        });
+        let mut held = lock(&worker);
+        see(held.insert(started));
+        drop(held);
+        // Until the task, and with it the observer, is gone.
+        let seen: Vec<_> = std::iter::from_fn(|| seen.recv_timeout(PATIENCE).ok()).collect();
+        assert!(seen.iter().any(|event| event.contains("Stopped")), "{seen:?}");
+        assert!(!seen.iter().any(|event| event.contains("GaveUp") || event.contains("Died")), "{seen:?}");
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    }
 }

@@ -1,0 +1,86 @@
+//! What passes between the [`Pilot`](super::Pilot) and those who speak with the camera for it.
+
+use std::fmt;
+use std::time::Duration;
+
+use super::{LinkChange, PanTilt};
+use crate::vapix::{Command, Limits, Parameters, Position};
+
+/// Something to ask the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Query {
+    /// Where it looks.
+    Position,
+    /// How far it can look.
+    Limits,
+    /// Its PTZ parameters.
+    Parameters,
+}
+
+/// One exchange with the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Job {
+    /// Tell it.
+    Command(Command),
+    /// Ask it.
+    Query(Query),
+}
+
+impl fmt::Display for Job {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Command(command) => command.fmt(f),
+            Self::Query(query) => write!(f, "query for {query:?}"),
+        }
+    }
+}
+
+/// What the camera answered.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Answer {
+    /// To a command: yes.
+    Accepted,
+    /// To [`Query::Position`].
+    Position(Position),
+    /// To [`Query::Limits`].
+    Limits(Limits),
+    /// To [`Query::Parameters`].
+    Parameters(Parameters),
+}
+
+/// What is to be done now.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Next {
+    /// This.
+    Do(Job),
+    /// Nothing before this time, or before something new is seen.
+    Wait(Option<Duration>),
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Report {
+    /// The connection came, went, or is refused.
+    Link(LinkChange),
+    /// The camera was at rest and has accepted a move.
+    Moving,
+    /// The camera has accepted a stop, or arrived.
+    Stopped,
+    /// The target lies beyond the camera's range.
+    AtLimit,
+}
+
+/// The camera as it is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Status {
+    /// It answers and does as it is told.
+    pub connected: bool,
+    /// It may be moving on our behalf.
+    pub moving: bool,
+    /// Where it last said it looks.
+    pub position: Position,
+    /// What it was last told, degrees per second.
+    pub rate: PanTilt,
+    /// Horizontal field of view in degrees, where it is set or told.
+    pub fov_deg: Option<f64>,
+}

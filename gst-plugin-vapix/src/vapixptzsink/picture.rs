@@ -1,0 +1,50 @@
+//! What the caps say of the picture.
+
+/// Size and shape of the picture, whatever memory it lies in.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Picture {
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Width by height as displayed.
+    pub aspect: f64,
+}
+
+impl Picture {
+    /// Reads caps; `None` where they tell no size.
+    pub fn of(caps: &gst::Caps) -> Option<Self> {
+        let structure = caps.structure(0)?;
+        let pixels = |field| structure.get::<i32>(field).ok().and_then(|size| u32::try_from(size).ok());
+        let size = (pixels("width")?, pixels("height")?);
+        let pixel = structure.get::<gst::Fraction>("pixel-aspect-ratio").unwrap_or(gst::Fraction::new(1, 1));
+        let aspect =
+            f64::from(size.0) * f64::from(pixel.numer()) / (f64::from(size.1) * f64::from(pixel.denom()));
+        (aspect.is_finite() && aspect > 0.0).then_some(Self { size, aspect })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn picture(caps: gst::caps::Builder<gst::caps::NoFeature>) -> Option<Picture> {
+        Picture::of(&caps.build())
+    }
+
+    #[test]
+    fn pixels_need_not_be_square() {
+        gst::init().unwrap();
+        let caps = || gst::Caps::builder("video/x-raw").field("width", 720).field("height", 576);
+        assert_eq!(picture(caps()), Some(Picture { size: (720, 576), aspect: 1.25 }));
+        let wide = caps().field("pixel-aspect-ratio", gst::Fraction::new(64, 45));
+        assert!((picture(wide).unwrap().aspect - 16.0 / 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn caps_without_a_size_are_refused() {
+        gst::init().unwrap();
+        let caps = || gst::Caps::builder("video/x-raw");
+        assert_eq!(picture(caps()), None);
+        assert_eq!(picture(caps().field("width", 320).field("height", 0)), None);
+        assert_eq!(picture(caps().field("width", -320).field("height", 240)), None);
+    }
+}
