@@ -165,6 +165,26 @@ fn motion_is_reported_with_box_region_of_interest_and_messages() {
 }
 
 #[test]
+fn the_trail_of_a_walker_can_be_shed_or_kept() {
+    let width = |shed_trail: bool| {
+        let mut detector = Detector::learned(&grey());
+        detector.element.set_property("shed-trail", shed_trail);
+        for step in 0..8 {
+            // As a camera slower than the stream has it: each picture twice.
+            detector.see(&[(20 + step * 6, 30, 20, 40)], 2);
+        }
+        let buffer = detector.buffer(&[(68, 30, 20, 40)]);
+        let seen = detector.push(buffer);
+        let meta = MotionMeta::of(&seen).unwrap().unwrap();
+        let (x, _, width, _) = meta.regions[0].bounds.to_pixels(160, 120);
+        assert_eq!(x + width, 88);
+        width
+    };
+    assert_eq!(width(true), 26);
+    assert!(width(false) > 30);
+}
+
+#[test]
 fn the_end_of_the_stream_ends_motion() {
     let mut detector = Detector::learned(&grey());
     detector.see(&[BOX], 3);

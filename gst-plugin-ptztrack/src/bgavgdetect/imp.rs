@@ -77,7 +77,12 @@ pub struct BgAvgDetect {
     #[property(
         name = "close-size", get, set, type = i32, member = close_size, mutable_playing,
         default = Settings::default().close_size, minimum = -1, maximum = 999,
-        blurb = "Side of the square for closing, in pixels of the frame: smaller gaps are filled (0 or 1 = none, -1 = chosen by the frame's height)"
+        blurb = "Side of the square for closing, in pixels of the frame: smaller gaps are filled (0 or 1 = none, -1 = an upright rectangle chosen by the frame's height)"
+    )]
+    #[property(
+        name = "shed-trail", get, set, type = bool, member = shed_trail, mutable_playing,
+        default = Settings::default().shed_trail,
+        blurb = "Cut regions to where the picture still changes, so that the trail of the mean does not count"
     )]
     #[property(
         name = "selection", get, set, type = Selection, member = selection, mutable_playing,

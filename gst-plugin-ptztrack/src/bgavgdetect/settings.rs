@@ -30,6 +30,7 @@ pub(super) struct Settings {
     pub window: u32,
     pub open_size: i32,
     pub close_size: i32,
+    pub shed_trail: bool,
     pub selection: Selection,
     pub min_area: f64,
     pub max_area: f64,
@@ -50,7 +51,7 @@ impl Default for Settings {
         Self {
             analysis_width: 640,
             alpha: 0.5,
-            alpha_interval_ns: 300_000_000,
+            alpha_interval_ns: 200_000_000,
             test: Test::default(),
             threshold: 0.15,
             noise_floor: 12.0,
@@ -58,6 +59,7 @@ impl Default for Settings {
             window: 25,
             open_size: -1,
             close_size: -1,
+            shed_trail: true,
             selection: Selection::default(),
             min_area: 0.001,
             max_area: 0.8,
@@ -91,6 +93,7 @@ impl Settings {
             criterion: Criterion { test, noise_floor: self.noise_floor },
             open_size: usize::try_from(self.open_size).ok(),
             close_size: usize::try_from(self.close_size).ok(),
+            shed_trail: self.shed_trail,
             choice: match self.selection {
                 Selection::LargestPerimeter => RegionChoice::LargestPerimeter,
                 Selection::All => RegionChoice::All,

@@ -5,6 +5,7 @@ use opencv::core::{self, CV_8UC1, Mat, Scalar};
 use opencv::prelude::*;
 use ptztrack_contract::Region;
 
+use super::afterimage::Afterimage;
 use super::background::{Background, Criterion};
 use super::contours::{Grid, fill_regions, regions};
 use super::morphology::clean;
@@ -15,8 +16,9 @@ use super::{Luma, LumaError};
 
 /// Side of the opening, pixels of the reduced picture: specks of one or two pixels are noise.
 const AUTO_OPEN: usize = 3;
-/// The closing's side is this part of the picture's height.
-const AUTO_CLOSE: usize = 16;
+/// The closing's width and height are these parts of the picture's height. Upright, as people are: head,
+/// body and legs are joined, neighbours are not.
+const AUTO_CLOSE: (usize, usize) = (64, 16);
 
 /// Which regions are reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,8 +42,10 @@ pub struct DetectorConfig {
     pub criterion: Criterion,
     /// Side of the opening's square in pixels of the whole picture; `None` chooses.
     pub open_size: Option<usize>,
-    /// Side of the closing's square in pixels of the whole picture; `None` chooses.
+    /// Side of the closing's square in pixels of the whole picture; `None` chooses an upright rectangle.
     pub close_size: Option<usize>,
+    /// Whether regions are cut to where the picture changes.
+    pub shed_trail: bool,
     /// Which regions are reported.
     pub choice: RegionChoice,
     /// Smallest area that counts, as a fraction of the picture.
@@ -86,6 +90,7 @@ pub enum DetectorError {
 #[derive(Debug, Default)]
 pub struct Detector {
     background: Background,
+    afterimage: Afterimage,
     persistence: Persistence,
     /// Pictures learned since the last start.
     learned: u32,
@@ -110,6 +115,7 @@ impl Detector {
     /// Forgets the background: the next pictures are learned before anything is reported.
     pub fn relearn(&mut self) {
         self.background.restart();
+        self.afterimage.restart();
         self.persistence.restart();
         self.learned = 0;
         self.mask = Mat::default();
@@ -133,10 +139,19 @@ impl Detector {
             return Ok(None);
         }
         let mut kept = std::mem::take(&mut self.reduced);
-        let foreground =
-            with_reduced(luma, divisor, &mut kept, |small| self.subtract(small, elapsed, config));
+        let found = with_reduced(luma, divisor, &mut kept, |small| self.look(small, elapsed, config));
         self.reduced = kept;
-        if foreground? > config.relearn_fraction {
+        found
+    }
+
+    /// The same of the reduced picture.
+    fn look(
+        &mut self,
+        luma: &Luma,
+        elapsed: Duration,
+        config: &DetectorConfig,
+    ) -> Result<Option<Vec<Region>>, DetectorError> {
+        if self.subtract(luma, elapsed, config)? > config.relearn_fraction {
             self.relearn();
         }
         if self.learned < config.warm_up.max(1) {
@@ -144,7 +159,7 @@ impl Detector {
             self.mask = Mat::default();
             return Ok(None);
         }
-        self.find(config).map(Some)
+        self.find(luma, elapsed, config).map(Some)
     }
 
     /// Updates the background; leaves the foreground in `mask` and gives its fraction of the picture.
@@ -165,11 +180,21 @@ impl Detector {
         Ok(f64::from(core::count_non_zero(&self.mask)?) / (f64::from(rows) * f64::from(columns)))
     }
 
-    /// The regions of the foreground in `mask`.
-    fn find(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
+    /// The regions of the foreground in `mask`, which was won from `luma`.
+    fn find(
+        &mut self,
+        luma: &Luma,
+        elapsed: Duration,
+        config: &DetectorConfig,
+    ) -> Result<Vec<Region>, DetectorError> {
         self.look_in_zones(config)?;
         let (open_size, close_size) = self.sizes(config);
         clean(&mut self.mask, open_size, close_size)?;
+        if config.shed_trail {
+            self.afterimage.shed(luma, elapsed, config.criterion.noise_floor, &mut self.mask)?;
+        } else {
+            self.afterimage.restart();
+        }
         let mut found = regions(&self.mask, self.grid())?;
         found.retain(|region| (config.min_area..=config.max_area).contains(&region.area));
         let mut found = self.persistence.confirmed(found, config.confirm_pictures);
@@ -207,13 +232,14 @@ impl Detector {
         Ok(())
     }
 
-    /// Sides of opening and closing in pixels of the mask.
-    fn sizes(&self, config: &DetectorConfig) -> (usize, usize) {
+    /// Side of the opening, width and height of the closing, in pixels of the mask.
+    fn sizes(&self, config: &DetectorConfig) -> (usize, (usize, usize)) {
         let reduced = |size: usize| (size + self.divisor / 2) / self.divisor;
         let height = self.frame.1 / self.divisor;
+        let upright = ((height / AUTO_CLOSE.0).max(3), (height / AUTO_CLOSE.1).max(3));
         (
             config.open_size.map_or(AUTO_OPEN, reduced),
-            config.close_size.map_or((height / AUTO_CLOSE).max(3), reduced),
+            config.close_size.map(reduced).map_or(upright, |side| (side, side)),
         )
     }
 
@@ -275,6 +301,7 @@ mod tests {
             criterion: Criterion { test: ForegroundTest::Relative { threshold: 0.15 }, noise_floor: 12.0 },
             open_size: None,
             close_size: None,
+            shed_trail: true,
             choice: RegionChoice::LargestPerimeter,
             min_area: 0.001,
             max_area: 0.8,
@@ -289,7 +316,7 @@ mod tests {
     /// A grey picture with fixed noise of ±3 and bright boxes at these places (pixels).
     fn picture(boxes: &[(usize, usize, usize, usize)]) -> Vec<u8> {
         let mut noise = 12345u32;
-        let mut picture: Vec<u8> = std::iter::repeat_with(|| {
+        let mut picture: Vec<u8> = iter::repeat_with(|| {
             noise = noise.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             97 + (noise >> 24) as u8 % 7
         })
@@ -348,6 +375,33 @@ mod tests {
         assert_eq!(largest.len(), 1);
         assert!(largest[0].bounds.width > 0.4);
         assert_eq!(found(&DetectorConfig { choice: RegionChoice::All, ..config() }, &boxes).len(), 2);
+    }
+
+    #[test]
+    fn a_walker_is_found_without_the_trail() {
+        let width = |shed_trail| {
+            let config = DetectorConfig { shed_trail, ..config() };
+            let mut detector = learned(&config);
+            let walk = (0..12).map(|step| picture(&[(20 + step * 4, 30, 16, 60)]));
+            let found: Vec<_> = walk.filter_map(|picture| look(&mut detector, &picture, &config)).collect();
+            let [region] = found[11].as_slice() else { panic!("{:?}", found[11]) };
+            // 4 pixels in each of the three pictures of the last 100 ms.
+            assert!(!shed_trail || region.bounds.x * 160.0 > 51.5, "{:?}", region.bounds);
+            region.bounds.width * 160.0
+        };
+        assert!(width(true) < 29.0, "{}", width(true));
+        assert!(width(false) > 34.0, "{}", width(false));
+    }
+
+    #[test]
+    fn neighbours_stay_apart_and_head_body_and_legs_together() {
+        let all = DetectorConfig { choice: RegionChoice::All, ..config() };
+        let person = |x| [(x, 30, 12, 10), (x, 44, 12, 20), (x, 68, 12, 20)];
+        let regions = found(&all, &[person(40), person(58)].concat());
+        let mut boxes: Vec<_> =
+            regions.iter().map(|region| region.bounds.to_pixels(WIDTH as u32, HEIGHT as u32)).collect();
+        boxes.sort();
+        assert_eq!(boxes, [(40, 30, 12, 58), (58, 30, 12, 58)]);
     }
 
     #[test]

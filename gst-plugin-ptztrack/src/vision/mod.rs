@@ -1,5 +1,6 @@
 //! Everything that computes on pictures: plain types, tested by themselves.
 
+mod afterimage;
 mod background;
 mod contours;
 mod detector;
