@@ -149,6 +149,18 @@ fn it_resumes_after_a_pause() {
 }
 
 #[test]
+fn it_resumes_after_ready() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    rig.sink.set_state(gst::State::Ready).unwrap();
+    assert!(!camera.status().moving || camera.wait_for(PATIENCE, |status| !status.moving));
+    assert_eq!(rig.stats().get::<&str>("state").unwrap(), "stopped");
+    rig.sink.set_state(gst::State::Playing).unwrap();
+    rig.push_until(&target(TargetState::Tracking, 0.1, 0.5), &camera, |status| status.pan_rate_deg_s < 0.0);
+}
+
+#[test]
 fn paused_commands_nothing() {
     let camera = camera(Auth::None);
     let rig = Rig::ready(&camera.url());

@@ -1,3 +1,4 @@
+use std::mem;
 use std::time::Duration;
 
 use crate::vapix::Error;
@@ -14,11 +15,13 @@ pub enum LinkChange {
 }
 
 /// Judges the camera's answers: one report when a fault begins, one when it is over, and longer
-/// pauses in between.
+/// pauses in between. Faults that come and go are not reported each time.
 #[derive(Debug, Default)]
 pub struct Link {
     connected: bool,
     fault: Option<Fault>,
+    /// When which kind was last reported.
+    told: Vec<(FaultKind, Duration)>,
     pause: Duration,
     retry_at: Duration,
 }
@@ -28,7 +31,7 @@ struct Fault {
     kind: FaultKind,
     /// Met by a command: that queries are answered does not mend it.
     of_command: bool,
-    /// The kinds already reported: a camera that reboots shows several, in any order.
+    /// The kinds of this fault already reported: a camera that reboots shows several, in any order.
     reported: Vec<FaultKind>,
 }
 
@@ -55,6 +58,9 @@ impl Link {
 
     /// Short enough for control to be back within two seconds of the camera's return.
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+    /// A fault that comes again within this time is reported only if it lasts longer.
+    const QUIET: Duration = Duration::from_secs(10);
 
     /// Nothing may be sent before.
     pub fn retry_at(&self) -> Duration {
@@ -86,11 +92,12 @@ impl Link {
         if !mended {
             return None;
         }
-        *self = Self { connected: true, ..Self::default() };
-        Some(LinkChange::Connected)
+        let news = self.fault.as_ref().is_none_or(|fault| !fault.reported.is_empty());
+        *self = Self { connected: true, told: mem::take(&mut self.told), ..Self::default() };
+        news.then_some(LinkChange::Connected)
     }
 
-    /// Something failed. Reports the first failure of each kind in a row only.
+    /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
     pub fn failed(&mut self, err: &Error, of_command: bool, now: Duration) -> Option<LinkChange> {
         self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
         self.retry_at = now + self.pause;
@@ -98,10 +105,13 @@ impl Link {
         let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
         fault.kind = kind;
         fault.of_command |= of_command;
-        if fault.reported.contains(&kind) {
+        let just_told = self.told.iter().any(|(told, at)| *told == kind && now < *at + Self::QUIET);
+        if just_told || fault.reported.contains(&kind) {
             return None;
         }
         fault.reported.push(kind);
+        self.told.retain(|(told, _)| *told != kind);
+        self.told.push((kind, now));
         Some(match kind {
             FaultKind::Silent => LinkChange::Disconnected(err.clone()),
             FaultKind::Refusing | FaultKind::LockedOut => LinkChange::Refused(err.clone()),
@@ -134,7 +144,23 @@ mod tests {
         assert_eq!(link.failed(&Error::Timeout(ms(1)), true, ms(1)), None);
         assert!(!link.connected());
         assert_eq!(link.succeeded(true, false), Some(LinkChange::Connected));
-        assert_eq!(link.failed(&broken(), true, ms(2)), Some(LinkChange::Disconnected(broken())));
+        let later = ms(60_000);
+        assert_eq!(link.failed(&broken(), true, later), Some(LinkChange::Disconnected(broken())));
+    }
+
+    #[test]
+    fn a_link_that_comes_and_goes_is_no_flood_and_no_secret() {
+        let mut link = Link::default();
+        let mut reports = 0;
+        for second in 0..30 {
+            reports += usize::from(link.failed(&broken(), true, ms(second * 1000)).is_some());
+            assert!(!link.connected());
+            reports += usize::from(link.succeeded(true, false).is_some());
+            assert!(link.connected());
+        }
+        assert_eq!(reports, 6, "three times lost and found");
+        assert_eq!(link.failed(&broken(), true, ms(29_500)), None);
+        assert!(link.failed(&broken(), true, ms(30_500)).is_some(), "it lasts");
     }
 
     #[test]

@@ -10,7 +10,7 @@ use ptztrack_contract::{BufferMeta, CameraChange, CameraMessage, TargetMeta, Tim
 
 use super::news::camera_event;
 use super::picture::Picture;
-use super::settings::Settings;
+use super::settings::{Settings, environment};
 use super::statistics::Statistics;
 use super::worker::{self, Event, Worker};
 use super::{Mode, Prediction, SpeedCurve};
@@ -268,8 +268,9 @@ impl VapixPtzSink {
             );
             return Err(gst::StateChangeError);
         };
-        *lock(&self.stream) = Stream::default();
+        lock(&self.stream).warned = false;
         *lock(&self.news) = None;
+        gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
         let worker = Worker::start(client, settings.servo(), move |event| {
             if let Some(element) = element.upgrade() {
@@ -348,10 +349,10 @@ impl VapixPtzSink {
     fn happened(&self, event: Event) {
         match event {
             Event::Exchanged { job, failure: None, round_trip } => {
-                gst::log!(CAT, imp = self, "{} answered in {round_trip:?}", job);
+                gst::log!(CAT, imp = self, "{job} answered in {round_trip:?}");
             }
             Event::Exchanged { job, failure: Some(err), round_trip } => {
-                gst::debug!(CAT, imp = self, "{} failed after {round_trip:?}: {err}", job);
+                gst::debug!(CAT, imp = self, "{job} failed after {round_trip:?}: {err}");
             }
             Event::Report(Report::Link(change)) => self.link_changed(&change),
             Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
@@ -489,10 +490,6 @@ servo_setters! {
     set_stale_timeout: stale_timeout_ms, u32;
     set_camera_speed: camera_speed_deg_s, f64;
     set_speed_curve: speed_curve, SpeedCurve;
-}
-
-fn environment(name: &str) -> Option<String> {
-    std::env::var(name).ok()
 }
 
 /// A panic elsewhere must not take the application with it.

@@ -24,7 +24,8 @@
 //!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
-//! `at-limit`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end.
+//! `at-limit`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end,
+//! and one that comes and goes is said no more often than every 10 s.
 //! Upstream events `ptztrack-camera-state` tell detector and tracker what the camera does.
 //!
 //! ## Example pipelines
