@@ -54,6 +54,9 @@ fn picture(person: Option<(i32, i32)>, wall: Option<std::ops::Range<usize>>) -> 
     pixels
 }
 
+/// Name and pixels of a region of interest.
+type Seen<'a> = (&'a str, (u32, u32, u32, u32));
+
 struct Bench {
     harness: Harness,
     frames: u64,
@@ -73,12 +76,12 @@ impl Bench {
         Self { harness, frames: 0, bus }
     }
 
-    fn push(&mut self, pixels: Vec<u8>, detections: &[(&str, (u32, u32, u32, u32))]) -> TargetMeta {
+    fn push(&mut self, pixels: Vec<u8>, detections: &[Seen]) -> TargetMeta {
         let out = self.push_through(pixels, detections);
         TargetMeta::of(&out).expect("a meta on every frame").expect("readable")
     }
 
-    fn push_through(&mut self, pixels: Vec<u8>, detections: &[(&str, (u32, u32, u32, u32))]) -> gst::Buffer {
+    fn push_through(&mut self, pixels: Vec<u8>, detections: &[Seen]) -> gst::Buffer {
         let mut buffer = gst::Buffer::from_mut_slice(pixels);
         {
             let buffer = buffer.get_mut().unwrap();

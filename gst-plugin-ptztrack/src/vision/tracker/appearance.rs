@@ -217,13 +217,24 @@ fn features(grey: &Mat, columns: usize, rows: usize) -> opencv::Result<Vec<Vec<f
     opencv::core::cart_to_polar(&dx, &dy, &mut strength, &mut angle, false)?;
     let (strength, angle) = (strength.data_typed::<f32>()?, angle.data_typed::<f32>()?);
     let mut channels = vec![vec![0.0; columns * rows]; ORIENTATIONS];
-    for (pixel, (strength, angle)) in strength.iter().zip(angle).enumerate() {
-        let (x, y) = (pixel % (columns * CELL), pixel / (columns * CELL));
-        let cell = y / CELL * columns + x / CELL;
-        let turn = angle * (ORIENTATIONS as f32 / std::f32::consts::PI);
-        let (lower, share) = (turn as usize, turn.fract());
-        channels[lower % ORIENTATIONS][cell] += strength * (1.0 - share);
-        channels[(lower + 1) % ORIENTATIONS][cell] += strength * share;
+    let width = columns * CELL;
+    for cell in 0..columns * rows {
+        let first = cell / columns * CELL * width + cell % columns * CELL;
+        // One more than there are orientations: the last wraps around to the first.
+        let mut histogram = [0.0; ORIENTATIONS + 1];
+        for row in (0..CELL).map(|y| first + y * width) {
+            for (strength, angle) in strength[row..row + CELL].iter().zip(&angle[row..row + CELL]) {
+                let turn = angle * (ORIENTATIONS as f32 / std::f32::consts::PI);
+                let lower = turn as usize;
+                let share = turn - lower as f32;
+                histogram[lower % ORIENTATIONS] += strength * (1.0 - share);
+                histogram[lower % ORIENTATIONS + 1] += strength * share;
+            }
+        }
+        histogram[0] += histogram[ORIENTATIONS];
+        for (channel, value) in channels.iter_mut().zip(histogram) {
+            channel[cell] = value;
+        }
     }
     normalise(&mut channels, columns, rows);
     channels.push(grey_cells(grey, columns, rows)?);

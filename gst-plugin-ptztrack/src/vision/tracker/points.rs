@@ -148,6 +148,24 @@ impl Points {
         Some(Consensus { motion, growth: growth(&agreeing), share })
     }
 
+    /// The thesis: all points that are found again count, and their mean is the motion. `None` once none is left.
+    pub fn average(&mut self, found: &[Option<Point2f>]) -> Option<Consensus> {
+        self.rejected.clear();
+        let before = std::mem::take(&mut self.points);
+        let mut motions = Vec::new();
+        for (point, place) in before.iter().zip(found) {
+            match place {
+                Some(place) => {
+                    motions.push(*place - point.position);
+                    self.points.push(Tracked { position: *place, ..*point });
+                }
+                None => self.rejected.push(point.position),
+            }
+        }
+        let share = motions.len() as f32 / before.len().max(1) as f32;
+        Some(Consensus { motion: mean(motions.into_iter())?, growth: 1.0, share })
+    }
+
     /// Keeps, promotes or rejects one point.
     fn settle(&mut self, mut point: Tracked, tolerance: f32) {
         // What a point of the point's age would have travelled with the target: young ones saw less.
@@ -220,6 +238,17 @@ mod tests {
         assert!(length(consensus.motion - Point2f::new(3.0, -1.0)) < 1e-3);
         assert_eq!((consensus.share, points.len()), (1.0, 20));
         assert!((consensus.growth - 1.0).abs() < 1e-3);
+    }
+
+    #[test]
+    fn the_thesis_takes_the_mean_until_no_point_is_left() {
+        let mut points = Points::on_target(body());
+        let found: Vec<_> =
+            (0..20).map(|n| (n < 2).then(|| body()[n] + Point2f::new(n as f32, 4.0))).collect();
+        let mean = points.average(&found).expect("two points");
+        assert_eq!((mean.motion, mean.share, points.len()), (Point2f::new(0.5, 4.0), 0.1, 2));
+        assert_eq!(points.rejected().len(), 18);
+        assert_eq!(points.average(&[None, None]), None);
     }
 
     #[test]

@@ -38,6 +38,8 @@ pub(super) struct Sighting {
     pub bounds: Rect2f,
     /// Polygon around it; empty where only the box is known.
     pub contour: Vec<Point2f>,
+    /// Pixels per second; nothing where it was seen only once.
+    pub velocity: Point2f,
 }
 
 struct Candidate {
@@ -45,6 +47,19 @@ struct Candidate {
     frames: u32,
     missed: u32,
     age_s: f64,
+}
+
+impl Candidate {
+    /// Takes the next sighting; the edges of a detection flicker, so its velocity is smoothed.
+    fn continue_with(&mut self, sighting: Sighting, dt_s: f64) {
+        const SMOOTHING: f32 = 0.5;
+        let time_s = (f64::from(self.missed) * dt_s) as f32;
+        let velocity = (centre(sighting.bounds) - centre(self.sighting.bounds)) / time_s.max(f32::EPSILON);
+        let old = self.sighting.velocity;
+        self.sighting = Sighting { velocity: old + (velocity - old) * SMOOTHING, ..sighting };
+        self.frames += 1;
+        self.missed = 0;
+    }
 }
 
 /// Follows detections until one is sure enough to become the target.
@@ -80,11 +95,7 @@ impl Selection {
                 .filter(|(share, _)| *share >= SAME)
                 .max_by(|(a, _), (b, _)| a.total_cmp(b));
             match same {
-                Some((_, candidate)) => {
-                    candidate.sighting = sighting;
-                    candidate.frames += 1;
-                    candidate.missed = 0;
-                }
+                Some((_, candidate)) => candidate.continue_with(sighting, dt_s),
                 None => self.candidates.push(Candidate { sighting, frames: 1, missed: 0, age_s: 0.0 }),
             }
         }
@@ -168,7 +179,11 @@ mod tests {
     const DT: f64 = 0.1;
 
     fn at(x: f32, y: f32, width: f32, height: f32) -> Sighting {
-        Sighting { bounds: Rect2f::new(x, y, width, height), contour: Vec::new() }
+        Sighting {
+            bounds: Rect2f::new(x, y, width, height),
+            contour: Vec::new(),
+            velocity: Point2f::default(),
+        }
     }
 
     fn seen(frames: usize, sightings: &[Sighting]) -> Selection {
@@ -209,6 +224,16 @@ mod tests {
         let edge = [at(0.0, 100.0, 30.0, 90.0)];
         assert!(seen(5, &edge).choose(Choice::Largest, 3, FRAME).is_none());
         assert!(seen(16, &edge).choose(Choice::Largest, 3, FRAME).is_some());
+    }
+
+    #[test]
+    fn the_velocity_of_a_detection_is_known() {
+        let mut selection = Selection::default();
+        for n in 0..8 {
+            selection.update(vec![at(100.0 + 6.0 * n as f32, 100.0, 30.0, 60.0)], FRAME, DT);
+        }
+        let velocity = selection.choose(Choice::Largest, 3, FRAME).expect("confirmed").velocity;
+        assert!((velocity.x - 60.0).abs() < 1.0 && velocity.y.abs() < 1e-3, "{velocity:?}");
     }
 
     #[test]

@@ -163,6 +163,7 @@ impl Tracker {
         let sightings = detections.iter().map(|detection| Sighting {
             bounds: frame.rect_to_pixels(detection.bounds),
             contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
+            velocity: Point2f::default(),
         });
         self.selection.update(sightings.collect(), frame, dt_s);
     }
@@ -235,7 +236,7 @@ impl Tracker {
             .selection
             .at(pixels)
             .cloned()
-            .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), contour: Vec::new() });
+            .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), ..Sighting::default() });
         let old = self.let_go(old, frame, report, changes);
         match Target::acquire(luma, &sighting, self.config.profile.steps())? {
             Some(target) => Ok(self.begin(target, frame, report, changes)),

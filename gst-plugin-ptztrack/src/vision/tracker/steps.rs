@@ -21,6 +21,8 @@ pub(super) struct Steps {
     pub max_return_error: Option<f32>,
     /// Whether the motion of the background is measured.
     pub ego_motion: bool,
+    /// Whether points must agree on the motion to stay.
+    pub consensus: bool,
     /// Whether the look of the whole target has a say, and a hidden target is looked for.
     pub appearance: bool,
     /// Whether new points take the place of lost ones.
@@ -29,7 +31,7 @@ pub(super) struct Steps {
     pub background_weighted: bool,
     /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
     pub centroid_reach: f32,
-    /// Whether the box is centred on the centre of mass.
+    /// Whether the box is centred on its points, from where the mean-shift starts.
     pub recentre: bool,
 }
 
@@ -42,6 +44,7 @@ impl Profile {
                 max_residual: 20.0,
                 max_return_error: None,
                 ego_motion: false,
+                consensus: false,
                 appearance: false,
                 replenish: false,
                 background_weighted: false,
@@ -54,6 +57,7 @@ impl Profile {
                 max_residual: 25.0,
                 max_return_error: Some(0.8),
                 ego_motion: true,
+                consensus: true,
                 appearance: true,
                 replenish: true,
                 background_weighted: true,

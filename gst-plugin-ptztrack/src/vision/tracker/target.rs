@@ -7,7 +7,7 @@ use super::background::Background;
 use super::corners::{self, Search};
 use super::ego_motion::{self, EgoMotion};
 use super::flow::Flow;
-use super::geometry::{Frame, around, centre, grown, in_ellipse, length, scaled, share_inside};
+use super::geometry::{Frame, around, centre, grown, in_ellipse, length, mean, scaled, share_inside};
 use super::mean_shift::{GreyModel, near_the_middle};
 use super::patch::{Cut, Patch};
 use super::points::{Consensus, Points};
@@ -41,7 +41,7 @@ const WIDE_SPREAD: f32 = 1.0;
 /// How much larger or smaller a box is tried, by how much it must fit better, and what is then made of it.
 const TRIED_GROWTH: f32 = 0.06;
 const BETTER: f32 = 1.0;
-const GROWTH_GAIN: f32 = 0.35;
+const GROWTH_GAIN: f32 = 0.6;
 /// Share of the usual peak from which the appearance is learned, and below which points that stop may lie
 /// on something in front.
 const LEARNT: f32 = 0.7;
@@ -92,7 +92,8 @@ pub(super) struct Target {
     usual_peak: f32,
     sightings_in_a_row: u32,
     sure: bool,
-    larger: bool,
+    /// What is done with the appearance in this frame.
+    turn: u8,
     frames_since_replenished: u32,
 }
 
@@ -112,6 +113,8 @@ impl Target {
             return Ok(None);
         }
         let greys = GreyModel::new(&patch, &found.kept, steps.background_weighted.then_some(bounds))?;
+        let mut background = Background::default();
+        background.remember(luma, bounds)?;
         let mut points = Points::on_target(found.kept);
         points.reject(found.rejected);
         let mut target = Self {
@@ -119,19 +122,19 @@ impl Target {
             centroid: centre(bounds),
             confidence: 1.0,
             points,
-            own_velocity: Point2f::default(),
+            own_velocity: sighting.velocity,
             ego_velocity: None,
             steps,
             first_size: (bounds.width, bounds.height),
             patch,
-            background: Background::remember(luma, bounds)?,
+            background,
             ego: EgoMotion::translation(Point2f::default()),
             greys,
             appearance: Appearance::new(luma, bounds)?,
             usual_peak: 0.6,
             sightings_in_a_row: 0,
             sure: true,
-            larger: false,
+            turn: 0,
             frames_since_replenished: 0,
         };
         target.centroid = target.centre_of_mass()?;
@@ -227,7 +230,11 @@ impl Target {
             max_return_error: self.steps.max_return_error,
         };
         let found = flow.follow(&self.patch, &next, &starts, &guesses)?;
-        let consensus = self.points.advance(&found, self.ego, self.bounds.height);
+        let consensus = if self.steps.consensus {
+            self.points.advance(&found, self.ego, self.bounds.height)
+        } else {
+            self.points.average(&found)
+        };
         Ok((next, consensus))
     }
 
@@ -249,11 +256,12 @@ impl Target {
     ) -> opencv::Result<Sight> {
         let start = centre(self.bounds);
         let carried = self.ego.at(start) + expected;
-        let answer = self.appearance.look(luma, self.bounds + carried, SPREAD)?;
-        let hidden_behind = consensus.is_some_and(|consensus| {
-            self.stays_behind(consensus.motion - self.ego.at(start), dt_s)
-                && answer.peak < UNHIDDEN * self.usual_peak
-        });
+        let stays =
+            consensus.is_some_and(|consensus| self.stays_behind(consensus.motion - self.ego.at(start), dt_s));
+        let hidden_behind = stays && {
+            let answer = self.appearance.look(luma, self.bounds + carried, SPREAD)?;
+            answer.peak < UNHIDDEN * self.usual_peak
+        };
         let consensus = consensus.filter(|_| !hidden_behind);
         let share = consensus.map_or(0.0, |consensus| consensus.share);
         self.carry(expected);
@@ -270,8 +278,7 @@ impl Target {
             self.bounds += answer.offset * if believed { PULL } else { 1.0 };
         }
         if likeness >= LEARNT {
-            self.resize(luma, answer.peak)?;
-            self.learn(luma, answer.peak, dt_s)?;
+            self.update_appearance(luma, answer.peak, dt_s)?;
         }
         let seen = self.sure || (believed && likeness >= POSSIBLE);
         Ok(if seen { Sight::Seen } else { Sight::Hidden })
@@ -284,21 +291,24 @@ impl Target {
         usual * VELOCITY_TIME_S > MOVING && length(own) < STAYING * usual * dt_s
     }
 
-    /// Tries a larger and a smaller box in turn.
-    fn resize(&mut self, luma: &Luma, peak: f32) -> opencv::Result<()> {
-        self.larger = !self.larger;
-        let growth = if self.larger { 1.0 + TRIED_GROWTH } else { 1.0 / (1.0 + TRIED_GROWTH) };
+    /// Learns in one frame and tries another size in the next: each costs as much as looking for the target.
+    fn update_appearance(&mut self, luma: &Luma, peak: f32, dt_s: f32) -> opencv::Result<()> {
+        let rate = (LEARNING_PER_S * dt_s).min(MAX_LEARNING);
+        self.usual_peak += (peak - self.usual_peak) * rate.max(0.02);
+        self.turn = (self.turn + 1) % 4;
+        match self.turn {
+            1 => self.try_size(luma, 1.0 + TRIED_GROWTH, peak),
+            3 => self.try_size(luma, 1.0 / (1.0 + TRIED_GROWTH), peak),
+            _ => self.appearance.learn(luma, self.bounds, 2.0 * rate),
+        }
+    }
+
+    fn try_size(&mut self, luma: &Luma, growth: f32, peak: f32) -> opencv::Result<()> {
         let other = self.appearance.look(luma, scaled(self.bounds, growth, growth), SPREAD)?;
         if other.peak > BETTER * peak {
             self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
         }
         Ok(())
-    }
-
-    fn learn(&mut self, luma: &Luma, peak: f32, dt_s: f32) -> opencv::Result<()> {
-        let rate = (LEARNING_PER_S * dt_s).min(MAX_LEARNING);
-        self.usual_peak += (peak - self.usual_peak) * rate.max(0.02);
-        self.appearance.learn(luma, self.bounds, rate)
     }
 
     /// What every frame ends with: velocity, centre of mass, and the pixels for the next frame.
@@ -315,11 +325,13 @@ impl Target {
         if self.sure {
             self.own_velocity += (own - self.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
         }
+        if self.steps.recentre
+            && let Some(middle) = mean(self.points.positions().into_iter())
+        {
+            self.bounds = around(middle, self.bounds.width, self.bounds.height);
+        }
         self.take_stock(luma)?;
         self.centroid = self.centre_of_mass()?;
-        if self.steps.recentre {
-            self.bounds = around(self.centroid, self.bounds.width, self.bounds.height);
-        }
         if self.steps.replenish {
             let body = scaled(self.bounds, 1.2, 1.1);
             self.points.retain(|point| in_ellipse(body, point));
@@ -335,7 +347,7 @@ impl Target {
             self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
         }
         if self.steps.ego_motion {
-            self.background = Background::remember(luma, self.bounds)?;
+            self.background.remember(luma, self.bounds)?;
         }
         Ok(())
     }
