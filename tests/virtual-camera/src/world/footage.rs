@@ -42,9 +42,6 @@ pub enum FootageError {
         /// Where to start.
         start: u64,
     },
-    /// OpenCV failed.
-    #[error("cannot warp the picture: {0}")]
-    Warp(#[from] opencv::Error),
 }
 
 /// A looped recording.

@@ -5,6 +5,7 @@ mod footage;
 mod panorama;
 mod synthetic;
 mod timeline;
+mod warp;
 
 use std::sync::Arc;
 

@@ -5,16 +5,11 @@ use std::{
     time::Duration,
 };
 
-use opencv::{
-    core::{BORDER_REPLICATE, Mat, Scalar, Size},
-    imgproc::{INTER_LINEAR, WARP_INVERSE_MAP, warp_perspective},
-};
-
-use super::{FootageError, Recording, blur::motion_blur, timeline::Timeline};
+use super::{FootageError, Recording, blur::motion_blur, timeline::Timeline, warp::warp};
 use crate::{
     geometry::{self, Matrix, Pinhole},
     kinematics::{Limits, Optics, Pose},
-    picture::{Picture, Plane},
+    picture::Picture,
     settings::Settings,
     sync::lock,
 };
@@ -120,7 +115,7 @@ impl Panorama {
         let mut picture = Picture::grey(size.0, size.1, 0);
         for (index, target) in picture.planes.iter_mut().enumerate() {
             let homography = if index == 0 { &luma } else { &chroma };
-            warp(&source.planes[index], target, homography)?;
+            warp(&source.planes[index], target, homography);
         }
         let centre = (view.centre_x, view.centre_y);
         let (x, y) = geometry::project(&luma, centre.0, centre.1);
@@ -149,19 +144,4 @@ fn aspect(size: (u32, u32)) -> f64 {
 fn default_size(recording: (u32, u32)) -> (u32, u32) {
     let height = (640.0 * aspect(recording) / 2.0).round() as u32 * 2;
     (640, height)
-}
-
-fn warp(source: &Plane, target: &mut Plane, homography: &Matrix) -> opencv::Result<()> {
-    let (width, height) = (target.width as i32, target.height as i32);
-    let source = Mat::new_rows_cols_with_data(source.height as i32, source.width as i32, &source.data)?;
-    let mut target = Mat::new_rows_cols_with_data_mut(height, width, &mut target.data)?;
-    warp_perspective(
-        &source,
-        &mut target,
-        &Mat::from_slice_2d(homography)?,
-        Size::new(width, height),
-        INTER_LINEAR | WARP_INVERSE_MAP,
-        BORDER_REPLICATE,
-        Scalar::default(),
-    )
 }
