@@ -66,6 +66,7 @@ impl Settings {
             confirm_frames: self.confirm_frames,
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             manual_size: self.manual_size,
+            must_move: self.roi_type == MOTION_ROI,
         }
     }
 }

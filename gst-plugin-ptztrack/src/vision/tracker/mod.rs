@@ -9,6 +9,7 @@
 //! | motion of the background | beyond | `background`, `ego_motion` |
 //! | points that leave and join | beyond | `points` |
 //! | what it looks like | beyond | `appearance` |
+//! | whether it moves at all | beyond | `proof` |
 //!
 //! [`Tracker`] is the state machine around one `target`; `steps` says what each profile does.
 
@@ -21,6 +22,7 @@ mod geometry;
 mod mean_shift;
 mod patch;
 mod points;
+mod proof;
 mod selection;
 mod state;
 mod steps;

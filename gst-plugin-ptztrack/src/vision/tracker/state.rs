@@ -2,6 +2,7 @@ use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Feature, Point, Rect, TargetChange, TargetState, Vector};
 
 use super::geometry::{Frame, around};
+use super::proof::MotionProof;
 use super::selection::{Choice, Selection, Sighting};
 use super::steps::Profile;
 use super::target::{Sight, Target};
@@ -27,6 +28,9 @@ pub struct Config {
     pub coast_s: f64,
     /// Height, in frame heights, of the box that is made around a place selected by hand.
     pub manual_size: f64,
+    /// Whether a detection that was chosen must soon be seen to move against the background, or is lost: right for
+    /// a motion detector, wrong for one that finds people who stand.
+    pub must_move: bool,
 }
 
 /// Something that a detector saw, in frame sizes.
@@ -187,6 +191,7 @@ impl Tracker {
             None => target.follow(luma, dt_s as f32)?,
             Some(_) => self.look_for(&mut target, luma, dt_s as f32)?,
         };
+        let sight = if target.proof.failed() { Sight::Gone } else { sight };
         let (state, phase_of): (_, fn(Box<Target>, f64) -> Phase) = match sight {
             Sight::Seen => (TargetState::Tracking, |target, _| Phase::Tracking(target)),
             Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => (TargetState::Occluded, Phase::Occluded),
@@ -275,7 +280,10 @@ impl Tracker {
         let chosen = self.selection.choose(self.config.choice, self.config.confirm_frames, frame);
         let Some(sighting) = chosen else { return Ok(Phase::Searching) };
         match Target::acquire(luma, sighting, self.config.profile.steps())? {
-            Some(target) => Ok(self.begin(target, frame, report, changes)),
+            Some(mut target) => {
+                target.proof = MotionProof::new(self.config.must_move);
+                Ok(self.begin(target, frame, report, changes))
+            }
             None => Ok(Phase::Searching),
         }
     }
@@ -347,6 +355,7 @@ mod tests {
             confirm_frames: 1,
             coast_s: 1.5,
             manual_size: 0.3,
+            must_move: false,
         }
     }
 
@@ -360,7 +369,11 @@ mod tests {
     }
 
     fn following(profile: Profile, picture: &Picture, x: f32, y: f32) -> Tracker {
-        let mut tracker = Tracker::new(Config { profile, ..config() });
+        following_with(Config { profile, ..config() }, picture, x, y)
+    }
+
+    fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Tracker {
+        let mut tracker = Tracker::new(config);
         let (width, height) = (SIZE.0 as f64, SIZE.1 as f64);
         let bounds = Rect {
             x: f64::from(x) / width,
@@ -399,6 +412,21 @@ mod tests {
             let x = 80.0 + 8.5 * n as f32;
             assert_at(&step(&mut tracker, &street((0.0, 0.0), &[(x, 100.0, 7)])), x, 100.0);
         }
+    }
+
+    #[test]
+    fn a_detection_that_never_moves_is_lost_and_a_chosen_one_is_not() {
+        let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
+        let lost_within = |chosen: bool| {
+            let must_move = Config { must_move: true, ..config() };
+            let mut tracker = following_with(must_move, &picture, 200.0, 100.0);
+            if chosen {
+                tracker.select(Point { x: 220.0 / SIZE.0 as f64, y: 145.0 / SIZE.1 as f64 });
+            }
+            (1..40).find(|_| step(&mut tracker, &picture).state == TargetState::Lost)
+        };
+        assert_eq!(lost_within(true), None);
+        assert!((14..20).contains(&lost_within(false).expect("lost")));
     }
 
     #[test]

@@ -11,6 +11,7 @@ use super::geometry::{Frame, around, centre, grown, in_ellipse, length, mean, sc
 use super::mean_shift::{GreyModel, near_the_middle};
 use super::patch::{Cut, Patch};
 use super::points::{Consensus, Points};
+use super::proof::MotionProof;
 use super::selection::Sighting;
 use super::steps::Steps;
 use crate::vision::Luma;
@@ -82,6 +83,7 @@ pub(super) struct Target {
     pub own_velocity: Point2f,
     /// Motion of the background at the target, pixels per second; `None` where it could not be seen.
     pub ego_velocity: Option<Point2f>,
+    pub proof: MotionProof,
     steps: Steps,
     first_size: (f32, f32),
     patch: Patch,
@@ -124,6 +126,7 @@ impl Target {
             points,
             own_velocity: sighting.velocity,
             ego_velocity: None,
+            proof: MotionProof::new(false),
             steps,
             first_size: (bounds.width, bounds.height),
             patch,
@@ -322,6 +325,9 @@ impl Target {
             return Ok(sight);
         }
         let own = (centre(self.bounds) - start - self.ego.at(start)) / dt_s;
+        if self.ego_velocity.is_some() {
+            self.proof.watch(own * dt_s, dt_s, self.bounds);
+        }
         if self.sure {
             self.own_velocity += (own - self.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
         }
