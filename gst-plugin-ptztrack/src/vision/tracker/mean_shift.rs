@@ -149,7 +149,7 @@ mod tests {
     #[test]
     fn centre_of_mass_by_hand() {
         // Two pixels of weight 10 at (2, 1) and one of 20 at (4, 3): M00 = 30, M10 = 100, M01 = 70.
-        let mut pixels = vec![0_u8; 48];
+        let mut pixels = [0_u8; 48];
         (pixels[8 + 2], pixels[3 * 8 + 4]) = (10, 20);
         let probability = Mat::from_slice_2d(&pixels.chunks(8).collect::<Vec<_>>()).expect("plane");
         let middle = mass_centre(&probability, Rect::new(0, 0, 8, 6)).expect("moments").expect("mass");
