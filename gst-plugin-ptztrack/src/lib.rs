@@ -11,6 +11,7 @@ pub mod lkfeaturetrack;
 mod lock;
 pub mod luma_source;
 pub mod ptzoverlay;
+mod region_of_interest;
 pub mod vision;
 
 /// What GStreamer asks of a plugin; private, as nobody calls it from Rust.

@@ -545,3 +545,62 @@ fn pipelines_of_the_documentation_run() {
         assert!(started, "{line}: the ball was not found");
     }
 }
+
+#[test]
+fn upstream_gets_what_downstream_proposes_where_frames_pass() {
+    for (output, supported, gets) in
+        [("frame", false, false), ("frame", true, true), ("mask", false, true), ("mask", true, true)]
+    {
+        init();
+        let mut harness = Harness::new("bgavgdetect");
+        harness.element().unwrap().set_property_from_str("output", output);
+        if supported {
+            harness.add_propose_allocation_meta(gst_video::VideoMeta::meta_api(), None);
+        }
+        harness.set_src_caps(grey().to_caps().unwrap());
+        harness.push_and_pull(picture(&grey(), &[])).unwrap();
+        let mut query = gst::query::Allocation::new(Some(&grey().to_caps().unwrap()), false);
+        assert!(harness.srcpad().unwrap().peer_query(&mut query));
+        let has = query.find_allocation_meta::<gst_video::VideoMeta>().is_some();
+        assert_eq!(has, gets, "{output} {supported}");
+    }
+}
+
+#[test]
+fn regions_that_another_detector_attached_are_replaced() {
+    let mut detector = Detector::learned(&grey());
+    detector.see(&[BOX], 1);
+    let mut buffer = detector.buffer(&[BOX]);
+    VideoRegionOfInterestMeta::add(buffer.get_mut().unwrap(), MOTION_ROI, (1, 2, 3, 4));
+    VideoRegionOfInterestMeta::add(buffer.get_mut().unwrap(), "face", (5, 6, 7, 8));
+    let seen = detector.push(buffer);
+    let names = |seen: &gst::BufferRef| {
+        seen.iter_meta::<VideoRegionOfInterestMeta>()
+            .map(|roi| (roi.roi_type().to_owned(), roi.rect()))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(names(&seen), [("face".to_owned(), (5, 6, 7, 8)), (MOTION_ROI.to_owned(), BOX)]);
+}
+
+#[test]
+fn a_fault_in_every_other_frame_is_one_warning() {
+    let mut detector = Detector::learned(&grey());
+    for _ in 0..3 {
+        detector.push(gst::Buffer::with_size(10).unwrap());
+        detector.see(&[], 1);
+    }
+    assert_eq!(detector.warnings().len(), 1);
+}
+
+#[test]
+fn drops_before_frames_without_timestamps_do_not_keep_it_learning() {
+    let mut detector = Detector::new(&grey());
+    let found: Vec<_> = (0..4)
+        .map(|_| {
+            let mut buffer = picture(&grey(), &[]);
+            buffer.get_mut().unwrap().set_flags(gst::BufferFlags::DISCONT);
+            regions(&detector.push(buffer))
+        })
+        .collect();
+    assert_eq!(found, [None, None, Some(0), Some(0)]);
+}

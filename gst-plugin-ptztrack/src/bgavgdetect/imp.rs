@@ -19,6 +19,7 @@ use super::stream::{Stream, StreamError};
 use super::{Output, Selection, Test, caps};
 use crate::lock::lock;
 use crate::luma_source;
+use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Duty, Zones};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
@@ -387,7 +388,6 @@ impl BgAvgDetect {
         }
         match stream.look(buffer, elapsed, &settings) {
             Ok(regions) => {
-                stream.warned = false;
                 let regions = regions?;
                 let change = stream.change(&regions, elapsed, &settings);
                 self.post(change, buffer.pts(), &regions);
@@ -421,7 +421,7 @@ impl BgAvgDetect {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Failed,
-                ("A frame passes unseen: {error}. Faults are reported again after the next good frame")
+                ("A frame passes unseen: {error}. Further faults of this stream are not reported")
             );
         }
     }
@@ -441,6 +441,7 @@ fn attach(
     info: &VideoInfo,
 ) -> Result<(), glib::BoolError> {
     let Some(regions) = regions else { return Ok(()) };
+    remove_regions_of_interest(buffer, MOTION_ROI);
     for region in regions {
         let pixels = region.bounds.to_pixels(info.width(), info.height());
         VideoRegionOfInterestMeta::add(buffer, MOTION_ROI, pixels);

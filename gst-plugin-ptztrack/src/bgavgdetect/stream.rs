@@ -38,7 +38,7 @@ pub(super) struct Stream {
     last_pts: Option<gst::ClockTime>,
     /// Something is missing before the next picture.
     interrupted: bool,
-    /// Whether a fault was reported since the last good frame: one warning, not a flood.
+    /// Whether a fault of this stream was already reported, so that one fault is not a flood.
     pub warned: bool,
 }
 
@@ -90,7 +90,9 @@ impl Stream {
             }
             // Time runs backwards: another stream.
             Some(None) => (true, self.nominal_distance()),
-            None => (interrupted, self.nominal_distance()),
+            // Nobody can tell how much is missing. A leaky queue may mark every other frame: learning anew
+            // each time, nothing would ever be found.
+            None => (false, self.nominal_distance()),
         };
         if relearn {
             self.detector.relearn();
