@@ -6,8 +6,8 @@ use gst_check::Harness;
 use gst_video::{NavigationEvent, VideoRegionOfInterestMeta};
 use gstptztrack::luma_source::FORMATS;
 use ptztrack_contract::{
-    BufferMeta, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMessage, TargetMeta, TargetState,
-    TrackerEvent,
+    BufferMeta, CameraEvent, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMessage, TargetMeta,
+    TargetState, TrackerEvent,
 };
 
 const WIDTH: usize = 320;
@@ -398,5 +398,95 @@ fn the_pipelines_of_the_documentation_run() {
         );
         pipeline.set_state(gst::State::Null).unwrap();
         assert_eq!(message.map(|message| message.type_()), Some(gst::MessageType::Eos), "{description}");
+    }
+}
+
+#[test]
+fn news_of_the_camera_travel_on_to_the_detector() {
+    let mut bench = Bench::new(|_| ());
+    bench.harness.push_upstream_event(CameraEvent { moving: true, ..CameraEvent::default() }.to_event());
+    let events: Vec<_> = std::iter::from_fn(|| bench.harness.try_pull_upstream_event()).collect();
+    let moving = events.iter().filter_map(|event| CameraEvent::of(event)?.ok()).map(|event| event.moving);
+    assert_eq!(moving.collect::<Vec<_>>(), [true]);
+}
+
+#[test]
+fn the_detector_is_woken_when_the_tracker_stops() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    bench.harness.element().unwrap().set_state(gst::State::Null).unwrap();
+    assert_eq!(bench.events(), [TargetState::Tracking, TargetState::Searching]);
+    let mut idle = Bench::new(|_| ());
+    idle.detected((60, 80));
+    idle.harness.element().unwrap().set_state(gst::State::Null).unwrap();
+    assert_eq!(idle.events(), []);
+}
+
+#[test]
+fn a_gap_holds_no_picture_and_loses_nothing() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    let mut gap = gst::Buffer::from_mut_slice(picture(None, None));
+    gap.get_mut().unwrap().set_flags(gst::BufferFlags::GAP);
+    gap.get_mut().unwrap().set_pts(gst::ClockTime::from_mseconds(bench.frames * FRAME_MS));
+    bench.frames += 1;
+    let out = bench.harness.push_and_pull(gap).unwrap();
+    assert!(out.flags().contains(gst::BufferFlags::GAP));
+    assert!(TargetMeta::of(&out).is_none());
+    assert_eq!(bench.detected((62, 80)).state, TargetState::Tracking);
+    assert_eq!(bench.changes(), [TargetChange::Acquired]);
+}
+
+#[test]
+fn a_frame_that_cannot_be_read_loses_nothing_and_is_one_warning() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    for _ in 0..3 {
+        let out = bench.push_through(vec![0; 10], &[]);
+        assert_eq!(out.size(), 10);
+        assert!(TargetMeta::of(&out).is_none());
+    }
+    let warnings = std::iter::from_fn(|| bench.bus.pop_filtered(&[gst::MessageType::Warning])).count();
+    assert_eq!(warnings, 1);
+    assert_eq!(bench.detected((60, 80)).state, TargetState::Tracking);
+    assert_eq!(bench.events(), [TargetState::Tracking]);
+}
+
+#[test]
+fn a_target_that_another_tracker_attached_is_replaced() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    let out = bench.push_through(picture(Some((60, 80)), None), &[("target", (1, 2, 3, 4))]);
+    let targets: Vec<_> = out
+        .iter_meta::<VideoRegionOfInterestMeta>()
+        .filter(|region| region.roi_type() == "target")
+        .map(|region| region.rect())
+        .collect();
+    assert_eq!(targets.len(), 1);
+    assert_ne!(targets[0], (1, 2, 3, 4));
+}
+
+#[test]
+fn no_name_of_detections_is_none() {
+    let mut bench = Bench::new(|element| element.set_property("roi-type", None::<String>));
+    for _ in 0..4 {
+        assert_eq!(bench.detected((60, 80)).state, TargetState::Searching);
+    }
+}
+
+#[test]
+fn upstream_gets_what_downstream_proposes() {
+    for supported in [false, true] {
+        init();
+        let mut harness = Harness::new("lkfeaturetrack");
+        if supported {
+            harness.add_propose_allocation_meta(gst_video::VideoMeta::meta_api(), None);
+        }
+        harness.set_src_caps_str("video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1");
+        harness.push_and_pull(gst::Buffer::from_mut_slice(picture(None, None))).unwrap();
+        let caps = harness.srcpad().unwrap().current_caps().unwrap();
+        let mut query = gst::query::Allocation::new(Some(&caps), false);
+        assert!(harness.srcpad().unwrap().peer_query(&mut query));
+        assert_eq!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some(), supported);
     }
 }

@@ -6,6 +6,7 @@ use ptztrack_contract::{
     TargetMeta, TargetState, Times,
 };
 
+use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Detection, Report};
 
 /// What a detector saw: the motion meta where it is asked for and there, or else the regions of interest
@@ -39,6 +40,7 @@ pub(super) fn attach(
     report: Report,
     capture_time: Option<gst::ClockTime>,
 ) -> Result<(), glib::BoolError> {
+    remove_regions_of_interest(buffer, TARGET_ROI);
     if matches!(report.state, TargetState::Tracking | TargetState::Occluded) {
         let pixels = report.bounds.to_pixels(info.width(), info.height());
         if pixels.2 > 0 && pixels.3 > 0 {

@@ -137,8 +137,10 @@ pub struct LkFeatureTrack {
         builder(Settings::default().selection)
     )]
     #[property(
-        name = "roi-type", get, set, type = String, member = roi_type, default = Some(MOTION_ROI), mutable_playing,
-        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect)"
+        name = "roi-type", type = String, default = Some(MOTION_ROI), mutable_playing,
+        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect)",
+        get = |imp: &Self| lock(&imp.settings).roi_type.clone(),
+        set = |imp: &Self, name: Option<String>| lock(&imp.settings).roi_type = name.unwrap_or_default()
     )]
     #[property(
         name = "confirm-frames", get, set, type = u32, member = confirm_frames, mutable_playing,
@@ -181,6 +183,8 @@ impl ObjectImpl for LkFeatureTrack {
         self.parent_constructed();
         // Optical flow needs every frame that comes: dropping belongs to the queue in front.
         self.obj().set_qos(false);
+        // Else the base class takes the flag off frames that pass untouched.
+        self.obj().set_gap_aware(true);
     }
 
     fn signals() -> &'static [glib::subclass::Signal] {
@@ -249,7 +253,10 @@ impl BaseTransformImpl for LkFeatureTrack {
     const TRANSFORM_IP_ON_PASSTHROUGH: bool = false;
 
     fn stop(&self) -> Result<(), gst::ErrorMessage> {
-        *lock(&self.stream) = None;
+        let stream = lock(&self.stream).take();
+        if stream.is_some_and(|stream| has_target(stream.state)) {
+            self.wake_detector();
+        }
         *lock(&self.size) = None;
         *lock(&self.command) = None;
         Ok(())
@@ -274,6 +281,10 @@ impl BaseTransformImpl for LkFeatureTrack {
 
     /// In place of the base class's, which would map the pixels writable and so copy a shared frame.
     fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
+        if buffer.flags().contains(gst::BufferFlags::GAP) {
+            // No picture; what was asked for waits for the next one.
+            return Ok(gst::FlowSuccess::Ok);
+        }
         let settings = lock(&self.settings).clone();
         let command = lock(&self.command).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
@@ -345,12 +356,15 @@ impl LkFeatureTrack {
             segment if segment.format() == gst::Format::Time => Times::of(&segment, buffer.pts()),
             _ => Times { timestamp: buffer.pts(), ..Times::default() },
         };
+        let before = stream.last_time;
         let step = stream.step(times.running_time);
         let report = match self.look(stream, settings, buffer, step) {
             Ok(report) => report,
             Err(reason) => {
+                // Says nothing about the target: the next frame continues the last one that could be read.
+                stream.last_time = before;
                 self.warn_once(stream, &reason);
-                vision::Report::default()
+                return;
             }
         };
         self.announce(stream, settings, &report, times, step);
@@ -359,7 +373,7 @@ impl LkFeatureTrack {
         }
     }
 
-    /// Reads the frame and follows the target; the error says why that failed.
+    /// Reads the frame and follows the target; the error says why the frame cannot be read.
     fn look(
         &self,
         stream: &mut Stream,
@@ -375,10 +389,11 @@ impl LkFeatureTrack {
             .map_err(|err| format!("the frame cannot be mapped: {err}"))?;
         let luma =
             stream.luma.luma(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
-        stream
-            .tracker
-            .process(&luma, step.seconds_f64(), &detections)
-            .map_err(|err| format!("tracking failed: {err}"))
+        let report = stream.tracker.process(&luma, step.seconds_f64(), &detections);
+        Ok(report.unwrap_or_else(|err| {
+            self.warn_once(stream, &format!("tracking failed: {err}"));
+            lost(stream.state)
+        }))
     }
 
     /// Tells the bus and upstream what changed.
@@ -394,7 +409,7 @@ impl LkFeatureTrack {
             gst::info!(CAT, imp = self, "target {} {change:?}", report.id);
             self.post(report, *change, times);
         }
-        let has_target = matches!(report.state, TargetState::Tracking | TargetState::Occluded);
+        let has_target = has_target(report.state);
         let interval = gst::ClockTime::from_nseconds(settings.message_interval_ns);
         stream.since_message = stream.since_message.saturating_add(step);
         if has_target && !interval.is_zero() && stream.since_message >= interval {
@@ -405,6 +420,15 @@ impl LkFeatureTrack {
             let event = TrackerEvent { state: report.state, bounds: has_target.then_some(report.bounds) };
             // Nobody has to listen.
             let _ = self.obj().sink_pad().push_event(event.to_event());
+        }
+    }
+
+    /// A detector must not sleep on when nobody is left to wake it. The own pad is no longer active then.
+    fn wake_detector(&self) {
+        if let Some(detector) = self.obj().sink_pad().peer() {
+            let event = TrackerEvent { state: TargetState::Searching, bounds: None };
+            // Fails where it has stopped, too.
+            let _ = detector.send_event(event.to_event());
         }
     }
 
@@ -427,4 +451,21 @@ impl LkFeatureTrack {
             );
         }
     }
+}
+
+/// What there is to tell after the tracker failed in that state: it has let go of its target, if any.
+fn lost(state: TargetState) -> vision::Report {
+    if !has_target(state) {
+        return vision::Report::default();
+    }
+    vision::Report {
+        state: TargetState::Lost,
+        changes: vec![TargetChange::Lost],
+        ..vision::Report::default()
+    }
+}
+
+/// Whether there is a target in that state: the detector sleeps, the bus hears of positions.
+fn has_target(state: TargetState) -> bool {
+    matches!(state, TargetState::Tracking | TargetState::Occluded)
 }

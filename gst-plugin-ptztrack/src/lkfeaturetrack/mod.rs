@@ -2,8 +2,8 @@
 //!
 //! Follows one target by its feature points (thesis 3.5), also while the camera turns. Takes what
 //! `bgavgdetect` saw, or the `GstVideoRegionOfInterestMeta`s of any other detector (`roi-type`), chooses
-//! one of them (`selection`), and attaches a `PtzTargetMeta` to every frame and a region of interest named
-//! `target` where there is one. Pixels pass untouched and uncopied; only those around the target are looked at.
+//! one of them (`selection`), and attaches a `PtzTargetMeta` to every frame that holds a picture (not to gaps)
+//! and a region of interest named `target` where there is one. Pixels pass untouched and uncopied; only those around the target are looked at.
 //!
 //! ## States
 //! *Searching* → *tracking* → *occluded* (hidden: coasted for `coast-time` and looked for) → *tracking* again
