@@ -186,9 +186,12 @@ impl Target {
     /// Whether a detection may be this target, hidden until now, and takes it up if so.
     pub fn recognise(&mut self, luma: &Luma, sighting: &Sighting) -> opencv::Result<bool> {
         let place = around(centre(sighting.bounds), self.bounds.width, self.bounds.height);
-        let near = length(centre(place) - centre(self.bounds)) < self.bounds.height;
+        // Before looking, which is dear: a crowd has a hundred sightings.
+        if length(centre(place) - centre(self.bounds)) >= self.bounds.height {
+            return Ok(false);
+        }
         let answer = self.appearance.look(luma, place, WIDE_SPREAD)?;
-        if !near || answer.peak < FOUND * self.usual_peak {
+        if answer.peak < FOUND * self.usual_peak {
             return Ok(false);
         }
         self.bounds = place + answer.offset;
