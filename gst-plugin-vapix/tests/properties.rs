@@ -122,3 +122,14 @@ fn the_documented_pipelines_run() {
     }
     assert!(common::moves(&camera).is_empty(), "a test picture has no target");
 }
+
+#[test]
+fn any_layout_of_the_pixels_is_welcome() {
+    let rig = Rig::ready("http://192.168.0.90");
+    let caps: gst::Caps = "video/x-raw,format=I420,width=321,height=241,framerate=25/1".parse().unwrap();
+    let pad = rig.sink.static_pad("sink").unwrap();
+    let mut query = gst::query::Allocation::new(Some(&caps), false);
+    pad.set_active(true).unwrap();
+    assert!(pad.query(&mut query));
+    assert!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some());
+}

@@ -232,6 +232,12 @@ impl BaseSinkImpl for VapixPtzSink {
         Ok(())
     }
 
+    /// Pixels are never read here, so any layout will do: a `tee` offers upstream only what all its branches take.
+    fn propose_allocation(&self, query: &mut gst::query::Allocation) -> Result<(), gst::LoggableError> {
+        query.add_allocation_meta::<gst_video::VideoMeta>(None);
+        self.parent_propose_allocation(query)
+    }
+
     fn event(&self, event: gst::Event) -> bool {
         match event.type_() {
             gst::EventType::Eos => self.rest(),
