@@ -61,8 +61,10 @@ mod imp {
 
     impl RTSPMediaFactoryImpl for MediaFactory {
         fn create_element(&self, url: &gst_rtsp::RTSPUrl) -> Option<gst::Element> {
-            // A refused URL makes no media, which the server tells the client.
-            self.0.get().and_then(|making| making.make(&url.request_uri()).ok())
+            // A refused URL makes a media without streams, which the server tells the client. `None` would do too,
+            // but the binding passes it on to GLib, which calls that critical.
+            let made = self.0.get().and_then(|making| making.make(&url.request_uri()).ok());
+            Some(made.unwrap_or_else(|| gst::Bin::new().upcast()))
         }
     }
 
