@@ -10,6 +10,7 @@ pub mod bgavgdetect;
 pub mod lkfeaturetrack;
 mod lock;
 pub mod luma_source;
+mod pad_templates;
 pub mod ptzoverlay;
 mod region_of_interest;
 pub mod vision;

@@ -4,6 +4,7 @@
 //! * [`servo`]: prediction and control, plain types,
 //! * [`vapix`]: the camera's HTTP client.
 
+mod lock;
 pub mod servo;
 pub mod vapix;
 pub mod vapixptzsink;

@@ -19,6 +19,7 @@ use super::stream::{Stream, StreamError};
 use super::{Output, Selection, Test, caps};
 use crate::lock::lock;
 use crate::luma_source;
+use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Duty, Zones};
 
@@ -203,16 +204,9 @@ impl ElementImpl for BgAvgDetect {
         Some(&*METADATA)
     }
 
-    #[allow(clippy::expect_used, reason = "fails on nothing but its constant arguments")]
     fn pad_templates() -> &'static [gst::PadTemplate] {
-        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
-            let caps = luma_source::template_caps();
-            let template = |name, direction| {
-                gst::PadTemplate::new(name, direction, gst::PadPresence::Always, &caps)
-                    .expect("valid template")
-            };
-            vec![template("sink", gst::PadDirection::Sink), template("src", gst::PadDirection::Src)]
-        });
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> =
+            LazyLock::new(|| pad_templates::in_and_out(&luma_source::template_caps()));
         &TEMPLATES
     }
 }

@@ -13,6 +13,7 @@ use ptztrack_contract::{MOTION_ROI, Point, TargetChange, TargetState, Times, Tra
 use super::{Profile, Selection, buffer};
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
+use crate::pad_templates;
 use crate::vision;
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
@@ -234,15 +235,8 @@ impl ElementImpl for LkFeatureTrack {
     }
 
     fn pad_templates() -> &'static [gst::PadTemplate] {
-        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
-            let caps = luma_source::template_caps();
-            [("sink", gst::PadDirection::Sink), ("src", gst::PadDirection::Src)]
-                .into_iter()
-                .filter_map(|(name, direction)| {
-                    gst::PadTemplate::new(name, direction, gst::PadPresence::Always, &caps).ok()
-                })
-                .collect()
-        });
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> =
+            LazyLock::new(|| pad_templates::in_and_out(&luma_source::template_caps()));
         &TEMPLATES
     }
 }

@@ -8,6 +8,7 @@ use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, Targe
 
 use super::caps;
 use crate::lock::lock;
+use crate::pad_templates;
 use crate::vision::{self, FrameSize, Parts, Patch, Seen, Shape, Trail};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
@@ -187,14 +188,8 @@ impl ElementImpl for PtzOverlay {
     }
 
     fn pad_templates() -> &'static [gst::PadTemplate] {
-        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> = LazyLock::new(|| {
-            [("sink", gst::PadDirection::Sink), ("src", gst::PadDirection::Src)]
-                .into_iter()
-                .filter_map(|(name, direction)| {
-                    gst::PadTemplate::new(name, direction, gst::PadPresence::Always, &caps::TEMPLATE).ok()
-                })
-                .collect()
-        });
+        static TEMPLATES: LazyLock<Vec<gst::PadTemplate>> =
+            LazyLock::new(|| pad_templates::in_and_out(&caps::TEMPLATE));
         &TEMPLATES
     }
 

@@ -1,4 +1,4 @@
-use std::sync::{LazyLock, Mutex, MutexGuard, PoisonError};
+use std::sync::{LazyLock, Mutex};
 use std::time::Duration;
 
 use glib::Properties;
@@ -14,6 +14,7 @@ use super::settings::{Settings, environment};
 use super::statistics::Statistics;
 use super::worker::{self, Event, Worker};
 use super::{Mode, Prediction, SpeedCurve};
+use crate::lock::lock;
 use crate::servo::{LinkChange, Report, Sight, Status};
 use crate::vapix::{Location, Secret};
 
@@ -496,9 +497,4 @@ servo_setters! {
     set_stale_timeout: stale_timeout_ms, u32;
     set_camera_speed: camera_speed_deg_s, f64;
     set_speed_curve: speed_curve, SpeedCurve;
-}
-
-/// A panic elsewhere must not take the application with it.
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::pin::pin;
 use std::sync::mpsc::{Receiver, SyncSender};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use once_cell::sync::OnceCell;
@@ -12,6 +12,7 @@ use tokio::time::sleep;
 
 use super::inbox::{Inbox, Mail};
 use super::statistics::Statistics;
+use crate::lock::lock;
 use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Status};
 use crate::vapix::{Client, ClientSettings, Credentials, Error};
 
@@ -311,10 +312,6 @@ async fn sleep_until(until: Option<Duration>, now: Duration) {
         Some(until) => sleep(until.saturating_sub(now)).await,
         None => std::future::pending().await,
     }
-}
-
-fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
