@@ -1,0 +1,3 @@
+//! `evaluate`: runs tests and writes down what came out.
+
+fn main() {}

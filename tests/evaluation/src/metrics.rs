@@ -1,0 +1,1 @@
+//! The metrics of thesis 5.2.

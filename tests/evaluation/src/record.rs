@@ -1,0 +1,196 @@
+//! What one run leaves: per picture what was true, what the tracker said and where the camera looked. Pure data.
+
+use std::{fmt, str::FromStr, time::Duration};
+
+pub use crate::truth::{Bounds, GroundTruth};
+pub use ptztrack_contract::TargetState;
+
+/// Number of a test in the order of the thesis' table 5.2, from 1.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct TestId(pub u32);
+
+impl TestId {
+    /// How many there are.
+    pub const COUNT: u32 = 72;
+
+    /// Every one of them.
+    pub fn all() -> impl Iterator<Item = Self> {
+        (1..=Self::COUNT).map(Self)
+    }
+}
+
+impl fmt::Display for TestId {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+/// An enumeration whose values have a name each, on the command line and in tables.
+macro_rules! named {
+    ($(#[$meta:meta])* $type:ident, $what:literal { $($(#[$variant_meta:meta])* $variant:ident = $name:literal),+ $(,)? }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        pub enum $type { $($(#[$variant_meta])* $variant),+ }
+
+        impl $type {
+            /// Every one, in the order of the tables.
+            pub const ALL: &[Self] = &[$(Self::$variant),+];
+
+            /// As on the command line and in the tables.
+            pub fn name(self) -> &'static str {
+                match self { $(Self::$variant => $name),+ }
+            }
+        }
+
+        impl fmt::Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.pad(self.name())
+            }
+        }
+
+        impl FromStr for $type {
+            type Err = String;
+
+            fn from_str(name: &str) -> Result<Self, String> {
+                let known = Self::ALL.iter().copied().find(|known| known.name() == name);
+                known.ok_or_else(|| {
+                    let names: Vec<_> = Self::ALL.iter().map(|known| known.name()).collect();
+                    format!(concat!("no ", $what, " is named `{}`; there are {}"), name, names.join(", "))
+                })
+            }
+        }
+    };
+}
+
+named! {
+    /// What follows the person.
+    TrackerName, "tracker" {
+        /// Ours with its defaults.
+        Ptztrack = "ptztrack",
+        /// The thesis to the letter: its detector, features, mean-shift and one-second average.
+        Thesis = "thesis",
+        /// GStreamer's `cvtracker algorithm=csrt`.
+        Csrt = "csrt",
+        /// GStreamer's `cvtracker algorithm=kcf`.
+        Kcf = "kcf",
+        /// GStreamer's `cvtracker algorithm=mosse`.
+        Mosse = "mosse",
+        /// GStreamer's `cvtracker algorithm=medianflow`.
+        MedianFlow = "medianflow",
+        /// Bound: knows the truth of the delayed picture. What is lost is lost by the servo.
+        Oracle = "oracle",
+        /// Bound: a camera that never moves.
+        Still = "still",
+    }
+}
+
+named! {
+    /// What the pictures go through before the tracker sees them.
+    Codec, "codec" {
+        /// Motion JPEG.
+        Mjpeg = "mjpeg",
+        /// MPEG-4 part 2.
+        Mpeg4 = "mpeg4",
+    }
+}
+
+named! {
+    /// Who draws the first box.
+    FirstBox, "first box" {
+        /// Every tracker is given the true box of the first counted picture.
+        Given = "given",
+        /// Trackers with a detector find the person themselves; the others are given the box.
+        Detected = "detected",
+    }
+}
+
+/// How old things are when they arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Delays {
+    /// From light on the sensor to the picture at the tracker.
+    pub video: Duration,
+    /// From a command's arrival to the first movement.
+    pub command: Duration,
+}
+
+impl Delays {
+    /// Both together.
+    pub fn total(&self) -> Duration {
+        self.video + self.command
+    }
+}
+
+impl Default for Delays {
+    fn default() -> Self {
+        Self { video: Duration::from_millis(100), command: Duration::from_millis(60) }
+    }
+}
+
+/// What the tracker said of one picture. Pixels, edges of pixels at whole numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Estimate {
+    /// What it was doing. In any state but tracking and occluded the geometry says nothing.
+    pub state: TargetState,
+    /// Mean of its features (thesis 3.15), or the middle of its box where it has none.
+    pub centroid: (f64, f64),
+    /// Its box.
+    pub bounds: Bounds,
+    /// Number of its target.
+    pub id: u64,
+    /// How many feature points it kept.
+    pub features: usize,
+}
+
+/// One counted picture.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameRecord {
+    /// Its exposure, in seconds since that of the first counted picture.
+    pub time_s: f64,
+    /// The person in this very picture; `None` where there is nobody, not even outside of the view.
+    pub truth: Option<GroundTruth>,
+    /// Everybody else in it.
+    pub others: Vec<GroundTruth>,
+    /// What the tracker said; `None` where it said nothing.
+    pub estimate: Option<Estimate>,
+    /// Width and height of the picture in pixels.
+    pub size: (u32, u32),
+    /// Where the camera looked during the exposure, degrees, positive to the right.
+    pub pan_deg: f64,
+    /// Degrees, positive up.
+    pub tilt_deg: f64,
+    /// VAPIX zoom step.
+    pub zoom: f64,
+    /// Commands that the camera received since the previous picture.
+    pub commands: u32,
+}
+
+/// One test with one tracker.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Run {
+    /// Which test; `None` for a recording.
+    pub test: Option<TestId>,
+    /// What was shown, in words for tables: `test 7`, or the recording's file name and person.
+    pub title: String,
+    /// What followed.
+    pub tracker: TrackerName,
+    /// What the pictures went through.
+    pub codec: Codec,
+    /// Width and height of the pictures.
+    pub size: (u32, u32),
+    /// Number of the world.
+    pub seed: u64,
+    /// How late everything was.
+    pub delays: Delays,
+    /// Who drew the first box.
+    pub first_box: FirstBox,
+    /// Pictures a second.
+    pub frame_rate: f64,
+    /// From the first counted picture to the first in which the tracker was right; `None` if it never was.
+    pub acquire_s: Option<f64>,
+    /// Pictures that were there but never reached the tracker; only in real time, `None` in virtual time.
+    pub dropped: Option<u64>,
+    /// The counted pictures.
+    pub frames: Vec<FrameRecord>,
+    /// When it failed, why; the pictures up to there are kept.
+    pub error: Option<String>,
+}
