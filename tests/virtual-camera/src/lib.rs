@@ -21,6 +21,7 @@ mod kinematics;
 mod pace;
 mod picture;
 mod rtsp;
+mod seeded;
 mod settings;
 mod status;
 mod sync;
@@ -37,7 +38,9 @@ pub use kinematics::{
 };
 pub use settings::{Auth, FootageSettings, PtzApi, Settings, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
-pub use world::{FootageError, SyntheticSettings, Waypoint};
+pub use world::{
+    Change, FootageError, Lighting, Occlusion, RoomSettings, Subject, SyntheticSettings, Waypoint,
+};
 
 /// Why a camera does not start.
 #[derive(Debug, thiserror::Error)]

@@ -3,6 +3,7 @@
 mod blur;
 mod footage;
 mod panorama;
+mod room;
 mod synthetic;
 mod timeline;
 mod warp;
@@ -11,6 +12,7 @@ use std::sync::Arc;
 
 pub use footage::FootageError;
 pub(crate) use panorama::{Exposure, Panorama};
+pub use room::{Change, Lighting, Occlusion, RoomSettings, Subject};
 pub use synthetic::{SyntheticSettings, Waypoint};
 use timeline::Timeline;
 

@@ -1,0 +1,142 @@
+//! Which test the room plays: the thesis' 72 and the seeds they are rerun with.
+
+use std::time::Duration;
+
+use crate::kinematics::Pose;
+
+/// How much light there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lighting {
+    /// All lamps are on.
+    Optimal,
+    /// Half of the light.
+    Dim,
+}
+
+/// What stands between the camera and the person's way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Occlusion {
+    /// Nothing.
+    None,
+    /// Furniture that hides the lower body for a part of the way.
+    Partial,
+    /// A pillar or a screen that hides the whole person for a second.
+    Full,
+}
+
+/// Whether something stays as it is all the way.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// It does.
+    Fixed,
+    /// It changes on the way.
+    Variable,
+}
+
+/// Who walks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Subject {
+    /// Tall, in strong colours.
+    A,
+    /// Short and quick of step.
+    B,
+    /// Of middle height, clothed nearly as grey as the wall.
+    C,
+}
+
+/// The room and the person in it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RoomSettings {
+    /// Of the room, the clothes, the gait and the way; 1 is the reference world.
+    pub seed: u64,
+    /// How much light there is.
+    pub lighting: Lighting,
+    /// What hides the person on the way.
+    pub occlusion: Occlusion,
+    /// Of walking: 1.4 m/s, or once up to 2.2 and once down to 0.8 m/s.
+    pub speed: Change,
+    /// Of walking: across the room, or half of the way and back.
+    pub direction: Change,
+    /// Who walks.
+    pub subject: Subject,
+    /// Whether the person walks the same way again after the end of it, for ever.
+    pub repeats: bool,
+}
+
+impl Default for RoomSettings {
+    /// Test 1 in the reference world.
+    fn default() -> Self {
+        Self {
+            seed: 1,
+            lighting: Lighting::Optimal,
+            occlusion: Occlusion::None,
+            speed: Change::Fixed,
+            direction: Change::Fixed,
+            subject: Subject::A,
+            repeats: false,
+        }
+    }
+}
+
+impl RoomSettings {
+    /// Test `number` of the thesis' table 5.2, from 1 to 72; `None` for any other.
+    pub fn test(number: u32, seed: u64) -> Option<Self> {
+        let index = number.checked_sub(1).filter(|index| *index < 72)? as usize;
+        let change = |changed: usize| [Change::Fixed, Change::Variable][changed % 2];
+        Some(Self {
+            seed,
+            subject: [Subject::A, Subject::B, Subject::C][index % 3],
+            lighting: [Lighting::Optimal, Lighting::Dim][index / 3 % 2],
+            occlusion: [Occlusion::None, Occlusion::Partial, Occlusion::Full][index / 6 % 3],
+            speed: change(index / 18),
+            direction: change(index / 36),
+            repeats: false,
+        })
+    }
+
+    /// From the start of the world, empty for two seconds, to the end of the person's way.
+    pub fn duration(&self) -> Duration {
+        Duration::from_secs(12)
+    }
+
+    /// Where the camera looks at first: the person comes in at the side of the widest view.
+    pub fn home(&self) -> Pose {
+        Pose { tilt_deg: -10.0, ..Pose::default() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_tests_are_in_the_order_of_the_thesis() {
+        use self::{Change::*, Lighting::*, Subject::*};
+        let of = |number| {
+            let test = RoomSettings::test(number, 1).unwrap();
+            (test.lighting, test.occlusion, test.speed, test.direction, test.subject)
+        };
+        assert_eq!(of(1), (Optimal, Occlusion::None, Fixed, Fixed, A));
+        assert_eq!(of(6), (Dim, Occlusion::None, Fixed, Fixed, C));
+        assert_eq!(of(8), (Optimal, Occlusion::Partial, Fixed, Fixed, B));
+        assert_eq!(of(16), (Dim, Occlusion::Full, Fixed, Fixed, A));
+        assert_eq!(of(19), (Optimal, Occlusion::None, Variable, Fixed, A));
+        assert_eq!(of(37), (Optimal, Occlusion::None, Fixed, Variable, A));
+        assert_eq!(of(72), (Dim, Occlusion::Full, Variable, Variable, C));
+        assert_eq!(RoomSettings::test(0, 1), None);
+        assert_eq!(RoomSettings::test(73, 1), None);
+    }
+
+    #[test]
+    fn every_test_is_another() {
+        let tests: Vec<_> = (1..=72).map(|number| RoomSettings::test(number, 1).unwrap()).collect();
+        for (index, test) in tests.iter().enumerate() {
+            assert!(!tests[..index].contains(test), "{test:?}");
+        }
+        let count = |holds: &dyn Fn(&RoomSettings) -> bool| tests.iter().filter(|test| holds(test)).count();
+        assert_eq!(count(&|test| test.occlusion == Occlusion::Full), 24);
+        assert_eq!(count(&|test| test.lighting == Lighting::Dim), 36);
+        assert_eq!(count(&|test| test.subject == Subject::C), 24);
+        assert_eq!(count(&|test| test.direction == Change::Variable), 36);
+    }
+}
