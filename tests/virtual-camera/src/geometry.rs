@@ -70,7 +70,7 @@ fn transpose(a: &Matrix) -> Matrix {
 }
 
 /// From a ray of the view to the same ray of the recording.
-fn rotation(pose: &Pose) -> Matrix {
+pub(crate) fn rotation(pose: &Pose) -> Matrix {
     let (sin_p, cos_p) = pose.pan_deg.to_radians().sin_cos();
     let (sin_t, cos_t) = pose.tilt_deg.to_radians().sin_cos();
     let pan = [[cos_p, 0.0, sin_p], [0.0, 1.0, 0.0], [-sin_p, 0.0, cos_p]];
