@@ -12,20 +12,24 @@ use std::{
 
 use crate::{
     Error, Fault, ReceivedCommand, Settings, Status,
+    clock::Time,
     geometry::Matrix,
     http::HttpServer,
     kinematics::{Head, Limits, Pose},
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
+    truth::{GroundTruth, Mask},
     vapix::{Answer, Args, device::Device},
-    world::{self, Exposure, FootageError, Panorama},
+    world::{self, Exposure, FootageError, World},
 };
 
 /// How often a moving camera tells those who wait for it.
 const PULSE: Duration = Duration::from_millis(10);
 /// How often a resting camera is looked at by those who wait.
 const LOOK: Duration = Duration::from_millis(50);
+/// For ever: what is waited for comes with a notice.
+const UNTIL_TOLD: Duration = Duration::from_secs(3600);
 /// Commands kept for the page and for tests.
 const COMMANDS_KEPT: usize = 20_000;
 
@@ -44,8 +48,8 @@ struct State {
 /// What all servers of one camera share.
 pub(crate) struct Camera {
     pub settings: Settings,
-    pub world: Panorama,
-    started: Instant,
+    pub world: Box<dyn World>,
+    time: Time,
     stopping: AtomicBool,
     state: Mutex<State>,
     changed: Condvar,
@@ -71,7 +75,8 @@ impl Camera {
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
         let limits = world.limits();
-        let head = Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home, memory);
+        let home = settings.home.unwrap_or_else(|| world.home());
+        let head = Head::new(settings.kinematics.clone(), world.optics(), limits, home, memory);
         let device = Device::new(&settings, head, limits, world.view_size());
         let state = State {
             device,
@@ -84,9 +89,9 @@ impl Camera {
             viewers: 0,
         };
         Ok(Self {
+            time: Time::new(settings.clock),
             settings,
             world,
-            started: Instant::now(),
             stopping: AtomicBool::new(false),
             state: Mutex::new(state),
             changed: Condvar::new(),
@@ -96,7 +101,7 @@ impl Camera {
 
     /// Time since the start.
     pub fn now(&self) -> Duration {
-        self.started.elapsed()
+        self.time.now()
     }
 
     pub fn is_stopping(&self) -> bool {
@@ -111,9 +116,22 @@ impl Camera {
             if left.is_zero() {
                 return true;
             }
-            state = self.changed.wait_timeout(state, left).unwrap_or_else(PoisonError::into_inner).0;
+            let pause = if self.time.runs() { left } else { UNTIL_TOLD };
+            state = self.changed.wait_timeout(state, pause).unwrap_or_else(PoisonError::into_inner).0;
         }
         false
+    }
+
+    fn advance_to(&self, time: Duration) {
+        self.update(|state| {
+            self.time.advance_to(time);
+            state.device.head.advance(self.now());
+        });
+    }
+
+    /// Time that a CGI takes for a request.
+    pub fn service_time(&self) -> Duration {
+        if self.time.runs() { self.settings.service_time } else { Duration::ZERO }
     }
 
     pub fn frame_rate(&self) -> f64 {
@@ -228,8 +246,9 @@ impl Camera {
         while !self.is_stopping() {
             state.device.head.advance(self.now());
             self.changed.notify_all();
-            // An hour stands for ever: at rest only a command, which notifies, changes anything.
-            let pause = if state.device.head.is_at_rest() { Duration::from_secs(3600) } else { PULSE };
+            // At rest only a command changes anything, in stepped time only a step; both notify.
+            let moving = self.time.runs() && !state.device.head.is_at_rest();
+            let pause = if moving { PULSE } else { UNTIL_TOLD };
             state = self.changed.wait_timeout(state, pause).unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -247,9 +266,29 @@ impl Camera {
         self.world.render(&Exposure { time, opening, closing }, size)
     }
 
+    /// Of the picture whose exposure began at `time`: who is in it.
+    pub fn ground_truth(&self, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.world.truth(&self.opening(time), size)
+    }
+
+    fn silhouette(&self, time: Duration, size: (u32, u32)) -> Option<Mask> {
+        self.world.silhouette(&self.opening(time), size)
+    }
+
+    /// Only the moment at which the shutter opens.
+    fn opening(&self, time: Duration) -> Exposure {
+        let pose = self.pose_at(time);
+        Exposure { time, opening: pose, closing: pose }
+    }
+
     /// When the picture leaves the sensor that leaves the camera now.
     pub fn newest_exposure(&self) -> Duration {
         self.now().saturating_sub(self.settings.video.delay)
+    }
+
+    /// Lets stepped time go on by itself: nobody steps any more, and what is being set up still needs a picture.
+    fn close(&self) {
+        self.update(|_| self.time.run());
     }
 
     fn stop(&self) {
@@ -320,6 +359,46 @@ impl VirtualCamera {
         self.camera.fault.send_replace(fault);
     }
 
+    /// Lets the time of a camera with [`crate::Clock::Stepped`] go on to `time` since its start, and wakes whatever
+    /// waits for that. Time does not go back, and a real clock is not moved: nothing happens then.
+    pub fn advance_to(&self, time: Duration) {
+        self.camera.advance_to(time);
+    }
+
+    /// The picture whose exposure begins at a time since the start, as it is before any encoder, in any size.
+    ///
+    /// The time must lie no further back than the video delay and two seconds, as the head forgets, and not after now,
+    /// as it does not foresee: who asks before the exposure is over sees no motion blur of the rest of it.
+    pub fn picture(&self, exposure: Duration, size: (u32, u32)) -> Result<Picture, FootageError> {
+        self.camera.picture(exposure, size)
+    }
+
+    /// Who is in that picture and where, as its exposure begins. People outside of the view are told of as well; a
+    /// recording without a ground-truth file shows nobody that is known.
+    pub fn ground_truth(&self, exposure: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.camera.ground_truth(exposure, size)
+    }
+
+    /// Which pixels of that picture show a person; `None` in worlds that know boxes at best.
+    pub fn silhouette(&self, exposure: Duration, size: (u32, u32)) -> Option<Mask> {
+        self.camera.silhouette(exposure, size)
+    }
+
+    /// Where it looks at first, and the preset `Home`.
+    pub fn home(&self) -> Pose {
+        self.camera.settings.home.unwrap_or_else(|| self.camera.world.home())
+    }
+
+    /// From one picture to the next.
+    pub fn frame_period(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.camera.frame_rate())
+    }
+
+    /// From light on the sensor to data on the wire.
+    pub fn video_delay(&self) -> Duration {
+        self.camera.settings.video.delay
+    }
+
     /// How far it turns.
     pub fn limits(&self) -> Limits {
         self.camera.world.limits()
@@ -330,9 +409,10 @@ impl VirtualCamera {
         self.camera.world.view_size()
     }
 
-    /// From a pixel of the recording to the pixel of the view of that size, for a pose.
+    /// From a pixel of the recording to the pixel of the view of that size, for a pose. The recording of a room is the
+    /// wide picture on its live page.
     pub fn recording_to_view(&self, pose: &Pose, size: (u32, u32)) -> Matrix {
-        self.camera.world.recording_to_view(pose, size)
+        self.camera.world.overview_to_view(pose, size)
     }
 
     /// Where the camera looked at a time since its start, not longer ago than its video delay and two seconds.
@@ -343,6 +423,7 @@ impl VirtualCamera {
 
 impl Drop for VirtualCamera {
     fn drop(&mut self) {
+        self.camera.close();
         self.rtsp.close();
         self.camera.stop();
         self.http.stop();

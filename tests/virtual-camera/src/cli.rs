@@ -151,7 +151,7 @@ impl TryFrom<Options> for Settings {
                 delay: milliseconds(options.video_delay),
                 exposure: milliseconds(options.exposure),
             },
-            home: Pose { pan_deg: options.pan, tilt_deg: options.tilt, zoom_step: options.zoom },
+            home: Some(Pose { pan_deg: options.pan, tilt_deg: options.tilt, zoom_step: options.zoom }),
             user: options.user,
             password: options.password,
             ..Self::default()
@@ -249,7 +249,7 @@ mod tests {
         assert_eq!(settings.auth, Auth::Digest { qop: false });
         assert_eq!(settings.video.size, Some((320, 240)));
         assert_eq!(settings.video.delay, Duration::from_millis(250));
-        assert_eq!(settings.home.pan_deg, -5.0);
+        assert_eq!(settings.home.unwrap().pan_deg, -5.0);
         let World::Footage(footage) = settings.world else { panic!("no footage") };
         assert_eq!((footage.start, footage.looped), (Duration::from_millis(12_500), true));
     }

@@ -78,23 +78,40 @@ pub(crate) fn rotation(pose: &Pose) -> Matrix {
     multiply(&pan, &tilt)
 }
 
-/// From a pixel of the view to the pixel of the recording that shows the same.
+/// From a pixel of one view to the pixel of another view from the same place that shows the same.
+pub fn between(from: (&Pose, &Pinhole), to: (&Pose, &Pinhole)) -> Matrix {
+    let turned = multiply(&transpose(&rotation(to.0)), &rotation(from.0));
+    multiply(&to.1.to_pixel(), &multiply(&turned, &from.1.to_ray()))
+}
+
+/// From a pixel of the view to the pixel of the recording, made at pan and tilt 0, that shows the same.
 pub fn view_to_recording(pose: &Pose, view: &Pinhole, recording: &Pinhole) -> Matrix {
-    multiply(&recording.to_pixel(), &multiply(&rotation(pose), &view.to_ray()))
+    between((pose, view), (&Pose::default(), recording))
 }
 
 /// The other way round.
 pub fn recording_to_view(pose: &Pose, view: &Pinhole, recording: &Pinhole) -> Matrix {
-    multiply(&view.to_pixel(), &multiply(&transpose(&rotation(pose)), &recording.to_ray()))
+    between((&Pose::default(), recording), (pose, view))
 }
 
 /// Where a homography takes a point.
 pub fn project(homography: &Matrix, x: f64, y: f64) -> (f64, f64) {
-    let [u, v, w] = [0, 1, 2].map(|row| {
+    let [u, v, w] = homogeneous(homography, x, y);
+    (u / w, v / w)
+}
+
+/// Where a homography between two views takes a point; `None` where that is behind the other.
+pub fn project_ahead(homography: &Matrix, x: f64, y: f64) -> Option<(f64, f64)> {
+    // Rays have depth 1 in their own view, so that this is the depth in the other one.
+    let [u, v, depth] = homogeneous(homography, x, y);
+    (depth > 1e-6).then(|| (u / depth, v / depth))
+}
+
+fn homogeneous(homography: &Matrix, x: f64, y: f64) -> [f64; 3] {
+    [0, 1, 2].map(|row| {
         let line = &homography[row];
         line[0] * x + line[1] * y + line[2]
-    });
-    (u / w, v / w)
+    })
 }
 
 /// Pan and tilt in degrees that bring the ray (`x`, `y`, 1) of a view into its centre.
@@ -165,6 +182,14 @@ mod tests {
         near(project(&right, 159.5, 119.5), (383.5 + recording.focal * 10f64.to_radians().tan(), 287.5));
         let up = view_to_recording(&pose(0.0, 5.0), &view, &recording);
         near(project(&up, 159.5, 119.5), (383.5, 287.5 - recording.focal * 5f64.to_radians().tan()));
+    }
+
+    #[test]
+    fn what_is_behind_a_view_is_nowhere_in_it() {
+        let (view, recording) = (Pinhole::new(320, 240, 20.0), Pinhole::new(768, 576, 60.0));
+        let turned = recording_to_view(&pose(70.0, 0.0), &view, &recording);
+        assert_eq!(project_ahead(&turned, 383.5, 287.5), Some(project(&turned, 383.5, 287.5)));
+        assert_eq!(project_ahead(&turned, 0.0, 287.5), None);
     }
 
     #[test]

@@ -14,6 +14,7 @@
 //! ```
 
 mod camera;
+mod clock;
 mod encode;
 mod geometry;
 mod http;
@@ -26,6 +27,7 @@ mod settings;
 mod status;
 mod sync;
 mod threads;
+mod truth;
 mod vapix;
 mod wish;
 mod world;
@@ -36,10 +38,12 @@ pub use geometry::{Matrix, project};
 pub use kinematics::{
     Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
 };
-pub use settings::{Auth, FootageSettings, PtzApi, Settings, Video, World};
+pub use picture::{Picture, Plane};
+pub use settings::{Auth, Clock, FootageSettings, PtzApi, Settings, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
+pub use truth::{Bounds, GroundTruth, Mask};
 pub use world::{
-    Change, FootageError, Lighting, Occlusion, RoomSettings, Subject, SyntheticSettings, Waypoint,
+    Change, FootageError, Lighting, MotError, Occlusion, RoomSettings, Subject, SyntheticSettings, Waypoint,
 };
 
 /// Why a camera does not start.

@@ -4,7 +4,7 @@ use std::{fmt, path::PathBuf, time::Duration};
 
 use crate::{
     kinematics::{Kinematics, Pose},
-    world::SyntheticSettings,
+    world::{RoomSettings, SyntheticSettings},
 };
 
 /// How the camera asks its clients who they are.
@@ -32,6 +32,17 @@ pub enum PtzApi {
     Extended,
 }
 
+/// How the camera's time passes. HTTP and RTSP themselves are as quick as the machine in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Clock {
+    /// As everybody's.
+    #[default]
+    Real,
+    /// It stands at zero and goes on by [`crate::VirtualCamera::advance_to`] only. Whatever waits for a moment, a
+    /// command that acts later or the next picture of a stream, waits for that.
+    Stepped,
+}
+
 /// What the camera looks at.
 #[derive(Debug, Clone)]
 pub enum World {
@@ -39,6 +50,8 @@ pub enum World {
     Footage(FootageSettings),
     /// A small world made up on the spot, with one person in it.
     Synthetic(SyntheticSettings),
+    /// A room in true perspective, with one walking person in it.
+    Room(RoomSettings),
 }
 
 /// A recording to look around in.
@@ -54,6 +67,8 @@ pub struct FootageSettings {
     pub start: Duration,
     /// Whether it begins again after its end; its last picture stays otherwise.
     pub looped: bool,
+    /// Who is where in it, if anybody wrote it down: a MOTChallenge file, `frame,id,left,top,width,height,...` a line.
+    pub ground_truth: Option<PathBuf>,
 }
 
 impl FootageSettings {
@@ -65,6 +80,7 @@ impl FootageSettings {
             view_width: 0.45,
             start: Duration::ZERO,
             looped: true,
+            ground_truth: None,
         }
     }
 }
@@ -115,7 +131,8 @@ pub struct Settings {
     pub serial: String,
     /// Which parts of ptz.cgi there are.
     pub ptz_api: PtzApi,
-    /// Time that ptz.cgi and param.cgi take for a request. They take one at a time, in order of arrival.
+    /// Time that ptz.cgi and param.cgi take for a request. They take one at a time, in order of arrival. With a stepped
+    /// clock they take none: nobody would step on before the answer has come.
     pub service_time: Duration,
     /// What it looks at.
     pub world: World,
@@ -123,8 +140,10 @@ pub struct Settings {
     pub kinematics: Kinematics,
     /// What it sends.
     pub video: Video,
-    /// Where it looks at first, and the preset `Home`.
-    pub home: Pose,
+    /// Where it looks at first, and the preset `Home`; `None` is what suits the world.
+    pub home: Option<Pose>,
+    /// Who moves its time on.
+    pub clock: Clock,
 }
 
 impl Default for Settings {
@@ -142,7 +161,8 @@ impl Default for Settings {
             world: World::Synthetic(SyntheticSettings::default()),
             kinematics: Kinematics::default(),
             video: Video::default(),
-            home: Pose::default(),
+            home: None,
+            clock: Clock::Real,
         }
     }
 }

@@ -76,7 +76,7 @@ fn every_common_container_can_be_looked_around_in() {
 #[test]
 fn the_view_shows_what_the_homography_says() {
     let camera = VirtualCamera::start(Settings {
-        home: Pose { pan_deg: -9.0, tilt_deg: 3.0, zoom_step: 1.0 },
+        home: Some(Pose { pan_deg: -9.0, tilt_deg: 3.0, zoom_step: 1.0 }),
         ..looking_at(FootageSettings {
             looped: false,
             ..FootageSettings::new(recording("bars.avi", "jpegenc ! avimux"))

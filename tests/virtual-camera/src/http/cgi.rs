@@ -75,7 +75,7 @@ async fn answer(
     }
     let response = {
         let _turn = site.turn.lock().await;
-        tokio::time::sleep(camera.settings.service_time).await;
+        tokio::time::sleep(camera.service_time()).await;
         match run(camera, &parse_args(query.as_bytes())) {
             Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
             Answer::Text(text) => plain(text),

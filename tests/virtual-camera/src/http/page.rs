@@ -29,7 +29,7 @@ struct Report {
     status: Status,
     limits: Limits,
     /// Corners of the view in the overview, from 0 to 1.
-    outline: [(f64, f64); 4],
+    outline: Vec<(f64, f64)>,
     commands: Vec<ReceivedCommand>,
 }
 

@@ -78,8 +78,8 @@ pub struct Kinematics {
     pub acceleration_deg_s2: f64,
     /// From a command's arrival to the first movement.
     pub command_delay: Duration,
-    /// Magnification at the narrowest view.
-    pub max_magnification: f64,
+    /// Magnification at the narrowest view; `None` is the world's own.
+    pub max_magnification: Option<f64>,
     /// Zoom steps per second at zoom speed 100. Undocumented.
     pub zoom_speed_step_s: f64,
 }
@@ -95,7 +95,7 @@ impl Default for Kinematics {
             },
             acceleration_deg_s2: 400.0,
             command_delay: Duration::from_millis(60),
-            max_magnification: 18.0,
+            max_magnification: None,
             zoom_speed_step_s: 3000.0,
         }
     }

@@ -1,10 +1,18 @@
 //! A recording from a file, decoded as it is looked at.
 
-use std::{collections::VecDeque, path::PathBuf, sync::Arc};
+use std::{
+    collections::{BTreeMap, VecDeque},
+    path::PathBuf,
+    sync::Arc,
+};
 
 use gst::prelude::*;
 
-use super::{Recording, timeline::Timeline};
+use super::{
+    mot::{self, MotError},
+    panorama::{Person, Recording},
+    timeline::Timeline,
+};
 use crate::{picture::Picture, settings::FootageSettings};
 
 /// Pictures kept, for clients that look at slightly different times.
@@ -42,6 +50,9 @@ pub enum FootageError {
         /// Where to start.
         start: u64,
     },
+    /// Its ground truth cannot be used.
+    #[error(transparent)]
+    GroundTruth(#[from] MotError),
 }
 
 /// A looped recording.
@@ -54,10 +65,12 @@ pub(super) struct Footage {
     /// Number of the picture that the decoder gives next.
     next: u64,
     recent: VecDeque<(u64, Arc<Picture>)>,
+    people: BTreeMap<u64, Vec<Person>>,
 }
 
 impl Footage {
     pub fn open(settings: &FootageSettings) -> Result<Self, FootageError> {
+        let people = settings.ground_truth.as_deref().map(mot::read).transpose()?.unwrap_or_default();
         let path = settings.file.clone();
         std::fs::File::open(&path)
             .map_err(|source| FootageError::Unreadable { path: path.clone(), source })?;
@@ -85,8 +98,8 @@ impl Footage {
         let frames = (length.nseconds() as f64 / 1e9 * frame_rate).round() as u64;
         let start = (settings.start.as_secs_f64() * frame_rate) as u64;
         let timeline = Arc::new(Timeline::new(frame_rate, start, frames, settings.looped));
-        let footage =
-            Self { path: path.clone(), pipeline, sink, info, timeline, next: 0, recent: VecDeque::new() };
+        let recent = VecDeque::new();
+        let footage = Self { path: path.clone(), pipeline, sink, info, timeline, next: 0, recent, people };
         if start >= frames {
             return Err(FootageError::Empty { path, frames, start });
         }
@@ -170,6 +183,10 @@ impl Recording for Footage {
         self.timeline.end_at(number + 1);
         self.next = u64::MAX;
         Ok(picture)
+    }
+
+    fn people(&self, frame: u64) -> Vec<Person> {
+        self.people.get(&frame).cloned().unwrap_or_default()
     }
 }
 

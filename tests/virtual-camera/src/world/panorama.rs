@@ -5,25 +5,41 @@ use std::{
     time::Duration,
 };
 
-use super::{FootageError, Recording, blur::motion_blur, timeline::Timeline, warp::warp};
+use super::{Exposure, FootageError, World, aspect, blur::motion_blur, timeline::Timeline, warp::warp};
 use crate::{
     geometry::{self, Matrix, Pinhole},
     kinematics::{Limits, Optics, Pose},
     picture::Picture,
     settings::Settings,
     sync::lock,
+    truth::{Bounds, GroundTruth, Mask},
 };
 
-/// One picture's worth of light.
-#[derive(Debug, Clone, Copy)]
-pub(crate) struct Exposure {
-    /// When the shutter opens, since the camera's start.
-    pub time: Duration,
-    /// Where the camera looks then.
-    pub opening: Pose,
-    /// Where it looks when the shutter closes.
-    pub closing: Pose,
+/// A pinhole recording by a camera that stands still.
+pub(crate) trait Recording: Send {
+    /// Width and height in pixels.
+    fn size(&self) -> (u32, u32);
+    /// Which picture shows the world when.
+    fn timeline(&self) -> Arc<Timeline>;
+    /// The picture of that number.
+    fn picture(&mut self, frame: u64) -> Result<Arc<Picture>, FootageError>;
+    /// Who is known to be in it.
+    fn people(&self, frame: u64) -> Vec<Person>;
 }
+
+/// Somebody in a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Person {
+    /// The same in all pictures.
+    pub id: u32,
+    /// In pixels of the recording.
+    pub bounds: Bounds,
+    /// Part of them that nothing hides, 0 to 1.
+    pub unhidden: f64,
+}
+
+/// That of the AXIS Q6034-E (thesis, table 5.1).
+const MAX_MAGNIFICATION: f64 = 18.0;
 
 /// A recording, seen by a camera that turns and zooms in it.
 pub(crate) struct Panorama {
@@ -47,27 +63,53 @@ impl Panorama {
             recording_size,
             recording_fov_deg,
             timeline: recording.timeline(),
-            optics: Optics { wide_fov_deg, max_magnification: settings.kinematics.max_magnification },
+            optics: Optics {
+                wide_fov_deg,
+                max_magnification: settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION),
+            },
             view_size: settings.video.size.unwrap_or_else(|| default_size(recording_size)),
             recording: Mutex::new(recording),
         }
     }
 
-    pub fn optics(&self) -> Optics {
+    fn recording_pinhole(&self) -> Pinhole {
+        Pinhole::new(self.recording_size.0, self.recording_size.1, self.recording_fov_deg)
+    }
+
+    /// A person of the recording, as they are in a view.
+    fn seen(&self, person: &Person, to_view: &Matrix, size: (u32, u32)) -> Option<GroundTruth> {
+        let Bounds { left, top, width, height } = person.bounds;
+        let corners = [(left, top), (left + width, top), (left + width, top + height), (left, top + height)];
+        // Homographies count from the middle of the first pixel, boxes from its edge.
+        let seen = corners.map(|(x, y)| geometry::project_ahead(to_view, x - 0.5, y - 0.5));
+        let seen = seen.into_iter().collect::<Option<Vec<_>>>()?;
+        let bounds = Bounds::around(seen.into_iter().map(|(x, y)| (x + 0.5, y + 0.5)))?;
+        let in_view = bounds.part_inside(size);
+        let (x, y) = person.bounds.centre();
+        let recording = self.recording_pinhole();
+        let ray = |place: f64, centre: f64| (place - 0.5 - centre) / recording.focal;
+        let direction =
+            geometry::aim(&Pose::default(), ray(x, recording.centre_x), ray(y, recording.centre_y));
+        Some(GroundTruth {
+            id: person.id,
+            bounds,
+            centroid: bounds.centre(),
+            visible: in_view * person.unhidden,
+            unhidden: person.unhidden,
+            in_view,
+            position_m: None,
+            direction_deg: Some(direction),
+        })
+    }
+}
+
+impl World for Panorama {
+    fn optics(&self) -> Optics {
         self.optics
     }
 
-    /// Width and height in pixels that the camera sends unless asked for others.
-    pub fn view_size(&self) -> (u32, u32) {
-        self.view_size
-    }
-
-    pub fn frame_rate(&self) -> f64 {
-        self.timeline.frame_rate()
-    }
-
     /// How far the widest view may turn; narrower ones stay inside all the more.
-    pub fn limits(&self) -> Limits {
+    fn limits(&self) -> Limits {
         geometry::limits_inside(
             self.optics.wide_fov_deg,
             aspect(self.view_size),
@@ -76,40 +118,25 @@ impl Panorama {
         )
     }
 
-    pub fn frame_at(&self, time: Duration) -> u64 {
+    fn home(&self) -> Pose {
+        Pose::default()
+    }
+
+    fn view_size(&self) -> (u32, u32) {
+        self.view_size
+    }
+
+    fn frame_rate(&self) -> f64 {
+        self.timeline.frame_rate()
+    }
+
+    fn frame_at(&self, time: Duration) -> u64 {
         self.timeline.frame_at(time)
     }
 
-    /// The whole recording at a time.
-    pub fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
-        lock(&self.recording).picture(self.timeline.frame_at(time))
-    }
-
-    /// From a pixel of the recording to the pixel of a view of `size`.
-    pub fn recording_to_view(&self, pose: &Pose, size: (u32, u32)) -> Matrix {
-        geometry::recording_to_view(pose, &self.view(pose, size), &self.pinhole())
-    }
-
-    /// From a pixel of a view of `size` to the pixel of the recording.
-    pub fn view_to_recording(&self, pose: &Pose, size: (u32, u32)) -> Matrix {
-        geometry::view_to_recording(pose, &self.view(pose, size), &self.pinhole())
-    }
-
-    /// The corners of a view in the recording, from 0 to 1 of its width and height.
-    pub fn outline(&self, pose: &Pose) -> [(f64, f64); 4] {
-        let homography = self.view_to_recording(pose, self.view_size);
-        let [right, bottom] = [self.view_size.0, self.view_size.1].map(|length| f64::from(length) - 0.5);
-        [(-0.5, -0.5), (right, -0.5), (right, bottom), (-0.5, bottom)].map(|(x, y)| {
-            let (u, v) = geometry::project(&homography, x, y);
-            let (width, height) = self.recording_size;
-            ((u + 0.5) / f64::from(width), (v + 0.5) / f64::from(height))
-        })
-    }
-
-    /// What the sensor catches, at any `size`.
-    pub fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
+    fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
         let source = self.overview(exposure.time)?;
-        let (view, recording) = (self.view(&exposure.opening, size), self.pinhole());
+        let (view, recording) = (self.pinhole(exposure.opening.zoom_step, size), self.recording_pinhole());
         let luma = geometry::view_to_recording(&exposure.opening, &view, &recording);
         let chroma = geometry::view_to_recording(&exposure.opening, &view.halved(), &recording.halved());
         let mut picture = Picture::grey(size.0, size.1, 0);
@@ -119,25 +146,33 @@ impl Panorama {
         }
         let centre = (view.centre_x, view.centre_y);
         let (x, y) = geometry::project(&luma, centre.0, centre.1);
-        let (x, y) = geometry::project(&self.recording_to_view(&exposure.closing, size), x, y);
+        let (x, y) = geometry::project(&self.overview_to_view(&exposure.closing, size), x, y);
         motion_blur(&mut picture, x - centre.0, y - centre.1);
         Ok(picture)
     }
 
-    fn pinhole(&self) -> Pinhole {
-        Pinhole::new(self.recording_size.0, self.recording_size.1, self.recording_fov_deg)
+    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+        let people = lock(&self.recording).people(self.timeline.frame_at(exposure.time));
+        let to_view = self.overview_to_view(&exposure.opening, size);
+        people.iter().filter_map(|person| self.seen(person, &to_view, size)).collect()
     }
 
-    /// The pinhole of a view. One relatively taller than the camera's own shows less at its sides, not more above.
-    fn view(&self, pose: &Pose, size: (u32, u32)) -> Pinhole {
-        let half_width = (self.optics.fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
-        let narrowed = half_width * (aspect(self.view_size) / aspect(size)).min(1.0);
-        Pinhole::new(size.0, size.1, 2.0 * narrowed.atan().to_degrees())
+    fn silhouette(&self, _: &Exposure, _: (u32, u32)) -> Option<Mask> {
+        None
     }
-}
 
-fn aspect(size: (u32, u32)) -> f64 {
-    f64::from(size.1) / f64::from(size.0)
+    /// The whole recording at a time.
+    fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
+        lock(&self.recording).picture(self.timeline.frame_at(time))
+    }
+
+    fn overview_size(&self) -> (u32, u32) {
+        self.recording_size
+    }
+
+    fn overview_view(&self) -> (Pose, Pinhole) {
+        (Pose::default(), self.recording_pinhole())
+    }
 }
 
 /// 640 pixels wide, as high as the recording's shape has it.

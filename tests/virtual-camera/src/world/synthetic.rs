@@ -2,8 +2,15 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::{FootageError, Recording, timeline::Timeline};
-use crate::picture::{Picture, Plane};
+use super::{
+    FootageError,
+    panorama::{Person, Recording},
+    timeline::Timeline,
+};
+use crate::{
+    picture::{Picture, Plane},
+    truth::Bounds,
+};
 
 /// Where the person is at a time; between two of these they walk straight on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,6 +104,19 @@ impl Synthetic {
         paint(&mut person.planes[1], settings.seed ^ 0xb10e, 8, (60, 200));
         Self { settings: settings.clone(), background: Arc::new(background), person, focal }
     }
+
+    /// The person's left and top edge in a picture, in pixels of the chroma planes.
+    fn corner(&self, frame: u64) -> Option<(isize, isize)> {
+        let time = Duration::from_secs_f64(frame as f64 / self.settings.frame_rate);
+        let (pan_deg, tilt_deg) = self.settings.person_at(time)?;
+        let (pan, tilt) = (pan_deg.to_radians(), tilt_deg.to_radians());
+        let x = f64::from(self.settings.size.0) / 2.0 + self.focal * pan.tan();
+        let y = f64::from(self.settings.size.1) / 2.0 - self.focal * tilt.tan() / pan.cos();
+        let (width, height) = self.person.size();
+        let left = ((x - f64::from(width) / 2.0) / 2.0).round() as isize;
+        let top = ((y - f64::from(height) / 2.0) / 2.0).round() as isize;
+        Some((left, top))
+    }
 }
 
 impl Recording for Synthetic {
@@ -109,22 +129,30 @@ impl Recording for Synthetic {
     }
 
     fn picture(&mut self, frame: u64) -> Result<Arc<Picture>, FootageError> {
-        let time = Duration::from_secs_f64(frame as f64 / self.settings.frame_rate);
-        let Some((pan_deg, tilt_deg)) = self.settings.person_at(time) else {
+        let Some((left, top)) = self.corner(frame) else {
             return Ok(self.background.clone());
         };
-        let (pan, tilt) = (pan_deg.to_radians(), tilt_deg.to_radians());
-        let x = f64::from(self.settings.size.0) / 2.0 + self.focal * pan.tan();
-        let y = f64::from(self.settings.size.1) / 2.0 - self.focal * tilt.tan() / pan.cos();
         let mut picture = (*self.background).clone();
-        let (width, height) = self.person.size();
-        let left = ((x - f64::from(width) / 2.0) / 2.0).round() as isize;
-        let top = ((y - f64::from(height) / 2.0) / 2.0).round() as isize;
         for (index, plane) in picture.planes.iter_mut().enumerate() {
             let scale = if index == 0 { 2 } else { 1 };
             paste(plane, &self.person.planes[index], left * scale, top * scale);
         }
         Ok(Arc::new(picture))
+    }
+
+    fn people(&self, frame: u64) -> Vec<Person> {
+        let (width, height) = self.person.size();
+        let person = self.corner(frame).map(|(left, top)| Person {
+            id: 1,
+            bounds: Bounds {
+                left: 2.0 * left as f64,
+                top: 2.0 * top as f64,
+                width: width.into(),
+                height: height.into(),
+            },
+            unhidden: 1.0,
+        });
+        person.into_iter().collect()
     }
 }
 
