@@ -8,6 +8,7 @@ use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, CameraChange, CameraMessage, TargetMeta, Times};
 
+use super::clock::Clock;
 use super::news::camera_event;
 use super::picture::Picture;
 use super::settings::{Settings, environment};
@@ -34,6 +35,7 @@ struct Stream {
     picture: Option<Picture>,
     /// Whether unreadable metas were already warned of.
     warned: bool,
+    lockstep: bool,
 }
 
 /// The locks are never held together, nor while anything is posted, pushed or waited for.
@@ -125,6 +127,11 @@ pub struct VapixPtzSink {
         name = "speed-curve", get, set = Self::set_speed_curve, type = SpeedCurve, member = speed_curve, mutable_playing,
         blurb = "How the camera's speed grows with the speed step",
         builder(Settings::default().speed_curve)
+    )]
+    #[property(
+        name = "lockstep", get, set, type = bool, member = lockstep, mutable_ready,
+        default = Settings::default().lockstep,
+        blurb = "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras"
     )]
     settings: Mutex<Settings>,
     worker: Mutex<Option<Worker>>,
@@ -255,10 +262,17 @@ impl BaseSinkImpl for VapixPtzSink {
 
     fn render(&self, buffer: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
         self.push_news();
+        let step = self.lockstep_time(buffer.pts());
+        if let Some(time) = step {
+            self.with_worker(|worker| worker.inbox().hold_at(time));
+        }
         match TargetMeta::of(buffer) {
             Some(Ok(target)) => self.see(&target, buffer.pts()),
             Some(Err(err)) => self.warn_of_meta(&err),
             None => {}
+        }
+        if step.is_some() {
+            self.settle();
         }
         Ok(gst::FlowSuccess::Ok)
     }
@@ -275,11 +289,12 @@ impl VapixPtzSink {
             );
             return Err(gst::StateChangeError);
         };
-        lock(&self.stream).warned = false;
+        *lock(&self.stream) = Stream { lockstep: settings.lockstep, ..Stream::default() };
+        let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
         *lock(&self.news) = None;
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
-        let worker = Worker::start(client, settings.servo(), move |event| {
+        let worker = Worker::start(client, settings.servo(), clock, move |event| {
             if let Some(element) = element.upgrade() {
                 element.imp().happened(event);
             }
@@ -317,12 +332,29 @@ impl VapixPtzSink {
         });
     }
 
+    /// The time of a step, where time goes by the stream's.
+    fn lockstep_time(&self, pts: Option<gst::ClockTime>) -> Option<Duration> {
+        lock(&self.stream).lockstep.then(|| self.running_time(pts)).flatten().map(Duration::from)
+    }
+
+    /// Waits, not under the lock, until the camera has answered what is due.
+    fn settle(&self) {
+        let settled = lock(&self.worker).as_ref().map(|worker| worker.inbox().settled());
+        // An error says that the worker is gone; it has told why.
+        let _ = settled.map(|settled| settled.recv());
+    }
+
+    fn running_time(&self, pts: Option<gst::ClockTime>) -> Option<gst::ClockTime> {
+        self.obj().segment().downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_running_time(pts))
+    }
+
     /// How long ago the picture was taken, as far as its timestamp tells.
     fn age(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) -> Duration {
+        if lock(&self.stream).lockstep {
+            return Duration::ZERO;
+        }
         let sink = self.obj();
-        let captured = target.capture_time.or_else(|| {
-            sink.segment().downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_running_time(pts))
-        });
+        let captured = target.capture_time.or_else(|| self.running_time(pts));
         let age =
             sink.current_running_time().zip(captured).map(|(now, captured)| now.saturating_sub(captured));
         age.filter(|age| *age <= OLDEST_PICTURE).unwrap_or_default().into()

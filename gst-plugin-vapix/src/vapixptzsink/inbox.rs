@@ -4,10 +4,11 @@ use std::mem;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use tokio::sync::Notify;
 
+use super::clock::Clock;
 use crate::servo::{ServoSettings, Sight};
 use crate::vapix::Credentials;
 
@@ -21,6 +22,8 @@ pub struct Mail {
     pub sight: Option<Sight>,
     /// Who waits for the camera to be at rest.
     pub waiting: Vec<SyncSender<()>>,
+    /// Who waits until nothing more is to be done at this time.
+    pub settling: Vec<SyncSender<()>>,
     /// The last thing to do is to stop the camera.
     pub finish: bool,
 }
@@ -30,23 +33,32 @@ pub struct Mail {
 pub struct Inbox {
     mail: Mutex<Mail>,
     arrived: Notify,
-    epoch: Instant,
+    clock: Clock,
     overtaken: AtomicU64,
 }
 
 impl Inbox {
-    pub fn new() -> Self {
-        Self {
-            mail: Mutex::default(),
-            arrived: Notify::new(),
-            epoch: Instant::now(),
-            overtaken: AtomicU64::new(0),
-        }
+    /// `clock` is that of everything that is timed here and in the servo.
+    pub fn new(clock: Clock) -> Self {
+        Self { mail: Mutex::default(), arrived: Notify::new(), clock, overtaken: AtomicU64::new(0) }
     }
 
-    /// The clock of everything that is timed here and in the servo.
+    /// The time by which everything here and in the servo goes.
     pub fn now(&self) -> Duration {
-        self.epoch.elapsed()
+        self.clock.now()
+    }
+
+    /// Lets that time stand at `time` until the next call. Nobody is woken: [`Inbox::settled`] does that.
+    pub fn hold_at(&self, time: Duration) {
+        self.clock.hold_at(time);
+    }
+
+    /// The receiver hears when nothing is left to be done at this time, or that there is nobody to do it.
+    pub fn settled(&self) -> Receiver<()> {
+        let (sender, receiver) = sync_channel(1);
+        self.mail().settling.push(sender);
+        self.arrived.notify_one();
+        receiver
     }
 
     /// Leaves the newest picture of the target, in place of one not looked at yet.
@@ -69,8 +81,9 @@ impl Inbox {
         receiver
     }
 
-    /// Asks for rest, and for an end.
+    /// Asks for rest, and for an end. From here on time runs: an end must come, stream or not.
     pub fn finish(&self) -> Receiver<()> {
+        self.clock.run();
         self.mail().finish = true;
         self.rest()
     }
@@ -97,6 +110,11 @@ impl Inbox {
     /// Resolves when something arrives, or has arrived since the last time.
     pub(super) async fn arrived(&self) {
         self.arrived.notified().await;
+    }
+
+    /// Resolves at a time, unless time is held.
+    pub(super) async fn sleep_until(&self, time: Option<Duration>) {
+        self.clock.sleep_until(time).await;
     }
 
     fn mail(&self) -> MutexGuard<'_, Mail> {

@@ -20,7 +20,12 @@
 //! (`http://user:password@host`, where they are taken out at once), or from the environment variables
 //! `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process lists and of the parser's log.
 //! `user`, `password` and everything about the servo can be changed while playing; `location`,
-//! `camera`, `timeout`, `ca-file` and `insecure` count from the next READY to PAUSED on.
+//! `camera`, `timeout`, `ca-file`, `insecure` and `lockstep` count from the next READY to PAUSED on.
+//!
+//! With `lockstep` the servo's time is the stream's running time and stands still between buffers: each
+//! buffer waits until the camera has answered what is due at its time. A simulated camera that moves on only
+//! then gives the same run every time, at any speed. It is for simulations: a camera that does not answer
+//! holds the stream for up to `timeout`.
 //!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
@@ -41,6 +46,7 @@ use glib::prelude::*;
 
 use crate::servo;
 
+mod clock;
 #[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
 mod imp;
 mod inbox;

@@ -28,6 +28,7 @@ pub struct Settings {
     pub stale_timeout_ms: u32,
     pub camera_speed_deg_s: f64,
     pub speed_curve: SpeedCurve,
+    pub lockstep: bool,
 }
 
 impl Default for Settings {
@@ -52,6 +53,7 @@ impl Default for Settings {
             stale_timeout_ms: servo.stale_timeout.as_millis() as u32,
             camera_speed_deg_s: servo.camera_speed_deg_s,
             speed_curve: SpeedCurve::default(),
+            lockstep: false,
         }
     }
 }

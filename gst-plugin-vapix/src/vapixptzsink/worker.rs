@@ -8,8 +8,8 @@ use std::time::Duration;
 
 use once_cell::sync::OnceCell;
 use tokio::runtime::{Builder, Runtime};
-use tokio::time::sleep;
 
+use super::clock::Clock;
 use super::inbox::{Inbox, Mail};
 use super::statistics::Statistics;
 use crate::lock::lock;
@@ -62,11 +62,12 @@ impl Worker {
     pub fn start(
         client: ClientSettings,
         servo: ServoSettings,
+        clock: Clock,
         observer: impl Fn(Event) + Clone + Send + Sync + 'static,
     ) -> Result<Self, String> {
         let client = Client::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
-        let inbox = Arc::new(Inbox::new());
+        let inbox = Arc::new(Inbox::new(clock));
         let statistics = Arc::new(Mutex::new(Statistics::default()));
         let desk = Desk {
             pilot: Pilot::new(servo),
@@ -76,6 +77,7 @@ impl Worker {
             last_status: Status::default(),
             credentials: None,
             waiting: Vec::new(),
+            settling: Vec::new(),
             deadline: None,
         };
         let task = Task { client, desk };
@@ -131,6 +133,7 @@ struct Desk<O> {
     last_status: Status,
     credentials: Option<Option<Credentials>>,
     waiting: Vec<SyncSender<()>>,
+    settling: Vec<SyncSender<()>>,
     /// The end, once it has been asked for.
     deadline: Option<Duration>,
 }
@@ -152,9 +155,10 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 Next::Do(job) => self.perform(job).await,
                 Next::Wait(until) => {
                     let until = until.into_iter().chain(self.desk.deadline).min();
+                    self.desk.tell_settled();
                     tokio::select! {
                         () = self.desk.inbox.arrived() => {}
-                        () = sleep_until(until, now) => {}
+                        () = self.desk.inbox.sleep_until(until) => {}
                     }
                 }
             }
@@ -186,7 +190,7 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 biased;
                 answer = &mut exchange => return desk.answered(&job, answer, sent),
                 () = inbox.arrived() => desk.take_mail(),
-                () = sleep_until(until, now) => {}
+                () = inbox.sleep_until(until) => {}
             }
         }
     }
@@ -201,7 +205,7 @@ impl<O: Fn(Event)> Desk<O> {
     }
 
     fn take_mail(&mut self) {
-        let Mail { credentials, servo, rest, sight, waiting, finish } = self.inbox.take();
+        let Mail { credentials, servo, rest, sight, waiting, settling, finish } = self.inbox.take();
         let now = self.inbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(servo) = servo {
@@ -217,6 +221,7 @@ impl<O: Fn(Event)> Desk<O> {
             self.pilot.see(sight, now);
         }
         self.waiting.extend(waiting);
+        self.settling.extend(settling);
     }
 
     /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
@@ -286,6 +291,13 @@ impl<O: Fn(Event)> Desk<O> {
         self.tell_rest();
     }
 
+    /// Nothing is to be done at this time that has not been done.
+    fn tell_settled(&mut self) {
+        for settling in self.settling.drain(..) {
+            let _ = settling.try_send(());
+        }
+    }
+
     fn tell_rest(&mut self) {
         if self.pilot.is_at_rest() {
             // Who waits no longer is not there to be told.
@@ -303,14 +315,6 @@ async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
         Job::Query(Query::Position) => client.position().await.map(Answer::Position),
         Job::Query(Query::Limits) => client.limits().await.map(Answer::Limits),
         Job::Query(Query::Parameters) => client.parameters().await.map(Answer::Parameters),
-    }
-}
-
-/// Sleeps until a time on the inbox's clock; for ever where there is none.
-async fn sleep_until(until: Option<Duration>, now: Duration) {
-    match until {
-        Some(until) => sleep(until.saturating_sub(now)).await,
-        None => std::future::pending().await,
     }
 }
 
@@ -333,7 +337,7 @@ mod tests {
             timeout: Duration::from_secs(2),
             trust: Trust::System,
         };
-        Worker::start(client, ServoSettings::default(), observer).unwrap()
+        Worker::start(client, ServoSettings::default(), Clock::running(), observer).unwrap()
     }
 
     fn see(worker: &Worker) {

@@ -1,0 +1,82 @@
+//! Time that goes by the stream's.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use common::{PATIENCE, Rig, camera, moves, target};
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, TargetMeta, TargetState};
+use virtual_camera::{Auth, VirtualCamera};
+
+fn rig(camera: &VirtualCamera) -> Rig {
+    Rig::ready(&camera.url()).with("lockstep", true).play()
+}
+
+fn push_at(rig: &mut Rig, milliseconds: u64, meta: Option<&TargetMeta>) {
+    let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
+    let content = buffer.get_mut().unwrap();
+    content.set_pts(gst::ClockTime::from_mseconds(milliseconds));
+    if let Some(meta) = meta {
+        meta.attach(content).unwrap();
+    }
+    assert_eq!(rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+}
+
+/// A target that moves to the left; the moves that the camera has got when each buffer has passed.
+fn walk(camera: &VirtualCamera) -> Vec<Vec<String>> {
+    let mut rig = rig(camera);
+    let pictures = 0..12u32;
+    pictures
+        .map(|picture| {
+            let meta = target(TargetState::Tracking, 0.9 - 0.02 * f64::from(picture), 0.5);
+            push_at(&mut rig, 40 * u64::from(picture), Some(&meta));
+            moves(camera)
+        })
+        .collect()
+}
+
+#[test]
+fn a_buffer_has_passed_when_the_camera_has_answered() {
+    let counts: Vec<_> = walk(&camera(Auth::None)).iter().map(Vec::len).collect();
+    // At most ten a second, by the stream's time: at 0, 120, 240, 360 ms.
+    assert_eq!(counts, [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4]);
+}
+
+#[test]
+fn the_same_stream_gives_the_same_commands() {
+    assert_eq!(walk(&camera(Auth::None)), walk(&camera(Auth::None)));
+}
+
+#[test]
+fn a_target_becomes_stale_by_the_streams_time() {
+    let camera = camera(Auth::None);
+    let mut rig = rig(&camera);
+    push_at(&mut rig, 0, Some(&target(TargetState::Tracking, 0.9, 0.5)));
+    push_at(&mut rig, 960, None);
+    assert_ne!(moves(&camera).last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+    push_at(&mut rig, 1000, None);
+    assert_eq!(moves(&camera).last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+}
+
+#[test]
+fn the_end_comes_though_the_stream_stands() {
+    let camera = camera(Auth::None);
+    let mut rig = rig(&camera);
+    push_at(&mut rig, 0, Some(&target(TargetState::Tracking, 0.9, 0.5)));
+    drop(rig);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    assert_eq!(moves(&camera).last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+}
+
+#[test]
+fn a_camera_that_is_gone_holds_no_stream_for_ever() {
+    let camera = camera(Auth::None);
+    let url = camera.url();
+    drop(camera);
+    let mut rig = Rig::ready(&url).with("lockstep", true).play();
+    for picture in 0..5 {
+        push_at(&mut rig, 40 * picture, Some(&target(TargetState::Tracking, 0.9, 0.5)));
+    }
+    assert!(rig.stats().get::<Option<String>>("last-error").unwrap().is_some());
+    rig.sink.set_state(gst::State::Null).unwrap();
+}
