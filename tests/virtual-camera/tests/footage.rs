@@ -7,7 +7,9 @@ use std::{path::PathBuf, time::Duration};
 
 use common::{PATIENCE, settings};
 use gst::prelude::*;
-use virtual_camera::{Error, FootageError, FootageSettings, Pose, Settings, VirtualCamera, World, project};
+use virtual_camera::{
+    Clock, Error, FootageError, FootageSettings, Pose, Settings, VirtualCamera, World, project,
+};
 
 /// Twenty pictures at ten a second, in a file of this name.
 fn recording(name: &str, encoder_and_muxer: &str) -> PathBuf {
@@ -114,6 +116,44 @@ fn a_start_in_the_middle_and_an_end_that_holds() {
     assert!(camera.wait_for(PATIENCE, |status| status.time > Duration::from_millis(800)));
     assert_eq!(camera.status().footage_frame, 19);
     snapshot(&camera);
+}
+
+#[test]
+fn people_written_down_are_where_the_homography_takes_them() {
+    let ground_truth = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("gt.txt");
+    std::fs::write(&ground_truth, "3,7,100,80,20,50,1,-1,-1,-1\n3,8,310,80,10,50\n4,7,104,80,20,50\n")
+        .unwrap();
+    let pose = Pose { pan_deg: -9.0, tilt_deg: 3.0, zoom_step: 1.0 };
+    let camera = VirtualCamera::start(Settings {
+        home: Some(pose),
+        clock: Clock::Stepped,
+        ..looking_at(FootageSettings {
+            ground_truth: Some(ground_truth.clone()),
+            ..FootageSettings::new(recording("truth.avi", "jpegenc ! avimux"))
+        })
+    })
+    .unwrap();
+    let size = camera.view_size();
+    let seen = |milliseconds| camera.ground_truth(Duration::from_millis(milliseconds), size);
+    assert_eq!(seen(150), []);
+    // The third picture of ten a second.
+    let [person, far] = &seen(250)[..] else { panic!("{:?}", seen(250)) };
+    let to_view = camera.recording_to_view(&pose, size);
+    let (x, y) = project(&to_view, 109.5, 104.5);
+    let (centre_x, centre_y) = person.centroid;
+    assert!((centre_x - x - 0.5).hypot(centre_y - y - 0.5) < 0.5, "{person:?} {x} {y}");
+    assert_eq!((person.id, person.visible, person.unhidden), (7, 1.0, 1.0));
+    assert!(person.bounds.width > 20.0 * 1.8 && person.bounds.height > 50.0 * 1.8);
+    assert_eq!((far.id, far.visible, far.in_view, far.unhidden), (8, 0.0, 0.0, 1.0));
+    let moved = &seen(350)[0];
+    assert!(moved.bounds.left > person.bounds.left + 7.0);
+    // It begins again, and so do they.
+    assert_eq!(seen(2250), seen(250));
+
+    std::fs::write(&ground_truth, "1,2,3\n").unwrap();
+    let bad = FootageSettings { ground_truth: Some(ground_truth), ..FootageSettings::new("truth.avi") };
+    let error = VirtualCamera::start(looking_at(bad)).err().unwrap().to_string();
+    assert!(error.contains("gt.txt, line 1: top is missing"), "{error}");
 }
 
 #[test]
