@@ -100,7 +100,9 @@ impl Link {
     /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
     pub fn failed(&mut self, err: &Error, of_command: bool, now: Duration) -> Option<LinkChange> {
         self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
-        self.retry_at = now + self.pause;
+        // Who has waited in vain has paused already; else silence would last longer than the camera's.
+        let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
+        self.retry_at = now + self.pause.saturating_sub(waited);
         let kind = FaultKind::of(err);
         let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
         fault.kind = kind;
@@ -174,6 +176,17 @@ mod tests {
         assert_eq!(pauses, [125, 250, 500, 1000, 1000, 1000]);
         link.succeeded(true, false);
         assert_eq!(link.retry_at(), Duration::ZERO);
+    }
+
+    #[test]
+    fn a_wait_in_vain_was_pause_enough() {
+        let mut link = Link::default();
+        for _ in 0..6 {
+            link.failed(&Error::Timeout(ms(2000)), true, ms(5000));
+            assert_eq!(link.retry_at(), ms(5000));
+        }
+        link.failed(&Error::Timeout(ms(100)), true, ms(5000));
+        assert_eq!(link.retry_at(), ms(5900));
     }
 
     #[test]

@@ -7,6 +7,9 @@ use reqwest::header::{HeaderMap, HeaderValue, WWW_AUTHENTICATE};
 use super::text::excerpt;
 use super::{Error, Secret};
 
+/// A longer challenge is none: real ones have about 200 characters.
+const MAX_CHALLENGE_BYTES: usize = 4096;
+
 /// A user and the password.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Credentials {
@@ -73,6 +76,7 @@ impl Authenticator {
             .get_all(WWW_AUTHENTICATE)
             .iter()
             .filter_map(|value| value.to_str().ok())
+            .filter(|offer| offer.len() <= MAX_CHALLENGE_BYTES)
             .flat_map(split_challenges)
             .collect();
         let digest = offers.iter().filter_map(|offer| parameters_of(offer, "Digest")).find_map(parse_digest);
@@ -92,6 +96,22 @@ impl Authenticator {
     pub fn forget_challenge(&mut self) {
         self.challenge = None;
     }
+}
+
+/// The `Authorization` with which a GET of `target` (path and query) answers a `WWW-Authenticate`.
+///
+/// # Errors
+/// [`Error::UnsupportedAuthentication`] where the challenge is neither Basic nor Digest, or cannot be answered.
+pub fn answer_to_challenge(
+    challenge: &str,
+    credentials: Credentials,
+    target: &str,
+) -> Result<HeaderValue, Error> {
+    let unsupported = || Error::UnsupportedAuthentication(excerpt(challenge));
+    let mut authenticator = Authenticator::new(Some(credentials));
+    let challenge = HeaderValue::from_str(challenge).map_err(|_| unsupported())?;
+    authenticator.challenged(&HeaderMap::from_iter([(WWW_AUTHENTICATE, challenge)]))?;
+    authenticator.authorization(target)?.ok_or_else(unsupported)
 }
 
 fn basic(user: &str, password: &str) -> String {
@@ -281,6 +301,14 @@ mod tests {
         assert_eq!(err, Error::UnsupportedAuthentication("Negotiate".to_owned()));
         let err = Authenticator::new(None).challenged(&headers(&["Basic realm=\"x\""])).unwrap_err();
         assert_eq!(err, Error::CredentialsMissing);
+    }
+
+    #[test]
+    fn a_challenge_without_end_is_none() {
+        let endless = format!("Digest realm=\"{}\", nonce=\"n\"", "x".repeat(MAX_CHALLENGE_BYTES));
+        let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
+        let err = answer_to_challenge(&endless, credentials, "/").unwrap_err();
+        assert!(err.to_string().len() < 256, "{err}");
     }
 
     proptest! {

@@ -6,7 +6,10 @@ use reqwest::{Response, StatusCode, redirect};
 use super::auth::Authenticator;
 use super::location::without_user_info;
 use super::text::{complaint, excerpt, unexpected};
-use super::{Command, Credentials, Error, Limits, Location, Parameters, Position, Trust};
+use super::{
+    Attributes, Command, Credentials, Error, Limits, Location, Parameters, Position, QueuePlace,
+    QueueRequest, Trust, parse_move_speed,
+};
 
 /// Longest answer that is read; a full PTZ parameter list is a few kilobytes.
 const MAX_BODY_BYTES: usize = 64 * 1024;
@@ -113,6 +116,33 @@ impl Client {
         Parameters::parse(&answer.body, self.settings.camera)
     }
 
+    /// Asks what the camera's steps mean.
+    ///
+    /// # Errors
+    /// Any; [`Error::Camera`] where the firmware does not know.
+    pub async fn attributes(&mut self) -> Result<Attributes, Error> {
+        Attributes::parse(&self.query("attributes").await?)
+    }
+
+    /// Asks for the speed step of moves to a position.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn move_speed(&mut self) -> Result<u8, Error> {
+        parse_move_speed(&self.query("speed").await?)
+    }
+
+    /// Asks for control where the camera has a control queue. `None`: accepted without a place.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn queue(&mut self, request: QueueRequest) -> Result<Option<QueuePlace>, Error> {
+        let target = format!("/axis-cgi/com/ptzqueue.cgi?control={request}&camera={}", self.settings.camera);
+        let answer = self.get(&target).await?;
+        let accepted = answer.status == StatusCode::NO_CONTENT;
+        if accepted { Ok(None) } else { QueuePlace::parse(&answer.body).map(Some) }
+    }
+
     async fn query(&mut self, what: &str) -> Result<String, Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&query={what}", self.settings.camera);
         let answer = self.get(&target).await?;
@@ -148,7 +178,9 @@ impl Client {
                 }
                 signed_fresh = true;
                 // Read to its end, so that the connection can carry the answer to the challenge.
-                let _ = self.body(response).await;
+                if let Err(err @ Error::Timeout(_)) = self.body(response).await {
+                    return Err(err);
+                }
             } else if status.is_redirection() {
                 self.follow(&response)?;
             } else if status.is_success() {
@@ -191,8 +223,10 @@ impl Client {
             let target = redirect.split('?').next().unwrap_or("");
             return Err(Error::Redirected(excerpt(&without_user_info(target))));
         };
-        self.settings.location = location;
-        self.http = http_client(&self.settings)?;
+        // Where TLS cannot be set up nothing changes, so that each attempt fails alike.
+        let settings = ClientSettings { location, ..self.settings.clone() };
+        self.http = http_client(&settings)?;
+        self.settings = settings;
         self.authenticator.forget_challenge();
         self.connected = false;
         Ok(())

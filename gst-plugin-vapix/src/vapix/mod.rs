@@ -1,26 +1,30 @@
 //! VAPIX, the HTTP interface of Axis cameras, as far as following a target needs it.
 //!
 //! [`Client`] asks and commands one camera; [`Command`] is what it can be told; [`Position`],
-//! [`Limits`] and [`Parameters`] are what it says of itself. Nothing here knows GStreamer.
+//! [`Limits`], [`Parameters`] and [`Attributes`] are what it says of itself. Nothing here knows GStreamer.
 //!
 //! Facts of the wire (Axis, "VAPIX Pan/tilt/zoom API"): a move is accepted with `204 No Content`; a
 //! `200` in answer to a move is a refusal whose text begins with `Error:`; queries answer `200` with
 //! `key=value` lines in no fixed order, with CRLF or LF.
 
+mod attributes;
 mod auth;
 mod client;
 mod command;
 mod error;
 mod location;
+mod queue;
 mod secret;
 mod text;
 mod tls;
 
-pub use auth::Credentials;
+pub use attributes::{Attributes, StepMeaning};
+pub use auth::{Credentials, answer_to_challenge};
 pub use client::{Client, ClientSettings};
 pub use command::Command;
 pub use error::Error;
 pub use location::Location;
+pub use queue::{QueuePlace, QueueRequest};
 pub use secret::Secret;
-pub use text::{Limits, Parameters, Position, Range};
+pub use text::{Limits, Parameters, Position, Range, parse_move_speed};
 pub use tls::Trust;

@@ -8,6 +8,12 @@ use super::Error;
 /// Longest part of a camera's text that is repeated in a message.
 const EXCERPT_CHARS: usize = 160;
 
+/// A longer line is not read: the longest real one, a table of speeds, has a few hundred characters.
+const MAX_LINE_BYTES: usize = 4096;
+
+/// Lines that are read; a full parameter list has several hundred.
+const MAX_FIELDS: usize = 4096;
+
 /// Smallest and largest value of something.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
@@ -135,6 +141,16 @@ impl Parameters {
     }
 }
 
+/// Reads the answer to `query=speed`: the step, 1 to 100, at which moves to a position are made.
+///
+/// # Errors
+/// [`Error::Unexpected`] where it tells no such step.
+pub fn parse_move_speed(body: &str) -> Result<u8, Error> {
+    let speed = Fields::of(body).number("speed").filter(|speed| (1.0..=100.0).contains(speed));
+    // Truncated: "no assumption on rounding".
+    speed.map(|speed| speed as u8).ok_or_else(|| unexpected(body))
+}
+
 /// The text of an `Error:` answer, on one line; `None` where it is no error.
 pub(super) fn complaint(body: &str) -> Option<String> {
     body.trim_start().strip_prefix("Error:").map(excerpt)
@@ -156,24 +172,25 @@ pub(super) fn excerpt(text: &str) -> String {
 }
 
 /// The `key=value` lines of a text.
-struct Fields<'a>(Vec<(&'a str, &'a str)>);
+pub(super) struct Fields<'a>(Vec<(&'a str, &'a str)>);
 
 impl<'a> Fields<'a> {
-    fn of(body: &'a str) -> Self {
-        let fields = body.lines().filter_map(|line| {
+    pub fn of(body: &'a str) -> Self {
+        let lines = body.lines().filter(|line| line.len() <= MAX_LINE_BYTES);
+        let fields = lines.filter_map(|line| {
             let (key, value) = line.trim().split_once('=')?;
             let key = key.trim();
             // Older firmware lists `root.PTZ...`, newer may leave `root.` out.
             Some((key.strip_prefix("root.").unwrap_or(key), value.trim()))
         });
-        Self(fields.collect())
+        Self(fields.take(MAX_FIELDS).collect())
     }
 
-    fn text(&self, key: &str) -> Option<&'a str> {
+    pub fn text(&self, key: &str) -> Option<&'a str> {
         self.0.iter().find(|(known, _)| known.eq_ignore_ascii_case(key)).map(|(_, value)| *value)
     }
 
-    fn number(&self, key: &str) -> Option<f64> {
+    pub fn number(&self, key: &str) -> Option<f64> {
         self.text(key)?.parse::<f64>().ok().filter(|number| number.is_finite())
     }
 
@@ -259,10 +276,39 @@ mod tests {
         assert!(Limits::parse("MinFieldAngle=0\nMaxFieldAngle=4000\n").is_err());
     }
 
+    #[test]
+    fn a_move_speed_is_a_step() {
+        assert_eq!(parse_move_speed("speed=100\r\n"), Ok(100));
+        for body in ["", "speed=0", "speed=101", "speed=x", "speed=NaN", "mode=normal"] {
+            assert!(parse_move_speed(body).is_err(), "{body}");
+        }
+    }
+
+    #[test]
+    fn lines_and_lists_without_end_are_cut() {
+        let body =
+            format!("pan=1\ntilt={}\n{}zoom=5\n", "1".repeat(MAX_LINE_BYTES), "x=1\n".repeat(MAX_FIELDS));
+        let expected = Position { pan_deg: Some(1.0), tilt_deg: None, zoom_steps: None };
+        assert_eq!(Position::parse(&body).unwrap(), expected);
+    }
+
     proptest! {
+        #[test]
+        fn limits_are_read_back(min in -180..0i32, max in 1..180i32, narrow in 1..100u32, wide in 101..1700u32) {
+            let body = format!(
+                "MinPan={min}\r\nMaxPan={max}\r\nMinFieldAngle={narrow}\r\nMaxFieldAngle={wide}\r\n"
+            );
+            let limits = Limits::parse(&body).unwrap();
+            prop_assert_eq!(limits.pan_deg, Some(Range { min: min.into(), max: max.into() }));
+            let field = limits.field_angle_deg.unwrap();
+            prop_assert!((field.min * 10.0 - f64::from(narrow)).abs() < 1e-9);
+            prop_assert!((field.max * 10.0 - f64::from(wide)).abs() < 1e-9);
+        }
+
         #[test]
         fn any_text_is_read_or_refused(body in "(?s).{0,512}") {
             let _ = (Position::parse(&body), Limits::parse(&body), Parameters::parse(&body, 1));
+            let _ = parse_move_speed(&body);
             if let Some(text) = complaint(&body) {
                 prop_assert!(text.chars().count() <= EXCERPT_CHARS);
             }

@@ -1,0 +1,116 @@
+//! The control queue: who may move the camera where several want to (`ptzqueue.cgi`).
+
+use std::fmt;
+use std::time::Duration;
+
+use super::Error;
+use super::text::{complaint, unexpected};
+
+/// What `ptzqueue.cgi` can be asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum QueueRequest {
+    /// To be let in, or up.
+    Request,
+    /// To be let out.
+    Drop,
+    /// Where we stand; without it at least once in [`QueuePlace::poll_every`] we are out.
+    Query,
+}
+
+impl fmt::Display for QueueRequest {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Request => "request",
+            Self::Drop => "drop",
+            Self::Query => "query",
+        })
+    }
+}
+
+/// Our place in the control queue.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct QueuePlace {
+    /// 1 is in control; 0 is not in the queue.
+    pub position: u32,
+    /// Until our turn comes or ends, where the camera knows.
+    pub left: Option<Duration>,
+    /// How often it wants to be asked again.
+    pub poll_every: Duration,
+}
+
+impl QueuePlace {
+    /// The shortest and longest that a camera can be set to (`PTZ.Various.V#.CtlQueuePollTime`).
+    const POLL_S: (i64, i64) = (5, 3600);
+
+    /// Reads `<a name="POSITION"></a><a name="SECONDS"></a><a name="PERIOD"></a>`.
+    ///
+    /// # Errors
+    /// [`Error::Camera`] with the camera's `Error:`, [`Error::Unexpected`] where it is of another form.
+    pub fn parse(body: &str) -> Result<Self, Error> {
+        if let Some(text) = complaint(body) {
+            return Err(Error::Camera(text));
+        }
+        let mut numbers =
+            body.split("name=\"").skip(1).map(|rest| rest.split('"').next()?.parse::<i64>().ok());
+        let (Some(Some(position)), Some(Some(left)), Some(Some(period))) =
+            (numbers.next(), numbers.next(), numbers.next())
+        else {
+            return Err(unexpected(body));
+        };
+        Ok(Self {
+            position: u32::try_from(position).map_err(|_| unexpected(body))?,
+            // -1 where it is not known.
+            left: u64::try_from(left).ok().map(Duration::from_secs),
+            poll_every: Duration::from_secs(period.clamp(Self::POLL_S.0, Self::POLL_S.1).unsigned_abs()),
+        })
+    }
+
+    /// Whether we may move the camera.
+    pub fn in_control(&self) -> bool {
+        self.position == 1
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    #[test]
+    fn the_documented_answer_is_read() {
+        let place = QueuePlace::parse(r#"<a name="3"></a><a name="410"></a><a name="5"></a>"#).unwrap();
+        assert_eq!(place.position, 3);
+        assert_eq!(place.left, Some(Duration::from_secs(410)));
+        assert_eq!(place.poll_every, Duration::from_secs(5));
+        assert!(!place.in_control());
+        let first = QueuePlace::parse("<a name=\"1\"></a>\r\n<a name=\"-1\"></a>\r\n<a name=\"20\"></a>\r\n");
+        let first = first.unwrap();
+        assert!(first.in_control() && first.left.is_none());
+    }
+
+    #[test]
+    fn refusals_and_nonsense_are_errors() {
+        assert_eq!(QueuePlace::parse("Error:queue full"), Err(Error::Camera("queue full".to_owned())));
+        for body in ["", r#"<a name="1"></a>"#, r#"<a name="x"></a><a name="1"></a><a name="5"></a>"#] {
+            assert!(matches!(QueuePlace::parse(body), Err(Error::Unexpected(_))), "{body}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn any_text_is_read_or_refused(body in "(<a name=\"|\"></a>|-|[0-9]{1,24}|name=|\"|Error:|x){0,24}") {
+            if let Ok(place) = QueuePlace::parse(&body) {
+                prop_assert!((5..=3600).contains(&place.poll_every.as_secs()));
+            }
+        }
+
+        #[test]
+        fn a_place_is_read_back(position in 0u32..100, left in -1i64..100_000, period in 5u64..=3600) {
+            let body = format!("<a name=\"{position}\"></a><a name=\"{left}\"></a><a name=\"{period}\"></a>");
+            let place = QueuePlace::parse(&body).unwrap();
+            prop_assert_eq!(place.position, position);
+            prop_assert_eq!(place.left.map(|left| left.as_secs() as i64), (left >= 0).then_some(left));
+            prop_assert_eq!(place.poll_every.as_secs(), period);
+        }
+    }
+}
