@@ -93,7 +93,7 @@ impl Aim {
         self.prediction
     }
 
-    /// Takes a picture of the target, seen with `view`. `latency`: a command given that long before
+    /// Takes a picture of the target, seen with `view`. `latency`: a command sent that long before
     /// the picture's timestamp shows in it.
     pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, latency: Duration) {
         if sight.id != self.id {
@@ -121,19 +121,13 @@ impl Aim {
         self.target_rate.clear();
     }
 
-    /// The error left when a command computed `now` begins to act, `round_trip` later, if nothing new
-    /// is commanded: the target has moved on since the picture was taken, and the camera has made, or
-    /// will make, the turns it was already told and that the picture does not show yet (Smith predictor).
-    pub fn error_at_effect(
-        &self,
-        now: Duration,
-        history: &CommandHistory,
-        latency: Duration,
-        round_trip: Duration,
-    ) -> PanTilt {
+    /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
+    /// target has moved on since the picture was taken, and the camera has made, or will make, the turns
+    /// it was already told and that the picture does not show yet (Smith predictor).
+    pub fn error_at_effect(&self, now: Duration, history: &CommandHistory, latency: Duration) -> PanTilt {
         let shown = self.taken_at.saturating_sub(latency);
-        let horizon = now.saturating_sub(self.taken_at) + latency + round_trip;
-        let under_way = history.rotation(shown, now) + history.rate_at(now) * round_trip.as_secs_f64();
+        let horizon = now.saturating_sub(self.taken_at) + latency;
+        let under_way = history.rotation(shown, now);
         self.error + self.target_rate() * horizon.as_secs_f64() - under_way
     }
 
@@ -175,8 +169,8 @@ pub(super) mod tests {
         aim.see(&walking, &VIEW, &history, LATENCY);
         let rate = aim.target_rate().pan;
         assert!((rate - 6.616).abs() < 0.01, "{rate}");
-        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY, seconds(0.05)).pan;
-        assert!((error - rate * 0.35).abs() < 1e-9, "{error}");
+        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
+        assert!((error - rate * 0.3).abs() < 1e-9, "{error}");
     }
 
     #[test]
@@ -193,7 +187,7 @@ pub(super) mod tests {
         aim.see(&still, &VIEW, &history, LATENCY);
         assert_eq!(aim.target_rate(), PanTilt::default());
         let offset = VIEW.error(still.centroid).pan;
-        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY, Duration::ZERO).pan;
+        let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
         assert!((error - (offset - 2.0)).abs() < 1e-9, "{error} of {offset}");
     }
 

@@ -1,53 +1,93 @@
-use super::{Lens, PanTilt, SpeedCurve, SpeedMap};
-use crate::vapix::{Limits, Parameters, Position, Range};
+use super::{Lens, PanTilt, SpeedMap};
+use crate::vapix::{Attributes, Limits, Parameters, Position, Range};
 
 /// Field of view of a camera that does not tell: a common dome's, zoomed out.
 const ASSUMED_FOV_DEG: f64 = 55.0;
 
-/// Last step of optical zoom; beyond it cameras magnify digitally.
-const LAST_OPTICAL_STEP: f64 = 9999.0;
+/// Steps of optical zoom; beyond them cameras magnify digitally.
+const OPTICAL_STEPS: Range = Range { min: 1.0, max: 9999.0 };
 
-/// What the camera said of itself.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+/// What the camera said of itself; every part is optional.
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct CameraModel {
-    /// How far it can look.
+    /// How far it can look, from `query=limits`.
     pub limits: Limits,
     /// Its PTZ parameters.
     pub parameters: Parameters,
+    /// What its steps mean.
+    pub attributes: Attributes,
+    /// The speed step of its moves to a position.
+    pub move_speed: Option<u8>,
     /// Where it last said it looks.
     pub position: Position,
+    /// It refused a move that was to be free of proportional speed.
+    pub refuses_free_moves: bool,
 }
 
 impl CameraModel {
-    /// Horizontal field of view in degrees at the present zoom, where the camera told it.
-    pub fn told_fov_deg(&self) -> Option<f64> {
-        let limits = self.limits.or(self.parameters.limits);
-        let angle = limits.field_angle_deg?;
-        let zoom = limits.zoom_steps.unwrap_or(Range { min: 1.0, max: LAST_OPTICAL_STEP });
-        let lens = Lens {
-            wide_fov_deg: angle.max,
-            tele_fov_deg: angle.min,
-            wide_step: zoom.min,
-            tele_step: zoom.max.min(LAST_OPTICAL_STEP).max(zoom.min + 1.0),
+    /// A range this wide is no end: the camera turns round and round.
+    const ENDLESS_DEG: f64 = 359.0;
+
+    /// How far it can look and zoom, by whichever of its answers.
+    pub fn limits(&self) -> Limits {
+        self.limits.or(self.parameters.limits)
+    }
+
+    /// Whether pan turns round and round; `None` where it did not tell.
+    pub fn endless_pan(&self) -> Option<bool> {
+        self.limits().pan_deg.map(|range| range.max - range.min >= Self::ENDLESS_DEG)
+    }
+
+    /// Its lens; `None` where it told neither field of view nor zoom.
+    pub fn lens(&self) -> Option<Lens> {
+        let limits = self.limits();
+        let angle = limits.field_angle_deg;
+        let wide_deg = angle.map_or(ASSUMED_FOV_DEG, |angle| angle.max);
+        if self.attributes.zooms.len() > 1 {
+            return Some(Lens::new(wide_deg, self.attributes.zooms.clone()));
+        }
+        let most = angle.map(|angle| Lens::magnification_between(angle.max, angle.min));
+        let most = self.attributes.max_optical_magnification.or(most)?;
+        let steps = limits.zoom_steps.unwrap_or(OPTICAL_STEPS);
+        // Beyond the optical steps it magnifies on, but by how much nobody says.
+        let max = steps.max.min(OPTICAL_STEPS.max).max(steps.min + 1.0);
+        Some(Lens::linear(wide_deg, Range { max, ..steps }, most))
+    }
+
+    /// Horizontal field of view in degrees at the present zoom. `wide_fov_deg`: that of the lens zoomed out, where
+    /// it is set; else what the camera told, or what is common.
+    pub fn fov_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
+        let lens = match (self.lens(), wide_fov_deg) {
+            (Some(lens), Some(wide_deg)) => lens.with_wide_fov(wide_deg),
+            (Some(lens), None) => lens,
+            (None, wide_deg) => Lens::fixed(wide_deg.unwrap_or(ASSUMED_FOV_DEG)),
         };
-        Some(lens.fov_deg(self.position.zoom_steps.unwrap_or(lens.wide_step)))
+        lens.fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
     }
 
-    /// Horizontal field of view in degrees: as told, or assumed.
-    pub fn fov_deg(&self) -> f64 {
-        self.told_fov_deg().unwrap_or(ASSUMED_FOV_DEG)
+    /// Whether it told its field of view.
+    pub fn tells_fov(&self) -> bool {
+        self.limits().field_angle_deg.is_some()
     }
 
-    /// Speed steps of this camera at a field of view.
+    /// The speed map it told, as it is without proportional speed.
+    pub fn told_speeds(&self) -> Option<SpeedMap> {
+        SpeedMap::through(&self.attributes.speeds)
+    }
+
+    /// Whether its moves can be made free of proportional speed, one by one (`proportionalspeed=disabled`).
     ///
-    /// With proportional speed (on in every recorded dome) no step exceeds `MaxProportionalSpeed`
-    /// fields of view per second.
-    pub fn speed_map(&self, full_deg_s: f64, curve: SpeedCurve, fov_deg: f64) -> SpeedMap {
-        let cap_deg_s = match (self.parameters.proportional_speed, self.parameters.max_proportional_speed) {
-            (Some(true), Some(fields_of_view)) => fields_of_view * fov_deg,
+    /// Firmware that tells its attributes knows the word; one that turns out not to is not asked again.
+    pub fn takes_free_moves(&self) -> bool {
+        self.attributes != Attributes::default() && !self.refuses_free_moves
+    }
+
+    /// The most degrees per second that proportional speed (on in every recorded dome) leaves at a field of view.
+    pub fn proportional_cap_deg_s(&self, fov_deg: f64) -> f64 {
+        match (self.parameters.proportional_speed, self.parameters.max_proportional_speed) {
+            (Some(true), Some(fields_of_view)) if !self.takes_free_moves() => fields_of_view * fov_deg,
             _ => f64::INFINITY,
-        };
-        SpeedMap { full_deg_s, curve, cap_deg_s }
+        }
     }
 
     /// Where it looks, where it told both angles.
@@ -66,13 +106,10 @@ impl LimitGuard {
     /// This near to its end an axis counts as there.
     const NEAR_DEG: f64 = 0.1;
 
-    /// A range this wide is no end: the camera turns round and round.
-    const ENDLESS_DEG: f64 = 359.0;
-
     /// `rate` without the part that would drive an axis on beyond its end.
     pub fn apply(&mut self, rate: PanTilt, camera: &CameraModel) -> PanTilt {
-        let limits = camera.limits.or(camera.parameters.limits);
-        let pan_limits = limits.pan_deg.filter(|range| range.max - range.min < Self::ENDLESS_DEG);
+        let limits = camera.limits();
+        let pan_limits = limits.pan_deg.filter(|_| camera.endless_pan() == Some(false));
         let pan = held(rate.pan, camera.position.pan_deg, pan_limits);
         let tilt = held(rate.tilt, camera.position.tilt_deg, limits.tilt_deg);
         self.at_limit = pan.is_some() || tilt.is_some();
@@ -96,6 +133,7 @@ fn held(rate: f64, position: Option<f64>, limits: Option<Range>) -> Option<f64> 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vapix::StepMeaning;
 
     fn camera(pan: f64, min: f64, max: f64) -> CameraModel {
         CameraModel {
@@ -127,18 +165,39 @@ mod tests {
     fn field_of_view_follows_the_zoom() {
         let limits = Limits { field_angle_deg: Some(Range { min: 3.2, max: 55.2 }), ..Limits::default() };
         let mut camera = CameraModel { limits, ..CameraModel::default() };
-        assert!((camera.fov_deg() - 55.2).abs() < 1e-9);
+        assert!((camera.fov_deg(None) - 55.2).abs() < 1e-9);
         camera.position.zoom_steps = Some(9999.0);
-        assert!((camera.fov_deg() - 3.2).abs() < 1e-9);
-        assert_eq!(CameraModel::default().told_fov_deg(), None);
+        assert!((camera.fov_deg(None) - 3.2).abs() < 1e-9);
+        // Set by hand: the widest, from which the lens narrows as it does.
+        let magnification = Lens::magnification_between(40.0, camera.fov_deg(Some(40.0)));
+        assert!((magnification - Lens::magnification_between(55.2, 3.2)).abs() < 1e-9);
+        assert!((CameraModel::default().fov_deg(None) - ASSUMED_FOV_DEG).abs() < 1e-9);
+        assert!((CameraModel::default().fov_deg(Some(40.0)) - 40.0).abs() < 1e-9);
+        assert!(!CameraModel::default().tells_fov());
     }
 
     #[test]
-    fn proportional_speed_bounds_the_map() {
+    fn a_told_magnification_outweighs_the_field_angles() {
+        let attributes = Attributes { max_optical_magnification: Some(10.0), ..Attributes::default() };
+        let mut camera = CameraModel { attributes, ..CameraModel::default() };
+        camera.position.zoom_steps = Some(9999.0);
+        assert!((camera.lens().unwrap().magnification(9999.0) - 10.0).abs() < 1e-9);
+        camera.attributes.zooms =
+            vec![StepMeaning { step: 1.0, value: 1.0 }, StepMeaning { step: 9999.0, value: 3.0 }];
+        assert!((camera.lens().unwrap().magnification(9999.0) - 3.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn proportional_speed_caps_where_it_cannot_be_left_out() {
         let mut camera = CameraModel::default();
-        assert_eq!(camera.speed_map(450.0, SpeedCurve::Cubic, 55.0).deg_s(100), 450.0);
+        assert_eq!(camera.proportional_cap_deg_s(55.0), f64::INFINITY);
         camera.parameters.proportional_speed = Some(true);
         camera.parameters.max_proportional_speed = Some(2.0);
-        assert_eq!(camera.speed_map(450.0, SpeedCurve::Cubic, 55.0).deg_s(100), 110.0);
+        assert_eq!(camera.proportional_cap_deg_s(55.0), 110.0);
+        camera.attributes.speeds = vec![StepMeaning { step: 100.0, value: 150.0 }];
+        assert!(camera.takes_free_moves());
+        assert_eq!(camera.proportional_cap_deg_s(55.0), f64::INFINITY);
+        camera.refuses_free_moves = true;
+        assert_eq!(camera.proportional_cap_deg_s(55.0), 110.0);
     }
 }

@@ -26,7 +26,7 @@ pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use camera::{CameraModel, LimitGuard};
 pub use controller::Controller;
 pub use link::{Link, LinkChange};
-pub use optics::{Lens, View};
+pub use optics::{Lens, View, magnified};
 pub use pan_tilt::PanTilt;
 pub use pilot::Pilot;
 pub use prediction::{CommandHistory, RateAverage};

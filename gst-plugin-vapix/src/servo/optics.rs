@@ -1,6 +1,7 @@
 use ptztrack_contract::{Point, Vector};
 
 use super::PanTilt;
+use crate::vapix::{Range, StepMeaning};
 
 /// What the camera sees at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,31 +45,82 @@ impl View {
 
     /// Half the picture's width at distance 1.
     fn half_width(&self) -> f64 {
-        (self.horizontal_fov_deg / 2.0).to_radians().tan()
+        half_tangent(self.horizontal_fov_deg)
     }
 }
 
-/// A zoom lens: magnification grows linearly with the zoom step (Axis' example: step 3868 is 2x, 7736 is 3x).
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// A zoom lens: how much it magnifies at which zoom step.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
     /// Horizontal field of view zoomed out, degrees.
-    pub wide_fov_deg: f64,
-    /// Horizontal field of view zoomed in, degrees.
-    pub tele_fov_deg: f64,
-    /// Step zoomed out.
-    pub wide_step: f64,
-    /// Step zoomed in.
-    pub tele_step: f64,
+    wide_fov_deg: f64,
+    /// Zoom steps and magnification, growing; straight lines in between.
+    magnifications: Vec<StepMeaning>,
 }
 
 impl Lens {
+    /// A lens that does not zoom, or not that anybody knew.
+    pub fn fixed(fov_deg: f64) -> Self {
+        Self { wide_fov_deg: fov_deg, magnifications: Vec::new() }
+    }
+
+    /// A lens with a table of its magnification at zoom steps, rows growing in both.
+    pub fn new(wide_fov_deg: f64, magnifications: Vec<StepMeaning>) -> Self {
+        Self { wide_fov_deg, magnifications }
+    }
+
+    /// Magnification grows linearly with the step (Axis' example: step 3868 is 2x, 7736 is 3x) up to `max`.
+    pub fn linear(wide_fov_deg: f64, steps: Range, max: f64) -> Self {
+        let row = |step, value| StepMeaning { step, value };
+        Self::new(wide_fov_deg, vec![row(steps.min, 1.0), row(steps.max, max)])
+    }
+
+    /// How much narrower one field of view is than another, both in degrees, as a magnification.
+    pub fn magnification_between(wide_deg: f64, narrow_deg: f64) -> f64 {
+        half_tangent(wide_deg) / half_tangent(narrow_deg)
+    }
+
+    /// The same lens with another field of view zoomed out.
+    pub fn with_wide_fov(self, wide_fov_deg: f64) -> Self {
+        Self { wide_fov_deg, ..self }
+    }
+
     /// Horizontal field of view in degrees at a zoom step.
     pub fn fov_deg(&self, step: f64) -> f64 {
-        let wide = (self.wide_fov_deg / 2.0).to_radians().tan();
-        let tele = (self.tele_fov_deg / 2.0).to_radians().tan();
-        let share = ((step - self.wide_step) / (self.tele_step - self.wide_step)).clamp(0.0, 1.0);
-        let magnification = 1.0 + share * (wide / tele - 1.0);
-        2.0 * (wide / magnification).atan().to_degrees()
+        magnified(self.wide_fov_deg, self.magnification(step))
+    }
+
+    /// Magnification at a zoom step.
+    pub fn magnification(&self, step: f64) -> f64 {
+        interpolate(&self.magnifications, step, |row| (row.step, row.value)).unwrap_or(1.0)
+    }
+
+    /// The zoom step with a horizontal field of view nearest to this, in degrees; `None` where it does not zoom.
+    pub fn step(&self, fov_deg: f64) -> Option<f64> {
+        let wanted = Self::magnification_between(self.wide_fov_deg, fov_deg);
+        interpolate(&self.magnifications, wanted, |row| (row.value, row.step))
+    }
+}
+
+/// The field of view in degrees of a picture magnified so much.
+pub fn magnified(fov_deg: f64, magnification: f64) -> f64 {
+    2.0 * (half_tangent(fov_deg) / magnification).atan().to_degrees()
+}
+
+fn half_tangent(fov_deg: f64) -> f64 {
+    (fov_deg / 2.0).to_radians().tan()
+}
+
+/// The value at `x` of straight lines between the rows, which grow; the first and last hold beyond. `None` of no row.
+fn interpolate(rows: &[StepMeaning], x: f64, axes: impl Fn(&StepMeaning) -> (f64, f64)) -> Option<f64> {
+    let above = rows.partition_point(|row| axes(row).0 < x);
+    match (above.checked_sub(1).and_then(|below| rows.get(below)), rows.get(above)) {
+        (Some(low), Some(high)) => {
+            let ((x0, y0), (x1, y1)) = (axes(low), axes(high));
+            Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+        }
+        (Some(row), None) | (None, Some(row)) => Some(axes(row).1),
+        (None, None) => None,
     }
 }
 
@@ -110,13 +162,24 @@ mod tests {
 
     #[test]
     fn magnification_is_linear_in_the_step() {
-        let lens = Lens { wide_fov_deg: 55.2, tele_fov_deg: 3.2, wide_step: 1.0, tele_step: 9999.0 };
+        let max = Lens::magnification_between(55.2, 3.2);
+        let lens = Lens::linear(55.2, Range { min: 1.0, max: 9999.0 }, max);
         near(lens.fov_deg(1.0), 55.2, 1e-9);
         near(lens.fov_deg(9999.0), 3.2, 1e-9);
         near(lens.fov_deg(20_000.0), 3.2, 1e-9);
-        let wide = 27.6f64.to_radians().tan();
-        let middle = (lens.fov_deg(5000.0) / 2.0).to_radians().tan();
-        near(wide / middle, (1.0 + wide / 1.6f64.to_radians().tan()) / 2.0, 1e-9);
+        near(lens.magnification(5000.0), (1.0 + max) / 2.0, 1e-9);
+        near(lens.step(lens.fov_deg(1234.0)).unwrap(), 1234.0, 1e-6);
+        assert_eq!((lens.step(90.0), lens.step(0.1)), (Some(1.0), Some(9999.0)));
+    }
+
+    #[test]
+    fn a_lens_has_its_own_table_or_none() {
+        let row = |step, value| StepMeaning { step, value };
+        let lens = Lens::new(60.0, vec![row(1.0, 1.0), row(5000.0, 2.0), row(9999.0, 12.0)]);
+        near(lens.magnification(5000.0), 2.0, 1e-9);
+        near(lens.magnification(7499.5), 7.0, 1e-9);
+        near(lens.clone().with_wide_fov(40.0).fov_deg(1.0), 40.0, 1e-9);
+        assert_eq!((Lens::fixed(50.0).fov_deg(777.0), Lens::fixed(50.0).step(20.0)), (50.0, None));
     }
 
     proptest! {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::{
     Aim, Answer, CameraModel, CommandHistory, Controller, Job, LimitGuard, Link, Mode, Next, PanTilt, Query,
-    Report, Scheduler, ServoSettings, Sight, Status, Steps, View, Visibility,
+    Report, Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility,
 };
 use crate::vapix::{Command, Error};
 
@@ -25,7 +25,6 @@ pub struct Pilot {
     /// What is still to be asked of a camera just met.
     introduction: VecDeque<Query>,
     next_poll: Duration,
-    round_trip: Duration,
     /// The speed steps in force, for the quantiser's hysteresis.
     speed_steps: (i8, i8),
     /// The words that end the last move, whatever the mode is by now.
@@ -72,9 +71,8 @@ impl Pilot {
             controller: Controller::default(),
             guard: LimitGuard::default(),
             target: None,
-            introduction: [Query::Position, Query::Limits, Query::Parameters].into(),
+            introduction: Query::INTRODUCTION.into(),
             next_poll: Duration::ZERO,
-            round_trip: Duration::ZERO,
             speed_steps: (0, 0),
             stop: Command::Halt,
             at_limit: false,
@@ -207,7 +205,7 @@ impl Pilot {
             moving: self.scheduler.may_move(),
             position: self.camera.position,
             rate: self.history.rate_at(now),
-            fov_deg: self.settings.fov_deg.or(self.camera.told_fov_deg()),
+            fov_deg: self.known_fov_deg(),
         }
     }
 
@@ -232,14 +230,14 @@ impl Pilot {
     fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
         let settings = &self.settings;
         let view = self.view(sight);
-        let error = self.aim.error_at_effect(now, &self.history, settings.latency, self.round_trip);
+        let error = self.aim.error_at_effect(now, &self.history, settings.latency);
         let dead_zone_deg = settings.dead_zone * view.horizontal_fov_deg;
         let target = self.aim.target_rate();
         let wanted =
             self.controller.rate(error, target, settings.gain, dead_zone_deg, settings.max_speed_deg_s);
         let rate = self.guard.apply(wanted, &self.camera);
         self.report_limit();
-        let map = self.speed_map(view.horizontal_fov_deg);
+        let map = self.speed_map();
         self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
         match self.speed_steps {
             (0, 0) => Wish::Rest,
@@ -257,7 +255,7 @@ impl Pilot {
             return Wish::AsIs;
         }
         let view = self.view(sight);
-        let error = self.aim.error_at_effect(now, &self.history, self.settings.latency, self.round_trip);
+        let error = self.aim.error_at_effect(now, &self.history, self.settings.latency);
         if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg {
             return Wish::AsIs;
         }
@@ -273,8 +271,7 @@ impl Pilot {
 
     /// The pixel where the target will be when the camera begins to move.
     fn centre(&self, sight: &Sight, now: Duration) -> Command {
-        let ahead_s =
-            (now.saturating_sub(sight.taken_at) + self.settings.latency + self.round_trip).as_secs_f64();
+        let ahead_s = (now.saturating_sub(sight.taken_at) + self.settings.latency).as_secs_f64();
         let pixel = |place: f64, velocity: f64, size: u32| {
             let last = f64::from(size.saturating_sub(1));
             // Saturates; inside the picture by the clamp.
@@ -291,15 +288,13 @@ impl Pilot {
     fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
         let was_moving = self.scheduler.may_move();
         self.scheduler.accepted(command, now);
-        self.round_trip = now.saturating_sub(sent);
-        let rate = match command {
+        // Counted from its sending on: that is when it can begin to act, however late the answer is.
+        match command {
             Command::Velocity { pan, tilt } => {
-                let map = self.speed_map(self.fov_deg());
-                PanTilt::new(map.deg_s(*pan), map.deg_s(*tilt))
+                self.history.push_steps(sent, (*pan, *tilt), &self.speed_map());
             }
-            _ => PanTilt::default(),
-        };
-        self.history.push(now, rate);
+            _ => self.history.push(sent, PanTilt::default()),
+        }
         match command {
             Command::Absolute { .. } | Command::Centre { .. } => {
                 self.steps.begin(now);
@@ -336,6 +331,8 @@ impl Pilot {
             }
             Answer::Limits(limits) => self.camera.limits = limits,
             Answer::Parameters(parameters) => self.camera.parameters = parameters,
+            Answer::Attributes(attributes) => self.camera.attributes = attributes,
+            Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
             Answer::Accepted => {}
         }
         self.succeeded(false);
@@ -399,11 +396,17 @@ impl Pilot {
     }
 
     fn fov_deg(&self) -> f64 {
-        self.settings.fov_deg.unwrap_or_else(|| self.camera.fov_deg())
+        self.camera.fov_deg(self.settings.fov_deg)
     }
 
-    fn speed_map(&self, fov_deg: f64) -> super::SpeedMap {
-        self.camera.speed_map(self.settings.camera_speed_deg_s, self.settings.speed_curve, fov_deg)
+    fn known_fov_deg(&self) -> Option<f64> {
+        (self.settings.fov_deg.is_some() || self.camera.tells_fov()).then(|| self.fov_deg())
+    }
+
+    fn speed_map(&self) -> SpeedMap {
+        let assumed = SpeedMap::new(self.settings.camera_speed_deg_s, self.settings.speed_curve);
+        let map = self.camera.told_speeds().unwrap_or(assumed);
+        map.capped(self.camera.proportional_cap_deg_s(self.fov_deg()))
     }
 }
 

@@ -1,7 +1,8 @@
 use std::collections::VecDeque;
+use std::iter;
 use std::time::Duration;
 
-use super::PanTilt;
+use super::{PanTilt, SpeedMap};
 
 /// Mean of a rate over a window of time (thesis 3.16: one second), whatever the frame rate.
 #[derive(Debug)]
@@ -41,7 +42,15 @@ impl RateAverage {
 
 /// The rates the camera was told, so that the rotation not yet visible in the picture is known.
 #[derive(Debug, Default)]
-pub struct CommandHistory(VecDeque<(Duration, PanTilt)>);
+pub struct CommandHistory(VecDeque<Entry>);
+
+#[derive(Debug)]
+struct Entry {
+    since: Duration,
+    rate: PanTilt,
+    /// Where the rate comes from, and may be revised.
+    steps: Option<(i8, i8)>,
+}
 
 impl CommandHistory {
     /// Longer than any latency that is allowed for.
@@ -49,31 +58,66 @@ impl CommandHistory {
 
     /// From `at` on the camera turns with `rate`.
     pub fn push(&mut self, at: Duration, rate: PanTilt) {
-        self.0.push_back((at, rate));
+        self.add(Entry { since: at, rate, steps: None });
+    }
+
+    /// From `at` on the camera turns with these speed steps for pan and tilt.
+    pub fn push_steps(&mut self, at: Duration, steps: (i8, i8), map: &SpeedMap) {
+        self.add(Entry { since: at, rate: rate_of(steps, map), steps: Some(steps) });
+    }
+
+    /// Counts what was commanded in steps by another map.
+    pub fn revise(&mut self, map: &SpeedMap) {
+        for entry in &mut self.0 {
+            entry.rate = entry.steps.map_or(entry.rate, |steps| rate_of(steps, map));
+        }
+    }
+
+    fn add(&mut self, entry: Entry) {
+        let at = entry.since;
+        self.0.push_back(entry);
         // The entry before the span is still in force at its beginning.
-        while self.0.get(1).is_some_and(|(second, _)| *second + Self::SPAN < at) {
+        while self.0.get(1).is_some_and(|second| second.since + Self::SPAN < at) {
             self.0.pop_front();
         }
     }
 
     /// The rate in force at a time; zero before the first.
     pub fn rate_at(&self, at: Duration) -> PanTilt {
-        self.0.iter().rev().find(|(since, _)| *since <= at).map_or(PanTilt::default(), |(_, rate)| *rate)
+        self.0.iter().rev().find(|entry| entry.since <= at).map_or(PanTilt::default(), |entry| entry.rate)
+    }
+
+    /// The rates in force at some moment between two times, in order.
+    pub fn rates_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = PanTilt> {
+        let first = self.rate_at(from);
+        let within = move |entry: &&Entry| entry.since > from && entry.since <= to;
+        iter::once(first).chain(self.0.iter().filter(within).map(|entry| entry.rate))
     }
 
     /// The rotation commanded between two times, degrees.
     pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
-        let ends = self.0.iter().skip(1).map(|(since, _)| *since).chain([to.max(from)]);
-        self.0.iter().zip(ends).fold(PanTilt::default(), |sum, ((since, rate), end)| {
-            let overlap = end.min(to).saturating_sub((*since).max(from));
-            sum + *rate * overlap.as_secs_f64()
-        })
+        let mut rotation = PanTilt::default();
+        let mut end = to;
+        for entry in self.0.iter().rev() {
+            let since = entry.since.max(from);
+            rotation = rotation + entry.rate * end.saturating_sub(since).as_secs_f64();
+            end = end.min(since);
+            if entry.since <= from {
+                break;
+            }
+        }
+        rotation
     }
+}
+
+fn rate_of((pan, tilt): (i8, i8), map: &SpeedMap) -> PanTilt {
+    PanTilt::new(map.deg_s(pan), map.deg_s(tilt))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::servo::SpeedCurve;
     use proptest::prelude::*;
 
     fn ms(ms: u64) -> Duration {
@@ -115,6 +159,30 @@ mod tests {
         assert_eq!(history.rate_at(ms(50)).pan, 0.0);
         assert_eq!(history.rate_at(ms(299)).pan, 10.0);
         assert_eq!(history.rate_at(ms(900)).pan, -20.0);
+    }
+
+    #[test]
+    fn steps_are_counted_anew_by_another_map() {
+        let mut history = CommandHistory::default();
+        history.push_steps(ms(0), (10, -20), &SpeedMap::new(100.0, SpeedCurve::Linear));
+        history.push(ms(1000), PanTilt::new(3.0, 0.0));
+        assert_eq!(history.rate_at(ms(5)), PanTilt::new(10.0, -20.0));
+        history.revise(&SpeedMap::new(50.0, SpeedCurve::Linear));
+        assert_eq!(history.rotation(ms(0), ms(1000)), PanTilt::new(5.0, -10.0));
+        assert_eq!(history.rate_at(ms(1000)).pan, 3.0);
+    }
+
+    #[test]
+    fn rates_between_are_those_in_force() {
+        let mut history = CommandHistory::default();
+        for (at, rate) in [(100, 1.0), (200, 2.0), (300, 3.0)] {
+            history.push(ms(at), PanTilt::new(rate, 0.0));
+        }
+        let rates =
+            |from, to| history.rates_between(ms(from), ms(to)).map(|rate| rate.pan).collect::<Vec<_>>();
+        assert_eq!(rates(0, 50), [0.0]);
+        assert_eq!(rates(150, 200), [1.0, 2.0]);
+        assert_eq!(rates(210, 900), [2.0, 3.0]);
     }
 
     proptest! {

@@ -27,7 +27,7 @@ pub struct ServoSettings {
     pub max_speed_deg_s: f64,
     /// Commands per second at most; a stop does not wait for its turn.
     pub max_rate_hz: f64,
-    /// From light on the sensor to the picture's timestamp, and from a command to the motion, together.
+    /// From sending a command to the motion, and from light on the sensor to the picture's timestamp, together.
     pub latency: Duration,
     /// Horizontal field of view in degrees; `None`: what the camera says.
     pub fov_deg: Option<f64>,

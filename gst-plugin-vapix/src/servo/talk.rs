@@ -4,7 +4,7 @@ use std::fmt;
 use std::time::Duration;
 
 use super::{LinkChange, PanTilt};
-use crate::vapix::{Command, Limits, Parameters, Position};
+use crate::vapix::{Attributes, Command, Limits, Parameters, Position};
 
 /// Something to ask the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -15,6 +15,16 @@ pub enum Query {
     Limits,
     /// Its PTZ parameters.
     Parameters,
+    /// What its steps mean.
+    Attributes,
+    /// How fast its moves to a position are.
+    MoveSpeed,
+}
+
+impl Query {
+    /// What a camera just met is asked, what matters most first.
+    pub const INTRODUCTION: [Self; 5] =
+        [Self::Position, Self::Limits, Self::Attributes, Self::Parameters, Self::MoveSpeed];
 }
 
 /// One exchange with the camera.
@@ -36,7 +46,7 @@ impl fmt::Display for Job {
 }
 
 /// What the camera answered.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Answer {
     /// To a command: yes.
     Accepted,
@@ -46,6 +56,10 @@ pub enum Answer {
     Limits(Limits),
     /// To [`Query::Parameters`].
     Parameters(Parameters),
+    /// To [`Query::Attributes`].
+    Attributes(Attributes),
+    /// To [`Query::MoveSpeed`]: a speed step.
+    MoveSpeed(u8),
 }
 
 /// What is to be done now.

@@ -101,7 +101,7 @@ pub struct VapixPtzSink {
     #[property(
         name = "latency", get, set = Self::set_latency, type = u32, member = latency_ms, mutable_playing,
         default = Settings::default().latency_ms, maximum = 5000,
-        blurb = "Delay of the camera: from a command it has accepted until a picture that shows it arrives, in milliseconds"
+        blurb = "Delay of the camera: from the sending of a command until a picture that shows it arrives, in milliseconds"
     )]
     #[property(
         name = "field-of-view", get, set = Self::set_field_of_view, type = f64, member = field_of_view_deg, mutable_playing,

@@ -315,6 +315,8 @@ async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
         Job::Query(Query::Position) => client.position().await.map(Answer::Position),
         Job::Query(Query::Limits) => client.limits().await.map(Answer::Limits),
         Job::Query(Query::Parameters) => client.parameters().await.map(Answer::Parameters),
+        Job::Query(Query::Attributes) => client.attributes().await.map(Answer::Attributes),
+        Job::Query(Query::MoveSpeed) => client.move_speed().await.map(Answer::MoveSpeed),
     }
 }
 
