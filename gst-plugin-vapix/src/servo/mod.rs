@@ -11,6 +11,7 @@
 mod aim;
 mod camera;
 mod controller;
+mod learning;
 mod link;
 mod optics;
 mod pan_tilt;
@@ -25,6 +26,7 @@ mod talk;
 pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use camera::{CameraModel, LimitGuard};
 pub use controller::Controller;
+pub use learning::{Calibration, Turn};
 pub use link::{Link, LinkChange};
 pub use optics::{Lens, View, magnified};
 pub use pan_tilt::PanTilt;

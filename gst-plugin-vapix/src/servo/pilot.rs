@@ -3,8 +3,9 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Answer, CameraModel, CommandHistory, Controller, Job, LimitGuard, Link, Mode, Next, PanTilt, Query,
-    Report, Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility,
+    Aim, Answer, Calibration, CameraModel, CommandHistory, Controller, Job, LimitGuard, Link, Mode, Next,
+    PanTilt, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility,
+    magnified,
 };
 use crate::vapix::{Command, Error};
 
@@ -19,6 +20,9 @@ pub struct Pilot {
     steps: Steps,
     aim: Aim,
     history: CommandHistory,
+    calibration: Calibration,
+    /// Speed steps as they are known by now.
+    map: SpeedMap,
     controller: Controller,
     guard: LimitGuard,
     target: Option<Target>,
@@ -62,6 +66,8 @@ impl Pilot {
     pub fn new(settings: ServoSettings) -> Self {
         Self {
             aim: Aim::new(settings.prediction),
+            calibration: Calibration::new(settings.latency),
+            map: settings.speed_map(),
             settings,
             camera: CameraModel::default(),
             link: Link::default(),
@@ -86,7 +92,19 @@ impl Pilot {
         if settings.prediction != self.aim.prediction() {
             self.aim = Aim::new(settings.prediction);
         }
-        self.settings = settings;
+        let before = mem::replace(&mut self.settings, settings);
+        let now = &self.settings;
+        if !now.learn {
+            self.calibration = Calibration::new(now.latency);
+        }
+        self.calibration.assume_latency(now.latency);
+        if now.fov_deg != before.fov_deg {
+            self.calibration.assume_field();
+        }
+        if now.speed_map() != before.speed_map() {
+            self.assume_speeds();
+        }
+        self.revise();
     }
 
     /// The camera may be asked anew: who we are has changed.
@@ -101,7 +119,11 @@ impl Pilot {
             (Visibility::Predicted, Some(target)) => target.last_seen,
             (Visibility::Predicted, None) | (Visibility::Gone, _) => return self.rest(),
         };
-        self.aim.see(&sight, &self.view(&sight), &self.history, self.settings.latency);
+        if self.settings.learn {
+            self.calibration.see(&sight, &self.view(&sight), &self.history, &self.map);
+            self.revise();
+        }
+        self.aim.see(&sight, &self.view(&sight), &self.history, self.calibration.latency());
         self.overtaken += u64::from(self.target.as_ref().is_some_and(|target| !target.considered));
         self.target = Some(Target { sight, last_seen, considered: false });
     }
@@ -163,7 +185,7 @@ impl Pilot {
                 self.scheduler.failed(command, err.may_have_acted(), now);
                 self.failed(&err, true, now);
             }
-            (Job::Query(query), Ok(answer)) => self.told(*query, answer, now),
+            (Job::Query(query), Ok(answer)) => self.told(*query, answer, sent, now),
             (Job::Query(query), Err(err)) => self.not_told(*query, &err, now),
         }
     }
@@ -230,14 +252,14 @@ impl Pilot {
     fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
         let settings = &self.settings;
         let view = self.view(sight);
-        let error = self.aim.error_at_effect(now, &self.history, settings.latency);
+        let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
         let dead_zone_deg = settings.dead_zone * view.horizontal_fov_deg;
         let target = self.aim.target_rate();
         let wanted =
             self.controller.rate(error, target, settings.gain, dead_zone_deg, settings.max_speed_deg_s);
         let rate = self.guard.apply(wanted, &self.camera);
         self.report_limit();
-        let map = self.speed_map();
+        let map = &self.map;
         self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
         match self.speed_steps {
             (0, 0) => Wish::Rest,
@@ -251,11 +273,11 @@ impl Pilot {
             // By speed, before the mode was changed; or who knows, as a step went unanswered.
             return Wish::Rest;
         }
-        if !self.steps.shows_rest(sight.taken_at, self.settings.latency) {
+        if !self.steps.shows_rest(sight.taken_at, self.calibration.latency()) {
             return Wish::AsIs;
         }
         let view = self.view(sight);
-        let error = self.aim.error_at_effect(now, &self.history, self.settings.latency);
+        let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
         if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg {
             return Wish::AsIs;
         }
@@ -271,7 +293,7 @@ impl Pilot {
 
     /// The pixel where the target will be when the camera begins to move.
     fn centre(&self, sight: &Sight, now: Duration) -> Command {
-        let ahead_s = (now.saturating_sub(sight.taken_at) + self.settings.latency).as_secs_f64();
+        let ahead_s = (now.saturating_sub(sight.taken_at) + self.calibration.latency()).as_secs_f64();
         let pixel = |place: f64, velocity: f64, size: u32| {
             let last = f64::from(size.saturating_sub(1));
             // Saturates; inside the picture by the clamp.
@@ -291,7 +313,7 @@ impl Pilot {
         // Counted from its sending on: that is when it can begin to act, however late the answer is.
         match command {
             Command::Velocity { pan, tilt } => {
-                self.history.push_steps(sent, (*pan, *tilt), &self.speed_map());
+                self.history.push_steps(sent, (*pan, *tilt), &self.map);
             }
             _ => self.history.push(sent, PanTilt::default()),
         }
@@ -322,19 +344,29 @@ impl Pilot {
         }
     }
 
-    fn told(&mut self, query: Query, answer: Answer, now: Duration) {
+    fn told(&mut self, query: Query, answer: Answer, sent: Duration, now: Duration) {
         self.introduction.retain(|pending| *pending != query);
         match answer {
             Answer::Position(position) => {
-                self.camera.position = position;
+                let before = mem::replace(&mut self.camera.position, position);
+                if position.zoom_steps != before.zoom_steps {
+                    self.calibration.zoomed();
+                }
+                if let Some(position) = self.camera.pan_tilt() {
+                    self.calibration.positioned((sent + now) / 2, position);
+                }
                 self.positioned(self.camera.pan_tilt(), now);
             }
             Answer::Limits(limits) => self.camera.limits = limits,
             Answer::Parameters(parameters) => self.camera.parameters = parameters,
-            Answer::Attributes(attributes) => self.camera.attributes = attributes,
+            Answer::Attributes(attributes) => {
+                self.camera.attributes = attributes;
+                self.assume_speeds();
+            }
             Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
             Answer::Accepted => {}
         }
+        self.revise();
         self.succeeded(false);
     }
 
@@ -396,17 +428,26 @@ impl Pilot {
     }
 
     fn fov_deg(&self) -> f64 {
-        self.camera.fov_deg(self.settings.fov_deg)
+        magnified(self.camera.fov_deg(self.settings.fov_deg), 1.0 / self.calibration.field_factor())
     }
 
     fn known_fov_deg(&self) -> Option<f64> {
-        (self.settings.fov_deg.is_some() || self.camera.tells_fov()).then(|| self.fov_deg())
+        let known = self.settings.fov_deg.is_some() || self.camera.tells_fov();
+        // To a tenth of a degree: those who are told need not hear of every picture's.
+        known.then(|| (self.fov_deg() * 10.0).round() / 10.0)
     }
 
-    fn speed_map(&self) -> SpeedMap {
-        let assumed = SpeedMap::new(self.settings.camera_speed_deg_s, self.settings.speed_curve);
-        let map = self.camera.told_speeds().unwrap_or(assumed);
-        map.capped(self.camera.proportional_cap_deg_s(self.fov_deg()))
+    fn assume_speeds(&mut self) {
+        self.calibration.assume_speeds(self.camera.told_speeds().is_some());
+    }
+
+    /// Brings the speed map up to what is known by now.
+    fn revise(&mut self) {
+        let fov_deg = self.fov_deg();
+        let assumed = self.camera.told_speeds().unwrap_or_else(|| self.settings.speed_map());
+        let map = self.calibration.correct(&assumed, fov_deg);
+        self.map = map.capped(self.camera.proportional_cap_deg_s(fov_deg));
+        self.history.revise(&self.map);
     }
 }
 

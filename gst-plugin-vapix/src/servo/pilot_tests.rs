@@ -301,7 +301,7 @@ fn walk(settings: ServoSettings, target_deg_s: f64, delay_frames: usize) -> Vec<
     let mut rig = Rig::new(settings);
     let (mut camera_deg, mut target_deg, mut in_force) = (0.0, 5.0, VecDeque::from(vec![0i8; delay_frames]));
     let (mut offsets, mut command) = (Vec::new(), 0i8);
-    let map = rig.pilot.speed_map();
+    let map = rig.pilot.map;
     for _ in 0..250 {
         in_force.push_back(command);
         let rate = map.deg_s(in_force.pop_front().unwrap());

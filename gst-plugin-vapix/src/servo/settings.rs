@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Prediction, SpeedCurve};
+use super::{Prediction, SpeedCurve, SpeedMap};
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -39,6 +39,15 @@ pub struct ServoSettings {
     pub camera_speed_deg_s: f64,
     /// How its speed grows up to there.
     pub speed_curve: SpeedCurve,
+    /// Whether latency, field of view and speed map are learned; the settings above are where that begins.
+    pub learn: bool,
+}
+
+impl ServoSettings {
+    /// The speed map of a camera that does not tell its own.
+    pub fn speed_map(&self) -> SpeedMap {
+        SpeedMap::new(self.camera_speed_deg_s, self.speed_curve)
+    }
 }
 
 impl Default for ServoSettings {
@@ -55,6 +64,7 @@ impl Default for ServoSettings {
             stale_timeout: Duration::from_secs(1),
             camera_speed_deg_s: 450.0,
             speed_curve: SpeedCurve::default(),
+            learn: true,
         }
     }
 }

@@ -78,6 +78,11 @@ impl SpeedMap {
         Self { cap_deg_s, ..self }
     }
 
+    /// Whether no step is faster than this.
+    pub fn is_capped(&self, deg_s: f64) -> bool {
+        deg_s.abs() >= self.cap_deg_s * (1.0 - 1e-6)
+    }
+
     /// Degrees per second of a step.
     pub fn deg_s(&self, step: i8) -> f64 {
         let speed = self.curve[usize::from(step.unsigned_abs()).min(Self::STEPS)];

@@ -17,7 +17,6 @@ use super::worker::{self, Event, Worker};
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
 use crate::servo::{LinkChange, Report, Sight, Status};
-use crate::vapix::{Location, Secret};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("vapixptzsink", gst::DebugColorFlags::empty(), Some("VAPIX PTZ servo"))
@@ -106,7 +105,7 @@ pub struct VapixPtzSink {
     #[property(
         name = "field-of-view", get, set = Self::set_field_of_view, type = f64, member = field_of_view_deg, mutable_playing,
         default = Settings::default().field_of_view_deg, minimum = 0.0, maximum = 179.0,
-        blurb = "Horizontal field of view in degrees (0: as the camera says)"
+        blurb = "Horizontal field of view zoomed out, in degrees (0: as the camera says)"
     )]
     #[property(
         name = "prediction", get, set = Self::set_prediction, type = Prediction, member = prediction, mutable_playing,
@@ -121,19 +120,24 @@ pub struct VapixPtzSink {
     #[property(
         name = "camera-speed", get, set = Self::set_camera_speed, type = f64, member = camera_speed_deg_s, mutable_playing,
         default = Settings::default().camera_speed_deg_s, minimum = 1.0, maximum = 1000.0,
-        blurb = "What the camera does at speed step 100, in degrees per second"
+        blurb = "What a camera that does not tell does at speed step 100, in degrees per second"
     )]
     #[property(
         name = "speed-curve", get, set = Self::set_speed_curve, type = SpeedCurve, member = speed_curve, mutable_playing,
-        blurb = "How the camera's speed grows with the speed step",
+        blurb = "How the speed of a camera that does not tell grows with the speed step",
         builder(Settings::default().speed_curve)
+    )]
+    #[property(
+        name = "learn", get, set = Self::set_learn, type = bool, member = learn, mutable_playing,
+        default = Settings::default().learn,
+        blurb = "Learn latency, field of view and speed map while following; what is set or told is where that begins"
     )]
     #[property(
         name = "lockstep", get, set, type = bool, member = lockstep, mutable_ready,
         default = Settings::default().lockstep,
         blurb = "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras"
     )]
-    settings: Mutex<Settings>,
+    pub(super) settings: Mutex<Settings>,
     worker: Mutex<Option<Worker>>,
     stream: Mutex<Stream>,
     /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
@@ -368,7 +372,7 @@ impl VapixPtzSink {
         }
     }
 
-    fn with_worker(&self, action: impl FnOnce(&Worker)) {
+    pub(super) fn with_worker(&self, action: impl FnOnce(&Worker)) {
         if let Some(worker) = &*lock(&self.worker) {
             action(worker);
         }
@@ -453,80 +457,8 @@ impl VapixPtzSink {
         let _ = self.obj().sink_pad().push_event(event.to_event());
     }
 
-    fn location(&self) -> Option<String> {
-        lock(&self.settings).location.as_ref().map(ToString::to_string)
-    }
-
-    fn set_location(&self, text: Option<String>) {
-        let parsed = text.filter(|text| !text.is_empty()).map(|text| Location::parse(&text)).transpose();
-        match parsed {
-            Ok(None) => lock(&self.settings).location = None,
-            Ok(Some((location, info))) => {
-                let mut settings = lock(&self.settings);
-                settings.location = Some(location);
-                settings.user = info.user.or(settings.user.take());
-                settings.password = info.password.or(settings.password.take());
-            }
-            Err(err) => gst::element_imp_warning!(
-                self,
-                gst::ResourceError::Settings,
-                ("{err}; `location` stays as it was")
-            ),
-        }
-    }
-
-    fn set_user(&self, user: Option<String>) {
-        lock(&self.settings).user = user;
-        self.credentials_changed();
-    }
-
-    fn set_password(&self, password: Option<String>) {
-        lock(&self.settings).password = password.map(Secret::new);
-        self.credentials_changed();
-    }
-
-    fn credentials_changed(&self) {
-        let credentials = lock(&self.settings).credentials(environment);
-        self.with_worker(|worker| worker.inbox().set_credentials(credentials));
-    }
-
-    /// Changes a setting of the servo, also of one that runs.
-    fn change_servo(&self, change: impl FnOnce(&mut Settings)) {
-        let servo = {
-            let mut settings = lock(&self.settings);
-            change(&mut settings);
-            settings.servo()
-        };
-        self.with_worker(|worker| worker.inbox().configure(servo));
-    }
-
     fn stats(&self) -> gst::Structure {
         let statistics = lock(&self.worker).as_ref().map(Worker::statistics);
         statistics.map_or_else(Statistics::stopped, |statistics| statistics.to_structure())
     }
-}
-
-/// Setters of properties that a running servo takes at once.
-macro_rules! servo_setters {
-    ($($setter:ident: $field:ident, $type:ty;)+) => {
-        impl VapixPtzSink {
-            $(fn $setter(&self, value: $type) {
-                self.change_servo(|settings| settings.$field = value);
-            })+
-        }
-    };
-}
-
-servo_setters! {
-    set_mode: mode, Mode;
-    set_gain: gain, f64;
-    set_dead_zone: dead_zone, f64;
-    set_max_speed: max_speed_deg_s, f64;
-    set_max_rate: max_rate_hz, f64;
-    set_latency: latency_ms, u32;
-    set_field_of_view: field_of_view_deg, f64;
-    set_prediction: prediction, Prediction;
-    set_stale_timeout: stale_timeout_ms, u32;
-    set_camera_speed: camera_speed_deg_s, f64;
-    set_speed_curve: speed_curve, SpeedCurve;
 }

@@ -52,6 +52,7 @@ mod imp;
 mod inbox;
 mod news;
 mod picture;
+mod setters;
 mod settings;
 mod statistics;
 mod worker;

@@ -28,6 +28,7 @@ pub struct Settings {
     pub stale_timeout_ms: u32,
     pub camera_speed_deg_s: f64,
     pub speed_curve: SpeedCurve,
+    pub learn: bool,
     pub lockstep: bool,
 }
 
@@ -53,6 +54,7 @@ impl Default for Settings {
             stale_timeout_ms: servo.stale_timeout.as_millis() as u32,
             camera_speed_deg_s: servo.camera_speed_deg_s,
             speed_curve: SpeedCurve::default(),
+            learn: servo.learn,
             lockstep: false,
         }
     }
@@ -73,6 +75,7 @@ impl Settings {
             stale_timeout: milliseconds(self.stale_timeout_ms),
             camera_speed_deg_s: self.camera_speed_deg_s,
             speed_curve: self.speed_curve.into(),
+            learn: self.learn,
         }
     }
 

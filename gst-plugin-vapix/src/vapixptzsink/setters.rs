@@ -1,0 +1,84 @@
+//! What setting a property does.
+
+use gst::subclass::prelude::*;
+
+use super::imp::VapixPtzSink;
+use super::settings::{Settings, environment};
+use super::{Mode, Prediction, SpeedCurve};
+use crate::lock::lock;
+use crate::vapix::{Location, Secret};
+
+impl VapixPtzSink {
+    pub(super) fn location(&self) -> Option<String> {
+        lock(&self.settings).location.as_ref().map(ToString::to_string)
+    }
+
+    pub(super) fn set_location(&self, text: Option<String>) {
+        let parsed = text.filter(|text| !text.is_empty()).map(|text| Location::parse(&text)).transpose();
+        match parsed {
+            Ok(None) => lock(&self.settings).location = None,
+            Ok(Some((location, info))) => {
+                let mut settings = lock(&self.settings);
+                settings.location = Some(location);
+                settings.user = info.user.or(settings.user.take());
+                settings.password = info.password.or(settings.password.take());
+            }
+            Err(err) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("{err}; `location` stays as it was")
+            ),
+        }
+    }
+
+    pub(super) fn set_user(&self, user: Option<String>) {
+        lock(&self.settings).user = user;
+        self.credentials_changed();
+    }
+
+    pub(super) fn set_password(&self, password: Option<String>) {
+        lock(&self.settings).password = password.map(Secret::new);
+        self.credentials_changed();
+    }
+
+    fn credentials_changed(&self) {
+        let credentials = lock(&self.settings).credentials(environment);
+        self.with_worker(|worker| worker.inbox().set_credentials(credentials));
+    }
+
+    /// Changes a setting of the servo, also of one that runs.
+    fn change_servo(&self, change: impl FnOnce(&mut Settings)) {
+        let servo = {
+            let mut settings = lock(&self.settings);
+            change(&mut settings);
+            settings.servo()
+        };
+        self.with_worker(|worker| worker.inbox().configure(servo));
+    }
+}
+
+/// Setters of properties that a running servo takes at once.
+macro_rules! servo_setters {
+    ($($setter:ident: $field:ident, $type:ty;)+) => {
+        impl VapixPtzSink {
+            $(pub(super) fn $setter(&self, value: $type) {
+                self.change_servo(|settings| settings.$field = value);
+            })+
+        }
+    };
+}
+
+servo_setters! {
+    set_mode: mode, Mode;
+    set_gain: gain, f64;
+    set_dead_zone: dead_zone, f64;
+    set_max_speed: max_speed_deg_s, f64;
+    set_max_rate: max_rate_hz, f64;
+    set_latency: latency_ms, u32;
+    set_field_of_view: field_of_view_deg, f64;
+    set_prediction: prediction, Prediction;
+    set_stale_timeout: stale_timeout_ms, u32;
+    set_camera_speed: camera_speed_deg_s, f64;
+    set_speed_curve: speed_curve, SpeedCurve;
+    set_learn: learn, bool;
+}
