@@ -133,7 +133,12 @@ impl Aim {
 
     /// The target's own angular rate, degrees per second.
     pub fn target_rate(&self) -> PanTilt {
-        self.target_rate.mean()
+        self.target_rate.certain_mean()
+    }
+
+    /// Off the middle, as the last picture has it.
+    pub fn error(&self) -> PanTilt {
+        self.error
     }
 }
 
@@ -165,8 +170,10 @@ pub(super) mod tests {
     fn a_moving_target_is_led() {
         let history = CommandHistory::default();
         let mut aim = Aim::new(Prediction::Lead);
-        let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(1.0)) };
-        aim.see(&walking, &VIEW, &history, LATENCY);
+        for time in [0.92, 0.96, 1.0] {
+            let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
+            aim.see(&walking, &VIEW, &history, LATENCY);
+        }
         let rate = aim.target_rate().pan;
         assert!((rate - 6.616).abs() < 0.01, "{rate}");
         let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
@@ -196,7 +203,9 @@ pub(super) mod tests {
         let mut history = CommandHistory::default();
         history.push(seconds(0.5), PanTilt::new(6.0, 0.0));
         let mut aim = Aim::new(Prediction::Average);
-        aim.see(&sight(0.5, 0.5, seconds(1.0)), &VIEW, &history, LATENCY);
+        for time in [0.92, 0.96, 1.0] {
+            aim.see(&sight(0.5, 0.5, seconds(time)), &VIEW, &history, LATENCY);
+        }
         assert_eq!(aim.target_rate().pan, 6.0);
     }
 
@@ -204,8 +213,10 @@ pub(super) mod tests {
     fn another_target_has_another_motion() {
         let history = CommandHistory::default();
         let mut aim = Aim::new(Prediction::Average);
-        let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(1.0)) };
-        aim.see(&walking, &VIEW, &history, LATENCY);
+        for time in [0.92, 0.96, 1.0] {
+            let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
+            aim.see(&walking, &VIEW, &history, LATENCY);
+        }
         aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY);
         assert_eq!(aim.target_rate(), PanTilt::default());
     }

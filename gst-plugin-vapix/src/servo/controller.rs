@@ -1,6 +1,21 @@
 use super::PanTilt;
 
-/// Proportional control with feed-forward and a dead zone, each axis for itself.
+/// How the controller is to behave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ControlLaw {
+    /// Degrees per second for a degree of error, 1/s.
+    pub gain: f64,
+    /// What part of the rate so found is wanted, up to 1.
+    pub trust: f64,
+    /// The error in degrees that an axis at rest tolerates.
+    pub dead_zone_deg: f64,
+    /// Degrees per second that neither axis exceeds.
+    pub max_deg_s: f64,
+    /// Degrees per second by which an axis' rate changes at most, from one command to the next.
+    pub max_change_deg_s: f64,
+}
+
+/// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.
 #[derive(Debug, Default)]
 pub struct Controller {
     pan: Axis,
@@ -8,22 +23,12 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// The rate that brings the error to zero within about 1/gain while the target moves on.
-    ///
-    /// `gain` in 1/s; `dead_zone_deg` is the error an axis at rest tolerates; neither axis exceeds `max_deg_s`.
-    pub fn rate(
-        &mut self,
-        error: PanTilt,
-        target: PanTilt,
-        gain: f64,
-        dead_zone_deg: f64,
-        max_deg_s: f64,
-    ) -> PanTilt {
-        let rate = PanTilt {
-            pan: self.pan.rate(error.pan, target.pan, gain, dead_zone_deg),
-            tilt: self.tilt.rate(error.tilt, target.tilt, gain, dead_zone_deg),
-        };
-        PanTilt::new(rate.pan.clamp(-max_deg_s, max_deg_s), rate.tilt.clamp(-max_deg_s, max_deg_s))
+    /// The rate that brings the error to zero within about 1/gain while the target moves on; `in_force` is the present one.
+    pub fn rate(&mut self, error: PanTilt, target: PanTilt, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
+        PanTilt {
+            pan: self.pan.rate(error.pan, target.pan, in_force.pan, law),
+            tilt: self.tilt.rate(error.tilt, target.tilt, in_force.tilt, law),
+        }
     }
 
     /// Both axes at rest.
@@ -38,14 +43,18 @@ struct Axis {
 }
 
 impl Axis {
-    fn rate(&mut self, error_deg: f64, target_deg_s: f64, gain: f64, dead_zone_deg: f64) -> f64 {
-        if self.moving {
-            // Rests again well inside the zone, and only for a target that would not leave it within a second.
-            self.moving = error_deg.abs() > dead_zone_deg / 2.0 || target_deg_s.abs() > dead_zone_deg / 2.0;
-        } else {
-            self.moving = error_deg.abs() > dead_zone_deg;
-        }
-        if self.moving { gain * error_deg + target_deg_s } else { 0.0 }
+    /// The part of the dead zone that an axis must reach to come to rest: the rest is left to a tracker's tremble.
+    const REST: f64 = 1.0 / 3.0;
+
+    fn rate(&mut self, error_deg: f64, target_deg_s: f64, in_force_deg_s: f64, law: &ControlLaw) -> f64 {
+        let rest_deg = Self::REST * law.dead_zone_deg;
+        // Rests only for a target that would not leave the zone within a second.
+        let leave = if self.moving { rest_deg } else { law.dead_zone_deg };
+        self.moving = error_deg.abs() > leave || (self.moving && target_deg_s.abs() > rest_deg);
+        let wanted = if self.moving { law.trust * (law.gain * error_deg + target_deg_s) } else { 0.0 };
+        let slewed =
+            wanted.clamp(in_force_deg_s - law.max_change_deg_s, in_force_deg_s + law.max_change_deg_s);
+        slewed.clamp(-law.max_deg_s, law.max_deg_s)
     }
 }
 
@@ -54,40 +63,61 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const LAW: ControlLaw =
+        ControlLaw { gain: 1.0, trust: 1.0, dead_zone_deg: 1.0, max_deg_s: 100.0, max_change_deg_s: 1000.0 };
+
     fn still() -> PanTilt {
         PanTilt::default()
+    }
+
+    fn pan(controller: &mut Controller, error: f64, target: f64, law: &ControlLaw) -> f64 {
+        controller.rate(PanTilt::new(error, 0.0), PanTilt::new(target, 0.0), still(), law).pan
     }
 
     #[test]
     fn a_centred_target_moves_nothing_and_an_axis_moves_alone() {
         let mut controller = Controller::default();
-        assert_eq!(controller.rate(PanTilt::new(0.9, -0.9), still(), 2.0, 1.0, 100.0), still());
-        assert_eq!(controller.rate(PanTilt::new(3.0, 0.9), still(), 2.0, 1.0, 100.0), PanTilt::new(6.0, 0.0));
+        assert_eq!(controller.rate(PanTilt::new(0.9, -0.9), still(), still(), &LAW), still());
+        let law = ControlLaw { gain: 2.0, ..LAW };
+        assert_eq!(controller.rate(PanTilt::new(3.0, 0.9), still(), still(), &law), PanTilt::new(6.0, 0.0));
     }
 
     #[test]
     fn the_dead_zone_has_hysteresis() {
         let mut controller = Controller::default();
-        let mut pan = |error| controller.rate(PanTilt::new(error, 0.0), still(), 1.0, 1.0, 100.0).pan;
-        assert_eq!(pan(0.9), 0.0);
-        assert_eq!(pan(1.1), 1.1);
-        assert_eq!(pan(0.6), 0.6);
-        assert_eq!(pan(0.4), 0.0);
-        assert_eq!(pan(0.9), 0.0);
+        for (error, rate) in [(0.9, 0.0), (1.1, 1.1), (0.4, 0.4), (0.3, 0.0), (0.9, 0.0)] {
+            assert_eq!(pan(&mut controller, error, 0.0, &LAW), rate, "{error}");
+        }
     }
 
     #[test]
     fn a_walking_target_is_followed_through_the_middle() {
         let mut controller = Controller::default();
-        let walking = PanTilt::new(5.0, 0.0);
-        assert!(controller.rate(PanTilt::new(2.0, 0.0), walking, 1.0, 1.0, 100.0).pan > 0.0);
-        assert_eq!(controller.rate(still(), walking, 1.0, 1.0, 100.0).pan, 5.0);
+        assert!(pan(&mut controller, 2.0, 5.0, &LAW) > 0.0);
+        assert_eq!(pan(&mut controller, 0.0, 5.0, &LAW), 5.0);
+    }
+
+    #[test]
+    fn less_trust_is_less_of_everything() {
+        let law = ControlLaw { trust: 0.5, ..LAW };
+        assert_eq!(pan(&mut Controller::default(), 2.0, 5.0, &law), 3.5);
+    }
+
+    #[test]
+    fn acceleration_and_deceleration_are_bounded() {
+        let law = ControlLaw { max_change_deg_s: 10.0, ..LAW };
+        let mut controller = Controller::default();
+        let mut from = |rate: f64, error: f64| {
+            controller.rate(PanTilt::new(error, 0.0), still(), PanTilt::new(rate, 0.0), &law).pan
+        };
+        assert_eq!((from(0.0, 50.0), from(10.0, 50.0), from(50.0, -5.0)), (10.0, 20.0, 40.0));
     }
 
     proptest! {
         #[test]
         fn no_axis_exceeds_the_maximum(pan in -180.0..180.0f64, tilt in -90.0..90.0f64, max in 0.1..200.0f64) {
-            let rate = Controller::default().rate(PanTilt::new(pan, tilt), still(), 10.0, 0.5, max);
+            let law = ControlLaw { gain: 10.0, max_deg_s: max, ..LAW };
+            let rate = Controller::default().rate(PanTilt::new(pan, tilt), still(), still(), &law);
             prop_assert!(rate.largest() <= max);
         }
     }

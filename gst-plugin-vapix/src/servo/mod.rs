@@ -13,25 +13,33 @@ mod camera;
 mod controller;
 mod learning;
 mod link;
+#[cfg(test)]
+mod motion_tests;
 mod optics;
+mod oscillation;
 mod pan_tilt;
 mod pilot;
 mod prediction;
+mod rate;
 mod scheduler;
 mod settings;
+#[cfg(test)]
+mod simulation;
 mod speed;
 mod steps;
 mod talk;
 
 pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use camera::{CameraModel, LimitGuard};
-pub use controller::Controller;
+pub use controller::{ControlLaw, Controller};
 pub use learning::{Calibration, Turn};
 pub use link::{Link, LinkChange};
 pub use optics::{Lens, View, magnified};
+pub use oscillation::OscillationGuard;
 pub use pan_tilt::PanTilt;
 pub use pilot::Pilot;
-pub use prediction::{CommandHistory, RateAverage};
+pub use prediction::CommandHistory;
+pub use rate::RateAverage;
 pub use scheduler::Scheduler;
 pub use settings::{Mode, ServoSettings};
 pub use speed::{SpeedCurve, SpeedMap};

@@ -3,9 +3,9 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Answer, Calibration, CameraModel, CommandHistory, Controller, Job, LimitGuard, Link, Mode, Next,
-    PanTilt, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility,
-    magnified,
+    Aim, Answer, Calibration, CameraModel, CommandHistory, ControlLaw, Controller, Job, LimitGuard, Link,
+    Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap, Status,
+    Steps, View, Visibility, magnified,
 };
 use crate::vapix::{Command, Error};
 
@@ -24,6 +24,9 @@ pub struct Pilot {
     /// Speed steps as they are known by now.
     map: SpeedMap,
     controller: Controller,
+    oscillation: OscillationGuard,
+    /// How long the last command took.
+    exchange: Duration,
     guard: LimitGuard,
     target: Option<Target>,
     /// What is still to be asked of a camera just met.
@@ -75,6 +78,8 @@ impl Pilot {
             steps: Steps::default(),
             history: CommandHistory::default(),
             controller: Controller::default(),
+            oscillation: OscillationGuard::default(),
+            exchange: Duration::ZERO,
             guard: LimitGuard::default(),
             target: None,
             introduction: Query::INTRODUCTION.into(),
@@ -123,7 +128,12 @@ impl Pilot {
             self.calibration.see(&sight, &self.view(&sight), &self.history, &self.map);
             self.revise();
         }
-        self.aim.see(&sight, &self.view(&sight), &self.history, self.calibration.latency());
+        let view = self.view(&sight);
+        self.aim.see(&sight, &view, &self.history, self.calibration.latency());
+        let tolerated_deg = self.settings.dead_zone * view.horizontal_fov_deg;
+        if self.oscillation.see(self.aim.error(), tolerated_deg, sight.taken_at) {
+            self.reports.push(Report::Swinging(self.oscillation.trust()));
+        }
         self.overtaken += u64::from(self.target.as_ref().is_some_and(|target| !target.considered));
         self.target = Some(Target { sight, last_seen, considered: false });
     }
@@ -133,6 +143,7 @@ impl Pilot {
         self.target = None;
         self.aim.clear();
         self.controller.rest();
+        self.oscillation.clear();
     }
 
     /// What to send now, if anything.
@@ -250,13 +261,9 @@ impl Pilot {
     }
 
     fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
-        let settings = &self.settings;
-        let view = self.view(sight);
+        let law = self.control_law(&self.view(sight));
         let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
-        let dead_zone_deg = settings.dead_zone * view.horizontal_fov_deg;
-        let target = self.aim.target_rate();
-        let wanted =
-            self.controller.rate(error, target, settings.gain, dead_zone_deg, settings.max_speed_deg_s);
+        let wanted = self.controller.rate(error, self.aim.target_rate(), self.history.rate_at(now), &law);
         let rate = self.guard.apply(wanted, &self.camera);
         self.report_limit();
         let map = &self.map;
@@ -264,6 +271,20 @@ impl Pilot {
         match self.speed_steps {
             (0, 0) => Wish::Rest,
             (pan, tilt) => Wish::Move(Command::Velocity { pan, tilt }),
+        }
+    }
+
+    fn control_law(&self, view: &View) -> ControlLaw {
+        let settings = &self.settings;
+        let interval_s = (1.0 / settings.max_rate_hz).max(self.exchange.as_secs_f64());
+        // No error is worth a move that would leave nearly as large a one on the other side.
+        let shortest_move_deg = self.map.deg_s(1) * interval_s;
+        ControlLaw {
+            gain: settings.gain,
+            trust: self.oscillation.trust(),
+            dead_zone_deg: (settings.dead_zone * view.horizontal_fov_deg).max(0.75 * shortest_move_deg),
+            max_deg_s: settings.max_speed_deg_s,
+            max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
         }
     }
 
@@ -310,6 +331,7 @@ impl Pilot {
     fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
         let was_moving = self.scheduler.may_move();
         self.scheduler.accepted(command, now);
+        self.exchange = now.saturating_sub(sent);
         // Counted from its sending on: that is when it can begin to act, however late the answer is.
         match command {
             Command::Velocity { pan, tilt } => {

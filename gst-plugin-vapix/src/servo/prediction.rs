@@ -4,42 +4,6 @@ use std::time::Duration;
 
 use super::{PanTilt, SpeedMap};
 
-/// Mean of a rate over a window of time (thesis 3.16: one second), whatever the frame rate.
-#[derive(Debug)]
-pub struct RateAverage {
-    window: Duration,
-    samples: VecDeque<(Duration, PanTilt)>,
-}
-
-impl RateAverage {
-    /// An empty average.
-    pub fn new(window: Duration) -> Self {
-        Self { window, samples: VecDeque::new() }
-    }
-
-    /// Takes the rate at a time; times that go back begin anew.
-    pub fn push(&mut self, at: Duration, rate: PanTilt) {
-        if self.samples.back().is_some_and(|(last, _)| *last > at) {
-            self.samples.clear();
-        }
-        self.samples.push_back((at, rate));
-        while self.samples.front().is_some_and(|(first, _)| at - *first > self.window) {
-            self.samples.pop_front();
-        }
-    }
-
-    /// The mean; zero where nothing is known.
-    pub fn mean(&self) -> PanTilt {
-        let sum = self.samples.iter().fold(PanTilt::default(), |sum, (_, rate)| sum + *rate);
-        sum / self.samples.len().max(1) as f64
-    }
-
-    /// Forgets everything.
-    pub fn clear(&mut self) {
-        self.samples.clear();
-    }
-}
-
 /// The rates the camera was told, so that the rotation not yet visible in the picture is known.
 #[derive(Debug, Default)]
 pub struct CommandHistory(VecDeque<Entry>);
@@ -122,26 +86,6 @@ mod tests {
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
-    }
-
-    #[test]
-    fn the_average_covers_its_window_only() {
-        let mut average = RateAverage::new(ms(1000));
-        assert_eq!(average.mean(), PanTilt::default());
-        for i in 0..=60 {
-            let rate = if i < 30 { 100.0 } else { f64::from(i % 2) * 2.0 };
-            average.push(ms(1000 * u64::from(i as u32) / 30), PanTilt::new(rate, -1.0));
-        }
-        assert!((average.mean().pan - 1.0).abs() < 0.05, "{:?}", average.mean());
-        assert!((average.mean().tilt + 1.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_clock_that_goes_back_begins_anew() {
-        let mut average = RateAverage::new(ms(1000));
-        average.push(ms(5000), PanTilt::new(10.0, 0.0));
-        average.push(ms(10), PanTilt::new(2.0, 0.0));
-        assert_eq!(average.mean().pan, 2.0);
     }
 
     #[test]

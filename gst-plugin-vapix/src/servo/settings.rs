@@ -25,6 +25,8 @@ pub struct ServoSettings {
     pub dead_zone: f64,
     /// Degrees per second that neither axis exceeds.
     pub max_speed_deg_s: f64,
+    /// Degrees per second that either axis' speed changes by in a second; a stop is at once.
+    pub max_acceleration_deg_s2: f64,
     /// Commands per second at most; a stop does not wait for its turn.
     pub max_rate_hz: f64,
     /// From sending a command to the motion, and from light on the sensor to the picture's timestamp, together.
@@ -57,6 +59,7 @@ impl Default for ServoSettings {
             gain: 2.0,
             dead_zone: 0.03,
             max_speed_deg_s: 100.0,
+            max_acceleration_deg_s2: 300.0,
             max_rate_hz: 10.0,
             latency: Duration::from_millis(200),
             fov_deg: None,

@@ -82,6 +82,8 @@ pub enum Report {
     Stopped,
     /// The target lies beyond the camera's range.
     AtLimit,
+    /// The camera swung to and fro about the target: from now on only this part of the speed is asked for.
+    Swinging(f64),
 }
 
 /// The camera as it is known.

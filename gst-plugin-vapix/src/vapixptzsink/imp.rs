@@ -93,6 +93,11 @@ pub struct VapixPtzSink {
         blurb = "Pan and tilt never turn faster than this, in degrees per second"
     )]
     #[property(
+        name = "max-acceleration", get, set = Self::set_max_acceleration, type = f64, member = max_acceleration_deg_s2, mutable_playing,
+        default = Settings::default().max_acceleration_deg_s2, minimum = 1.0, maximum = 10_000.0,
+        blurb = "By how much the speed of pan and tilt changes in a second at most, in degrees per second; a stop is at once"
+    )]
+    #[property(
         name = "max-rate", get, set = Self::set_max_rate, type = f64, member = max_rate_hz, mutable_playing,
         default = Settings::default().max_rate_hz, minimum = 0.1, maximum = 50.0,
         blurb = "Commands per second at most; stops are sent at once"
@@ -406,6 +411,14 @@ impl VapixPtzSink {
                     "the target is beyond the end of the camera's pan or tilt range",
                 );
             }
+            Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                (
+                    "the camera swings to and fro about the target; its speed is lowered to {:.0} % until it is calm. Lower `gain`, or set `latency` and `camera-speed` right",
+                    trust * 100.0
+                )
+            ),
             Event::Status(status) => *lock(&self.news) = Some(status),
             Event::GaveUp => gst::element_imp_warning!(
                 self,

@@ -73,6 +73,7 @@ servo_setters! {
     set_gain: gain, f64;
     set_dead_zone: dead_zone, f64;
     set_max_speed: max_speed_deg_s, f64;
+    set_max_acceleration: max_acceleration_deg_s2, f64;
     set_max_rate: max_rate_hz, f64;
     set_latency: latency_ms, u32;
     set_field_of_view: field_of_view_deg, f64;

@@ -1,0 +1,103 @@
+//! How well the whole servo moves, in closed loop.
+
+use std::time::Duration;
+
+use super::simulation::{Run, Setup};
+use super::{PanTilt, Report};
+
+/// Delay in milliseconds, and magnification.
+const CASES: [(u64, f64); 4] = [(100, 1.0), (300, 1.0), (100, 10.0), (300, 10.0)];
+
+/// Degrees per second that look as fast at any magnification.
+fn brisk(magnification: f64) -> f64 {
+    12.0 / magnification
+}
+
+/// A target with its pan over time, in degrees; it stands 20 degrees high.
+fn pan(path: impl Fn(f64) -> f64) -> impl Fn(f64) -> (PanTilt, f64) {
+    move |time| (PanTilt::new(path(time), 0.0), 20.0)
+}
+
+/// To and fro, 6 s each way; turning takes about a second, as it takes people.
+fn pacing(speed: f64) -> impl Fn(f64) -> f64 {
+    let turns = |time: f64| {
+        let phase = (time % 12.0) / 12.0 * std::f64::consts::TAU;
+        (4.0 * phase.sin()).clamp(-1.0, 1.0)
+    };
+    move |time| (0..(time * 100.0) as u32).map(|step| turns(f64::from(step) / 100.0) * speed / 100.0).sum()
+}
+
+/// How often the target changes sides, by more than the part of the picture.
+fn crossings(run: &Run, part: f64, from_s: f64) -> usize {
+    let sides: Vec<f64> = run
+        .frames_between(from_s, f64::INFINITY)
+        .map(|frame| frame.offset.x)
+        .filter(|x| x.abs() > part)
+        .map(f64::signum)
+        .collect();
+    sides.windows(2).filter(|pair| pair[0] != pair[1]).count()
+}
+
+#[test]
+fn a_walking_person_is_kept_in_the_middle() {
+    for (delay, zoom) in CASES {
+        let run = Setup::new(delay, zoom).run(15.0, pan(|t| brisk(zoom) * t));
+        assert!(run.mean_offset(3.0, 15.0) < 0.01, "{delay} ms, {zoom}x: {}", run.mean_offset(3.0, 15.0));
+    }
+}
+
+#[test]
+fn a_step_in_the_targets_speed_neither_overshoots_nor_oscillates() {
+    for (delay, zoom) in CASES {
+        for first in [0.0, 0.5, -0.5] {
+            let speed = brisk(zoom);
+            let path = |t: f64| speed * if t < 5.0 { first * t } else { first * 5.0 + t - 5.0 };
+            let run = Setup::new(delay, zoom).run(15.0, pan(path));
+            let overshoot = run.farthest(-1.0, 5.0, 15.0);
+            assert!(overshoot < 0.1, "{delay} ms, {zoom}x, from {first}: {overshoot} of the half width");
+            assert!(crossings(&run, 0.015, 5.0) <= 1, "{delay} ms, {zoom}x, from {first}");
+            assert_eq!(run.reports.iter().filter(|report| matches!(report, Report::Swinging(_))).count(), 0);
+        }
+    }
+}
+
+#[test]
+fn a_standing_person_is_let_be_though_the_tracker_trembles() {
+    for (delay, zoom) in CASES {
+        for noisy_velocity in [false, true] {
+            let setup = Setup { jitter: 0.01, noisy_velocity, ..Setup::new(delay, zoom) };
+            let run = setup.run(70.0, pan(|_| 10.0 / zoom));
+            assert_eq!(run.commands_between(10.0, 70.0), 0, "{delay} ms, {zoom}x, {:?}", run.commands);
+            assert!(run.mean_offset(10.0, 70.0) < 0.03);
+        }
+    }
+}
+
+#[test]
+fn coarse_speed_steps_make_no_limit_cycle() {
+    // Its slowest is 4.5 degrees per second, nearly a picture's width.
+    for delay in [100, 300] {
+        let linear = super::SpeedMap::new(450.0, super::SpeedCurve::Linear);
+        let mut setup = Setup { map: linear, jitter: 0.003, ..Setup::new(delay, 10.0) };
+        setup.settings.speed_curve = super::SpeedCurve::Linear;
+        let run = setup.run(70.0, pan(|_| 1.0));
+        assert_eq!(run.commands_between(10.0, 70.0), 0, "{:?}", run.commands);
+    }
+}
+
+#[test]
+fn a_loop_that_swings_is_calmed_and_said_so() {
+    let mut setup = Setup::new(900, 1.0);
+    setup.settings.learn = false;
+    setup.settings.latency = Duration::from_millis(50);
+    setup.settings.gain = 3.0;
+    setup.settings.dead_zone = 0.01;
+    let run = setup.run(60.0, pan(|_| 8.0));
+    assert!(run.reports.iter().any(|report| matches!(report, Report::Swinging(_))), "{:?}", run.reports);
+    assert!(run.farthest(1.0, 0.0, 10.0) > 0.2);
+    assert!(
+        run.farthest(1.0, 30.0, 60.0) < 0.1 && run.farthest(-1.0, 30.0, 60.0) < 0.1,
+        "{}",
+        run.farthest(-1.0, 30.0, 60.0)
+    );
+}

@@ -1,0 +1,146 @@
+use std::time::Duration;
+
+use super::PanTilt;
+
+/// Notices a loop that swings about its target, as one does whose delays or speeds are not what they are
+/// taken for, and lowers the gain until it is calm.
+#[derive(Debug)]
+pub struct OscillationGuard {
+    pan: Swing,
+    tilt: Swing,
+    trust: f64,
+    changed_at: Duration,
+}
+
+impl Default for OscillationGuard {
+    fn default() -> Self {
+        Self { pan: Swing::default(), tilt: Swing::default(), trust: 1.0, changed_at: Duration::ZERO }
+    }
+}
+
+impl OscillationGuard {
+    const LOWER: f64 = 0.6;
+    const LOWEST: f64 = 0.2;
+    const RAISE: f64 = 1.2;
+
+    /// After so long without a swing a little more is dared.
+    const CALM: Duration = Duration::from_secs(30);
+
+    /// Takes the error of a picture; `tolerated_deg` is no swing. Returns whether the gain was lowered by this.
+    pub fn see(&mut self, error: PanTilt, tolerated_deg: f64, at: Duration) -> bool {
+        let swings =
+            [self.pan.see(error.pan, tolerated_deg, at), self.tilt.see(error.tilt, tolerated_deg, at)];
+        if swings.contains(&true) {
+            self.trust = (self.trust * Self::LOWER).max(Self::LOWEST);
+            (self.pan, self.tilt, self.changed_at) = (Swing::default(), Swing::default(), at);
+            return true;
+        }
+        if self.trust < 1.0 && at.saturating_sub(self.changed_at) > Self::CALM {
+            self.trust = (self.trust * Self::RAISE).min(1.0);
+            self.changed_at = at;
+        }
+        false
+    }
+
+    /// What part of the wanted rate is to be commanded, up to 1.
+    pub fn trust(&self) -> f64 {
+        self.trust
+    }
+
+    /// Another target: what was seen so far tells nothing of it.
+    pub fn clear(&mut self) {
+        (self.pan, self.tilt) = (Swing::default(), Swing::default());
+    }
+}
+
+/// Half waves of one axis' error, from one crossing to the next.
+#[derive(Debug, Default)]
+struct Swing {
+    /// The farthest of the half wave under way, signed; 0 before the first.
+    peak: f64,
+    since: Duration,
+    /// The size of the one before, and how many in a row were no smaller.
+    last: f64,
+    steady: u32,
+}
+
+impl Swing {
+    /// A half wave that lasts longer is the target's own pacing.
+    const LONGEST: Duration = Duration::from_secs(2);
+
+    /// A half wave counts that has at least this part of the size of the one before: else it dies away by itself.
+    const STEADY: f64 = 0.8;
+
+    /// So many half waves in a row are no accident.
+    const ENOUGH: u32 = 4;
+
+    fn see(&mut self, error: f64, tolerated: f64, at: Duration) -> bool {
+        if error.abs() <= tolerated {
+            return false;
+        }
+        if error * self.peak >= 0.0 && self.peak != 0.0 {
+            self.peak = self.peak.abs().max(error.abs()).copysign(error);
+            return false;
+        }
+        let quick = at.saturating_sub(self.since) <= Self::LONGEST;
+        let steady = self.peak.abs() >= Self::STEADY * self.last;
+        self.steady = if quick && steady && self.peak != 0.0 { self.steady + 1 } else { 0 };
+        (self.last, self.peak, self.since) = (self.peak.abs(), error, at);
+        self.steady >= Self::ENOUGH
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// How often the gain is lowered by an error over 20 s.
+    fn lowered(guard: &mut OscillationGuard, error: impl Fn(f64) -> f64) -> usize {
+        let at = |frame: u32| f64::from(frame) / 25.0;
+        (0..500)
+            .filter(|frame| {
+                guard.see(PanTilt::new(error(at(*frame)), 0.0), 1.0, Duration::from_secs_f64(at(*frame)))
+            })
+            .count()
+    }
+
+    #[test]
+    fn a_steady_or_growing_swing_lowers_the_gain() {
+        let mut guard = OscillationGuard::default();
+        assert!(lowered(&mut guard, |t| 5.0 * (4.0 * t).sin()) > 1);
+        assert!(guard.trust() < 0.5 && guard.trust() >= OscillationGuard::LOWEST);
+        assert!(lowered(&mut OscillationGuard::default(), |t| t * (4.0 * t).sin()) > 0);
+    }
+
+    #[test]
+    fn a_swing_that_dies_away_and_a_pacing_target_do_not() {
+        let mut guard = OscillationGuard::default();
+        assert_eq!(lowered(&mut guard, |t| 20.0 * (-0.5 * t).exp() * (4.0 * t).sin()), 0);
+        assert_eq!(lowered(&mut guard, |t| 8.0 * (1.2 * t).sin()), 0);
+        assert_eq!(lowered(&mut guard, |t| 0.9 * (9.0 * t).sin()), 0);
+        assert_eq!(lowered(&mut guard, |t| 5.0 + 3.0 * (4.0 * t).sin()), 0);
+        assert_eq!(guard.trust(), 1.0);
+    }
+
+    #[test]
+    fn when_it_is_calm_the_gain_comes_back() {
+        let mut guard = OscillationGuard::default();
+        lowered(&mut guard, |t| 5.0 * (4.0 * t).sin());
+        for second in 20..600 {
+            assert!(!guard.see(PanTilt::default(), 1.0, Duration::from_secs(second)));
+        }
+        assert_eq!(guard.trust(), 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn trust_stays_in_range(errors in prop::collection::vec(-90.0..90.0f64, 0..400)) {
+            let mut guard = OscillationGuard::default();
+            for (frame, error) in (0..).zip(errors) {
+                guard.see(PanTilt::new(error, -error), 0.5, Duration::from_millis(40 * frame));
+                prop_assert!((OscillationGuard::LOWEST..=1.0).contains(&guard.trust()));
+            }
+        }
+    }
+}

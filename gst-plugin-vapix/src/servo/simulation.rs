@@ -1,0 +1,345 @@
+//! A head that turns and zooms as it is told, everything late, before somebody who walks: closed loops for tests.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ptztrack_contract::{Point, Rect, Vector};
+
+use super::{
+    Answer, Job, Lens, Next, PanTilt, Pilot, Query, ServoSettings, Sight, SpeedCurve, SpeedMap, View,
+    Visibility,
+};
+use crate::vapix::{Command, Error, Limits, Position, Range};
+
+const TICK: Duration = Duration::from_millis(5);
+const PICTURE: Duration = Duration::from_millis(40);
+pub const ASPECT: f64 = 4.0 / 3.0;
+const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+
+/// What the world is, whatever the servo believes.
+pub struct Setup {
+    pub settings: ServoSettings,
+    pub video_delay: Duration,
+    pub command_delay: Duration,
+    pub round_trip: Duration,
+    pub map: SpeedMap,
+    pub acceleration_deg_s2: f64,
+    /// Zoom steps per second at speed step 100.
+    pub zoom_speed: f64,
+    pub zoom_step: f64,
+    pub pan_limits: Range,
+    /// Half the width of the noise in the target's place and height, parts of the picture.
+    pub jitter: f64,
+    /// Whether the tracker's velocity is the difference of its noisy places; else it is the true one.
+    pub noisy_velocity: bool,
+    /// Whether the tracker sees the background's motion.
+    pub sees_ground: bool,
+    pub visible: fn(f64) -> Visibility,
+    /// Commands that this camera does not know.
+    pub refuses: fn(&Command) -> bool,
+}
+
+impl Setup {
+    /// A dome, zoomed so that it is magnified so often, with so much delay in all; the servo knows the delay.
+    pub fn new(total_delay_ms: u64, magnification: f64) -> Self {
+        Self {
+            settings: ServoSettings {
+                latency: Duration::from_millis(total_delay_ms),
+                ..ServoSettings::default()
+            },
+            video_delay: Duration::from_millis(total_delay_ms * 2 / 5 / 5 * 5),
+            command_delay: Duration::from_millis(total_delay_ms * 3 / 5),
+            round_trip: Duration::from_millis(30),
+            map: SpeedMap::new(450.0, SpeedCurve::Cubic),
+            acceleration_deg_s2: 400.0,
+            zoom_speed: 3000.0,
+            zoom_step: ZOOM_STEPS.min + (magnification - 1.0) / 17.0 * (ZOOM_STEPS.max - ZOOM_STEPS.min),
+            pan_limits: Range { min: -180.0, max: 180.0 },
+            jitter: 0.0,
+            noisy_velocity: false,
+            sees_ground: true,
+            visible: |_| Visibility::Seen,
+            refuses: |_| false,
+        }
+    }
+
+    /// Lets it follow a target for some seconds. `target`: its direction and height in degrees at a time in seconds.
+    pub fn run(self, seconds: f64, target: impl Fn(f64) -> (PanTilt, f64)) -> Run {
+        let mut simulation = Simulation::new(self);
+        let mut run = Run::default();
+        while simulation.now.as_secs_f64() < Simulation::START_S + seconds {
+            simulation.tick(&|time| target(time - Simulation::START_S), &mut run);
+        }
+        run.reports = simulation.pilot.take_reports();
+        run
+    }
+}
+
+/// One picture, as it really is.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    pub time_s: f64,
+    /// Offset of the target from the middle, in picture widths and heights.
+    pub offset: Vector,
+    pub height: f64,
+    pub pose: PanTilt,
+    pub rate: PanTilt,
+}
+
+/// What happened, time counted from the target's begin.
+#[derive(Debug, Default)]
+pub struct Run {
+    pub frames: Vec<Frame>,
+    pub commands: Vec<(f64, Command)>,
+    pub reports: Vec<super::Report>,
+}
+
+impl Run {
+    pub fn frames_between(&self, from_s: f64, to_s: f64) -> impl Iterator<Item = &Frame> {
+        self.frames.iter().filter(move |frame| (from_s..to_s).contains(&frame.time_s))
+    }
+
+    /// Mean distance from the middle in picture widths.
+    pub fn mean_offset(&self, from_s: f64, to_s: f64) -> f64 {
+        let distances =
+            self.frames_between(from_s, to_s).map(|frame| frame.offset.x.hypot(frame.offset.y / ASPECT));
+        let (sum, count) = distances.fold((0.0, 0), |(sum, count), distance| (sum + distance, count + 1));
+        sum / f64::from(count)
+    }
+
+    /// Farthest to that side (-1: the camera is ahead of a target that goes right), in half picture widths.
+    pub fn farthest(&self, side: f64, from_s: f64, to_s: f64) -> f64 {
+        self.frames_between(from_s, to_s).map(|frame| frame.offset.x * side * 2.0).fold(0.0, f64::max)
+    }
+
+    pub fn commands_between(&self, from_s: f64, to_s: f64) -> usize {
+        self.commands.iter().filter(|(at, _)| (from_s..to_s).contains(at)).count()
+    }
+}
+
+struct Shot {
+    frame: Frame,
+    place: Point,
+    ego: Vector,
+    velocity: Vector,
+    at: Duration,
+}
+
+struct Simulation {
+    setup: Setup,
+    pilot: Pilot,
+    now: Duration,
+    pose: PanTilt,
+    rate: PanTilt,
+    wanted: PanTilt,
+    /// Where a move to a position goes.
+    goal: Option<(PanTilt, Option<f64>)>,
+    zoom_rate: f64,
+    lens: Lens,
+    under_way: VecDeque<(Duration, Command)>,
+    in_flight: Option<(Job, Duration)>,
+    shots: VecDeque<Shot>,
+    last_shot: Option<(Duration, PanTilt, View, PanTilt, Point)>,
+    noise: u64,
+}
+
+impl Simulation {
+    /// The clock does not begin at zero; by then the camera has introduced itself.
+    const START_S: f64 = 2.0;
+    const WIDE_FOV_DEG: f64 = 55.2;
+
+    fn new(setup: Setup) -> Self {
+        Self {
+            pilot: Pilot::new(setup.settings.clone()),
+            now: Duration::from_secs(1),
+            pose: PanTilt::default(),
+            rate: PanTilt::default(),
+            wanted: PanTilt::default(),
+            goal: None,
+            zoom_rate: 0.0,
+            lens: Lens::linear(Self::WIDE_FOV_DEG, ZOOM_STEPS, 18.0),
+            under_way: VecDeque::new(),
+            in_flight: None,
+            shots: VecDeque::new(),
+            last_shot: None,
+            noise: 1,
+            setup,
+        }
+    }
+
+    fn tick(&mut self, target: &impl Fn(f64) -> (PanTilt, f64), run: &mut Run) {
+        self.now += TICK;
+        while self.under_way.front().is_some_and(|(at, _)| *at <= self.now) {
+            if let Some((_, command)) = self.under_way.pop_front() {
+                self.obey(&command);
+            }
+        }
+        self.turn();
+        if self.now.as_millis().is_multiple_of(PICTURE.as_millis()) {
+            self.expose(target);
+        }
+        while self.shots.front().is_some_and(|shot| shot.at + self.setup.video_delay <= self.now) {
+            if let Some(shot) = self.shots.pop_front() {
+                self.show(&shot, run);
+            }
+        }
+        self.talk(run);
+    }
+
+    fn obey(&mut self, command: &Command) {
+        match *command {
+            Command::Velocity { pan, tilt, .. } => {
+                self.goal = None;
+                self.wanted = PanTilt::new(self.setup.map.deg_s(pan), self.setup.map.deg_s(tilt));
+            }
+            Command::Absolute { pan_deg, tilt_deg, .. } => {
+                self.goal = Some((PanTilt::new(pan_deg, tilt_deg), None));
+            }
+            Command::Centre { x, y, width, height } => {
+                let part = |pixel: u32, size: u32| f64::from(pixel) / f64::from(size);
+                let turn = self.view().error(Point { x: part(x, width), y: part(y, height) });
+                self.goal = Some((self.pose + turn, None));
+            }
+            Command::Halt | Command::Stop => {
+                self.goal = None;
+                self.wanted = PanTilt::default();
+            }
+        }
+    }
+
+    fn turn(&mut self) {
+        let dt = TICK.as_secs_f64();
+        if let Some((goal, _)) = self.goal {
+            // Fast, and slower near the end.
+            let way = goal - self.pose;
+            let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
+            self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
+        }
+        let change = self.setup.acceleration_deg_s2 * dt;
+        let towards = |rate: f64, wanted: f64| rate + (wanted - rate).clamp(-change, change);
+        self.rate =
+            PanTilt::new(towards(self.rate.pan, self.wanted.pan), towards(self.rate.tilt, self.wanted.tilt));
+        self.pose = self.pose + self.rate * dt;
+        let limits = self.setup.pan_limits;
+        self.pose.pan = self.pose.pan.clamp(limits.min, limits.max);
+        self.setup.zoom_step =
+            (self.setup.zoom_step + self.zoom_rate * dt).clamp(ZOOM_STEPS.min, ZOOM_STEPS.max);
+    }
+
+    fn view(&self) -> View {
+        View {
+            horizontal_fov_deg: self.lens.fov_deg(self.setup.zoom_step),
+            aspect: ASPECT,
+            tilt_deg: self.pose.tilt,
+        }
+    }
+
+    fn expose(&mut self, target: &impl Fn(f64) -> (PanTilt, f64)) {
+        let time_s = self.now.as_secs_f64();
+        let (direction, height_deg) = target(time_s);
+        let view = self.view();
+        let place = project(direction, self.pose, &view);
+        let above = project(direction + PanTilt::new(0.0, height_deg / 2.0), self.pose, &view);
+        let below = project(direction - PanTilt::new(0.0, height_deg / 2.0), self.pose, &view);
+        let noisy = Point { x: place.x + self.jitter(), y: place.y + self.jitter() };
+        let (mut ego, mut velocity) = (Vector::default(), Vector::default());
+        if let Some((at, pose, last_view, last_direction, last_noisy)) = self.last_shot {
+            let dt = (self.now - at).as_secs_f64();
+            let per_s = |to: Point, from: Point| Vector { x: (to.x - from.x) / dt, y: (to.y - from.y) / dt };
+            let before = project(last_direction, pose, &last_view);
+            ego = per_s(project(last_direction, self.pose, &view), before);
+            velocity =
+                if self.setup.noisy_velocity { per_s(noisy, last_noisy) } else { per_s(place, before) };
+        }
+        self.last_shot = Some((self.now, self.pose, view, direction, noisy));
+        let frame = Frame {
+            time_s: time_s - Self::START_S,
+            offset: Vector { x: place.x - 0.5, y: place.y - 0.5 },
+            height: below.y - above.y,
+            pose: self.pose,
+            rate: self.rate,
+        };
+        self.shots.push_back(Shot { frame, place: noisy, ego, velocity, at: self.now });
+    }
+
+    fn show(&mut self, shot: &Shot, run: &mut Run) {
+        if shot.frame.time_s < 0.0 {
+            return;
+        }
+        run.frames.push(shot.frame);
+        let _ = Rect::default();
+        let sight = Sight {
+            visibility: (self.setup.visible)(shot.frame.time_s),
+            id: 1,
+            centroid: shot.place,
+            velocity: shot.velocity,
+            ego_velocity: Some(shot.ego).filter(|_| self.setup.sees_ground),
+            size: (640, 480),
+            aspect: ASPECT,
+            taken_at: self.now,
+        };
+        self.pilot.see(sight, self.now);
+    }
+
+    fn talk(&mut self, run: &mut Run) {
+        if let Some((job, sent)) = self.in_flight {
+            if self.now < sent + self.setup.round_trip {
+                return;
+            }
+            self.in_flight = None;
+            let answer = self.answer(&job);
+            self.pilot.answered(&job, answer, sent, self.now);
+        }
+        if let Next::Do(job) = self.pilot.next(self.now) {
+            self.pilot.sending(&job, self.now);
+            self.in_flight = Some((job, self.now));
+            if let Job::Command(command) = job {
+                run.commands.push((self.now.as_secs_f64() - Self::START_S, command));
+                if !(self.setup.refuses)(&command) {
+                    self.under_way.push_back((self.now + self.setup.command_delay, command));
+                }
+            }
+        }
+    }
+
+    fn answer(&self, job: &Job) -> Result<Answer, Error> {
+        Ok(match job {
+            Job::Command(command) if (self.setup.refuses)(command) => {
+                return Err(Error::Camera("unknown".to_owned()));
+            }
+            Job::Command(_) => Answer::Accepted,
+            Job::Query(Query::Position) => Answer::Position(Position {
+                pan_deg: Some(self.pose.pan),
+                tilt_deg: Some(self.pose.tilt),
+                zoom_steps: Some(self.setup.zoom_step.round()),
+            }),
+            Job::Query(Query::Limits) => Answer::Limits(Limits {
+                pan_deg: Some(self.setup.pan_limits),
+                tilt_deg: Some(Range { min: -90.0, max: 20.0 }),
+                zoom_steps: Some(ZOOM_STEPS),
+                field_angle_deg: Some(Range {
+                    min: self.lens.fov_deg(ZOOM_STEPS.max),
+                    max: self.lens.fov_deg(ZOOM_STEPS.min),
+                }),
+            }),
+            Job::Query(_) => return Err(Error::Camera("none".to_owned())),
+        })
+    }
+
+    fn jitter(&mut self) -> f64 {
+        // Knuth's linear congruence: the same noise every time.
+        self.noise =
+            self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        ((self.noise >> 33) as f64 / f64::from(1u32 << 31) * 2.0 - 1.0) * self.setup.jitter
+    }
+}
+
+/// Where a direction is in the picture of a camera that looks to `pose`; the inverse of [`View::error`].
+fn project(direction: PanTilt, pose: PanTilt, view: &View) -> Point {
+    let (pan, elevation) = ((direction.pan - pose.pan).to_radians(), direction.tilt.to_radians());
+    let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
+    let (sin, cos) = view.tilt_deg.to_radians().sin_cos();
+    let (ahead, up) = (far * cos + high * sin, high * cos - far * sin);
+    let width = 2.0 * (view.horizontal_fov_deg / 2.0).to_radians().tan();
+    Point { x: 0.5 + right / ahead / width, y: 0.5 - up / ahead * view.aspect / width }
+}
