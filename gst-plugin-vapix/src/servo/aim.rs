@@ -1,15 +1,15 @@
 use std::time::Duration;
 
-use ptztrack_contract::{Point, TargetState, Vector};
+use ptztrack_contract::{Point, Rect, TargetState, Vector};
 
-use super::{CommandHistory, PanTilt, RateAverage, View};
+use super::{CommandHistory, Offset, PanTilt, RateAverage, View};
 
 /// How the target's motion is carried forward over the latency.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Prediction {
     /// With its mean over the last second (thesis 3.16): smooth, and late when the target turns.
     Average,
-    /// With its mean over the last moments.
+    /// With its rate as it was over the last moments, and as that was changing.
     #[default]
     Lead,
 }
@@ -18,8 +18,8 @@ impl Prediction {
     fn window(self) -> Duration {
         match self {
             Self::Average => Duration::from_secs(1),
-            // A walking person's sway lasts about a second, the noise of optical flow a frame.
-            Self::Lead => Duration::from_millis(300),
+            // A walking person's sway lasts half a second or more, the noise of optical flow a frame.
+            Self::Lead => Duration::from_millis(400),
         }
     }
 }
@@ -54,6 +54,8 @@ pub struct Sight {
     pub id: u64,
     /// Where, in frame widths and heights from the top left.
     pub centroid: Point,
+    /// The box about it, in the same units.
+    pub bounds: Rect,
     /// Its motion in the picture, frames per second.
     pub velocity: Vector,
     /// The background's motion in the picture, same unit, where it was seen.
@@ -126,14 +128,32 @@ impl Aim {
     /// it was already told and that the picture does not show yet (Smith predictor).
     pub fn error_at_effect(&self, now: Duration, history: &CommandHistory, latency: Duration) -> PanTilt {
         let shown = self.taken_at.saturating_sub(latency);
-        let horizon = now.saturating_sub(self.taken_at) + latency;
+        let horizon = self.horizon(now, latency);
         let under_way = history.rotation(shown, now);
-        self.error + self.target_rate() * horizon.as_secs_f64() - under_way
+        // The rate grows evenly: on the way it is what it is half way.
+        self.error + self.target_rate(horizon / 2) * horizon.as_secs_f64() - under_way
     }
 
-    /// The target's own angular rate, degrees per second.
-    pub fn target_rate(&self) -> PanTilt {
-        self.target_rate.certain_mean()
+    /// Where the target is off the middle, and how it goes on.
+    pub fn offset(&self, now: Duration, history: &CommandHistory, latency: Duration) -> Offset {
+        Offset {
+            seen: self.error,
+            expected: self.error_at_effect(now, history, latency),
+            target: self.target_rate(self.horizon(now, latency)),
+        }
+    }
+
+    /// From the picture until a command sent `now` shows.
+    fn horizon(&self, now: Duration, latency: Duration) -> Duration {
+        now.saturating_sub(self.taken_at) + latency
+    }
+
+    /// The target's own angular rate so long after the picture.
+    fn target_rate(&self, lead: Duration) -> PanTilt {
+        match self.prediction {
+            Prediction::Average => self.target_rate.certain_mean(),
+            Prediction::Lead => self.target_rate.ahead(lead),
+        }
     }
 
     /// Off the middle, as the last picture has it.
@@ -154,6 +174,7 @@ pub(super) mod tests {
             visibility: Visibility::Seen,
             id: 1,
             centroid: Point { x, y },
+            bounds: Rect { x: x - 0.05, y: y - 0.1, width: 0.1, height: 0.2 },
             velocity: Vector::default(),
             ego_velocity: None,
             size: (640, 480),
@@ -174,7 +195,7 @@ pub(super) mod tests {
             let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
             aim.see(&walking, &VIEW, &history, LATENCY);
         }
-        let rate = aim.target_rate().pan;
+        let rate = aim.target_rate(Duration::ZERO).pan;
         assert!((rate - 6.616).abs() < 0.01, "{rate}");
         let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
         assert!((error - rate * 0.3).abs() < 1e-9, "{error}");
@@ -192,7 +213,7 @@ pub(super) mod tests {
             ..sight(0.6, 0.5, seconds(1.0))
         };
         aim.see(&still, &VIEW, &history, LATENCY);
-        assert_eq!(aim.target_rate(), PanTilt::default());
+        assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
         let offset = VIEW.error(still.centroid).pan;
         let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
         assert!((error - (offset - 2.0)).abs() < 1e-9, "{error} of {offset}");
@@ -206,7 +227,7 @@ pub(super) mod tests {
         for time in [0.92, 0.96, 1.0] {
             aim.see(&sight(0.5, 0.5, seconds(time)), &VIEW, &history, LATENCY);
         }
-        assert_eq!(aim.target_rate().pan, 6.0);
+        assert_eq!(aim.target_rate(Duration::ZERO).pan, 6.0);
     }
 
     #[test]
@@ -218,6 +239,6 @@ pub(super) mod tests {
             aim.see(&walking, &VIEW, &history, LATENCY);
         }
         aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY);
-        assert_eq!(aim.target_rate(), PanTilt::default());
+        assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
     }
 }

@@ -5,7 +5,7 @@ use super::PanTilt;
 pub struct ControlLaw {
     /// Degrees per second for a degree of error, 1/s.
     pub gain: f64,
-    /// What part of the rate so found is wanted, up to 1.
+    /// What part of that gain is wanted, up to 1; what the target does by itself is followed all the same.
     pub trust: f64,
     /// The error in degrees that an axis at rest tolerates.
     pub dead_zone_deg: f64,
@@ -13,6 +13,17 @@ pub struct ControlLaw {
     pub max_deg_s: f64,
     /// Degrees per second by which an axis' rate changes at most, from one command to the next.
     pub max_change_deg_s: f64,
+}
+
+/// How far off the middle the target is, degrees.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Offset {
+    /// In the last picture.
+    pub seen: PanTilt,
+    /// When a command sent now acts.
+    pub expected: PanTilt,
+    /// The target's own motion then, degrees per second.
+    pub target: PanTilt,
 }
 
 /// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.
@@ -23,11 +34,12 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// The rate that brings the error to zero within about 1/gain while the target moves on; `in_force` is the present one.
-    pub fn rate(&mut self, error: PanTilt, target: PanTilt, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
+    /// The rate that brings the error to zero within about 1/gain while the target moves on.
+    pub fn rate(&mut self, offset: &Offset, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
+        let Offset { seen, expected, target } = *offset;
         PanTilt {
-            pan: self.pan.rate(error.pan, target.pan, in_force.pan, law),
-            tilt: self.tilt.rate(error.tilt, target.tilt, in_force.tilt, law),
+            pan: self.pan.rate((seen.pan, expected.pan), target.pan, in_force.pan, law),
+            tilt: self.tilt.rate((seen.tilt, expected.tilt), target.tilt, in_force.tilt, law),
         }
     }
 
@@ -46,12 +58,22 @@ impl Axis {
     /// The part of the dead zone that an axis must reach to come to rest: the rest is left to a tracker's tremble.
     const REST: f64 = 1.0 / 3.0;
 
-    fn rate(&mut self, error_deg: f64, target_deg_s: f64, in_force_deg_s: f64, law: &ControlLaw) -> f64 {
+    fn rate(
+        &mut self,
+        (seen_deg, error_deg): (f64, f64),
+        target_deg_s: f64,
+        in_force_deg_s: f64,
+        law: &ControlLaw,
+    ) -> f64 {
         let rest_deg = Self::REST * law.dead_zone_deg;
-        // Rests only for a target that would not leave the zone within a second.
-        let leave = if self.moving { rest_deg } else { law.dead_zone_deg };
-        self.moving = error_deg.abs() > leave || (self.moving && target_deg_s.abs() > rest_deg);
-        let wanted = if self.moving { law.trust * (law.gain * error_deg + target_deg_s) } else { 0.0 };
+        self.moving = if self.moving {
+            // Rests only for a target that would not leave the zone within a second.
+            error_deg.abs() > rest_deg || target_deg_s.abs() > rest_deg
+        } else {
+            // Starts for nothing that is foreseen only: once in a while a tremble looks like a start.
+            error_deg.abs() > law.dead_zone_deg && seen_deg * error_deg.signum() > rest_deg
+        };
+        let wanted = if self.moving { law.trust * law.gain * error_deg + target_deg_s } else { 0.0 };
         let slewed =
             wanted.clamp(in_force_deg_s - law.max_change_deg_s, in_force_deg_s + law.max_change_deg_s);
         slewed.clamp(-law.max_deg_s, law.max_deg_s)
@@ -71,15 +93,20 @@ mod tests {
     }
 
     fn pan(controller: &mut Controller, error: f64, target: f64, law: &ControlLaw) -> f64 {
-        controller.rate(PanTilt::new(error, 0.0), PanTilt::new(target, 0.0), still(), law).pan
+        controller.rate(&offset(error, 0.0, target), still(), law).pan
+    }
+
+    fn offset(pan: f64, tilt: f64, target: f64) -> Offset {
+        let error = PanTilt::new(pan, tilt);
+        Offset { seen: error, expected: error, target: PanTilt::new(target, 0.0) }
     }
 
     #[test]
     fn a_centred_target_moves_nothing_and_an_axis_moves_alone() {
         let mut controller = Controller::default();
-        assert_eq!(controller.rate(PanTilt::new(0.9, -0.9), still(), still(), &LAW), still());
+        assert_eq!(controller.rate(&offset(0.9, -0.9, 0.0), still(), &LAW), still());
         let law = ControlLaw { gain: 2.0, ..LAW };
-        assert_eq!(controller.rate(PanTilt::new(3.0, 0.9), still(), still(), &law), PanTilt::new(6.0, 0.0));
+        assert_eq!(controller.rate(&offset(3.0, 0.9, 0.0), still(), &law), PanTilt::new(6.0, 0.0));
     }
 
     #[test]
@@ -91,6 +118,16 @@ mod tests {
     }
 
     #[test]
+    fn what_is_only_foreseen_starts_nothing() {
+        let mut controller = Controller::default();
+        let mut rate = |seen, expected| {
+            let [seen, expected] = [seen, expected].map(|error| PanTilt::new(error, 0.0));
+            controller.rate(&Offset { seen, expected, target: still() }, still(), &LAW).pan
+        };
+        assert_eq!((rate(0.2, 5.0), rate(-0.9, 5.0), rate(0.5, 5.0), rate(0.2, 5.0)), (0.0, 0.0, 5.0, 5.0));
+    }
+
+    #[test]
     fn a_walking_target_is_followed_through_the_middle() {
         let mut controller = Controller::default();
         assert!(pan(&mut controller, 2.0, 5.0, &LAW) > 0.0);
@@ -98,9 +135,9 @@ mod tests {
     }
 
     #[test]
-    fn less_trust_is_less_of_everything() {
+    fn less_trust_is_less_gain() {
         let law = ControlLaw { trust: 0.5, ..LAW };
-        assert_eq!(pan(&mut Controller::default(), 2.0, 5.0, &law), 3.5);
+        assert_eq!(pan(&mut Controller::default(), 2.0, 5.0, &law), 6.0);
     }
 
     #[test]
@@ -108,7 +145,7 @@ mod tests {
         let law = ControlLaw { max_change_deg_s: 10.0, ..LAW };
         let mut controller = Controller::default();
         let mut from = |rate: f64, error: f64| {
-            controller.rate(PanTilt::new(error, 0.0), still(), PanTilt::new(rate, 0.0), &law).pan
+            controller.rate(&offset(error, 0.0, 0.0), PanTilt::new(rate, 0.0), &law).pan
         };
         assert_eq!((from(0.0, 50.0), from(10.0, 50.0), from(50.0, -5.0)), (10.0, 20.0, 40.0));
     }
@@ -117,7 +154,7 @@ mod tests {
         #[test]
         fn no_axis_exceeds_the_maximum(pan in -180.0..180.0f64, tilt in -90.0..90.0f64, max in 0.1..200.0f64) {
             let law = ControlLaw { gain: 10.0, max_deg_s: max, ..LAW };
-            let rate = Controller::default().rate(PanTilt::new(pan, tilt), still(), still(), &law);
+            let rate = Controller::default().rate(&offset(pan, tilt, 0.0), still(), &law);
             prop_assert!(rate.largest() <= max);
         }
     }

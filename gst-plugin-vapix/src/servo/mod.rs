@@ -31,7 +31,7 @@ mod talk;
 
 pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use camera::{CameraModel, LimitGuard};
-pub use controller::{ControlLaw, Controller};
+pub use controller::{ControlLaw, Controller, Offset};
 pub use learning::{Calibration, Turn};
 pub use link::{Link, LinkChange};
 pub use optics::{Lens, View, magnified};

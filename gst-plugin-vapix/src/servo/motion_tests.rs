@@ -18,13 +18,24 @@ fn pan(path: impl Fn(f64) -> f64) -> impl Fn(f64) -> (PanTilt, f64) {
     move |time| (PanTilt::new(path(time), 0.0), 20.0)
 }
 
+/// What it has walked at a speed that changes over time.
+fn walked(speed: impl Fn(f64) -> f64) -> impl Fn(f64) -> f64 {
+    const STEP_S: f64 = 0.01;
+    move |time| (0..(time / STEP_S) as u32).map(|step| speed(f64::from(step) * STEP_S) * STEP_S).sum()
+}
+
 /// To and fro, 6 s each way; turning takes about a second, as it takes people.
 fn pacing(speed: f64) -> impl Fn(f64) -> f64 {
-    let turns = |time: f64| {
-        let phase = (time % 12.0) / 12.0 * std::f64::consts::TAU;
-        (4.0 * phase.sin()).clamp(-1.0, 1.0)
-    };
-    move |time| (0..(time * 100.0) as u32).map(|step| turns(f64::from(step) / 100.0) * speed / 100.0).sum()
+    walked(move |time| speed * (4.0 * (time / 12.0 * std::f64::consts::TAU).sin()).clamp(-1.0, 1.0))
+}
+
+/// 5 s one way, 3 s of rest, and back, for ever; starting and stopping take half a second.
+fn errand(speed: f64) -> impl Fn(f64) -> f64 {
+    walked(move |time| {
+        let phase = time % 8.0;
+        let pace = (phase / 0.5).min((5.5 - phase) / 0.5).clamp(0.0, 1.0);
+        if time % 16.0 < 8.0 { speed * pace } else { -speed * pace }
+    })
 }
 
 /// How often the target changes sides, by more than the part of the picture.
@@ -57,6 +68,45 @@ fn a_step_in_the_targets_speed_neither_overshoots_nor_oscillates() {
             assert!(overshoot < 0.1, "{delay} ms, {zoom}x, from {first}: {overshoot} of the half width");
             assert!(crossings(&run, 0.015, 5.0) <= 1, "{delay} ms, {zoom}x, from {first}");
             assert_eq!(run.reports.iter().filter(|report| matches!(report, Report::Swinging(_))).count(), 0);
+        }
+    }
+}
+
+#[test]
+fn three_times_the_delay_is_not_half_as_much_again_off_the_middle() {
+    for zoom in [1.0, 10.0] {
+        let offset = |delay| {
+            let setup = Setup { jitter: 0.005, ..Setup::new(delay, zoom) };
+            setup.run(15.0, pan(|t| brisk(zoom) * t)).mean_offset(3.0, 15.0)
+        };
+        let (short, long) = (offset(100), offset(300));
+        assert!(long <= 1.5 * short, "{zoom}x: {short} and {long}");
+    }
+}
+
+/// Nobody knows of a turn before it can be seen: there it is the distance itself that is small.
+#[test]
+fn somebody_who_starts_stops_and_turns_is_kept_in_the_middle() {
+    for (delay, zoom) in CASES {
+        for path in [Box::new(errand(brisk(zoom))) as Box<dyn Fn(f64) -> f64>, Box::new(pacing(brisk(zoom)))]
+        {
+            let setup = Setup { jitter: 0.005, ..Setup::new(delay, zoom) };
+            let offset = setup.run(48.0, pan(path)).mean_offset(4.0, 48.0);
+            assert!(offset < 0.015, "{delay} ms, {zoom}x: {offset}");
+        }
+    }
+}
+
+#[test]
+fn the_sway_of_a_walk_is_not_swung_after() {
+    for (delay, zoom) in CASES {
+        for steps_hz in [1.0, 2.0] {
+            let sway = |t: f64| 0.025 * (t * std::f64::consts::TAU * steps_hz).sin();
+            let run = Setup { jitter: 0.003, ..Setup::new(delay, zoom) }
+                .run(30.0, pan(|t| brisk(zoom) * (t + sway(t))));
+            let offset = run.mean_offset(3.0, 30.0);
+            assert!(offset < 0.015, "{delay} ms, {zoom}x, {steps_hz} Hz: {offset}");
+            assert!(!run.reports.iter().any(|report| matches!(report, Report::Swinging(_))));
         }
     }
 }

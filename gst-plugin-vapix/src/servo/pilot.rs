@@ -262,15 +262,16 @@ impl Pilot {
 
     fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
         let law = self.control_law(&self.view(sight));
-        let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
-        let wanted = self.controller.rate(error, self.aim.target_rate(), self.history.rate_at(now), &law);
+        let latency = self.calibration.latency();
+        let offset = self.aim.offset(now, &self.history, latency);
+        let wanted = self.controller.rate(&offset, self.history.rate_at(now), &law);
         let rate = self.guard.apply(wanted, &self.camera);
         self.report_limit();
         let map = &self.map;
         self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
         match self.speed_steps {
             (0, 0) => Wish::Rest,
-            (pan, tilt) => Wish::Move(Command::Velocity { pan, tilt }),
+            (pan, tilt) => Wish::Move(Command::Velocity { pan, tilt, zoom: None }),
         }
     }
 
@@ -325,6 +326,7 @@ impl Pilot {
             y: pixel(sight.centroid.y, sight.velocity.y, sight.size.1),
             width: sight.size.0,
             height: sight.size.1,
+            zoom_percent: None,
         }
     }
 
@@ -334,7 +336,7 @@ impl Pilot {
         self.exchange = now.saturating_sub(sent);
         // Counted from its sending on: that is when it can begin to act, however late the answer is.
         match command {
-            Command::Velocity { pan, tilt } => {
+            Command::Velocity { pan, tilt, .. } => {
                 self.history.push_steps(sent, (*pan, *tilt), &self.map);
             }
             _ => self.history.push(sent, PanTilt::default()),
@@ -479,6 +481,7 @@ fn absolute(position: PanTilt) -> Command {
         pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
         tilt_deg: position.tilt.clamp(-180.0, 180.0),
         speed: 100,
+        zoom: None,
     }
 }
 

@@ -89,7 +89,7 @@ fn the_camera_turns_towards_the_target() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.see(0.9, 0.2);
     match rig.after(ms(0))[..] {
-        [Command::Velocity { pan, tilt }] => assert!(pan > 0 && tilt > 0, "{pan}, {tilt}"),
+        [Command::Velocity { pan, tilt, zoom: None }] => assert!(pan > 0 && tilt > 0, "{pan}, {tilt}"),
         ref other => panic!("{other:?}"),
     }
     assert_eq!(rig.reports(), [Report::Moving]);
@@ -153,7 +153,7 @@ fn at_its_limit_the_camera_is_stopped_in_that_axis_and_it_is_said_once() {
     for _ in 0..5 {
         rig.see(0.9, 0.1);
         for command in rig.after(ms(100)) {
-            assert!(matches!(command, Command::Velocity { pan: 0, tilt: 1.. }), "{command:?}");
+            assert!(matches!(command, Command::Velocity { pan: 0, tilt: 1.., zoom: None }), "{command:?}");
         }
     }
     assert_eq!(rig.reports(), [Report::AtLimit, Report::Moving]);
@@ -206,7 +206,7 @@ fn absolute_mode_steps_from_rest_to_rest() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
     rig.see(1.0, 0.5);
     match rig.after(ms(0))[..] {
-        [Command::Absolute { pan_deg, tilt_deg, speed: 100 }] => {
+        [Command::Absolute { pan_deg, tilt_deg, speed: 100, zoom: None }] => {
             assert!((pan_deg - 30.0).abs() < 1e-6 && tilt_deg.abs() < 1e-6, "{pan_deg}, {tilt_deg}");
         }
         ref other => panic!("{other:?}"),
@@ -227,7 +227,7 @@ fn absolute_mode_steps_from_rest_to_rest() {
 fn centre_mode_names_the_pixel_and_stops_with_move_stop() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, ..ServoSettings::default() });
     rig.see(0.75, 0.25);
-    let expected = Command::Centre { x: 480, y: 120, width: 640, height: 480 };
+    let expected = Command::Centre { x: 480, y: 120, width: 640, height: 480, zoom_percent: None };
     assert_eq!(rig.after(ms(0)), [expected]);
     rig.pilot.rest();
     assert_eq!(rig.after(ms(10)), [Command::Stop]);
@@ -285,7 +285,7 @@ fn a_target_goes_stale_while_an_answer_is_waited_for() {
 #[test]
 fn what_was_abandoned_for_a_stop_is_no_fault_but_may_have_acted() {
     let mut rig = Rig::new(ServoSettings::default());
-    let job = Job::Command(Command::Velocity { pan: 10, tilt: 0 });
+    let job = Job::Command(Command::Velocity { pan: 10, tilt: 0, zoom: None });
     rig.pilot.sending(&job, rig.now);
     rig.pilot.abandoned(&job, rig.now);
     rig.pilot.abandoned(&Job::Query(Query::Position), rig.now);

@@ -11,9 +11,6 @@ pub struct RateAverage {
 }
 
 impl RateAverage {
-    /// Standard errors of the mean by which a rate must stand out.
-    const CONFIDENCE: f64 = 2.0;
-
     /// An empty average.
     pub fn new(window: Duration) -> Self {
         Self { window, samples: VecDeque::new() }
@@ -36,39 +33,96 @@ impl RateAverage {
         sum / self.samples.len().max(1) as f64
     }
 
-    /// The part of the mean that stands out of the noise: nearly all of a rate well above it, nothing of one below.
+    /// The mean as far as it stands out of the noise: nearly all of a rate well above it, nothing of one below.
     ///
     /// Somebody who stands before a tracker that trembles would else be led to and fro for ever.
     pub fn certain_mean(&self) -> PanTilt {
-        let (mean, variance) = (self.mean(), self.variance_of_mean());
-        let part = |mean: f64, variance: f64| {
-            let noise = Self::CONFIDENCE.powi(2) * variance / (mean * mean);
-            // What is no number, as at 0 of 0, stays out.
-            if noise < 1.0 { mean * (1.0 - noise) } else { 0.0 }
-        };
-        PanTilt::new(part(mean.pan, variance.pan), part(mean.tilt, variance.tilt))
+        self.axes(|axis| axis.certain_mean())
     }
 
-    /// Estimated from the differences of neighbours (von Neumann), which a change of the rate itself hardly swells.
-    fn variance_of_mean(&self) -> PanTilt {
-        let count = self.samples.len() as f64;
-        let mut squares = PanTilt::default();
-        for (before, after) in self.samples.iter().zip(self.samples.iter().skip(1)) {
-            let step = after.1 - before.1;
-            squares = squares + PanTilt::new(step.pan * step.pan, step.tilt * step.tilt);
-        }
-        // Of two or fewer samples nothing can be said.
-        if count < 3.0 {
-            PanTilt::new(f64::INFINITY, f64::INFINITY)
-        } else {
-            squares / (2.0 * (count - 1.0) * count)
-        }
+    /// The rate to expect so long after the newest sample, by the straight line through the samples as far as
+    /// it stands out of the noise. Never much beyond what was seen: nobody turns for ever.
+    pub fn ahead(&self, lead: Duration) -> PanTilt {
+        self.axes(|axis| axis.ahead(lead.as_secs_f64()))
+    }
+
+    fn axes(&self, value: impl Fn(&Samples) -> f64) -> PanTilt {
+        let Some((newest, _)) = self.samples.back() else { return PanTilt::default() };
+        let samples = |part: fn(&PanTilt) -> f64| {
+            let at = |time: &Duration| -newest.saturating_sub(*time).as_secs_f64();
+            Samples::new(self.samples.iter().map(|(time, rate)| (at(time), part(rate))))
+        };
+        PanTilt::new(value(&samples(|rate| rate.pan)), value(&samples(|rate| rate.tilt)))
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.samples.clear();
     }
+}
+
+/// Values over time, in order; times in seconds, 0 is the newest.
+pub(super) struct Samples(Vec<(f64, f64)>);
+
+impl Samples {
+    /// Standard errors by which a value must stand out.
+    const CONFIDENCE: f64 = 2.0;
+
+    /// How far beyond the rates seen a rate may be expected, as a part of their range: with more, the sway of a
+    /// walk is exaggerated; with less, who starts or turns is followed late.
+    const STRETCH: f64 = 0.3;
+
+    /// At least one.
+    pub fn new(samples: impl Iterator<Item = (f64, f64)>) -> Self {
+        Self(samples.collect())
+    }
+
+    fn mean(&self, value: impl Fn(&(f64, f64)) -> f64) -> f64 {
+        self.0.iter().map(value).sum::<f64>() / self.0.len() as f64
+    }
+
+    /// Variance of a sample, from the differences of neighbours (von Neumann), which a change of the rate itself
+    /// hardly swells. Of two or fewer nothing can be said.
+    fn variance(&self) -> f64 {
+        let squares: f64 = self.0.windows(2).map(|pair| (pair[1].1 - pair[0].1).powi(2)).sum();
+        if self.0.len() < 3 { f64::INFINITY } else { squares / (2.0 * (self.0.len() - 1) as f64) }
+    }
+
+    fn certain_mean(&self) -> f64 {
+        certain(self.mean(|(_, rate)| *rate), self.variance() / self.0.len() as f64)
+    }
+
+    /// The rate to expect `lead_s` after the newest.
+    fn ahead(&self, lead_s: f64) -> f64 {
+        let slope = self.slope();
+        if slope == 0.0 {
+            return self.certain_mean();
+        }
+        let rates = || self.0.iter().map(|(_, rate)| *rate);
+        let (low, high) = (rates().fold(f64::INFINITY, f64::min), rates().fold(f64::NEG_INFINITY, f64::max));
+        let beyond = Self::STRETCH * (high - low);
+        self.line(slope, lead_s).clamp(low - beyond, high + beyond)
+    }
+
+    /// Slope per second of the straight line through them, as far as it stands out of the noise.
+    pub fn slope(&self) -> f64 {
+        let (middle, mean) = (self.mean(|(time, _)| *time), self.mean(|(_, rate)| *rate));
+        let spread: f64 = self.0.iter().map(|(time, _)| (time - middle).powi(2)).sum();
+        let together: f64 = self.0.iter().map(|(time, rate)| (time - middle) * (rate - mean)).sum();
+        certain(together / spread, self.variance() / spread)
+    }
+
+    /// A line of that slope through their middle, `lead_s` after the newest.
+    pub fn line(&self, slope: f64, lead_s: f64) -> f64 {
+        self.mean(|(_, rate)| *rate) + slope * (lead_s - self.mean(|(time, _)| *time))
+    }
+}
+
+/// The part of a value of this variance that is no noise.
+fn certain(value: f64, variance: f64) -> f64 {
+    let noise = Samples::CONFIDENCE.powi(2) * variance / (value * value);
+    // What is no number, as at 0 of 0, stays out.
+    if noise < 1.0 { value * (1.0 - noise) } else { 0.0 }
 }
 
 #[cfg(test)]
@@ -116,6 +170,16 @@ mod tests {
         // A rate that has just changed is no tremble.
         let changed = average([0.0, 0.0, 0.0, 0.0, 12.0, 12.0, 12.0, 12.0]);
         assert!(changed.certain_mean().pan > 0.75 * changed.mean().pan, "{:?}", changed.certain_mean());
+    }
+
+    #[test]
+    fn a_rate_that_grows_is_followed_ahead_but_not_far_beyond_what_was_seen() {
+        let growing = average((0..8).map(|sample| f64::from(sample) * 0.4));
+        assert!((growing.ahead(ms(0)).pan - 2.8).abs() < 0.2, "{:?}", growing.ahead(ms(0)));
+        assert!((growing.ahead(ms(200)).pan - 3.64).abs() < 0.01, "{:?}", growing.ahead(ms(200)));
+        assert!((growing.ahead(ms(9000)).pan - 3.64).abs() < 1e-9);
+        assert_eq!(average([5.0; 8]).ahead(ms(300)).pan, 5.0);
+        assert_eq!(average([3.0, -4.0, 5.0, -3.0, 4.0, -3.0, 4.0]).ahead(ms(300)).pan, 0.0);
     }
 
     proptest! {

@@ -87,8 +87,8 @@ mod tests {
     use super::*;
 
     const INTERVAL: Duration = Duration::from_millis(100);
-    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0 };
-    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0 };
+    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None };
+    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0, zoom: None };
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)

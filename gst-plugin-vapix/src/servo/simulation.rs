@@ -7,7 +7,7 @@ use ptztrack_contract::{Point, Rect, Vector};
 
 use super::{
     Answer, Job, Lens, Next, PanTilt, Pilot, Query, ServoSettings, Sight, SpeedCurve, SpeedMap, View,
-    Visibility,
+    Visibility, magnified,
 };
 use crate::vapix::{Command, Error, Limits, Position, Range};
 
@@ -122,6 +122,7 @@ struct Shot {
     place: Point,
     ego: Vector,
     velocity: Vector,
+    bounds: Rect,
     at: Duration,
 }
 
@@ -188,32 +189,44 @@ impl Simulation {
 
     fn obey(&mut self, command: &Command) {
         match *command {
-            Command::Velocity { pan, tilt, .. } => {
+            Command::Velocity { pan, tilt, zoom } => {
                 self.goal = None;
                 self.wanted = PanTilt::new(self.setup.map.deg_s(pan), self.setup.map.deg_s(tilt));
+                self.zoom_rate =
+                    zoom.map_or(self.zoom_rate, |zoom| f64::from(zoom) / 100.0 * self.setup.zoom_speed);
             }
-            Command::Absolute { pan_deg, tilt_deg, .. } => {
-                self.goal = Some((PanTilt::new(pan_deg, tilt_deg), None));
+            Command::Absolute { pan_deg, tilt_deg, zoom, .. } => {
+                self.goal = Some((PanTilt::new(pan_deg, tilt_deg), zoom.map(f64::from)));
             }
-            Command::Centre { x, y, width, height } => {
+            Command::Centre { x, y, width, height, zoom_percent } => {
                 let part = |pixel: u32, size: u32| f64::from(pixel) / f64::from(size);
-                let turn = self.view().error(Point { x: part(x, width), y: part(y, height) });
-                self.goal = Some((self.pose + turn, None));
+                let view = self.view();
+                let turn = view.error(Point { x: part(x, width), y: part(y, height) });
+                let zoomed = zoom_percent.and_then(|percent| {
+                    self.lens.step(magnified(view.horizontal_fov_deg, f64::from(percent) / 100.0))
+                });
+                self.goal = Some((self.pose + turn, zoomed));
             }
             Command::Halt | Command::Stop => {
                 self.goal = None;
                 self.wanted = PanTilt::default();
+                if *command == Command::Stop {
+                    self.zoom_rate = 0.0;
+                }
             }
         }
     }
 
     fn turn(&mut self) {
         let dt = TICK.as_secs_f64();
-        if let Some((goal, _)) = self.goal {
+        if let Some((goal, zoom)) = self.goal {
             // Fast, and slower near the end.
             let way = goal - self.pose;
             let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
             self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
+            self.zoom_rate = zoom.map_or(0.0, |zoom| {
+                ((zoom - self.setup.zoom_step) * 8.0).clamp(-self.setup.zoom_speed, self.setup.zoom_speed)
+            });
         }
         let change = self.setup.acceleration_deg_s2 * dt;
         let towards = |rate: f64, wanted: f64| rate + (wanted - rate).clamp(-change, change);
@@ -221,7 +234,9 @@ impl Simulation {
             PanTilt::new(towards(self.rate.pan, self.wanted.pan), towards(self.rate.tilt, self.wanted.tilt));
         self.pose = self.pose + self.rate * dt;
         let limits = self.setup.pan_limits;
-        self.pose.pan = self.pose.pan.clamp(limits.min, limits.max);
+        if limits.max - limits.min < 360.0 {
+            self.pose.pan = self.pose.pan.clamp(limits.min, limits.max);
+        }
         self.setup.zoom_step =
             (self.setup.zoom_step + self.zoom_rate * dt).clamp(ZOOM_STEPS.min, ZOOM_STEPS.max);
     }
@@ -259,7 +274,9 @@ impl Simulation {
             pose: self.pose,
             rate: self.rate,
         };
-        self.shots.push_back(Shot { frame, place: noisy, ego, velocity, at: self.now });
+        let height = (frame.height + self.jitter()).max(0.0);
+        let bounds = box_about(noisy, height);
+        self.shots.push_back(Shot { frame, place: noisy, ego, velocity, bounds, at: self.now });
     }
 
     fn show(&mut self, shot: &Shot, run: &mut Run) {
@@ -267,11 +284,11 @@ impl Simulation {
             return;
         }
         run.frames.push(shot.frame);
-        let _ = Rect::default();
         let sight = Sight {
             visibility: (self.setup.visible)(shot.frame.time_s),
             id: 1,
             centroid: shot.place,
+            bounds: shot.bounds,
             velocity: shot.velocity,
             ego_velocity: Some(shot.ego).filter(|_| self.setup.sees_ground),
             size: (640, 480),
@@ -309,7 +326,7 @@ impl Simulation {
             }
             Job::Command(_) => Answer::Accepted,
             Job::Query(Query::Position) => Answer::Position(Position {
-                pan_deg: Some(self.pose.pan),
+                pan_deg: Some((self.pose.pan + 180.0).rem_euclid(360.0) - 180.0),
                 tilt_deg: Some(self.pose.tilt),
                 zoom_steps: Some(self.setup.zoom_step.round()),
             }),
@@ -332,6 +349,14 @@ impl Simulation {
             self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.noise >> 33) as f64 / f64::from(1u32 << 31) * 2.0 - 1.0) * self.setup.jitter
     }
+}
+
+/// What of a standing person's box is inside the picture.
+fn box_about(middle: Point, height: f64) -> Rect {
+    let inside = |from: f64, length: f64| (from.clamp(0.0, 1.0), (from + length).clamp(0.0, 1.0));
+    let (left, right) = inside(middle.x - height / 8.0, height / 4.0);
+    let (top, bottom) = inside(middle.y - height / 2.0, height);
+    Rect { x: left, y: top, width: right - left, height: bottom - top }
 }
 
 /// Where a direction is in the picture of a camera that looks to `pose`; the inverse of [`View::error`].

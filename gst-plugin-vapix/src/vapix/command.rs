@@ -9,6 +9,8 @@ pub enum Command {
         pan: i8,
         /// Speed step, -100 (down) to 100 (up).
         tilt: i8,
+        /// Speed step of `continuouszoommove`, -100 (out) to 100 (in); `None` leaves the zoom to others.
+        zoom: Option<i8>,
     },
     /// `pan`, `tilt`: move to a position.
     Absolute {
@@ -18,8 +20,10 @@ pub enum Command {
         tilt_deg: f64,
         /// Speed step, 1 to 100.
         speed: u8,
+        /// Zoom step, 1 to 9999; `None` leaves it as it is.
+        zoom: Option<u16>,
     },
-    /// `center`: bring a pixel of the picture to its middle.
+    /// `center`, or `areazoom`: bring a pixel of the picture to its middle.
     Centre {
         /// Pixels from the left.
         x: u32,
@@ -29,6 +33,8 @@ pub enum Command {
         width: u32,
         /// Height of the picture that the pixel is counted in.
         height: u32,
+        /// Magnify what is seen by so many per cent; `None` leaves the zoom as it is.
+        zoom_percent: Option<u32>,
     },
     /// `continuouspantiltmove=0,0`: end a continuous move.
     Halt,
@@ -39,19 +45,27 @@ pub enum Command {
 impl Command {
     /// Whether the camera is at rest once it has accepted this.
     pub fn is_stop(&self) -> bool {
-        matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0 })
+        matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0) })
     }
 }
 
 impl fmt::Display for Command {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Velocity { pan, tilt } => write!(f, "continuouspantiltmove={pan},{tilt}"),
-            Self::Absolute { pan_deg, tilt_deg, speed } => {
-                write!(f, "pan={pan_deg:.4}&tilt={tilt_deg:.4}&speed={speed}")
+            Self::Velocity { pan, tilt, zoom } => {
+                write!(f, "continuouspantiltmove={pan},{tilt}")?;
+                zoom.map_or(Ok(()), |zoom| write!(f, "&continuouszoommove={zoom}"))
             }
-            Self::Centre { x, y, width, height } => {
-                write!(f, "center={x},{y}&imagewidth={width}&imageheight={height}")
+            Self::Absolute { pan_deg, tilt_deg, speed, zoom } => {
+                write!(f, "pan={pan_deg:.4}&tilt={tilt_deg:.4}&speed={speed}")?;
+                zoom.map_or(Ok(()), |zoom| write!(f, "&zoom={zoom}"))
+            }
+            Self::Centre { x, y, width, height, zoom_percent } => {
+                match zoom_percent {
+                    Some(percent) => write!(f, "areazoom={x},{y},{percent}")?,
+                    None => write!(f, "center={x},{y}")?,
+                }
+                write!(f, "&imagewidth={width}&imageheight={height}")
             }
             Self::Halt => f.write_str("continuouspantiltmove=0,0"),
             Self::Stop => f.write_str("move=stop"),
@@ -66,14 +80,26 @@ mod tests {
     #[test]
     fn commands_are_spelled_as_documented() {
         let spelled = [
-            (Command::Velocity { pan: -49, tilt: 7 }, "continuouspantiltmove=-49,7"),
+            (Command::Velocity { pan: -49, tilt: 7, zoom: None }, "continuouspantiltmove=-49,7"),
             (
-                Command::Absolute { pan_deg: -12.5, tilt_deg: 3.0, speed: 100 },
+                Command::Velocity { pan: -49, tilt: 7, zoom: Some(-3) },
+                "continuouspantiltmove=-49,7&continuouszoommove=-3",
+            ),
+            (
+                Command::Absolute { pan_deg: -12.5, tilt_deg: 3.0, speed: 100, zoom: None },
                 "pan=-12.5000&tilt=3.0000&speed=100",
             ),
             (
-                Command::Centre { x: 960, y: 270, width: 1280, height: 720 },
+                Command::Absolute { pan_deg: -12.5, tilt_deg: 3.0, speed: 100, zoom: Some(3868) },
+                "pan=-12.5000&tilt=3.0000&speed=100&zoom=3868",
+            ),
+            (
+                Command::Centre { x: 960, y: 270, width: 1280, height: 720, zoom_percent: None },
                 "center=960,270&imagewidth=1280&imageheight=720",
+            ),
+            (
+                Command::Centre { x: 960, y: 270, width: 1280, height: 720, zoom_percent: Some(150) },
+                "areazoom=960,270,150&imagewidth=1280&imageheight=720",
             ),
             (Command::Halt, "continuouspantiltmove=0,0"),
             (Command::Stop, "move=stop"),
@@ -81,5 +107,11 @@ mod tests {
         for (command, query) in spelled {
             assert_eq!(command.to_string(), query);
         }
+    }
+
+    #[test]
+    fn a_zoom_is_no_rest() {
+        let zooming = |zoom| Command::Velocity { pan: 0, tilt: 0, zoom };
+        assert!(zooming(None).is_stop() && zooming(Some(0)).is_stop() && !zooming(Some(1)).is_stop());
     }
 }

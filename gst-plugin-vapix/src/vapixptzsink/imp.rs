@@ -332,6 +332,7 @@ impl VapixPtzSink {
                 visibility: target.state.into(),
                 id: target.id,
                 centroid: target.centroid,
+                bounds: target.bounds,
                 velocity: target.velocity,
                 ego_velocity: target.ego_velocity,
                 size: picture.size,

@@ -82,7 +82,7 @@ pub enum Prediction {
     Average,
     /// Over the last moments.
     #[default]
-    #[enum_value(name = "With its mean over the last 0.3 s", nick = "lead")]
+    #[enum_value(name = "With its rate over the last 0.4 s and the change of that", nick = "lead")]
     Lead,
 }
 

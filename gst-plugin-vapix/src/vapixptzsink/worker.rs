@@ -325,7 +325,7 @@ mod tests {
     use super::*;
     use crate::servo::{Sight, Visibility};
     use crate::vapix::{Location, Trust};
-    use ptztrack_contract::{Point, Vector};
+    use ptztrack_contract::{Point, Rect, Vector};
     use virtual_camera::VirtualCamera;
 
     const PATIENCE: Duration = Duration::from_secs(20);
@@ -347,6 +347,7 @@ mod tests {
             visibility: Visibility::Seen,
             id: 1,
             centroid: Point { x: 0.9, y: 0.5 },
+            bounds: Rect::default(),
             velocity: Vector::default(),
             ego_velocity: None,
             size: (320, 240),

@@ -1,0 +1,213 @@
+use std::collections::VecDeque;
+use std::time::Duration;
+
+use ptztrack_contract::Rect;
+
+use super::rate::Samples;
+use super::{Sight, Visibility};
+
+/// Keeps the target as tall in the picture as is wished, and widens the view when it is not seen well.
+///
+/// Everything is in logarithms of the magnification: a zoom is as fast whether far or near.
+#[derive(Debug, Default)]
+pub struct ZoomController {
+    /// Logarithm of the target's height in a picture that nothing magnifies, over time.
+    sizes: VecDeque<(Duration, f64)>,
+    id: u64,
+    zooming: bool,
+    view: Outlook,
+}
+
+/// What the last picture allows.
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+enum Outlook {
+    /// Either way.
+    #[default]
+    Clear,
+    /// The target is far from the middle: no nearer.
+    OffCentre,
+    /// It is hidden, or cut off by the picture's edge: wider.
+    Uncertain,
+}
+
+impl ZoomController {
+    /// Heights are averaged, and their change found, over this time: steps and gestures last less.
+    const WINDOW: Duration = Duration::from_millis(800);
+
+    /// Part of the error that is made good in a second: half of what pan and tilt do by default.
+    const GAIN: f64 = 1.0;
+
+    /// Logarithm of the magnification per second, at most ...
+    const FASTEST: f64 = 0.6;
+
+    /// ... and that with which the view is widened when the target is not seen well.
+    const WIDENING: f64 = 0.4;
+
+    /// A height this much off, as a logarithm, is let be while the zoom rests ...
+    const START: f64 = 0.09;
+
+    /// ... and while it moves.
+    const REST: f64 = 0.03;
+
+    /// From a target that is growing or shrinking less than this, per second, the zoom may rest.
+    const STEADY: f64 = 0.03;
+
+    /// A target farther than this from the middle, in picture widths or heights, is not zoomed in on.
+    const OFF_CENTRE: f64 = 0.25;
+
+    /// A box that comes this near to the picture's edge may be cut off by it.
+    const EDGE: f64 = 0.005;
+
+    /// Takes a picture; `magnification`: of the picture against the zoomed-out one.
+    pub fn see(&mut self, sight: &Sight, magnification: f64) {
+        if sight.id != self.id {
+            self.forget();
+            self.id = sight.id;
+        }
+        self.view = outlook(sight);
+        let size = (sight.bounds.height / magnification).ln();
+        if self.view != Outlook::Uncertain && size.is_finite() {
+            if self.sizes.back().is_some_and(|(last, _)| *last >= sight.taken_at) {
+                self.sizes.clear();
+            }
+            self.sizes.push_back((sight.taken_at, size));
+            while self.sizes.front().is_some_and(|(first, _)| *first + Self::WINDOW < sight.taken_at) {
+                self.sizes.pop_front();
+            }
+        }
+    }
+
+    /// Forgets the target.
+    pub fn forget(&mut self) {
+        self.sizes.clear();
+        self.zooming = false;
+        self.view = Outlook::Clear;
+    }
+
+    /// The wanted change of the magnification's logarithm per second, for a command that acts `lead` after the
+    /// last picture, when the magnification will be this one.
+    pub fn rate(&mut self, target_height: f64, magnification: f64, lead: Duration) -> f64 {
+        if self.view == Outlook::Uncertain {
+            self.zooming = true;
+            return -Self::WIDENING;
+        }
+        let Some((error, growth)) = self.error(target_height, magnification, lead) else { return 0.0 };
+        let tolerated = if self.zooming { Self::REST } else { Self::START };
+        self.zooming = error.abs() > tolerated || (self.zooming && growth.abs() > Self::STEADY);
+        if !self.zooming {
+            return 0.0;
+        }
+        let rate = (Self::GAIN * error - growth).clamp(-Self::FASTEST, Self::FASTEST);
+        if self.view == Outlook::OffCentre { rate.min(0.0) } else { rate }
+    }
+
+    /// By what factor to magnify at once, for a zoom from rest to rest; `None`: it is well as it is.
+    pub fn factor(&self, target_height: f64, magnification: f64) -> Option<f64> {
+        let error = match self.view {
+            Outlook::Uncertain => -Self::WIDENING,
+            _ => self.error(target_height, magnification, Duration::ZERO)?.0,
+        };
+        let allowed = if self.view == Outlook::OffCentre { error.min(0.0) } else { error };
+        (allowed.abs() > Self::START).then(|| allowed.clamp(-Self::FASTEST, Self::FASTEST).exp())
+    }
+
+    /// How much the magnification's logarithm is off, and how fast the target grows by itself.
+    fn error(&self, target_height: f64, magnification: f64, lead: Duration) -> Option<(f64, f64)> {
+        let (newest, _) = self.sizes.back()?;
+        let sizes = Samples::new(self.sizes.iter().map(|(at, size)| (-(*newest - *at).as_secs_f64(), *size)));
+        let growth = sizes.slope();
+        let size = sizes.line(growth, lead.as_secs_f64());
+        Some((target_height.ln() - size - magnification.ln(), growth))
+    }
+}
+
+fn outlook(sight: &Sight) -> Outlook {
+    let Rect { x, y, width, height } = sight.bounds;
+    let inside = ZoomController::EDGE..=1.0 - ZoomController::EDGE;
+    let whole = [x, y, x + width, y + height].iter().all(|edge| inside.contains(edge));
+    let middle = sight.bounds.centre();
+    let off = (middle.x - 0.5).abs().max((middle.y - 0.5).abs());
+    match sight.visibility {
+        Visibility::Seen if whole && off <= ZoomController::OFF_CENTRE => Outlook::Clear,
+        Visibility::Seen if whole => Outlook::OffCentre,
+        _ => Outlook::Uncertain,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::aim::tests::sight;
+    use proptest::prelude::*;
+
+    fn target(height: f64, milliseconds: u64) -> Sight {
+        let bounds = Rect { x: 0.45, y: 0.5 - height / 2.0, width: 0.1, height };
+        Sight { bounds, ..sight(0.5, 0.5, Duration::from_millis(milliseconds)) }
+    }
+
+    /// One that has seen a target for a second, at no magnification.
+    fn seen(height: impl Fn(f64) -> f64) -> ZoomController {
+        let mut zoom = ZoomController::default();
+        for picture in 0..=25 {
+            zoom.see(&target(height(f64::from(picture as u32) / 25.0), 40 * picture), 1.0);
+        }
+        zoom
+    }
+
+    #[test]
+    fn a_small_target_is_zoomed_in_on_and_a_tall_one_out_of() {
+        let lead = Duration::from_millis(200);
+        assert!((seen(|_| 0.2).rate(0.3, 1.0, lead) - 1.5f64.ln()).abs() < 0.01);
+        assert!((seen(|_| 0.4).rate(0.3, 1.0, lead) - 0.75f64.ln()).abs() < 0.01);
+        assert_eq!(seen(|_| 0.3).rate(0.3, 1.0, lead), 0.0);
+        assert_eq!(seen(|_| 0.15).rate(0.3, 2.0, lead), 0.0, "magnified already");
+        assert_eq!(ZoomController::default().rate(0.3, 1.0, lead), 0.0);
+    }
+
+    #[test]
+    fn a_height_that_trembles_moves_nothing() {
+        let mut zoom = ZoomController::default();
+        for picture in 0..500u64 {
+            zoom.see(&target(0.3 + 0.02 * ((picture * 7919 % 100) as f64 / 50.0 - 1.0), 40 * picture), 1.0);
+            assert_eq!(zoom.rate(0.3, 1.0, Duration::from_millis(300)), 0.0);
+        }
+    }
+
+    #[test]
+    fn a_target_that_walks_away_is_zoomed_after() {
+        let rate = seen(|time| 0.35 * (-0.2 * time).exp()).rate(0.3, 1.0, Duration::ZERO);
+        let error = (0.3f64 / 0.35).ln() + 0.2;
+        assert!((rate - (error + 0.2)).abs() < 0.02, "{rate}");
+    }
+
+    #[test]
+    fn what_is_not_seen_well_widens_the_view() {
+        let lead = Duration::ZERO;
+        let mut zoom = seen(|_| 0.2);
+        zoom.see(&Sight { visibility: Visibility::Predicted, ..target(0.2, 2000) }, 1.0);
+        assert!(zoom.rate(0.3, 1.0, lead) < 0.0);
+        assert!(zoom.factor(0.3, 1.0).unwrap() < 1.0);
+        let cut = Rect { x: 0.45, y: 0.0, width: 0.1, height: 0.2 };
+        zoom.see(&Sight { bounds: cut, ..target(0.2, 2040) }, 1.0);
+        assert!(zoom.rate(0.3, 1.0, lead) < 0.0);
+        let aside = Rect { x: 0.85, y: 0.4, width: 0.1, height: 0.2 };
+        zoom.see(&Sight { bounds: aside, ..target(0.2, 2080) }, 1.0);
+        assert_eq!(zoom.rate(0.3, 1.0, lead), 0.0);
+        assert_eq!(zoom.factor(0.3, 1.0), None);
+        zoom.see(&target(0.2, 2120), 1.0);
+        assert!(zoom.rate(0.3, 1.0, lead) > 0.0);
+        assert!((zoom.factor(0.3, 1.0).unwrap() - 1.5).abs() < 0.05);
+    }
+
+    proptest! {
+        #[test]
+        fn the_rate_is_bounded(heights in prop::collection::vec(0.0..1.0f64, 1..40), wanted in 0.05..0.95f64) {
+            let mut zoom = ZoomController::default();
+            for (picture, height) in (0..).zip(heights) {
+                zoom.see(&target(height, 40 * picture), 1.0 + height * 10.0);
+                let rate = zoom.rate(wanted, 1.0 + height * 10.0, Duration::from_millis(300));
+                prop_assert!(rate.abs() <= ZoomController::FASTEST, "{rate}");
+            }
+        }
+    }
+}
