@@ -7,11 +7,12 @@ use std::{
     io::{BufRead, BufReader, Write},
     path::{Path, PathBuf},
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    time::Duration,
 };
 
 use common::{PATIENCE, settings};
 use serde_json::{Value, json};
-use virtual_camera::{Settings, VirtualCamera};
+use virtual_camera::{Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
 /// A browser that is spoken to through pipes (Chrome DevTools Protocol, messages end in a zero byte).
 struct Browser {
@@ -122,13 +123,25 @@ impl Drop for Browser {
     }
 }
 
+fn save(shot: &Value, name: &str) {
+    let png = glib::base64_decode(shot["data"].as_str().unwrap());
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), png).unwrap();
+}
+
+/// Before somebody who stands a little to the right.
+fn with_a_person() -> Settings {
+    let here = Waypoint { time: Duration::ZERO, pan_deg: 6.0, tilt_deg: -2.0 };
+    let world = SyntheticSettings { size: (512, 384), path: vec![here], stays: true, ..Default::default() };
+    Settings { world: World::Synthetic(world), ..settings() }
+}
+
 #[test]
 fn the_page_shows_the_camera_and_steers_it() {
     let Some(mut browser) = Browser::start() else {
         return;
     };
     let auth = virtual_camera::Auth::Digest { qop: true };
-    let camera = VirtualCamera::start(Settings { auth, ..settings() }).unwrap();
+    let camera = VirtualCamera::start(Settings { auth, ..with_a_person() }).unwrap();
     browser.open(&camera.url());
 
     // It shows the picture, the overview with the view drawn in, and the numbers, and asks for no password.
@@ -140,6 +153,17 @@ fn the_page_shows_the_camera_and_steers_it() {
          .data.some(value => value > 200)",
     );
     assert_eq!(browser.value("$('commands').children.length"), json!(0));
+
+    // The truth is drawn in where it is asked for.
+    let drawn = "$('truth').getContext('2d').getImageData(0, 0, $('truth').width, $('truth').height) \
+                 .data.some(value => value > 200)";
+    assert_eq!(browser.value(drawn), json!(false));
+    browser.click("show-truth");
+    browser.wait_for(drawn);
+    let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
+    save(&shot, "live-page-truth.png");
+    browser.click("show-truth");
+    browser.wait_for(&format!("!({drawn})"));
 
     // A button held moves the camera, released it stops.
     browser.mouse("mousePressed", "right");
@@ -157,8 +181,7 @@ fn the_page_shows_the_camera_and_steers_it() {
     browser.mouse("mouseReleased", "zoom-in");
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
     let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
-    let png = glib::base64_decode(shot["data"].as_str().unwrap());
-    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("live-page.png"), png).unwrap();
+    save(&shot, "live-page.png");
     browser.click("home");
     assert!(camera.wait_for(PATIENCE, |status| status.pan_deg == 0.0 && status.zoom_step == 1.0));
     browser.wait_for("$('pan').textContent == '0.00°' && $('zoom').textContent.startsWith('1 (')");

@@ -122,14 +122,22 @@ impl Door {
         self.address
     }
 
-    /// Refuses connections until the fault is over. A socket that does not listen keeps the port from others.
-    async fn refuse(&mut self) {
+    /// Lets no connection come about until the fault is over, and keeps the port from others meanwhile.
+    async fn shut(&mut self) {
         self.listener = None;
-        let reserved = reserve(self.address);
-        if self.fault.wait_for(|fault| *fault != Fault::Refuse).await.is_err() {
+        let silent = *self.fault.borrow() == Fault::BlackHole;
+        // A socket that does not listen refuses; one whose queue is full says nothing.
+        let refusing = reserve(self.address);
+        let mute = if silent { refusing.and_then(|socket| socket.listen(0)).ok() } else { None };
+        let filling = mute.is_some().then(|| TcpStream::connect(self.address));
+        let filling = match filling {
+            Some(filling) => filling.await.ok(),
+            None => None,
+        };
+        if self.fault.wait_for(|fault| !fault.shuts()).await.is_err() {
             pending::<()>().await;
         }
-        self.listener = reserved.and_then(|socket| socket.listen(BACKLOG)).ok();
+        drop((filling, mute));
     }
 
     async fn next(&mut self) -> Option<(TcpStream, SocketAddr)> {
@@ -137,7 +145,7 @@ impl Door {
         let mut fault = self.fault.clone();
         tokio::select! {
             accepted = listener.accept() => accepted.ok(),
-            _ = fault.wait_for(|fault| *fault == Fault::Refuse) => None,
+            _ = fault.wait_for(Fault::shuts) => None,
         }
     }
 }
@@ -148,8 +156,8 @@ impl Listener for Door {
 
     async fn accept(&mut self) -> (Wire, SocketAddr) {
         loop {
-            if *self.fault.borrow() == Fault::Refuse {
-                self.refuse().await;
+            if self.fault.borrow().shuts() {
+                self.shut().await;
             }
             if let Some((stream, address)) = self.next().await {
                 // Commands are small and must not wait for one another.

@@ -42,8 +42,6 @@ pub(crate) trait World: Send + Sync {
     fn optics(&self) -> Optics;
     /// How far the camera turns in it.
     fn limits(&self) -> Limits;
-    /// Where the camera looks at first unless told otherwise.
-    fn home(&self) -> Pose;
     /// Width and height in pixels that the camera sends unless asked for others.
     fn view_size(&self) -> (u32, u32);
     /// Pictures per second unless asked for others.

@@ -118,10 +118,6 @@ impl World for Panorama {
         )
     }
 
-    fn home(&self) -> Pose {
-        Pose::default()
-    }
-
     fn view_size(&self) -> (u32, u32) {
         self.view_size
     }
