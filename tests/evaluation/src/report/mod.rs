@@ -1,1 +1,6 @@
-//! What runs are written down as.
+//! What runs are written down as: CSV for machines, Markdown and one page for people, plots and pictures.
+
+pub mod thesis;
+
+#[cfg(test)]
+pub(crate) mod made_up;
