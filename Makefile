@@ -23,6 +23,9 @@ TEST_TIMEOUT ?= 45m
 CODEC ?= mjpeg
 DURATION ?= 60
 FOOTAGE ?=
+WORLD ?= footage
+ROOM_TEST ?= 1
+SEED ?= 1
 
 ## help: list the targets
 help:
@@ -45,11 +48,16 @@ lint: packages-build
 
 ## demo: follow a person in real footage and leave video, plot and summary in target/demo
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
+##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
 demo: packages-demo
 	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix --package virtual-camera
-	@footage="$(FOOTAGE)"; \
+	@case "$(WORLD)" in \
+	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
+	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \
+	*) echo "WORLD is footage or room, not $(WORLD)" >&2; exit 2;; \
+	esac; \
 	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
-		--footage "$${footage:-$$(scripts/footage)}" --codec $(CODEC) --duration $(DURATION) --out target/demo
+		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
 ## install: build, and copy the plugins to a GStreamer plugin folder
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
