@@ -236,7 +236,10 @@ mod tests {
             let right = respond(challenge, "pass", TARGET);
             assert_eq!(guard.check(Some(&right), "GET", TARGET, now()), Ok(()));
             assert_eq!(guard.check(Some(&right), "POST", TARGET, now()), Err(Refusal::Unknown));
-            assert_eq!(guard.check(Some(&right), "GET", "/axis-cgi/com/ptz.cgi", now()), Err(Refusal::Unknown));
+            assert_eq!(
+                guard.check(Some(&right), "GET", "/axis-cgi/com/ptz.cgi", now()),
+                Err(Refusal::Unknown)
+            );
             let wrong = respond(challenge, "guess", TARGET);
             assert_eq!(guard.check(Some(&wrong), "GET", TARGET, now()), Err(Refusal::Unknown));
         }

@@ -126,18 +126,20 @@ impl Door {
     async fn shut(&mut self) {
         self.listener = None;
         let silent = *self.fault.borrow() == Fault::BlackHole;
-        // A socket that does not listen refuses; one whose queue is full says nothing.
-        let refusing = reserve(self.address);
-        let mute = if silent { refusing.and_then(|socket| socket.listen(0)).ok() } else { None };
-        let filling = mute.is_some().then(|| TcpStream::connect(self.address));
-        let filling = match filling {
-            Some(filling) => filling.await.ok(),
-            None => None,
-        };
+        if silent {
+            let _full = full_queue(self.address).await;
+            self.fault_over().await;
+        } else {
+            // A socket that does not listen refuses.
+            let _reserved = reserve(self.address);
+            self.fault_over().await;
+        }
+    }
+
+    async fn fault_over(&mut self) {
         if self.fault.wait_for(|fault| !fault.shuts()).await.is_err() {
             pending::<()>().await;
         }
-        drop((filling, mute));
     }
 
     async fn next(&mut self) -> Option<(TcpStream, SocketAddr)> {
@@ -148,6 +150,13 @@ impl Door {
             _ = fault.wait_for(Fault::shuts) => None,
         }
     }
+}
+
+/// A socket whose queue is full, and what fills it: the kernel drops whatever else comes.
+async fn full_queue(address: SocketAddr) -> io::Result<(TcpListener, TcpStream)> {
+    let listener = reserve(address)?.listen(0)?;
+    let filling = TcpStream::connect(address).await?;
+    Ok((listener, filling))
 }
 
 impl Listener for Door {
@@ -165,7 +174,7 @@ impl Listener for Door {
                 return (Wire { stream, connection: Connection::default(), answered: false }, address);
             }
             if self.listener.is_none() {
-                // The port was lost to somebody else: try again as long as it takes.
+                // Unless the port was lost to somebody else meanwhile, this works at once.
                 self.listener = reserve(self.address).and_then(|socket| socket.listen(BACKLOG)).ok();
                 tokio::task::yield_now().await;
             }
