@@ -72,6 +72,7 @@ impl Patience {
 
 #[cfg(test)]
 mod tests {
+    use super::super::ego_motion::estimate;
     use super::super::geometry::around;
     use super::*;
     use proptest::prelude::*;
@@ -116,6 +117,17 @@ mod tests {
     #[test]
     fn who_comes_straight_towards_the_camera_does_not_stand() {
         assert!(!given_up(30.0, EgoMotion::default(), |time| (Point2f::default(), (0.1 * time).exp())));
+    }
+
+    #[test]
+    fn who_stands_is_given_up_under_a_camera_that_zooms() {
+        for zoom in [0.99, 1.01] {
+            let corners = (0..36).map(|n| Point2f::new(100.0 * (n % 6) as f32, 80.0 * (n / 6) as f32));
+            let pairs: Vec<_> = corners.map(|corner| (corner, corner * zoom)).collect();
+            let ego = estimate(&pairs).expect("plenty of points");
+            assert!(given_up(11.0, ego, |_| along(0.0)), "{zoom}");
+            assert!(!given_up(11.0, ego, |time| (Point2f::default(), (0.1 * time).exp())), "{zoom}");
+        }
     }
 
     #[test]
