@@ -1,0 +1,126 @@
+//! What is run: who is followed where, by whom, and seen through what.
+
+use std::time::Duration;
+
+use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
+
+use crate::record::{Codec, Delays, FirstBox, Run, TestId, TrackerName};
+
+/// A world with somebody to follow in it.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Which test it is; `None` for a recording.
+    pub test: Option<TestId>,
+    /// For tables.
+    pub title: String,
+    /// What there is to see.
+    pub world: World,
+    /// From the start of the world to the last picture that counts.
+    pub duration: Duration,
+    /// Who is to be followed; `None` where there is only one.
+    pub person: Option<u32>,
+}
+
+impl Scene {
+    /// One of the 72 tests in the room of that seed; `None` where there is no such test.
+    pub fn room(test: TestId, seed: u64) -> Option<Self> {
+        let room = RoomSettings::test(test.0, seed)?;
+        Some(Self {
+            test: Some(test),
+            title: format!("test {test}"),
+            duration: room.duration(),
+            world: World::Room(room),
+            person: None,
+        })
+    }
+
+    /// Of those in a picture the one to follow, and the others.
+    pub(crate) fn split(&self, people: Vec<GroundTruth>) -> (Option<GroundTruth>, Vec<GroundTruth>) {
+        let (mut person, others): (Vec<_>, _) =
+            people.into_iter().partition(|one| self.person.is_none_or(|person| one.id == person));
+        (person.pop(), others)
+    }
+}
+
+/// One test with one tracker.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Who is followed where.
+    pub scene: Scene,
+    /// What follows.
+    pub tracker: TrackerName,
+    /// What the pictures go through.
+    pub codec: Codec,
+    /// Width and height of the pictures.
+    pub size: (u32, u32),
+    /// Number of the world.
+    pub seed: u64,
+    /// How late everything is.
+    pub delays: Delays,
+    /// Who draws the first box.
+    pub first_box: FirstBox,
+    /// Whether it is one of a series over the delay.
+    pub sweep: bool,
+}
+
+impl Experiment {
+    /// Tracker `tracker` in `scene` with everything else as it is by default.
+    pub fn new(scene: Scene, tracker: TrackerName, seed: u64) -> Self {
+        Self {
+            scene,
+            tracker,
+            codec: Codec::Mjpeg,
+            size: (640, 480),
+            seed,
+            delays: Delays::default(),
+            first_box: FirstBox::Given,
+            sweep: false,
+        }
+    }
+
+    /// The camera, at home at time zero.
+    pub(crate) fn camera(&self, clock: Clock) -> Result<VirtualCamera, virtual_camera::Error> {
+        let mut settings =
+            Settings { auth: Auth::None, world: self.scene.world.clone(), clock, ..Settings::default() };
+        settings.service_time = Duration::ZERO;
+        settings.video.delay = self.delays.video;
+        settings.video.size = Some(self.size);
+        settings.kinematics.command_delay = self.delays.command;
+        VirtualCamera::start(settings)
+    }
+
+    /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
+    /// was never moved; `None` where there is none.
+    pub(crate) fn first_counted(&self) -> Result<Option<u32>, virtual_camera::Error> {
+        let camera = self.camera(Clock::Stepped)?;
+        let period = camera.frame_period();
+        let pictures = (0..).take_while(|n| *n * period <= self.scene.duration);
+        let whole = |n: &u32| {
+            let exposure = *n * period;
+            camera.advance_to(exposure);
+            let (person, _) = self.scene.split(camera.ground_truth(exposure, self.size));
+            person.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
+        };
+        Ok(pictures.into_iter().find(whole))
+    }
+
+    /// What it will be recorded as.
+    pub(crate) fn blank(&self) -> Run {
+        Run {
+            test: self.scene.test,
+            title: self.scene.title.clone(),
+            tracker: self.tracker,
+            codec: self.codec,
+            size: self.size,
+            seed: self.seed,
+            delays: self.delays,
+            first_box: self.first_box,
+            sweep: self.sweep,
+            frame_rate: 0.0,
+            dropped: None,
+            frames: Vec::new(),
+            snapshots: Vec::new(),
+            error: None,
+        }
+    }
+}
