@@ -4,7 +4,7 @@ use std::{ops::Range, sync::Arc};
 
 use super::{
     cover::cover,
-    texture::{Material, Texture},
+    texture::{Level, Material, Texture},
 };
 use crate::{
     geometry::{Matrix, Pinhole},
@@ -16,6 +16,8 @@ use crate::{
 const SPAN: usize = 16;
 /// Nothing nearer than this is drawn, in metres.
 const NEAR: f64 = 0.05;
+/// Where a pixel covers so many pixels of the grain, nothing of it is left to see.
+const COARSEST_GRAIN: f64 = 12.0;
 /// How far a piece reaches under a neighbour drawn later, in pixels, so that nothing shines through the joint.
 const OVERLAP: f64 = 0.7;
 
@@ -263,7 +265,7 @@ impl<'a> Brush<'a> {
         let way = |axis: usize| {
             let u = (along_u[axis] - spot.u * along_w[axis]) * depth;
             let v = (along_v[axis] - spot.v * along_w[axis]) * depth;
-            u.hypot(v)
+            (u * u + v * v).sqrt()
         };
         let (across, down) = (way(0), way(1));
         0.6 * across.max(down) + 0.4 * across.min(down)
@@ -291,41 +293,19 @@ impl<'a> Brush<'a> {
     }
 
     fn shade(&self, row: usize, columns: Range<usize>, line: &mut [u8]) {
-        let material = &*self.surface.material;
+        let scale = (self.per_metre.0 * self.per_metre.1).sqrt();
         self.spans(row, columns, line, |span, pixels| {
             let footprint = self.footprint(span.x, span.y, &span.from);
-            let level = (footprint * (self.per_metre.0 * self.per_metre.1).sqrt()).log2().max(0.0);
-            let whole = level as usize;
-            let blend = ((level - whole as f64) * 256.0) as u32;
-            let sharp = self.texture.level(whole);
-            let soft = self.texture.level(whole + 1);
-            let a = self.walk(&span, whole, self.per_metre);
-            let b = self.walk(&span, whole + 1, self.per_metre);
-            let (mut light, light_step) = span.light();
-            let offset = |walk: &Walk, i: usize| walk.at(i as u32);
-            let grain = material.detail.as_ref().and_then(|detail| {
-                let level = (footprint * detail.per_metre).log2().max(0.0);
-                (level < 4.0).then(|| {
-                    let whole = (level + 0.5) as usize;
-                    let walk = self.walk(&span, whole, (detail.per_metre, detail.per_metre));
-                    (detail.texture.level(whole), walk, detail.gain)
-                })
-            });
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                let (u, v) = offset(&a, i);
-                let mut value = sharp.sample(u, v);
-                if blend > 0 {
-                    let (u, v) = offset(&b, i);
-                    value = (value * (256 - blend) + soft.sample(u, v) * blend) >> 8;
-                }
-                let mut value = value as i32;
-                if let Some((level, walk, gain)) = &grain {
-                    let (u, v) = offset(walk, i);
-                    value += ((level.sample(u, v) as i32 - (128 << 8)) * gain) >> 8;
-                }
-                *pixel = ((value.max(0) * light) >> 20).min(255) as u8;
-                light += light_step;
-            }
+            let (level, halved) = self.texture.fitting(footprint * scale);
+            let (walk, light) = (self.walk(&span, halved, self.per_metre), span.light());
+            let detail = self.surface.material.detail.as_ref();
+            let Some(detail) = detail.filter(|detail| footprint * detail.per_metre < COARSEST_GRAIN) else {
+                fill(pixels, light, level, walk);
+                return;
+            };
+            let (grain, halved) = detail.texture.fitting(footprint * detail.per_metre);
+            let fine = self.walk(&span, halved, (detail.per_metre, detail.per_metre));
+            fill_with_grain(pixels, light, (level, walk), (grain, fine), detail.gain);
         });
     }
 
@@ -342,12 +322,12 @@ impl<'a> Brush<'a> {
                 return;
             }
             let footprint = self.footprint(span.x, span.y, &span.from);
-            let level = (footprint * (self.per_metre.0 * self.per_metre.1).sqrt()).log2().max(0.0) + 0.5;
-            let walk = self.walk(&span, level as usize, self.per_metre);
-            let texture = self.texture.level(level as usize);
-            for (i, pixel) in pixels.iter_mut().enumerate() {
-                let (u, v) = walk.at(i as u32);
-                *pixel = lit(texture.sample(u, v) as i32);
+            let (texture, halved) =
+                self.texture.fitting(footprint * (self.per_metre.0 * self.per_metre.1).sqrt());
+            let mut walk = self.walk(&span, halved, self.per_metre);
+            for pixel in pixels {
+                *pixel = lit(texture.sample(walk.u, walk.v) as i32);
+                walk.next();
             }
         });
     }
@@ -396,9 +376,37 @@ struct Walk {
 
 impl Walk {
     #[inline(always)]
-    fn at(&self, pixel: u32) -> (u32, u32) {
-        let u = self.u.wrapping_add(self.step_u.wrapping_mul(pixel));
-        (u, self.v.wrapping_add(self.step_v.wrapping_mul(pixel)))
+    fn next(&mut self) {
+        self.u = self.u.wrapping_add(self.step_u);
+        self.v = self.v.wrapping_add(self.step_v);
+    }
+}
+
+/// Pixels of a tile under a light that changes evenly.
+fn fill(pixels: &mut [u8], (mut light, step): (i32, i32), level: &Level, mut walk: Walk) {
+    for pixel in pixels {
+        let value = level.sample(walk.u, walk.v) as i32;
+        *pixel = ((value * light) >> 20).min(255) as u8;
+        walk.next();
+        light += step;
+    }
+}
+
+/// The same with grain on top, `gain` in 1/256.
+fn fill_with_grain(
+    pixels: &mut [u8],
+    (mut light, step): (i32, i32),
+    (level, mut walk): (&Level, Walk),
+    (grain, mut fine): (&Level, Walk),
+    gain: i32,
+) {
+    for pixel in pixels {
+        let rough = grain.sample(fine.u, fine.v) as i32 - (128 << 8);
+        let value = level.sample(walk.u, walk.v) as i32 + ((rough * gain) >> 8);
+        *pixel = ((value.max(0) * light) >> 20).min(255) as u8;
+        walk.next();
+        fine.next();
+        light += step;
     }
 }
 

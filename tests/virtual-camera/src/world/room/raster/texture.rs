@@ -5,6 +5,7 @@ use std::sync::Arc;
 /// A square tile that repeats, at its own and all lower resolutions.
 #[derive(Debug)]
 pub(in super::super) struct Texture {
+    /// Each resolution as it is and softened, for what lies between it and the next: a step of √2 is hardly seen.
     levels: Vec<Level>,
 }
 
@@ -15,12 +16,21 @@ pub(in super::super) struct Level {
     cells: Vec<u32>,
 }
 
+/// Footprints at which the next step begins: 2^(1/4), 2^(3/4) and so on.
+const STEPS: [f64; 12] = [1.189, 1.682, 2.378, 3.364, 4.757, 6.727, 9.514, 13.45, 19.03, 26.91, 38.05, 53.82];
+
 impl Texture {
     /// A tile of 2^`shift` pixels a side.
     pub fn new(shift: u32, mut pixels: Vec<u8>) -> Self {
-        let mut levels = vec![Level::new(shift, &pixels)];
-        for shift in (0..shift).rev() {
+        let mut levels = Vec::new();
+        for shift in (0..=shift).rev() {
             let side = 1usize << shift;
+            levels.push(Level::new(shift, &pixels));
+            levels.push(Level::new(shift, &softened(side, &pixels)));
+            if side == 1 {
+                break;
+            }
+            let side = side / 2;
             let half = |x: usize, y: usize| {
                 let at = 2 * y * 2 * side + 2 * x;
                 let upper = u32::from(pixels[at]) + u32::from(pixels[at + 1]);
@@ -28,7 +38,6 @@ impl Texture {
                 ((upper + lower + 2) / 4) as u8
             };
             pixels = (0..side * side).map(|i| half(i % side, i / side)).collect();
-            levels.push(Level::new(shift, &pixels));
         }
         Self { levels }
     }
@@ -38,9 +47,11 @@ impl Texture {
         f64::from(1u32 << self.levels[0].shift)
     }
 
-    /// The tile at 1/2^`level` of its resolution, or the lowest there is.
-    pub fn level(&self, level: usize) -> &Level {
-        &self.levels[level.min(self.levels.len() - 1)]
+    /// The tile as sharp as fits pixels that cover `footprint` of its own, and how often its resolution is halved.
+    pub fn fitting(&self, footprint: f64) -> (&Level, usize) {
+        // Twice the logarithm, rounded.
+        let steps = STEPS.iter().take_while(|&&limit| footprint > limit).count().min(self.levels.len() - 1);
+        (&self.levels[steps], steps / 2)
     }
 
     /// Of one value all over?
@@ -48,6 +59,20 @@ impl Texture {
         let first = self.levels[0].cells[0];
         self.levels[0].cells.iter().all(|&cell| cell == first).then_some(first as u8)
     }
+}
+
+/// The mean of every pixel with its neighbours, twice as heavy itself.
+fn softened(side: usize, pixels: &[u8]) -> Vec<u8> {
+    let mask = side - 1;
+    let line = |x: usize, y: usize| {
+        let pixel = |x: usize| u32::from(pixels[y * side + (x & mask)]);
+        pixel(x + mask) + 2 * pixel(x) + pixel(x + 1)
+    };
+    let pixel = |i: usize| {
+        let (x, y) = (i & mask, i / side);
+        ((line(x, (y + mask) & mask) + 2 * line(x, y) + line(x, (y + 1) & mask) + 8) / 16) as u8
+    };
+    (0..side * side).map(pixel).collect()
 }
 
 impl Level {
@@ -111,14 +136,25 @@ mod tests {
     #[test]
     fn between_four_pixels_lies_their_mean() {
         let texture = Texture::new(1, vec![10, 20, 30, 60]);
-        let level = texture.level(0);
+        let level = &texture.levels[0];
         assert_eq!(level.sample(0, 0), 10 << 8);
         assert_eq!(level.sample(1 << 16, 0), 20 << 8);
         assert_eq!(level.sample(1 << 15, 0), 15 << 8);
         assert_eq!(level.sample(1 << 15, 1 << 15), 30 << 8);
         assert_eq!(level.sample(5 << 16, 2 << 16), 20 << 8, "it repeats");
-        assert_eq!(texture.level(1).sample(12345, 6789), 30 << 8);
-        assert_eq!(texture.level(9).sample(0, 0), 30 << 8);
+    }
+
+    #[test]
+    fn the_larger_the_pixel_the_softer_the_tile() {
+        let texture = Texture::new(1, vec![10, 20, 30, 60]);
+        let seen = |footprint| {
+            let (level, halved) = texture.fitting(footprint);
+            (level.sample(0, 0) >> 8, halved)
+        };
+        assert_eq!(
+            [seen(0.1), seen(1.0), seen(1.4), seen(2.0), seen(99.0)],
+            [(10, 0), (10, 0), (20, 0), (30, 1), (30, 1)]
+        );
     }
 
     #[test]

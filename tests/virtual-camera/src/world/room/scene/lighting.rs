@@ -41,12 +41,16 @@ fn corners(hall: &Hall, point: Vector, normal: Vector) -> f64 {
     hall.planes()
         .iter()
         .filter(|(out, _)| dot(*out, normal) < 0.9)
-        .map(|&(out, distance)| 1.0 - 0.32 * (-(dot(out, point) - distance).max(0.0) / 0.28).exp())
+        .map(|&(out, distance)| 1.0 - 0.25 * (-(dot(out, point) - distance).max(0.0) / 0.28).exp())
         .product()
 }
 
 /// Things darken what they stand on and lean against.
 fn beneath(solids: &[&Solid], point: Vector) -> f64 {
-    let shade = |solid: &&Solid| 1.0 - 0.42 * (-solid.distance(point) / 0.16).exp();
-    solids.iter().map(shade).product::<f64>().max(0.25)
+    let shade = |solid: &&Solid| {
+        // Light comes from above: little is lost over a thing, most at its foot.
+        let above = (point[1] - solid.base[1] - solid.size[1]).max(0.0);
+        1.0 - 0.4 * (-(solid.distance(point) + 3.0 * above) / 0.15).exp()
+    };
+    solids.iter().map(shade).product::<f64>().max(0.4)
 }

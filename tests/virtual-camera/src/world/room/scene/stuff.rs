@@ -63,7 +63,7 @@ impl Painter {
     /// Upright wooden panels.
     fn panels(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.4, 0.14);
-        Arc::new(paint(10, (2.4, 2.4), grain, |u, v| {
+        Arc::new(paint(9, (2.4, 2.4), grain, |u, v| {
             let panel = (u * 4.0).floor();
             let x = (u * 4.0).fract() * 600.0;
             let groove = 1.0 - (x.min(600.0 - x) / 6.0 - 0.6).clamp(0.0, 1.0);
@@ -76,7 +76,7 @@ impl Painter {
     /// Wallpaper.
     fn stripes(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.plaster, 0.25, 0.1);
-        Arc::new(paint(10, (1.8, 1.8), grain, |u, v| {
+        Arc::new(paint(9, (1.8, 1.8), grain, |u, v| {
             let stripe = ((u * 15.0).fract() - 0.5).abs() * 2.0;
             let band = ((stripe - 0.45) * 12.0).clamp(0.0, 1.0);
             times(colour, 1.0 - 0.07 * band + 0.012 * self.noise.sum(u, v, (8, 8), 5))
@@ -138,7 +138,7 @@ impl Painter {
     /// Wood for furniture, fibres along u.
     pub fn wood(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.35, 0.2);
-        Arc::new(paint(9, (1.3, 0.7), grain, |u, v| {
+        Arc::new(paint(8, (1.3, 0.7), grain, |u, v| {
             let fibre = self.noise.sum(u, v, (2, 64), 3);
             let rings = (10.0 * self.noise.sum(u, v, (1, 8), 3)).sin();
             times(colour, 1.0 + 0.12 * fibre + 0.07 * rings)
@@ -148,7 +148,7 @@ impl Painter {
     /// Varnish, plastic, painted metal.
     pub fn smooth(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.plaster, 0.3, 0.09);
-        Arc::new(paint(8, (1.1, 1.1), grain, |u, v| {
+        Arc::new(paint(7, (1.1, 1.1), grain, |u, v| {
             times(colour, 1.0 + 0.03 * self.noise.sum(u, v, (2, 2), 6))
         }))
     }
@@ -156,7 +156,7 @@ impl Painter {
     /// Cloth with seams every 0.6 m.
     pub fn cloth(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.cloth, 0.2, 0.32);
-        Arc::new(paint(9, (1.2, 1.2), grain, |u, v| {
+        Arc::new(paint(8, (1.2, 1.2), grain, |u, v| {
             let seam = ((u * 2.0).fract() - 0.5).abs() * 600.0;
             let crease = self.noise.sum(u, v, (4, 4), 5);
             times(colour, 1.0 + 0.1 * crease - 0.3 * (1.0 - seam / 5.0).max(0.0))

@@ -39,7 +39,7 @@ impl Painter {
         let (words, ink) = (seeded.bits(), seeded.range(0.05, 0.25));
         let frame = mix([0.08, 0.08, 0.08], [0.6, 0.5, 0.35], seeded.unit());
         let grain = detail(&self.grains.plaster, 0.35, 0.06);
-        Arc::new(paint(9, size, grain, |u, v| {
+        Arc::new(paint(8, size, grain, |u, v| {
             let mut colour = mix(paper, below, 0.6 * v * (1.0 - v) + 0.1 * self.noise.sum(u, v, (4, 4), 4));
             for shape in &shapes {
                 let far = if shape.round {
@@ -72,7 +72,7 @@ impl Painter {
         let glazed = seeded.unit() < 0.35;
         let handle = if seeded.unit() < 0.5 { 0.16 } else { 0.84 };
         let grain = detail(&self.grains.wood, 0.4, 0.1);
-        Arc::new(paint(9, size, grain, |u, v| {
+        Arc::new(paint(8, size, grain, |u, v| {
             let fibre = self.noise.sum(v, u, (2, 64), 3);
             let leaf = times(colour, 1.0 + 0.06 * fibre);
             let frame = times(colour, 0.82 + 0.05 * fibre);
@@ -100,7 +100,7 @@ impl Painter {
         let mut seeded = self.seeded.fork(3000 + label);
         let (columns, skyline) = (2.0 + seeded.below(2) as f64, seeded.range(0.5, 0.75));
         let shift = seeded.unit();
-        let mut material = paint(9, size, None, |u, v| {
+        let mut material = paint(8, size, None, |u, v| {
             let hills = skyline + 0.1 * self.noise.sum(u + shift, 0.5, (4, 4), 4);
             let sky =
                 mix([0.72, 0.84, 0.98], [0.98, 0.99, 1.0], v * 1.6 + 0.3 * self.noise.sum(u, v, (2, 4), 4));
@@ -131,7 +131,7 @@ impl Painter {
         let shelves = (size.1 / 0.36).round().max(1.0);
         let slots = (size.0 / 0.045).round();
         let grain = detail(&self.grains.plaster, 0.3, 0.12);
-        Arc::new(paint(9, size, grain, |u, v| {
+        Arc::new(paint(8, size, grain, |u, v| {
             let (shelf, y) = ((v * shelves).floor(), (v * shelves).fract());
             let slot = (u * slots).floor();
             let x = (u * slots).fract();
@@ -158,7 +158,7 @@ impl Painter {
         let notes: Vec<Shape> = (0..14).map(|_| note(&mut seeded)).collect();
         let cork = if seeded.unit() < 0.5 { [0.66, 0.5, 0.33] } else { [0.3, 0.42, 0.36] };
         let grain = detail(&self.grains.plaster, 0.3, 0.2);
-        Arc::new(paint(9, size, grain, |u, v| {
+        Arc::new(paint(8, size, grain, |u, v| {
             let mut shown = times(cork, 1.0 + 0.12 * self.noise.sum(u, v, (64, 32), 3));
             for note in &notes {
                 let far = beyond(u, v, note.middle, note.half);
@@ -187,7 +187,7 @@ impl Painter {
     ) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.4, 0.12);
         let cells = (cells.0 as f64, cells.1 as f64);
-        Arc::new(paint(9, size, grain, |u, v| {
+        Arc::new(paint(8, size, grain, |u, v| {
             let (x, y) = ((u * cells.0).fract(), (v * cells.1).fract());
             let metres = (size.0 / cells.0, size.1 / cells.1);
             let edge = (x.min(1.0 - x) * metres.0).min(y.min(1.0 - y) * metres.1);
