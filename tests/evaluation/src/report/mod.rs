@@ -127,8 +127,9 @@ impl<'a> Content<'a> {
         let over_time = self.sections.iter().flat_map(|section| {
             self.shown(section).into_iter().map(|title| Plot::over_time(section, title)).collect::<Vec<_>>()
         });
-        let failed = over_time.chain(self.plots_against_delay()).filter_map(|plot| plot.draw(folder).err());
-        failed.last().map(|error| format!("no plots: {error}; install gnuplot (Debian: gnuplot-nox)"))
+        let plots = over_time.chain(self.plots_against_delay());
+        let failed: Vec<_> = plots.filter_map(|plot| plot.draw(folder).err()).collect();
+        failed.first().map(|error| format!("no plots: {error}; install gnuplot (Debian: gnuplot-nox)"))
     }
 
     fn failures(&self) -> impl Iterator<Item = (String, &'a str)> {

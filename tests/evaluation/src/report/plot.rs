@@ -31,7 +31,7 @@ impl Plot {
     pub fn over_time(section: &Section, title: &str) -> Self {
         let runs: Vec<&Judged> = section.showing(title).collect();
         let file = format!("time-{}-{}.png", slug(title), section.setup.folder());
-        let panel = |block: &str, axis: &str, top: f64| {
+        let panel = |block: &str, axis: &str, top: &str| {
             let data = runs.iter().map(|one| Curve::of(block, one.run.tracker));
             format!("set ylabel \"{axis}\"\nset yrange [0:{top}]\n{}", plot(data))
         };
@@ -44,8 +44,14 @@ impl Plot {
             .collect();
         let hidden: String = runs.first().map(|one| shade_hidden(&one.run.frames)).unwrap_or_default();
         let header = header(&file, 800, "seconds since the first box");
-        let above = panel("gc", "d_{gc} (1: surely outside)", 1.5);
-        let below = panel("gp", "d_{gp} (while tracking)", 0.75);
+        let last = runs.iter().filter_map(|one| one.run.frames.last()).map(|frame| frame.time_s);
+        // A range of nothing is an error.
+        let end = last.fold(0.1, f64::max);
+        let title = title.replace('\'', "''");
+        let frame =
+            format!("set xrange [0:{end:.3}]\nset multiplot layout 2, 1 title '{title}' noenhanced\n");
+        let above = panel("gc", "d_{gc} (1: surely outside)", "*<1.5");
+        let below = panel("gp", "d_{gp} (while tracking)", "0.05<*<0.75");
         Self {
             caption: format!(
                 "d_gc (above) and d_gp (below) over time, {title}; grey: the person is wholly hidden"
@@ -134,7 +140,7 @@ fn plot(curves: impl Iterator<Item = Curve>) -> String {
     let curves: Vec<_> = curves
         .map(|Curve { block, tracker, points }| {
             let with = if points { "linespoints pointtype 7" } else { "lines" };
-            let width = if tracker == TrackerName::Ptztrack { 3 } else { 1 };
+            let width = if tracker == TrackerName::Ptztrack { 3 } else { 2 };
             let colour = colour(tracker);
             format!("{block} using 1:2 with {with} linewidth {width} linecolor rgb \"{colour}\" title \"{tracker}\"")
         })
