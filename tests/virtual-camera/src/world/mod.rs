@@ -69,6 +69,15 @@ pub(crate) trait World: Send + Sync {
         Pinhole::new(size.0, size.1, 2.0 * narrowed.atan().to_degrees())
     }
 
+    /// By how many pixels the middle of a picture moves to the right and down while it is exposed.
+    fn sweep(&self, exposure: &Exposure, size: (u32, u32)) -> (f64, f64) {
+        let view = |pose: &Pose| self.pinhole(pose.zoom_step, size);
+        let (opening, closing) = (view(&exposure.opening), view(&exposure.closing));
+        let moved = geometry::between((&exposure.opening, &opening), (&exposure.closing, &closing));
+        let (x, y) = geometry::project(&moved, opening.centre_x, opening.centre_y);
+        (x - opening.centre_x, y - opening.centre_y)
+    }
+
     /// From a pixel of the overview to the pixel of a view of `size`.
     fn overview_to_view(&self, pose: &Pose, size: (u32, u32)) -> Matrix {
         let (looking, overview) = self.overview_view();
@@ -101,12 +110,7 @@ pub(crate) fn open(settings: &Settings) -> Result<Box<dyn World>, FootageError> 
             let recording = Box::new(footage::Footage::open(footage)?);
             Box::new(Panorama::new(recording, footage.recording_fov_deg, wide, settings))
         }
-        // Stands in until the room is built.
-        settings::World::Room(_) => {
-            let synthetic = SyntheticSettings::default();
-            let recording = Box::new(synthetic::Synthetic::new(&synthetic));
-            Box::new(Panorama::new(recording, synthetic.recording_fov_deg, synthetic.wide_fov_deg, settings))
-        }
+        settings::World::Room(room) => Box::new(room::Room::new(room, settings)),
         settings::World::Synthetic(synthetic) => {
             let recording = Box::new(synthetic::Synthetic::new(synthetic));
             Box::new(Panorama::new(recording, synthetic.recording_fov_deg, synthetic.wide_fov_deg, settings))

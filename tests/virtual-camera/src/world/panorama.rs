@@ -140,10 +140,8 @@ impl World for Panorama {
             let homography = if index == 0 { &luma } else { &chroma };
             warp(&source.planes[index], target, homography);
         }
-        let centre = (view.centre_x, view.centre_y);
-        let (x, y) = geometry::project(&luma, centre.0, centre.1);
-        let (x, y) = geometry::project(&self.overview_to_view(&exposure.closing, size), x, y);
-        motion_blur(&mut picture, x - centre.0, y - centre.1);
+        let (x, y) = self.sweep(exposure, size);
+        motion_blur(&mut picture, x, y);
         Ok(picture)
     }
 

@@ -9,5 +9,7 @@ mod sensor;
 mod settings;
 pub(crate) mod view;
 mod walker;
+mod world;
 
 pub use settings::{Change, Lighting, Occlusion, RoomSettings, Subject};
+pub(crate) use world::Room;
