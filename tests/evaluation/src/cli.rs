@@ -41,6 +41,9 @@ pub struct Args {
     /// Who draws the first box: given (the truth, to every tracker) or detected (by those that can)
     #[arg(long, default_value = "given")]
     pub first_box: FirstBox,
+    /// Write a video of each run as well, with everything drawn in: the truth in white
+    #[arg(long)]
+    pub record: bool,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
     pub jobs: usize,
@@ -128,6 +131,7 @@ impl Args {
             size: self.size,
             delays,
             first_box: self.first_box,
+            film: self.record.then(|| self.out.join(format!("test-{test}-{tracker}.mkv"))),
             ..Experiment::new(Scene::room(test, self.seed)?, tracker, self.seed)
         })
     }
@@ -152,7 +156,9 @@ impl Args {
         });
         let at = |delays: Delays| {
             let swept = SWEPT.into_iter().filter_map(|test| self.experiment(TestId(test), tracker));
-            swept.map(move |experiment| Experiment { delays, sweep: true, ..experiment }).collect::<Vec<_>>()
+            swept
+                .map(move |experiment| Experiment { delays, sweep: true, film: None, ..experiment })
+                .collect::<Vec<_>>()
         };
         delays.flat_map(at).collect()
     }

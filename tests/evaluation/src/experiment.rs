@@ -1,6 +1,6 @@
 //! What is run: who is followed where, by whom, and seen through what.
 
-use std::time::Duration;
+use std::{path::PathBuf, time::Duration};
 
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
 
@@ -61,6 +61,8 @@ pub struct Experiment {
     pub first_box: FirstBox,
     /// Whether it is one of a series over the delay.
     pub sweep: bool,
+    /// Where to write a video of it, with everything drawn in (Matroska); nowhere unless given.
+    pub film: Option<PathBuf>,
 }
 
 impl Experiment {
@@ -75,6 +77,7 @@ impl Experiment {
             delays: Delays::default(),
             first_box: FirstBox::Given,
             sweep: false,
+            film: None,
         }
     }
 

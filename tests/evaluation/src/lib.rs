@@ -12,6 +12,7 @@ mod batch;
 pub mod cli;
 mod codec;
 mod experiment;
+mod film;
 mod lockstep;
 pub mod metrics;
 mod pipeline;

@@ -12,6 +12,7 @@ use virtual_camera::{Clock, Picture, VirtualCamera};
 use crate::{
     album::Album,
     experiment::Experiment,
+    film,
     pipeline::{Pipeline, PipelineError, SINK, SOURCE},
     record::{Bounds, Estimate, FrameRecord, Run},
     trackers::{Cue, Phase, Tracker},
@@ -54,6 +55,9 @@ fn drive(experiment: &Experiment, run: &mut Run) -> Result<(), RunError> {
             run.frames.push(record);
         }
     }
+    if experiment.film.is_some() {
+        stage.pipeline.end()?;
+    }
     run.snapshots = album.develop(&stage.info)?;
     Ok(())
 }
@@ -89,14 +93,15 @@ impl<'a> Stage<'a> {
         } else {
             format!("fakesink name={SINK} sync=false async=false")
         };
-        let description = format!(
-            "appsrc name={SOURCE} ! {} ! {} ! {sink}",
-            experiment.codec.description(),
-            tracker.description()
-        );
+        let sink = experiment.film.as_ref().map_or(sink.clone(), |file| film::description(&sink, file));
+        let (codec, elements) = (experiment.codec.description(), tracker.description());
+        let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
         experiment.codec.attach(&pipeline)?;
         tracker.attach(&pipeline)?;
+        if experiment.film.is_some() {
+            film::attach(&pipeline, tracker.cue(), &info)?;
+        }
         pipeline.start()?;
         Ok(Self { experiment, camera, pipeline, tracker, info, counted: 0 })
     }

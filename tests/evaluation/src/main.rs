@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use evaluation::cli::Args;
+use evaluation::{cli::Args, report};
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -23,7 +23,12 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     for reason in left_out {
         eprintln!("evaluate: {reason}");
     }
+    std::fs::create_dir_all(&args.out)?;
     let runs = evaluation::run_all(&args.experiments(&trackers), args.jobs, std::io::stderr());
-    println!("{}", args.out.display());
+    let report = report::write(&runs, &args.out)?;
+    for note in &report.notes {
+        eprintln!("evaluate: {note}");
+    }
+    println!("{}\nall of it: {}", report.summary, args.out.join("index.html").display());
     Ok(!runs.is_empty() && runs.iter().all(|run| run.error.is_none()))
 }

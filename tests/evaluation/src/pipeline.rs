@@ -45,6 +45,8 @@ pub(crate) enum PipelineError {
 enum Event {
     /// The source wants a picture: whatever it had has gone all the way.
     Hungry,
+    /// All of it has come to its end.
+    Ended,
     Posted(String),
 }
 
@@ -104,7 +106,7 @@ impl Pipeline {
         });
         let started = self.bin.set_state(gst::State::Playing);
         started.map_err(|error| PipelineError::Start(self.posted().unwrap_or_else(|| error.to_string())))?;
-        self.wait(|| true)
+        self.wait(|event| matches!(event, Event::Hungry))
     }
 
     /// Sends a picture through and waits until all elements have done with it; gives the target meta that it had at
@@ -114,18 +116,24 @@ impl Pipeline {
         self.source
             .push_buffer(buffer)
             .map_err(|_| PipelineError::Posted(self.posted().unwrap_or_else(|| "it has ended".into())))?;
-        self.wait(|| lock(&self.arrival).time == time)?;
+        self.wait(|event| matches!(event, Event::Hungry) && lock(&self.arrival).time == time)?;
         Ok(lock(&self.arrival).target.take())
     }
 
-    /// Waits until the source wants a picture and `done`.
-    fn wait(&self, done: impl Fn() -> bool) -> Result<(), PipelineError> {
+    /// Ends the stream, and waits until whatever writes a file has written it.
+    pub fn end(&self) -> Result<(), PipelineError> {
+        self.source.end_of_stream().map_err(|_| PipelineError::Stalled)?;
+        self.wait(|event| matches!(event, Event::Ended))
+    }
+
+    /// Waits for an event that is `wanted`.
+    fn wait(&self, wanted: impl Fn(&Event) -> bool) -> Result<(), PipelineError> {
         let deadline = Instant::now() + PATIENCE;
         loop {
             match self.events.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(Event::Hungry) if done() => return Ok(()),
-                Ok(Event::Hungry) => {}
+                Ok(event) if wanted(&event) => return Ok(()),
                 Ok(Event::Posted(text)) => return Err(PipelineError::Posted(text)),
+                Ok(Event::Hungry | Event::Ended) => {}
                 Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => {
                     return Err(PipelineError::Stalled);
                 }
@@ -136,7 +144,7 @@ impl Pipeline {
     fn posted(&self) -> Option<String> {
         self.events.try_iter().find_map(|event| match event {
             Event::Posted(text) => Some(text),
-            Event::Hungry => None,
+            Event::Hungry | Event::Ended => None,
         })
     }
 }
@@ -157,8 +165,12 @@ fn announce_hunger(source: &gst_app::AppSrc, sender: Sender<Event>) {
 fn announce_faults(bin: &gst::Pipeline, sender: Sender<Event>) {
     let Some(bus) = bin.bus() else { return };
     bus.set_sync_handler(move |_, message| {
-        if let Some(text) = fault(message) {
-            let _ = sender.send(Event::Posted(text));
+        let event = match message.type_() {
+            gst::MessageType::Eos => Some(Event::Ended),
+            _ => fault(message).map(Event::Posted),
+        };
+        if let Some(event) = event {
+            let _ = sender.send(event);
         }
         gst::BusSyncReply::Drop
     });

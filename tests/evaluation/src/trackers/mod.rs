@@ -60,6 +60,11 @@ impl Tracker {
         Self { name, first_box, cue: Arc::new(Mutex::new(Cue::new(size))) }
     }
 
+    /// What it is told of the picture that is under way.
+    pub fn cue(&self) -> &CurrentCue {
+        &self.cue
+    }
+
     /// Its elements, from decoded pictures to pictures with or without a target meta.
     pub fn description(&self) -> String {
         match self.name {
