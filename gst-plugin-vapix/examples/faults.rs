@@ -30,14 +30,22 @@ const REBOOT: Duration = Duration::from_secs(60);
 fn main() {
     common::init();
     println!("# What can go wrong with the camera\n");
-    println!("Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the");
     println!(
-        "properties' defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot"
+        "Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the properties'"
     );
     println!(
-        "60 s; the worst of three runs that end it at different moments between two attempts. In each of them the element took pictures at once all the time,"
+        "defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s; the worst"
     );
-    println!("posted one warning as the fault began and one `connected` as it was over.\n");
+    println!(
+        "of three runs that end it at different moments between two attempts; of the last two rows one run."
+    );
+    println!(
+        "The element took pictures at once all the time. Where the user sees something, that is one warning"
+    );
+    println!(
+        "as the fault begins and one `connected` as it is over. A request that hangs is waited for as long as"
+    );
+    println!("`timeout` says, 2 s by default: with a longer one it takes that long to be back.\n");
     println!("| Fault | What the user sees | Requests per second meanwhile | Back in control after |");
     println!("|---|---|---|---|");
     for case in cases() {
