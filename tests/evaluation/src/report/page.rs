@@ -79,7 +79,8 @@ fn definitions() -> String {
         DEFINITIONS.iter().map(|(what, how)| format!("<dt>{}</dt><dd>{}</dd>\n", escape(what), escape(how)));
     format!(
         "<h2 id=\"counted\">What is counted</h2>\n<dl>\n{}</dl>\n<p>In the pictures: green the true box, hidden parts \
-         included; yellow what the tracker says, where it is right; red where it is not.</p>\n",
+         included; yellow what the tracker says, where it is right; red where it is not; orange and dashed where it holds \
+         the target for occluded.</p>\n",
         list.collect::<String>()
     )
 }

@@ -54,11 +54,9 @@ impl Plot {
         let below = panel("gp", "d_{gp} (while tracking)", "0.05<*<0.75");
         Self {
             caption: format!(
-                "d_gc (above) and d_gp (below) over time, {title}; grey: the person is wholly hidden"
+                "{title}: d_gc (above) and d_gp (below) over time; grey: the person is wholly hidden"
             ),
-            script: format!(
-                "{header}{data}{hidden}set multiplot layout 2, 1\n{above}{below}unset multiplot\n"
-            ),
+            script: format!("{header}{data}{hidden}{frame}{above}{below}unset multiplot\n"),
             file,
         }
     }

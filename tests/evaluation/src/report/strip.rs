@@ -34,7 +34,11 @@ fn figure(snapshot: &Snapshot, frame: &FrameRecord) -> String {
         svg += &outline(&truth.bounds, "truth");
     }
     if let Some(estimate) = frame.estimate.as_ref().filter(|estimate| has_place(estimate)) {
-        let class = if is_true_positive(frame) { "right" } else { "wrong" };
+        let class = match estimate.state {
+            TargetState::Occluded => "predicted",
+            _ if is_true_positive(frame) => "right",
+            _ => "wrong",
+        };
         svg += &outline(&estimate.bounds, class);
         let (x, y) = estimate.centroid;
         let _ = write!(
