@@ -54,7 +54,7 @@ fn every_property_says_what_it_is() {
     let properties = rig.sink.list_properties();
     let own = properties.iter().filter(|property| property.owner_type() == rig.sink.type_());
     let own: Vec<_> = own.map(|property| (property.name(), property.blurb())).collect();
-    assert_eq!(own.len(), 19, "{own:?}");
+    assert_eq!(own.len(), 20, "{own:?}");
     assert!(own.iter().all(|(_, blurb)| blurb.is_some_and(|blurb| blurb.len() > 10)), "{own:?}");
 }
 
