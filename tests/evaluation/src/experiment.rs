@@ -94,17 +94,13 @@ impl Experiment {
 
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
     /// was never moved; `None` where there is none.
-    pub(crate) fn first_counted(&self) -> Result<Option<u32>, virtual_camera::Error> {
-        let camera = self.camera(Clock::Stepped)?;
-        let period = camera.frame_period();
-        let pictures = (0..).take_while(|n| *n * period <= self.scene.duration);
-        let whole = |n: &u32| {
-            let exposure = *n * period;
-            camera.advance_to(exposure);
-            let (person, _) = self.scene.split(camera.ground_truth(exposure, self.size));
-            person.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
+    pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
+        let (period, home) = (camera.frame_period(), camera.home());
+        let whole = |number: &u32| {
+            let people = camera.ground_truth_from(&home, *number * period, self.size);
+            self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
         };
-        Ok(pictures.into_iter().find(whole))
+        (0..).take_while(|number| *number * period <= self.scene.duration).find(whole)
     }
 
     /// What it will be recorded as.

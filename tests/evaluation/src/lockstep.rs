@@ -43,8 +43,8 @@ pub fn run(experiment: &Experiment) -> Run {
 }
 
 fn drive(experiment: &Experiment, run: &mut Run) -> Result<(), RunError> {
-    let first = experiment.first_counted()?.ok_or(RunError::Nobody)?;
     let mut stage = Stage::set(experiment)?;
+    let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
     let period = stage.camera.frame_period();
     run.frame_rate = 1.0 / period.as_secs_f64();
     let mut album = Album::default();

@@ -380,6 +380,11 @@ impl VirtualCamera {
         self.camera.ground_truth(exposure, size)
     }
 
+    /// Who would be in a picture at any time, the future too, if the camera looked along `pose`.
+    pub fn ground_truth_from(&self, pose: &Pose, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.camera.world.truth(&Exposure { time, opening: *pose, closing: *pose }, size)
+    }
+
     /// Which pixels of that picture show a person; `None` in worlds that know boxes at best.
     pub fn silhouette(&self, exposure: Duration, size: (u32, u32)) -> Option<Mask> {
         self.camera.silhouette(exposure, size)
