@@ -44,7 +44,8 @@ pub use settings::{Auth, Clock, FootageSettings, PtzApi, Settings, Video, World}
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Mask};
 pub use world::{
-    Change, FootageError, Lighting, MotError, Occlusion, RoomSettings, Subject, SyntheticSettings, Waypoint,
+    Change, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings, Subject,
+    SyntheticSettings, Waypoint, read_mot,
 };
 
 /// Why a camera does not start.

@@ -12,8 +12,9 @@ mod warp;
 use std::{sync::Arc, time::Duration};
 
 pub use footage::FootageError;
-pub use mot::MotError;
+pub use mot::{MotError, People, read as read_mot};
 use panorama::Panorama;
+pub use panorama::Person;
 pub use room::{Change, Lighting, Occlusion, RoomSettings, Subject};
 pub use synthetic::{SyntheticSettings, Waypoint};
 

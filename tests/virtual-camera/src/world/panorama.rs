@@ -29,7 +29,7 @@ pub(crate) trait Recording: Send {
 
 /// Somebody in a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Person {
+pub struct Person {
     /// The same in all pictures.
     pub id: u32,
     /// In pixels of the recording.

@@ -1,8 +1,6 @@
 //! A made-up room around the camera, with one person walking in it.
 
 pub(crate) mod light;
-#[cfg(test)]
-mod look;
 mod raster;
 mod scene;
 mod sensor;

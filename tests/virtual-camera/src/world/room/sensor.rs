@@ -98,7 +98,7 @@ impl Sensor {
         let (dark, fall) = (amount(dark) as i16, ((amount(dark) - amount(white)) * 256.0 / 219.0) as i16);
         for (pixel, &noise) in pixels.iter_mut().zip(noise) {
             let value = i16::from(*pixel) - BLACK;
-            let amount = dark - (value * fall >> 8);
+            let amount = dark - ((value * fall) >> 8);
             let counts = ((value * light + 64) >> 7) + ((i16::from(noise) * amount + 64) >> 7);
             let counts = (counts + step / 2) & !(step - 1);
             *pixel = (((counts.clamp(0, 239) * gain) >> 6) + BLACK).clamp(0, 255) as u8;
@@ -154,10 +154,14 @@ mod tests {
         let sensor = Sensor::new(lighting, &Seeded::new(3));
         let mut picture = Picture::grey(320, 240, luma);
         sensor.expose(&mut picture, 7, 0.28);
-        let values: Vec<f64> = picture.planes[0].data.iter().map(|&value| f64::from(value)).collect();
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let variance = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>() / values.len() as f64;
-        (mean, variance.sqrt())
+        let mean = |line: &[u8]| line.iter().map(|&value| f64::from(value)).sum::<f64>() / line.len() as f64;
+        let luma = &picture.planes[0].data;
+        // Within rows: from row to row the lamps flicker.
+        let variance = |line: &[u8]| {
+            let mean = mean(line);
+            line.iter().map(|&value| (f64::from(value) - mean).powi(2)).sum::<f64>() / line.len() as f64
+        };
+        (mean(luma), (luma.chunks(320).map(variance).sum::<f64>() / 240.0).sqrt())
     }
 
     #[test]

@@ -1,5 +1,6 @@
 //! Flat surfaces in true perspective: which pixels they cover, and with what.
 
+mod brush;
 mod cover;
 mod surface;
 mod texture;

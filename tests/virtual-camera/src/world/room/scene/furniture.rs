@@ -54,8 +54,7 @@ impl Painter {
     /// A cupboard with doors or drawers, and things on it.
     pub fn sideboard(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, d] = at.size;
-        let colour = Self::wood_colour(seeded);
-        let wood = self.wood(colour);
+        let (colour, wood) = self.some_wood(seeded);
         let cells = ((w / 0.5).round().max(1.0) as usize, 1 + seeded.below(3));
         let front = self.front(colour, (w, h - 0.1), cells, false);
         let body = Finish { sides: wood.clone(), top: wood.clone(), front };
@@ -66,7 +65,7 @@ impl Painter {
         joiner.add(0.0, h - 0.03, d / 2.0, [w + 0.04, 0.03, d + 0.02], &Finish::all(&wood));
         for share in [-0.33, 0.0, 0.33] {
             if seeded.unit() < 0.6 && d < 0.7 {
-                let stuff = self.smooth(Self::any_colour(seeded));
+                let (_, stuff) = self.some_paint(seeded);
                 let size = [seeded.range(0.1, 0.35), seeded.range(0.08, 0.35), seeded.range(0.1, 0.25)];
                 joiner.add(share * w, h, d / 2.0, size, &Finish::all(&stuff));
             }
@@ -77,7 +76,7 @@ impl Painter {
     /// A sofa with cushions.
     pub fn sofa(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, d] = at.size;
-        let cloth = Finish::all(&self.cloth(Self::any_colour(seeded)));
+        let cloth = Finish::all(&self.some_cloth(seeded));
         let mut joiner = Joiner::new(at);
         let seat = 0.42 * h / 0.8;
         joiner.add(0.0, 0.06, d / 2.0, [w - 0.36, seat - 0.18, d], &cloth);
@@ -93,7 +92,7 @@ impl Painter {
             joiner.add(side * (w / 2.0 - 0.09), 0.0, d / 2.0, [0.18, 0.75 * h, d], &cloth);
         }
         if seeded.unit() < 0.8 {
-            let cushion = Finish::all(&self.cloth(Self::any_colour(seeded)));
+            let cushion = Finish::all(&self.some_cloth(seeded));
             joiner.add(seeded.range(-0.3, 0.3) * w, seat + 0.02, d - 0.42, [0.42, 0.36, 0.12], &cushion);
         }
         joiner.pieces
@@ -101,16 +100,14 @@ impl Painter {
 
     /// Shelves with books.
     pub fn bookcase(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
-        let colour = Self::wood_colour(seeded);
-        let wood = self.wood(colour);
+        let (colour, wood) = self.some_wood(seeded);
         let front = self.books(colour, (at.size[0], at.size[1]), seeded.bits() % 1000);
         vec![Piece::new(at, &Finish { sides: wood.clone(), top: wood, front })]
     }
 
     /// A row of lockers.
     pub fn lockers(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
-        let colour = Self::any_colour(seeded);
-        let metal = self.smooth(colour);
+        let (colour, metal) = self.some_paint(seeded);
         let columns = (at.size[0] / 0.4).round().max(1.0) as usize;
         let front = self.front(colour, (at.size[0], at.size[1]), (columns, 1 + seeded.below(2)), true);
         vec![Piece::new(at, &Finish { sides: metal.clone(), top: metal, front })]
@@ -119,7 +116,7 @@ impl Painter {
     /// A table or bench: a board on legs.
     pub fn table(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, d] = at.size;
-        let top = Finish::all(&self.wood(Self::wood_colour(seeded)));
+        let top = Finish::all(&self.some_wood(seeded).1);
         let leg = Finish::all(&self.smooth([0.25, 0.25, 0.26]));
         let mut joiner = Joiner::new(at);
         joiner.add(0.0, h - 0.04, d / 2.0, [w, 0.04, d], &top);
@@ -132,9 +129,9 @@ impl Painter {
     /// A counter as in a reception.
     pub fn counter(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, d] = at.size;
-        let colour = Self::wood_colour(seeded);
+        let (colour, wood) = self.some_wood(seeded);
         let front = self.front(colour, (w, h), ((w / 0.6).round().max(1.0) as usize, 1), false);
-        let body = Finish { sides: self.wood(colour), top: self.wood(colour), front };
+        let body = Finish { sides: wood.clone(), top: wood, front };
         let mut joiner = Joiner::new(at);
         joiner.add(0.0, 0.0, d / 2.0, [w - 0.08, h - 0.05, d - 0.06], &body);
         joiner.add(0.0, h - 0.05, d / 2.0, [w, 0.05, d], &Finish::all(&self.smooth([0.8, 0.79, 0.77])));
@@ -148,13 +145,13 @@ impl Painter {
         let leaves = (w / 0.55).round().max(2.0);
         let each = w / leaves;
         let tilt_deg = (d / each).min(0.5).atan().to_degrees();
-        let cloth = self.cloth(Self::any_colour(seeded));
-        let frame = self.wood(Self::wood_colour(seeded));
+        let cloth = self.some_cloth(seeded);
+        let (_, frame) = self.some_wood(seeded);
         let finish = Finish { sides: frame.clone(), top: frame, front: cloth };
         let (width, _) = at.axes();
         let leaf = |i: usize| {
             let right = (i as f64 + 0.5) * each - w / 2.0;
-            let turn = if i % 2 == 0 { tilt_deg } else { -tilt_deg };
+            let turn = if i.is_multiple_of(2) { tilt_deg } else { -tilt_deg };
             let size = [each / tilt_deg.to_radians().cos() + 0.02, h, 0.03];
             Solid { base: add(at.base, scale(width, right)), size, yaw_deg: at.yaw_deg + turn }
         };
@@ -174,7 +171,7 @@ impl Painter {
     /// A plant in a pot.
     pub fn plant(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, _] = at.size;
-        let pot = Finish::all(&self.smooth(Self::any_colour(seeded)));
+        let pot = Finish::all(&self.some_paint(seeded).1);
         let mut joiner = Joiner::new(at);
         joiner.add(0.0, 0.0, w / 2.0, [0.62 * w, 0.3, 0.62 * w], &pot);
         let middle = at.place(0.0, 0.0, 0.0);
@@ -182,16 +179,7 @@ impl Painter {
             .map(|_| self.smooth([seeded.range(0.1, 0.3) as f32, seeded.range(0.3, 0.5) as f32, 0.14]))
             .collect();
         let mut leaves: Vec<Surface> = (0..34)
-            .map(|_| {
-                leaf(
-                    add(middle, [0.0, 0.3, 0.0]),
-                    h - 0.3,
-                    w,
-                    &seeded.pick(&[0, 1, 2]).clone(),
-                    &greens,
-                    seeded,
-                )
-            })
+            .map(|_| leaf(add(middle, [0.0, 0.3, 0.0]), (w, h - 0.3), &greens[seeded.below(3)], seeded))
             .collect();
         let far = |surface: &Surface| {
             let way = subtract(surface.origin, CAMERA);
@@ -205,14 +193,7 @@ impl Painter {
 }
 
 /// A leaf somewhere in the crown of a plant: a pointed piece that droops outwards.
-fn leaf(
-    foot: Vector,
-    height: f64,
-    width: f64,
-    green: &usize,
-    greens: &[Arc<Material>],
-    seeded: &mut Seeded,
-) -> Surface {
+fn leaf(foot: Vector, (width, height): (f64, f64), green: &Arc<Material>, seeded: &mut Seeded) -> Surface {
     let (around, rise) = (seeded.range(0.0, std::f64::consts::TAU), seeded.range(-0.2, 1.2));
     let out = [around.cos() * rise.cos(), rise.sin(), around.sin() * rise.cos()];
     let reach = seeded.range(0.05, 0.3) * width;
@@ -223,7 +204,7 @@ fn leaf(
     let length = seeded.range(0.5, 0.8) * width * 0.6;
     let outline =
         vec![(0.0, 0.0), (0.4 * length, -0.16 * length), (length, 0.0), (0.4 * length, 0.16 * length)];
-    let mut leaf = Surface::rectangle(origin, out, side, (1.0, 1.0), &greens[*green]);
+    let mut leaf = Surface::rectangle(origin, out, side, (1.0, 1.0), green);
     leaf.outline = outline;
     if !leaf.faces(CAMERA) {
         leaf.v = scale(leaf.v, -1.0);

@@ -145,7 +145,7 @@ struct Look {
 impl Look {
     fn new(painter: &Painter, seeded: &mut Seeded) -> Self {
         let floor = match seeded.below(3) {
-            0 => painter.tiles(mix_floor(seeded), seeded.range(0.4, 0.6)),
+            0 => painter.tiles(stone_colour(seeded), seeded.range(0.4, 0.6)),
             1 => painter.boards(Painter::wood_colour(seeded)),
             _ => painter.carpet(hue(seeded.unit(), seeded.range(0.1, 0.4), seeded.range(0.35, 0.55))),
         };
@@ -166,7 +166,7 @@ fn wall_colour(seeded: &mut Seeded) -> Colour {
     hue(seeded.unit(), seeded.range(0.02, 0.14), seeded.range(0.68, 0.9))
 }
 
-fn mix_floor(seeded: &mut Seeded) -> Colour {
+fn stone_colour(seeded: &mut Seeded) -> Colour {
     hue(seeded.range(0.02, 0.15), seeded.range(0.03, 0.25), seeded.range(0.45, 0.75))
 }
 
@@ -218,7 +218,7 @@ impl Row<'_> {
             let kind = seeded.pick(kinds);
             let width = match kind {
                 Kind::Poster => seeded.range(0.5, 1.0),
-                Kind::Nothing => seeded.range(0.4, 1.4),
+                Kind::Nothing => seeded.range(0.4, 1.1),
                 Kind::Door => 1.0,
                 Kind::Window => seeded.range(1.3, 2.2),
                 Kind::Notices => seeded.range(1.2, 1.9),
@@ -231,7 +231,7 @@ impl Row<'_> {
             }
             if kind != last {
                 self.put(kind, place, along, width, seeded);
-                along += width + seeded.range(0.12, 0.7);
+                along += width + seeded.range(0.12, 0.5);
             }
             last = kind;
         }

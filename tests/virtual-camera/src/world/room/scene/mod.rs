@@ -79,7 +79,7 @@ impl Scene {
                     let line = &mut mask.data[covered.row * view.size.0..][..view.size.0];
                     line[covered.whole.clone()].fill(0);
                     for (column, part) in covered.edges() {
-                        line[column] = (u32::from(line[column]) * (256 - u32::from(part)) >> 8) as u8;
+                        line[column] = ((u32::from(line[column]) * (256 - u32::from(part))) >> 8) as u8;
                     }
                 });
             }
@@ -106,3 +106,6 @@ fn in_order(mut pieces: Vec<Piece>) -> Vec<Piece> {
     }
     sorted
 }
+
+#[cfg(test)]
+mod tests;

@@ -72,6 +72,9 @@ impl Noise {
     }
 }
 
+/// Colours that differ by no more than this are as good as one: brightness alone tells them apart.
+const PLAIN: u8 = 9;
+
 /// Paints a tile of 2^`shift` pixels a side that is `tile` metres wide and high; `colour` takes 0 to 1 both ways.
 pub(super) fn paint(
     shift: u32,
@@ -98,7 +101,7 @@ pub(super) fn paint(
     let luma = Texture::new(shift, luma.collect());
     // BT.601.
     let chroma = [chroma([-0.169, -0.331, 0.5]), chroma([0.5, -0.419, -0.081])];
-    let plain = [chroma[0].constant(), chroma[1].constant()];
+    let plain = chroma.each_ref().map(|chroma| chroma.plain(PLAIN));
     Material { luma, chroma, plain, tile, detail, glows: false }
 }
 
@@ -148,7 +151,7 @@ impl Grains {
 
 /// A grain of 512 pixels on `metres`, as strong as `gain` of 1.
 pub(super) fn detail(texture: &Arc<Texture>, metres: f64, gain: f64) -> Option<Detail> {
-    Some(Detail { texture: texture.clone(), per_metre: 512.0 / metres, gain: (gain * 256.0) as i32 })
+    Some(Detail { texture: texture.clone(), per_metre: 512.0 / metres, gain: (gain * 256.0) as i16 })
 }
 
 #[cfg(test)]
@@ -168,8 +171,6 @@ mod tests {
     #[test]
     fn colours_become_yuv() {
         let red = paint(2, (1.0, 1.0), None, |_, _| hue(0.0, 1.0, 1.0));
-        let value = |texture: &Texture| texture.fitting(1.0).0.sample(0, 0) >> 8;
-        assert_eq!([value(&red.luma), value(&red.chroma[0]), value(&red.chroma[1])], [81, 90, 240]);
-        assert_eq!(red.plain, [Some(90), Some(240)]);
+        assert_eq!((red.luma.plain(0), red.plain), (Some(81), [Some(90), Some(240)]));
     }
 }

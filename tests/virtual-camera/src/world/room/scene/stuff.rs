@@ -19,12 +19,28 @@ pub(super) struct Painter {
     pub seeded: Seeded,
     pub noise: Noise,
     pub grains: Grains,
+    /// Furniture matches: there are few kinds of each.
+    woods: Vec<(Colour, Arc<Material>)>,
+    cloths: Vec<Arc<Material>>,
+    paints: Vec<(Colour, Arc<Material>)>,
 }
 
 impl Painter {
     pub fn new(seeded: Seeded) -> Self {
         let (noise, grains) = (Noise::new(seeded.fork(1)), Grains::new(&seeded.fork(2)));
-        Self { seeded, noise, grains }
+        let mut choice = seeded.fork(3);
+        let mut painter =
+            Self { seeded, noise, grains, woods: Vec::new(), cloths: Vec::new(), paints: Vec::new() };
+        for _ in 0..3 {
+            let wood = Self::wood_colour(&mut choice);
+            painter.woods.push((wood, painter.wood(wood)));
+            painter.cloths.push(painter.cloth(Self::any_colour(&mut choice)));
+        }
+        for _ in 0..6 {
+            let paint = Self::any_colour(&mut choice);
+            painter.paints.push((paint, painter.smooth(paint)));
+        }
+        painter
     }
 
     /// Painted plaster: nearly plain.
@@ -48,7 +64,7 @@ impl Painter {
     /// Bricks under paint: 8 by 24 of them.
     fn brick(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.plaster, 0.3, 0.22);
-        Arc::new(paint(10, (2.0, 2.0), grain, |u, v| {
+        Arc::new(paint(9, (2.0, 2.0), grain, |u, v| {
             let row = (v * 24.0).floor();
             let along = u * 8.0 + 0.5 * (row % 2.0);
             let (x, y) = (along.fract() * 250.0, (v * 24.0).fract() * 83.0);
@@ -86,7 +102,7 @@ impl Painter {
     /// Stone tiles: 4 by 4 with joints.
     pub fn tiles(&self, colour: Colour, side: f64) -> Arc<Material> {
         let grain = detail(&self.grains.plaster, 0.4, 0.16);
-        Arc::new(paint(10, (side * 4.0, side * 4.0), grain, |u, v| {
+        Arc::new(paint(9, (side * 4.0, side * 4.0), grain, |u, v| {
             let (x, y) = ((u * 4.0).fract(), (v * 4.0).fract());
             let edge = x.min(1.0 - x).min(y).min(1.0 - y) * side * 1000.0;
             let joint = 1.0 - ((edge - 2.0) / 3.0).clamp(0.0, 1.0);
@@ -97,18 +113,18 @@ impl Painter {
         }))
     }
 
-    /// Floor boards along u: 16 rows.
+    /// Floor boards along u: 8 rows.
     pub fn boards(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.35, 0.18);
-        Arc::new(paint(10, (3.6, 2.2), grain, |u, v| {
-            let row = (v * 16.0).floor();
-            let along = u * 2.0 + 0.5 + 0.5 * self.noise.at(0.5, row + 0.5, (4, 16));
+        Arc::new(paint(9, (2.8, 1.1), grain, |u, v| {
+            let row = (v * 8.0).floor();
+            let along = u * 2.0 + 0.5 + 0.5 * self.noise.at(0.5, row + 0.5, (4, 8));
             let board = along.rem_euclid(2.0).floor();
-            let (x, y) = (along.rem_euclid(1.0) * 1800.0, (v * 16.0).fract() * 137.0);
-            let gap = 1.0 - (x.min(1800.0 - x).min(y).min(137.0 - y) / 3.5).clamp(0.0, 1.0);
-            let tone = self.noise.at(board + 9.5, row + 0.5, (256, 16));
-            let fibre = self.noise.sum(u + 0.31 * row, v, (4, 128), 2);
-            let rings = (12.0 * self.noise.sum(u + 0.17 * row + 0.5 * board, v, (2, 16), 2)).sin();
+            let (x, y) = (along.rem_euclid(1.0) * 1400.0, (v * 8.0).fract() * 137.0);
+            let gap = 1.0 - (x.min(1400.0 - x).min(y).min(137.0 - y) / 3.5).clamp(0.0, 1.0);
+            let tone = self.noise.at(board + 9.5, row + 0.5, (256, 8));
+            let fibre = self.noise.sum(u + 0.31 * row, v, (4, 64), 2);
+            let rings = (12.0 * self.noise.sum(u + 0.17 * row + 0.5 * board, v, (2, 8), 2)).sin();
             times(colour, (1.0 + 0.14 * tone + 0.08 * fibre + 0.05 * rings) * (1.0 - 0.5 * gap))
         }))
     }
@@ -135,8 +151,23 @@ impl Painter {
         }))
     }
 
+    /// One of the room's kinds of wood: its colour, and the wood itself.
+    pub fn some_wood(&self, seeded: &mut Seeded) -> (Colour, Arc<Material>) {
+        self.woods[seeded.below(self.woods.len())].clone()
+    }
+
+    /// One of the room's kinds of cloth.
+    pub fn some_cloth(&self, seeded: &mut Seeded) -> Arc<Material> {
+        self.cloths[seeded.below(self.cloths.len())].clone()
+    }
+
+    /// One of the room's paints: its colour, and something painted.
+    pub fn some_paint(&self, seeded: &mut Seeded) -> (Colour, Arc<Material>) {
+        self.paints[seeded.below(self.paints.len())].clone()
+    }
+
     /// Wood for furniture, fibres along u.
-    pub fn wood(&self, colour: Colour) -> Arc<Material> {
+    fn wood(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.35, 0.2);
         Arc::new(paint(8, (1.3, 0.7), grain, |u, v| {
             let fibre = self.noise.sum(u, v, (2, 64), 3);
@@ -154,7 +185,7 @@ impl Painter {
     }
 
     /// Cloth with seams every 0.6 m.
-    pub fn cloth(&self, colour: Colour) -> Arc<Material> {
+    fn cloth(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.cloth, 0.2, 0.32);
         Arc::new(paint(8, (1.2, 1.2), grain, |u, v| {
             let seam = ((u * 2.0).fract() - 0.5).abs() * 600.0;
@@ -172,6 +203,6 @@ impl Painter {
 
     /// A colour that may be strong.
     pub fn any_colour(seeded: &mut Seeded) -> Colour {
-        hue(seeded.unit(), seeded.range(0.2, 0.75), seeded.range(0.25, 0.85))
+        hue(seeded.unit(), seeded.range(0.1, 0.62), seeded.range(0.25, 0.85))
     }
 }

@@ -29,6 +29,7 @@ pub(crate) fn patches(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: D
             patches.push(skin(&bare_arm(arm, build), SKIN, [offset, 0.0], detail));
         }
         patches.push(skin(&hand(arm, build, side), SKIN, [offset, 0.1], detail));
+        patches.push(skin(&thumb(arm, size, side), SKIN, [offset, 0.1], detail));
     }
     head(pose, build, outfit, detail, &mut patches);
     patches
@@ -36,24 +37,24 @@ pub(crate) fn patches(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: D
 
 /// Cross-sections of the trunk: height over the pelvis, half width, half depth, how far ahead, light; in body heights.
 const TORSO: [[f64; 5]; 10] = [
-    [-0.052, 0.099, 0.074, -0.004, 0.9],
-    [-0.02, 0.098, 0.073, -0.004, 0.95],
-    [0.05, 0.090, 0.064, 0.0, 1.0],
-    [0.11, 0.090, 0.065, 0.002, 0.95],
+    [-0.004, 0.096, 0.075, -0.006, 0.85],
+    [0.018, 0.094, 0.072, -0.005, 0.95],
+    [0.05, 0.090, 0.066, 0.0, 1.0],
+    [0.11, 0.090, 0.066, 0.002, 0.95],
     [0.17, 0.098, 0.070, 0.004, 0.93],
-    [0.225, 0.104, 0.070, 0.0, 0.95],
-    [0.265, 0.105, 0.062, -0.006, 1.0],
-    [0.293, 0.088, 0.050, -0.008, 1.0],
-    [0.312, 0.052, 0.042, -0.006, 0.9],
-    [0.330, 0.036, 0.038, 0.0, 0.75],
+    [0.225, 0.107, 0.070, 0.0, 0.95],
+    [0.262, 0.112, 0.060, -0.006, 1.0],
+    [0.286, 0.092, 0.049, -0.008, 1.0],
+    [0.303, 0.060, 0.042, -0.006, 0.95],
+    [0.316, 0.037, 0.037, -0.002, 0.8],
 ];
 const PELVIS: [[f64; 5]; 6] = [
     [0.04, 0.080, 0.060, 0.0, 0.8],
-    [0.0, 0.092, 0.068, -0.004, 0.85],
-    [-0.035, 0.094, 0.071, -0.008, 0.9],
-    [-0.065, 0.084, 0.064, -0.006, 0.85],
-    [-0.085, 0.055, 0.050, -0.002, 0.7],
-    [-0.095, 0.0, 0.0, 0.0, 0.6],
+    [0.0, 0.092, 0.066, -0.004, 0.85],
+    [-0.035, 0.092, 0.064, -0.008, 0.9],
+    [-0.060, 0.074, 0.054, -0.006, 0.8],
+    [-0.076, 0.036, 0.034, -0.002, 0.7],
+    [-0.080, 0.0, 0.0, 0.0, 0.6],
 ];
 
 fn trunk(pose: &BodyPose, build: &Build, sections: &[[f64; 5]], looseness: f64) -> Vec<Ring> {
@@ -80,8 +81,8 @@ fn neck(pose: &BodyPose, build: &Build) -> [Ring; 3] {
     let high = skull(pose, build);
     let ring = |share: f64, open| Ring {
         centre: add(low, scale(subtract(high, low), share)),
-        right: scale(pose.head.right, 0.033 * size * build.girth.sqrt()),
-        ahead: scale(pose.head.ahead, 0.034 * size * build.girth.sqrt()),
+        right: scale(pose.head.right, 0.031 * size * build.girth.sqrt()),
+        ahead: scale(pose.head.ahead, 0.032 * size * build.girth.sqrt()),
         open,
     };
     [ring(-0.1, 0.8), ring(0.4, 0.75), ring(0.95, 0.7)]
@@ -89,7 +90,7 @@ fn neck(pose: &BodyPose, build: &Build) -> [Ring; 3] {
 
 /// Where the skull sits on the neck.
 fn skull(pose: &BodyPose, build: &Build) -> Vector {
-    let top = pose.chest.place(pose.pelvis, [0.0, 0.36 * build.height, 0.004 * build.height]);
+    let top = pose.chest.place(pose.pelvis, [0.0, 0.348 * build.height, 0.006 * build.height]);
     pose.head.place(top, [0.0, 0.012 * build.height, 0.0])
 }
 
@@ -129,16 +130,16 @@ fn unit(vector: Vector) -> Vector {
 fn trouser_leg(pose: &BodyPose, leg: &Leg, build: &Build, outfit: &Outfit) -> Vec<Ring> {
     let width = outfit.trouser_width;
     let sections = [
-        [-0.12, 0.046, 0.058, 0.75],
-        [0.08, 0.051, 0.060, 0.8],
+        [-0.04, 0.034, 0.044, 0.8],
+        [0.1, 0.047, 0.057, 0.85],
         [0.35, 0.048, 0.054, 0.85],
         [0.7, 0.040, 0.044, 0.9],
         [0.95, 0.034, 0.039, 0.95],
         [1.08, 0.033, 0.037, 0.95],
         [1.35, 0.033 * width, 0.038 * width, 0.9],
         [1.7, 0.028 * width, 0.032 * width, 0.9],
-        [1.97, 0.027 * width, 0.031 * width, 0.8],
-        [2.06, 0.027 * width, 0.032 * width, 0.7],
+        [1.93, 0.027 * width, 0.031 * width, 0.8],
+        [2.02, 0.027 * width, 0.032 * width, 0.7],
     ];
     let right = add(scale(pose.hips.right, 0.6), scale(leg.foot.right, 0.4));
     limb([leg.hip, leg.knee, leg.ankle], right, &sections, build.height * build.girth.sqrt(), 1.0)
@@ -150,12 +151,12 @@ fn shoe(leg: &Leg, size: f64) -> Vec<Ring> {
         [-0.043, 0.0, 0.0],
         [-0.040, 0.014, 0.016],
         [-0.022, 0.020, 0.026],
-        [0.005, 0.021, 0.029],
-        [0.035, 0.023, 0.021],
-        [0.068, 0.027, 0.016],
-        [0.095, 0.023, 0.012],
-        [0.108, 0.013, 0.009],
-        [0.112, 0.0, 0.003],
+        [0.005, 0.021, 0.030],
+        [0.035, 0.023, 0.025],
+        [0.068, 0.026, 0.019],
+        [0.095, 0.023, 0.016],
+        [0.107, 0.015, 0.012],
+        [0.112, 0.0, 0.005],
     ];
     let sole = -0.047 * size;
     let ring = |[ahead, width, height]: [f64; 3]| Ring {
@@ -170,10 +171,11 @@ fn shoe(leg: &Leg, size: f64) -> Vec<Ring> {
 fn sleeve(pose: &BodyPose, arm: &Arm, build: &Build, outfit: &Outfit) -> Vec<Ring> {
     let wide = outfit.looseness;
     let mut sections = vec![
-        [-0.14, 0.008, 0.012, 1.0],
-        [-0.10, 0.022, 0.026, 1.0],
-        [0.03, 0.031, 0.034, 1.0],
-        [0.25, 0.030 * wide, 0.033 * wide, 0.95],
+        [-0.10, 0.0, 0.0, 1.0],
+        [-0.08, 0.014, 0.018, 1.0],
+        [-0.02, 0.025, 0.029, 1.0],
+        [0.08, 0.030, 0.034, 1.0],
+        [0.28, 0.029 * wide, 0.033 * wide, 0.95],
     ];
     if outfit.short_sleeves {
         sections.extend([[0.45, 0.031, 0.033, 0.9], [0.62, 0.033, 0.034, 0.8]]);
@@ -209,10 +211,10 @@ fn hand(arm: &Arm, build: &Build, side: usize) -> Vec<Ring> {
     let inwards = [1.0, -1.0][side];
     let sections: [[f64; 5]; 6] = [
         [0.004, 0.0, 0.012, 0.014, 0.0],
-        [-0.012, 0.0, 0.013, 0.020, 0.0],
-        [-0.038, 0.001, 0.013, 0.024, 0.004],
-        [-0.060, 0.004, 0.011, 0.022, 0.006],
-        [-0.082, 0.012, 0.009, 0.015, 0.004],
+        [-0.012, 0.0, 0.011, 0.017, 0.0],
+        [-0.036, 0.001, 0.011, 0.022, 0.002],
+        [-0.056, 0.004, 0.010, 0.019, 0.003],
+        [-0.080, 0.012, 0.007, 0.013, 0.002],
         [-0.092, 0.017, 0.0, 0.0, 0.002],
     ];
     let ring = |[up, inside, thick, wide, ahead]: [f64; 5]| Ring {
@@ -224,17 +226,28 @@ fn hand(arm: &Arm, build: &Build, side: usize) -> Vec<Ring> {
     sections.map(ring).to_vec()
 }
 
+fn thumb(arm: &Arm, size: f64, side: usize) -> [Ring; 5] {
+    let inwards = [1.0, -1.0][side];
+    let frame = arm.frame.pitched(0.35);
+    let middle = arm.frame.place(arm.wrist, [inwards * 0.004 * size, -0.034 * size, 0.020 * size]);
+    let axes =
+        [scale(frame.right, 0.006 * size), scale(frame.up, 0.022 * size), scale(frame.ahead, 0.007 * size)];
+    egg(middle, axes, 0.95)
+}
+
 /// Cross-sections of the head: height over the chin, half width, half depth, how far ahead, light; in body heights.
-const HEAD: [[f64; 5]; 9] = [
+const HEAD: [[f64; 5]; 11] = [
     [-0.002, 0.0, 0.0, 0.026, 0.7],
     [0.002, 0.016, 0.020, 0.022, 0.75],
-    [0.014, 0.029, 0.038, 0.010, 0.85],
-    [0.035, 0.038, 0.049, 0.003, 0.95],
-    [0.062, 0.042, 0.055, 0.0, 1.0],
-    [0.088, 0.043, 0.057, -0.003, 1.0],
-    [0.112, 0.036, 0.049, -0.005, 1.0],
-    [0.126, 0.021, 0.030, -0.005, 1.0],
-    [0.131, 0.0, 0.0, -0.005, 1.0],
+    [0.014, 0.029, 0.037, 0.011, 0.85],
+    [0.035, 0.038, 0.048, 0.004, 0.95],
+    [0.062, 0.042, 0.054, 0.0, 1.0],
+    [0.086, 0.042, 0.056, -0.003, 1.0],
+    [0.104, 0.037, 0.050, -0.005, 1.0],
+    [0.117, 0.029, 0.040, -0.006, 1.0],
+    [0.126, 0.019, 0.027, -0.006, 1.0],
+    [0.131, 0.009, 0.013, -0.006, 1.0],
+    [0.132, 0.0, 0.0, -0.006, 1.0],
 ];
 
 fn head(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail, patches: &mut Vec<Patch>) {
@@ -244,10 +257,10 @@ fn head(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail, patches
     let Frame { right, up, ahead } = pose.head;
     let axes = |a: f64, b: f64, c: f64| [scale(right, a * size), scale(up, b * size), scale(ahead, c * size)];
     let rings = HEAD.map(|[height, width, depth, forward, open]| {
-        let hair = outfit.hair_volume * ((height - 0.075) / 0.04).clamp(0.0, 1.0);
+        let hair = outfit.hair_volume * ((height - 0.075) / 0.03).clamp(0.0, 1.0);
         let grown = |length: f64| if length > 0.0 { (length + hair) * size } else { 0.0 };
         Ring {
-            centre: at(0.0, height, forward - hair * 0.5),
+            centre: at(0.0, height + hair * 0.7, forward - hair * 0.5),
             right: scale(right, grown(width)),
             ahead: scale(ahead, grown(depth)),
             open,
@@ -258,11 +271,11 @@ fn head(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail, patches
     for vertex in &mut face.vertices {
         // The face is one tile, from ear to ear and from chin to crown.
         let height = dot(subtract(vertex.place, chin), up) / (0.131 * size);
-        vertex.cloth = [vertex.cloth[0] / round * TILE, height.clamp(0.001, 0.999) * TILE];
+        vertex.cloth = [vertex.cloth[0] / round * TILE, height.clamp(0.01, 0.98) * TILE];
     }
     patches.push(face);
     patches.push(skin(
-        &egg(at(0.0, 0.052, 0.056), axes(0.007, 0.013, 0.010), 0.97),
+        &egg(at(0.0, 0.050, 0.0515), axes(0.0065, 0.014, 0.0085), 1.0),
         SKIN,
         [0.0, 0.0],
         detail,

@@ -1,7 +1,5 @@
 //! What the person wears: colours, patterns, folds and weave, as tiles of cloth.
 
-use std::f64::consts::TAU;
-
 use super::{super::settings::Subject, pattern::Pattern};
 use crate::seeded::Seeded;
 
@@ -15,8 +13,9 @@ pub(crate) const SHOES: usize = 5;
 
 /// Length of a tile's side, in metres.
 pub(crate) const TILE: f64 = 0.5;
-/// Texels along it at the finest level: about a millimetre each.
-const SIDE: usize = 512;
+/// Texels along it: about a millimetre each where there is something to see, two where not.
+const FINE: usize = 512;
+const COARSE: usize = 256;
 const LEVELS: usize = 5;
 
 /// Brightness and tints: Y, U, V in video range.
@@ -31,6 +30,8 @@ pub(crate) fn rgb(red: f64, green: f64, blue: f64) -> Colour {
 /// A tile of cloth, each level half as fine as the one before.
 #[derive(Debug, Clone)]
 pub(crate) struct Cloth {
+    /// Texels along a side at the finest level.
+    side: usize,
     levels: Vec<Vec<[u8; 4]>>,
     /// How strongly the threads show close up.
     pub weave: f32,
@@ -38,18 +39,18 @@ pub(crate) struct Cloth {
 
 impl Cloth {
     /// A tile painted by a function of the place in it, both coordinates from 0 to 1.
-    fn painted(weave: f32, paint: impl Fn(f64, f64) -> Colour) -> Self {
-        let at = |index: usize| (index as f64 + 0.5) / SIDE as f64;
-        let byte = |value: f64| value.round().clamp(1.0, 254.0) as u8;
-        let finest: Vec<[u8; 4]> = (0..SIDE * SIDE)
+    fn painted(side: usize, weave: f32, paint: impl Fn(f64, f64) -> Colour) -> Self {
+        let at = |index: usize| (index as f64 + 0.5) / side as f64;
+        let byte = |value: f64| (value + 0.5).clamp(1.0, 254.0) as u8;
+        let finest: Vec<[u8; 4]> = (0..side * side)
             .map(|index| {
-                let [y, u, v] = paint(at(index % SIDE), at(index / SIDE)).map(byte);
+                let [y, u, v] = paint(at(index % side), at(index / side)).map(byte);
                 [y, u, v, 0]
             })
             .collect();
         let mut levels = vec![finest];
         for level in 1..LEVELS {
-            let side = SIDE >> level;
+            let side = side >> level;
             let before = &levels[level - 1];
             let halved = (0..side * side)
                 .map(|index| {
@@ -64,14 +65,15 @@ impl Cloth {
                 .collect();
             levels.push(halved);
         }
-        Self { levels, weave }
+        Self { side, levels, weave }
     }
 
     /// The level whose texels are about as wide as a sample, its texels a row and its texels a metre.
     pub fn level(&self, samples_per_metre: f64) -> (&[[u8; 4]], usize, f64) {
-        let finer = SIDE as f64 / TILE / samples_per_metre.max(1.0);
+        let finer = self.side as f64 / TILE / samples_per_metre.max(1.0);
         let level = (finer.log2().round().max(0.0) as usize).min(LEVELS - 1);
-        (&self.levels[level], SIDE >> level, (SIDE >> level) as f64 / TILE)
+        let side = self.side >> level;
+        (&self.levels[level], side, side as f64 / TILE)
     }
 }
 
@@ -98,25 +100,28 @@ impl Outfit {
         let mut noise = Pattern::new(chance.bits());
         let fold_seed = chance.unit();
         let worn = |colour: Colour, shade: f64| [16.0 + (colour[0] - 16.0) * shade, colour[1], colour[2]];
-        let skin_cloth = Cloth::painted(0.02, |u, v| worn(skin, 0.97 + 0.06 * noise.smooth(u, v, 24)));
-        let hair_cloth = Cloth::painted(0.05, |u, v| worn(hair, hair_shade(&noise, u, v)));
+        let skin_cloth =
+            Cloth::painted(COARSE, 0.02, |u, v| worn(skin, 0.97 + 0.06 * noise.smooth(u, v, 24)));
+        let hair_cloth = Cloth::painted(COARSE, 0.05, |u, v| worn(hair, hair_shade(&noise, u, v)));
         let long_hair = subject == Subject::B;
-        let face_cloth = Cloth::painted(0.0, |u, v| {
-            let hairline = if long_hair { 0.16 } else { 0.23 } + 0.02 * noise.smooth(u, v, 32);
-            face(skin, u, v, hairline).unwrap_or_else(|| worn(hair, hair_shade(&noise, u, v)))
+        let face_cloth = Cloth::painted(FINE, 0.03, |u, v| {
+            let hair = worn(hair, hair_shade(&noise, u, v));
+            let strand = noise.stretched(u, v, 128, 40) - 0.5;
+            mix(&face(skin, u, v), &hair, grown(u, v, long_hair, strand))
         });
-        let shirt = Cloth::painted(0.10, |u, v| {
+        let shirt = Cloth::painted(FINE, 0.10, |u, v| {
             let colour = kind.shirt.colour(&kind.shirt_colours, u, v, &noise);
             worn(colour, folds(&noise, u, v, fold_seed, kind.shirt_folds))
         });
-        let trousers = Cloth::painted(0.14, |u, v| {
+        let trousers = Cloth::painted(FINE, 0.14, |u, v| {
             let faded = 0.10 * (noise.smooth(u, v, 6) - 0.5) + 0.12 * (noise.smooth(u, v, 128) - 0.5);
             worn(kind.trousers, folds(&noise, u, v, fold_seed + 0.4, 0.20) + faded)
         });
-        let shoes = Cloth::painted(0.03, |_, v| {
-            // Laces across the instep.
-            let laced = (0.2..0.34).contains(&v) && (v * 60.0).fract() < 0.35;
-            if laced { worn(kind.sole, 0.8) } else { kind.shoes }
+        let shoes = Cloth::painted(COARSE, 0.03, |u, v| {
+            // The sole below, laces across the instep.
+            let laced = (u - 0.28).abs() < 0.06 && (0.2..0.36).contains(&v) && (v * 40.0).fract() < 0.4;
+            let below = (u - 0.28).abs() > 0.17;
+            if laced || below { worn(kind.sole, 0.8) } else { kind.shoes }
         });
         noise = Pattern::new(chance.bits());
         let long = noise.smooth(0.1, 0.1, 4);
@@ -244,29 +249,33 @@ fn mix(one: &Colour, other: &Colour, share: f64) -> Colour {
 
 /// How light cloth is on and between its folds, 1 where it lies smooth.
 fn folds(noise: &Pattern, u: f64, v: f64, offset: f64, depth: f64) -> f64 {
-    let bent = noise.smooth(u + offset, v, 3) + 0.5 * noise.smooth(u, v + offset, 7);
-    let ridge = (TAU * (2.0 * v + u + 1.6 * bent)).sin();
-    let where_creased = noise.smooth(u + 0.5, v + offset, 5);
-    1.0 - depth * (0.5 - 0.5 * ridge).powi(3) * where_creased + 0.25 * depth * ridge * where_creased
+    let (u, v) = (u + offset, v + 2.0 * offset);
+    // Creases run slanting, and across where a joint bends.
+    let slanting = noise.stretched(u + v, v, 4, 9) + noise.stretched(u - v, v, 3, 7);
+    let across = noise.stretched(u, v, 3, 16);
+    let fold = 0.35 * slanting + 0.3 * across - 0.5;
+    1.0 + depth * (2.2 * fold).clamp(-1.0, 0.7)
 }
 
 fn hair_shade(noise: &Pattern, u: f64, v: f64) -> f64 {
-    0.75 + 0.5 * noise.stretched(u, v, 90, 8) + 0.25 * noise.smooth(u, v, 8)
+    0.6 + 0.8 * noise.stretched(u, v, 120, 8) + 0.25 * noise.smooth(u, v, 8)
 }
 
-/// A face round the front of a head: `u` from the back over 0.5 in front to the back, `v` from chin to crown; `None` is hair.
-fn face(skin: Colour, u: f64, v: f64, hairline: f64) -> Option<Colour> {
+/// How much of a head is hair at a place of [`face`]'s tile, from 0 to 1; `strand` makes its edge uneven.
+fn grown(u: f64, v: f64, long: bool, strand: f64) -> f64 {
     let side = (u - 0.5).abs();
-    let grown = if v > 0.8 {
-        true
-    } else if v > 0.42 {
-        side > hairline
-    } else {
-        side > hairline + 0.05 && v > 0.12
-    };
-    if grown {
-        return None;
-    }
+    let temple = if long { 0.17 } else { 0.22 } - 0.3 * (v - 0.6).max(0.0);
+    // Below the ears it goes back, to the nape, unless it is long.
+    let cheek = if long { 0.02 } else { 0.14 } * ((0.5 - v) / 0.2).clamp(0.0, 1.0);
+    let beside = side - temple - cheek;
+    let above = v - 0.80 + 1.2 * side * side;
+    let below = if long { 1.0 } else { v - 0.1 };
+    ((beside.max(above).min(below) + 0.03 * strand) / 0.012 + 0.5).clamp(0.0, 1.0)
+}
+
+/// A face round the front of a head: `u` from the back over 0.5 in front to the back, `v` from chin to crown.
+fn face(skin: Colour, u: f64, v: f64) -> Colour {
+    let side = (u - 0.5).abs();
     let near = |x: f64, y: f64, wide: f64, high: f64| {
         let (across, along) = ((side - x) / wide, (v - y) / high);
         (-(across * across + along * along)).exp()
@@ -280,5 +289,5 @@ fn face(skin: Colour, u: f64, v: f64, hairline: f64) -> Option<Colour> {
         + 0.15 * near(0.15, 0.3, 0.06, 0.16); // below the cheekbones
     let red = 14.0 * near(0.0, 0.21, 0.055, 0.025) + 5.0 * near(0.1, 0.36, 0.05, 0.08);
     let light = 1.0 - dark.min(0.85) + 0.06 * near(0.06, 0.42, 0.05, 0.06);
-    Some([16.0 + (skin[0] - 16.0) * light, skin[1] - red * 0.2, skin[2] + red * (1.0 - 0.5 * dark)])
+    [16.0 + (skin[0] - 16.0) * light, skin[1] - red * 0.2, skin[2] + red * (1.0 - 0.5 * dark)]
 }

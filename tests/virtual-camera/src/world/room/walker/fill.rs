@@ -35,7 +35,12 @@ pub(super) fn triangle(
         down[index] = (second * (b.x - a.x) - first * (c.x - a.x)) / area;
     }
     let on = |from: Corner, to: Corner, y: f32| from.x + (to.x - from.x) * ((y - from.y) / (to.y - from.y));
-    let limit = |place: f32, end: usize| place.ceil().clamp(0.0, end as f32) as usize;
+    // The next whole number, as `ceil` is a call on processors without SSE 4.1.
+    let limit = |place: f32, end: usize| {
+        let inside = place.clamp(0.0, end as f32);
+        let below = inside as usize;
+        below + usize::from(below as f32 != inside)
+    };
     for row in limit(top.y, size.1)..limit(bottom.y, size.1) {
         let y = row as f32;
         let long = on(top, bottom, y);

@@ -14,13 +14,13 @@ use super::{
 /// Part of the cycle for which a foot is on the floor.
 const STANCE: f64 = 0.62;
 /// Part of the cycle after touchdown at which the body is over the foot.
-const OVER: f64 = 0.29;
+const OVER: f64 = 0.26;
 /// Pitch of the foot over its cycle: degrees, toes up positive (after Perry & Burnfield, Gait Analysis, chapter 4).
 const PITCH: [(f64, f64); 9] = [
     (0.0, 20.0),
     (0.1, 0.0),
-    (0.36, 0.0),
-    (0.5, -20.0),
+    (0.3, 0.0),
+    (0.48, -24.0),
     (STANCE, -58.0),
     (0.74, -42.0),
     (0.85, -2.0),
@@ -119,12 +119,12 @@ impl Gait {
         let feet = [0, 1].map(|side| self.foot(side, cycle, effort));
         let level = Frame::heading(now.heading);
         // Weight goes over the supporting foot: the left one's stance is the first half of the cycle.
-        let sway = -0.016 * build.height * (swing - 0.6).sin() * effort;
+        let sway = -0.016 * build.height * (swing - 0.2).sin() * effort;
         let middle = add(place, scale(level.right, sway));
         let hips =
             Frame::heading(now.heading + 0.09 * effort * swing.cos()).rolled(0.05 * effort * swing.sin());
         let pelvis = [middle[0], self.pelvis_height(middle, &hips, &feet), middle[2]];
-        let lean = build.lean + 0.03 * effort;
+        let lean = build.lean + 0.02 * effort;
         let chest = Frame::heading(now.heading - build.twist * effort * swing.cos())
             .rolled(-0.02 * effort * swing.sin())
             .pitched(-lean);
@@ -178,7 +178,7 @@ impl Gait {
     /// As high as both legs reach, the one that reaches less deciding.
     fn pelvis_height(&self, middle: Vector, hips: &Frame, feet: &[(Vector, Frame); 2]) -> f64 {
         let softness = 0.012;
-        let reach = 0.985 * (self.build.thigh + self.build.shank);
+        let reach = 0.993 * (self.build.thigh + self.build.shank);
         let shares = [0, 1].map(|side: usize| {
             let (ankle, _) = feet[side];
             let hip = add(middle, scale(hips.right, [-1.0, 1.0][side] * self.build.hip));
@@ -206,7 +206,7 @@ impl Gait {
         // The arm swings with the other side's leg, a little behind it.
         let forwards = outwards * (swing - 0.25).cos();
         let raised = build.arm_swing * effort * forwards + 0.06;
-        let bent = build.elbow + 0.5 * build.arm_swing * effort * (1.0 + forwards);
+        let bent = build.elbow + 0.4 * build.arm_swing * effort * (1.0 + forwards);
         let upper = chest.pitched(raised).rolled(-outwards * build.arm_out);
         let fore = upper.pitched(bent).rolled(outwards * 0.12);
         let elbow = add(shoulder, scale(upper.up, -build.upper_arm));

@@ -102,10 +102,13 @@ impl Walker {
         let depth = view.seen(pose.pelvis)[2].max(1.0);
         // Corners of limbs must not show close up.
         let close = view.pinhole.focal / depth > 700.0;
-        let detail = if close { Detail { corners: 28, steps: 5 } } else { Detail { corners: 14, steps: 2 } };
+        let detail = if close { Detail { corners: 28, steps: 5 } } else { Detail { corners: 12, steps: 2 } };
         body::patches(pose, &self.build, &self.outfit, detail)
     }
 }
 
+#[cfg(test)]
+#[path = "/tmp/strips.rs"]
+mod strips;
 #[cfg(test)]
 mod tests;

@@ -16,6 +16,8 @@ const AFTER_ENTRY: (f64, f64) = (3.1, 3.7);
 /// Seconds for which all of the person is hidden, or their legs.
 const HIDDEN: f64 = 1.0;
 const LEGS_HIDDEN: f64 = 2.6;
+/// Between two looks at the body, in seconds.
+const STEP: f64 = 0.02;
 /// How far from the camera it stands, as a part of the person's distance.
 const NEARNESS: f64 = 0.76;
 
@@ -30,11 +32,25 @@ pub(super) fn obstacle(walker: &Walker, settings: &RoomSettings) -> Option<(Obst
     }
 }
 
-/// The body's last part goes out of sight when it begins, and its first part comes out when it ends.
+/// The body's last part goes out of sight when it begins; as wide as it takes to hide all of it for so long.
 fn whole(walker: &Walker, begins: f64) -> Solid {
-    let (first, last) = (azimuths(walker, begins), azimuths(walker, begins + HIDDEN));
-    let span = if last.0 > first.0 { (first.0, last.1) } else { (last.0, first.1) };
-    spanning(span, distance(walker, begins + HIDDEN / 2.0), [2.3, 0.3])
+    let seen: Vec<(f64, f64)> = (0..(3.0 * HIDDEN / STEP) as u32)
+        .map(|step| azimuths(walker, begins - HIDDEN + f64::from(step) * STEP))
+        .collect();
+    let first = azimuths(walker, begins);
+    let rightwards = azimuths(walker, begins + HIDDEN).0 > first.0;
+    // Limbs swing, so that a wall's width does not tell for how long it hides: look for it.
+    let span = |width: f64| if rightwards { (first.0, first.0 + width) } else { (first.1 - width, first.1) };
+    let hides = |width: f64| {
+        let (left, right) = span(width);
+        seen.iter().filter(|body| body.0 >= left && body.1 <= right).count() as f64 * STEP
+    };
+    let (mut narrow, mut wide) = (0.0, 1.0);
+    for _ in 0..16 {
+        let middle = (narrow + wide) / 2.0;
+        if hides(middle) < HIDDEN { narrow = middle } else { wide = middle }
+    }
+    spanning(span(wide), distance(walker, begins + HIDDEN / 2.0), [2.3, 0.3])
 }
 
 /// From one middle of the body to the other; the line of sight over its back edge meets the person below the hip.
@@ -68,8 +84,8 @@ fn spanning((left, right): (f64, f64), away: f64, [height, thickness]: [f64; 2])
 }
 
 /// Leftmost and rightmost direction in which the camera sees the body at a time.
-fn azimuths(walker: &Walker, time: f64) -> (f64, f64) {
-    let detail = Detail { corners: 14, steps: 2 };
+pub(super) fn azimuths(walker: &Walker, time: f64) -> (f64, f64) {
+    let detail = Detail { corners: 12, steps: 1 };
     let pose = walker.gait.pose(time);
     let patches = body::patches(&pose, &walker.build, &walker.outfit, detail);
     let directions =

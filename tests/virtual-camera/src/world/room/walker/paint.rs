@@ -6,7 +6,7 @@ use super::{
         view::{CAMERA, Canvas, Vector, View, dot, scale, subtract},
     },
     clothes::Cloth,
-    fill::{Corner, triangle},
+    fill::{CARRIED, Corner, triangle},
     mesh::{Detail, Patch, Ring, Vertex, skin},
 };
 use crate::picture::Plane;
@@ -48,7 +48,7 @@ impl Window {
         (self.width * self.fineness, self.height * self.fineness)
     }
 
-    fn corner(&self, (x, y): (f64, f64), carried: [f32; 4]) -> Corner {
+    fn corner(&self, (x, y): (f64, f64), carried: [f32; CARRIED]) -> Corner {
         let fine = self.fineness as f64;
         let place = |pixel: f64, first: usize| ((pixel - first as f64 + 0.5) * fine - 0.5) as f32;
         Corner { x: place(x, self.left), y: place(y, self.top), carried }
@@ -97,26 +97,26 @@ pub(super) fn paint(patches: &[Patch], cloths: &[Cloth], view: &View, light: &Li
     // Nearness and colour of the nearest skin; 0 is none.
     let mut nearness = vec![0.0f32; samples.0 * samples.1];
     let mut colours = vec![[0u8; 4]; samples.0 * samples.1];
-    for patch in patches {
-        let depth = view.pixel(patch.vertices[0].place).map_or(1.0, |(_, depth)| depth);
+    // The nearest first: what is hidden need not be coloured.
+    let depth = |patch: &Patch| view.seen(patch.vertices[patch.vertices.len() / 2].place)[2];
+    let mut order: Vec<(f64, &Patch)> = patches.iter().map(|patch| (depth(patch), patch)).collect();
+    order.sort_by(|one, other| one.0.total_cmp(&other.0));
+    for (depth, patch) in order {
         let fine = view.pinhole.focal / depth * window.fineness as f64;
         let (texels, side, texels_per_metre) = cloths[patch.material].level(fine);
-        let texture = Texture { texels, side, weave: cloths[patch.material].weave, close: fine > 1500.0 };
+        let texture = Texture { texels, side, weave: (cloths[patch.material].weave * 256.0) as i32 };
         let corners = |vertex: &Vertex, pixel, depth: f64| {
             let [u, v] = vertex.cloth.map(|metres| (metres * texels_per_metre) as f32);
             window.corner(pixel, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
         };
         for corners in facing(patch, view, corners) {
-            triangle(corners, samples, |start, end, mut carried, step| {
-                let (near, colours) = (&mut nearness[start..end], &mut colours[start..end]);
-                for (near, colour) in near.iter_mut().zip(colours) {
-                    if carried[0] > *near {
-                        *near = carried[0];
-                        *colour = texture.colour(carried[1], carried[2], carried[3]);
-                    }
-                    for (value, step) in carried.iter_mut().zip(step) {
-                        *value += step;
-                    }
+            triangle(corners, samples, |start, end, carried, step| {
+                let run = (&mut nearness[start..end], &mut colours[start..end]);
+                // Close up texels are wider than samples: they melt into each other, and threads show.
+                if fine > CLOSE {
+                    fill(run, carried, step, |u, v, shade| texture.close(u, v, shade));
+                } else {
+                    fill(run, carried, step, |u, v, shade| texture.far(u, v, shade));
                 }
             });
         }
@@ -124,82 +124,143 @@ pub(super) fn paint(patches: &[Patch], cloths: &[Cloth], view: &View, light: &Li
     blend(&window, &colours, canvas);
 }
 
-/// How bright a place on the skin is.
-fn shade(vertex: &Vertex, light: &Light) -> f64 {
-    let way = subtract(CAMERA, vertex.place);
-    let facing = dot(vertex.normal, scale(way, 1.0 / dot(way, way).sqrt())).max(0.0);
-    light.at(vertex.place, vertex.normal) * vertex.open * (0.70 + 0.30 * facing.sqrt())
-}
+/// Samples a metre from which on texels are smoothed.
+const CLOSE: f64 = 1500.0;
 
-struct Texture<'a> {
-    texels: &'a [[u8; 4]],
-    side: usize,
-    weave: f32,
-    /// Whether texels are wider than samples, so that threads show.
-    close: bool,
-}
-
-impl Texture<'_> {
-    /// Y, U, V and 255 for "covered".
-    fn colour(&self, u: f32, v: f32, shade: f32) -> [u8; 4] {
-        let mask = self.side - 1;
-        let (column, row) = (u.floor() as i32, v.floor() as i32);
-        let texel =
-            |column: i32, row: i32| self.texels[(row as usize & mask) * self.side + (column as usize & mask)];
-        if !self.close {
-            let [y, u, v, _] = texel(column, row);
-            return lit(f32::from(y), f32::from(u), f32::from(v), shade);
+/// Colours those samples of a row whose skin is nearer than what is there.
+///
+/// Places in the cloth and shades run in 65536ths: whole numbers are fast.
+fn fill(
+    (nearness, colours): (&mut [f32], &mut [[u8; 4]]),
+    carried: [f32; CARRIED],
+    step: &[f32; CARRIED],
+    colour: impl Fn(i32, i32, i32) -> [u8; 4],
+) {
+    let fixed = |value: f32| (value * 65536.0) as i32;
+    let mut near = carried[0];
+    let [mut u, mut v, mut shade] = [1, 2, 3].map(|index| fixed(carried[index]));
+    let [right_u, right_v, right_shade] = [1, 2, 3].map(|index| fixed(step[index]));
+    for (nearest, target) in nearness.iter_mut().zip(colours) {
+        if near > *nearest {
+            *nearest = near;
+            *target = colour(u, v, shade >> 8);
         }
-        let (across, down) = (u - column as f32, v - row as f32);
-        let four =
-            [texel(column, row), texel(column + 1, row), texel(column, row + 1), texel(column + 1, row + 1)];
-        let mixed = |part: usize| {
-            let of = |index: usize| f32::from(four[index][part]);
-            let above = of(0) + (of(1) - of(0)) * across;
-            let below = of(2) + (of(3) - of(2)) * across;
-            above + (below - above) * down
-        };
-        // Threads over and under each other.
-        let over = (across - 0.5).abs() + (down - 0.5).abs();
-        let thread = if (column ^ row) & 1 == 0 { over } else { 1.0 - over };
-        lit(mixed(0), mixed(1), mixed(2), shade * (1.0 + self.weave * (thread - 0.5)))
+        near += step[0];
+        u = u.wrapping_add(right_u);
+        v = v.wrapping_add(right_v);
+        shade = shade.wrapping_add(right_shade);
     }
 }
 
-/// Black stays black, grey stays grey.
-fn lit(y: f32, u: f32, v: f32, shade: f32) -> [u8; 4] {
-    let tint = |value: f32| (128.5 + (value - 128.0) * shade) as u8;
-    [(16.5 + (y - 16.0) * shade) as u8, tint(u), tint(v), 255]
+/// How bright a place on the skin is.
+fn shade(vertex: &Vertex, light: &Light) -> f64 {
+    let way = subtract(CAMERA, vertex.place);
+    let facing = dot(vertex.normal, scale(way, 1.0 / dot(way, way).sqrt()));
+    if facing < -0.5 {
+        return 0.0; // Seen by nobody.
+    }
+    light.at(vertex.place, vertex.normal) * vertex.open * (0.70 + 0.30 * facing.max(0.0).sqrt())
+}
+
+/// A level of a cloth.
+struct Texture<'a> {
+    texels: &'a [[u8; 4]],
+    side: usize,
+    /// In 256ths.
+    weave: i32,
+}
+
+impl Texture<'_> {
+    fn texel(&self, column: i32, row: i32) -> [u8; 4] {
+        let mask = self.side - 1;
+        self.texels[(row as usize & mask) * self.side + (column as usize & mask)]
+    }
+
+    /// The nearest texel; places in 65536ths of texels, shade in 256ths.
+    fn far(&self, u: i32, v: i32, shade: i32) -> [u8; 4] {
+        let [y, u, v, _] = self.texel(u >> 16, v >> 16).map(i32::from);
+        lit([y, u, v], shade)
+    }
+
+    /// Between texels, with threads that go over and under each other.
+    fn close(&self, u: i32, v: i32, shade: i32) -> [u8; 4] {
+        let (column, row) = (u >> 16, v >> 16);
+        let (across, down) = (u >> 8 & 255, v >> 8 & 255);
+        let four =
+            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, below)| self.texel(column + right, row + below));
+        let mixed = [0, 1, 2].map(|part| {
+            let [a, b, c, d] = four.map(|texel| i32::from(texel[part]));
+            let (above, below) = (a * 256 + (b - a) * across, c * 256 + (d - c) * across);
+            (above * 256 + (below - above) * down + 32768) >> 16
+        });
+        let over = (across - 128).abs() + (down - 128).abs() - 128;
+        let thread = if (column ^ row) & 1 == 0 { over } else { -over };
+        lit(mixed, (shade * (65536 + self.weave * thread)) >> 16)
+    }
+}
+
+/// Y, U, V and 255 for "covered". Black stays black, grey stays grey.
+fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
+    let scaled = |value: i32, zero: i32| (zero + (((value - zero) * shade + 128) >> 8)).clamp(0, 255) as u8;
+    [scaled(y, 16), scaled(u, 128), scaled(v, 128), 255]
 }
 
 /// Averages the samples of every pixel over what the picture shows behind them.
 fn blend(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
-    for (index, plane) in canvas.planes.iter_mut().enumerate() {
-        let shrink = if index == 0 { 1 } else { 2 };
-        let side = window.fineness * shrink;
-        let stride = window.samples().0;
-        let (left, top) = (window.left / shrink, window.top / shrink);
-        for row in 0..window.height.div_ceil(shrink) {
-            let Some(line) = plane.data.get_mut((top + row) * plane.width..(top + row + 1) * plane.width)
-            else {
-                break;
-            };
-            let rows = row * side..((row + 1) * side).min(window.samples().1);
-            for (column, pixel) in line[left..].iter_mut().take(window.width.div_ceil(shrink)).enumerate() {
-                let columns = column * side..((column + 1) * side).min(stride);
-                let (mut sum, mut covered, mut all) = (0u32, 0u32, 0u32);
-                for row in rows.clone() {
-                    for colour in &colours[row * stride + columns.start..row * stride + columns.end] {
-                        let hit = u32::from(colour[3] & 1);
-                        sum += u32::from(colour[index]) * hit;
-                        covered += hit;
-                        all += 1;
-                    }
-                }
-                if covered > 0 {
-                    *pixel = ((sum + u32::from(*pixel) * (all - covered) + all / 2) / all) as u8;
+    let (fine, stride) = (window.fineness, window.samples().0);
+    let [luma, chroma @ ..] = &mut canvas.planes;
+    for y in (0..window.height).step_by(2) {
+        for x in (0..window.width).step_by(2) {
+            let mut block = Sum::default();
+            for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
+                if x < window.width && y < window.height {
+                    let sum = Sum::of(colours, y * fine * stride + x * fine, stride, fine);
+                    sum.over(&mut luma.data[(window.top + y) * luma.width + window.left + x], 0);
+                    block.add(sum);
                 }
             }
+            for (index, plane) in chroma.iter_mut().enumerate() {
+                let place = (window.top + y) / 2 * plane.width + (window.left + x) / 2;
+                block.over(&mut plane.data[place], index + 1);
+            }
+        }
+    }
+}
+
+/// Y, U, V and coverage of some samples together; what is not covered is black.
+#[derive(Default, Clone, Copy)]
+struct Sum {
+    parts: [u32; 4],
+    samples: u32,
+}
+
+impl Sum {
+    /// A square of samples.
+    fn of(colours: &[[u8; 4]], first: usize, stride: usize, side: usize) -> Self {
+        // Two parts at a time, each with 16 bits to grow.
+        let (mut even, mut odd) = (0u32, 0u32);
+        for row in 0..side {
+            for &colour in &colours[first + row * stride..][..side] {
+                let parts = u32::from_le_bytes(colour);
+                even += parts & 0x00ff_00ff;
+                odd += parts >> 8 & 0x00ff_00ff;
+            }
+        }
+        let parts = [even & 0xffff, odd & 0xffff, even >> 16, odd >> 16];
+        Self { parts, samples: (side * side) as u32 }
+    }
+
+    fn add(&mut self, other: Self) {
+        self.parts.iter_mut().zip(other.parts).for_each(|(part, more)| *part += more);
+        self.samples += other.samples;
+    }
+
+    /// One of its parts over a pixel of the picture.
+    fn over(&self, pixel: &mut u8, part: usize) {
+        let covered = self.parts[3] / 255;
+        if covered > 0 {
+            let behind = u32::from(*pixel) * (self.samples - covered);
+            *pixel = ((self.parts[part] + behind + self.samples / 2) / self.samples) as u8;
         }
     }
 }

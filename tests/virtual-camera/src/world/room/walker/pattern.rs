@@ -19,12 +19,13 @@ impl Pattern {
         self.stretched(u, v, cells, cells)
     }
 
-    /// The same with different numbers of values along the sides.
+    /// The same anywhere, the tile repeated, with different numbers of values along the sides.
     pub fn stretched(&self, u: f64, v: f64, columns: usize, rows: usize) -> f64 {
         let split = |place: f64, cells: usize| {
-            let place = place.rem_euclid(1.0) * cells as f64;
-            let share = place.fract();
-            let cell = place as usize % cells;
+            let place = place * cells as f64;
+            let before = place as i32 - i32::from(place < 0.0);
+            let share = place - f64::from(before);
+            let cell = before.rem_euclid(cells as i32) as usize;
             (cell, (cell + 1) % cells, share * share * (3.0 - 2.0 * share))
         };
         let (left, right, across) = split(u, columns);
