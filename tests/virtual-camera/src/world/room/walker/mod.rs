@@ -107,8 +107,3 @@ impl Walker {
     }
 }
 
-#[cfg(test)]
-#[path = "/tmp/strips.rs"]
-mod strips;
-#[cfg(test)]
-mod tests;
