@@ -11,7 +11,7 @@ use virtual_camera::Picture;
 
 use crate::{
     codec, metrics,
-    pipeline::{Pipeline, PipelineError, SINK, SOURCE, lock},
+    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE, lock},
     record::{FrameRecord, Moment, Snapshot, TargetState},
 };
 
@@ -76,7 +76,7 @@ impl Encoder {
         let pipeline = Pipeline::new(&description, info)?;
         let jpeg = Arc::new(Mutex::new(Vec::new()));
         let out = jpeg.clone();
-        pipeline.pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
             let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
             *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
             gst::PadProbeReturn::Ok

@@ -6,6 +6,7 @@ use clap::Parser;
 
 use crate::{
     experiment::{Experiment, Scene},
+    footage::SceneError,
     record::{Codec, Delays, FirstBox, TestId, TrackerName},
     trackers::missing,
 };
@@ -44,6 +45,18 @@ pub struct Args {
     /// Write a video of each run as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
+    /// Instead of the tests, follow one person in a still camera's recording, cut out of it as a turning camera sees it
+    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
+    pub footage: Option<PathBuf>,
+    /// Instead of the tests, follow one person in a recording as it is, without a camera
+    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
+    pub still_recording: Option<PathBuf>,
+    /// Who is where in the recording: MOTChallenge; for --still-recording also a box a line, by size or corners
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Number of the person to follow in the recording, or auto: who is there longest
+    #[arg(long, value_name = "ID|auto", default_value = "auto")]
+    pub person: Whom,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
     pub jobs: usize,
@@ -70,6 +83,24 @@ impl FromStr for Tests {
             .ok_or_else(|| {
                 format!("tests are numbers from 1 to {} or ranges of them, not `{text}`", TestId::COUNT)
             })
+    }
+}
+
+/// Whom to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Whom(Option<u32>);
+
+impl FromStr for Whom {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self(None)),
+            number => number
+                .parse()
+                .map(|id| Self(Some(id)))
+                .map_err(|_| format!("`{text}` is no number, nor auto")),
+        }
     }
 }
 
@@ -121,31 +152,46 @@ impl Args {
         (there, left_out)
     }
 
-    fn experiment(&self, test: TestId, tracker: TrackerName) -> Option<Experiment> {
+    fn experiment(&self, scene: Scene, tracker: TrackerName) -> Experiment {
         let delays = Delays {
             video: Duration::from_millis(self.video_delay),
             command: Duration::from_millis(self.command_delay),
         };
-        Some(Experiment {
+        let name = scene.title.replace([' ', ',', '/'], "-");
+        Experiment {
             codec: self.codec,
             size: self.size,
             delays,
             first_box: self.first_box,
-            film: self.record.then(|| self.out.join(format!("test-{test}-{tracker}.mkv"))),
-            ..Experiment::new(Scene::room(test, self.seed)?, tracker, self.seed)
-        })
+            film: self.record.then(|| self.out.join(format!("{name}-{tracker}.mkv"))),
+            ..Experiment::new(scene, tracker, self.seed)
+        }
+    }
+
+    /// What is to be followed.
+    fn scenes(&self) -> Result<Vec<Scene>, SceneError> {
+        let Whom(person) = self.person;
+        match (&self.footage, &self.still_recording, &self.truth) {
+            (Some(file), _, Some(truth)) => Ok(vec![Scene::footage(file, truth, person, self.size)?]),
+            (None, Some(file), Some(truth)) => Ok(vec![Scene::recording(file, truth, person)?]),
+            _ => Ok(self.tests().into_iter().filter_map(|test| Scene::room(test, self.seed)).collect()),
+        }
     }
 
     /// Everything asked for, tracker after tracker.
-    pub fn experiments(&self, trackers: &[TrackerName]) -> Vec<Experiment> {
+    ///
+    /// # Errors
+    /// Where a recording or its ground truth cannot be used.
+    pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
+        let scenes = self.scenes()?;
         let mut experiments = Vec::new();
         for tracker in trackers {
-            experiments.extend(self.tests().into_iter().filter_map(|test| self.experiment(test, *tracker)));
+            experiments.extend(scenes.iter().map(|scene| self.experiment(scene.clone(), *tracker)));
             if self.sweep_delay {
                 experiments.extend(self.sweep(*tracker));
             }
         }
-        experiments
+        Ok(experiments)
     }
 
     /// The command takes its 60 ms where there are as many, the video what is left.
@@ -155,10 +201,9 @@ impl Args {
             Delays { video: total - command, command }
         });
         let at = |delays: Delays| {
-            let swept = SWEPT.into_iter().filter_map(|test| self.experiment(TestId(test), tracker));
-            swept
-                .map(move |experiment| Experiment { delays, sweep: true, film: None, ..experiment })
-                .collect::<Vec<_>>()
+            let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), self.seed));
+            let experiments = scenes.map(move |scene| self.experiment(scene, tracker));
+            experiments.map(move |experiment| Experiment { delays, sweep: true, film: None, ..experiment })
         };
         delays.flat_map(at).collect()
     }
@@ -180,7 +225,7 @@ mod tests {
         let args = parse("--test 7,1-3,2 --tracker oracle,thesis").unwrap();
         assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
         assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
-        assert_eq!(args.experiments(&args.trackers().0).len(), 8);
+        assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
     }
 
     #[test]
@@ -193,7 +238,7 @@ mod tests {
     #[test]
     fn the_sweep_goes_to_600_ms_and_is_marked() {
         let args = parse("--test 1 --sweep-delay --size 320x240 --seed 5").unwrap();
-        let experiments = args.experiments(&[TrackerName::Ptztrack]);
+        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
         assert_eq!(experiments.iter().filter(|experiment| experiment.sweep).count(), 28);
         let mut totals: Vec<_> =
             experiments.iter().filter(|e| e.sweep).map(|e| e.delays.total().as_millis()).collect();
@@ -211,6 +256,8 @@ mod tests {
             ("--tracker best", "ptztrack, thesis"),
             ("--codec h264", "mjpeg, mpeg4"),
             ("--first-box drawn", "given, detected"),
+            ("--footage x.avi", "--truth"),
+            ("--person somebody", "auto"),
         ] {
             let error = parse(line).unwrap_err().to_string();
             assert!(error.contains(hint), "{line}: {error}");

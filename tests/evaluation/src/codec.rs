@@ -8,7 +8,7 @@ use std::{
 use gst::prelude::*;
 
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{Elements, PipelineError, lock},
     record::Codec,
 };
 
@@ -33,7 +33,7 @@ impl Codec {
     }
 
     /// Mends what the elements do wrong.
-    pub(crate) fn attach(self, pipeline: &Pipeline) -> Result<(), PipelineError> {
+    pub(crate) fn attach(self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match self {
             Self::Mjpeg => Ok(()),
             Self::Mpeg4 => keep_times(&pipeline.pad("encoder", "sink")?, &pipeline.pad("encoder", "src")?),
@@ -70,6 +70,7 @@ fn keep_times(sink: &gst::Pad, source: &gst::Pad) -> Result<(), PipelineError> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::pipeline::Pipeline;
 
     /// Sends pictures of growing brightness through; gives what comes out for each, as (time, brightness).
     fn through(codec: Codec) -> Vec<(Option<gst::ClockTime>, u8)> {
@@ -81,10 +82,10 @@ mod tests {
         let description =
             format!("appsrc name=source ! {} ! fakesink name=sink sync=false", codec.description());
         let pipeline = Pipeline::new(&description, &info).unwrap();
-        codec.attach(&pipeline).unwrap();
+        codec.attach(pipeline.bin()).unwrap();
         let out = Arc::new(Mutex::new(Vec::new()));
         let seen = out.clone();
-        pipeline.pad("sink", "sink").unwrap().add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        pipeline.bin().pad("sink", "sink").unwrap().add_probe(gst::PadProbeType::BUFFER, move |_, info| {
             let buffer = info.buffer().unwrap();
             lock(&seen).push((buffer.pts(), buffer.map_readable().unwrap()[64 * 24 + 32]));
             gst::PadProbeReturn::Ok

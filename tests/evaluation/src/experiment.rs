@@ -4,7 +4,25 @@ use std::{path::PathBuf, time::Duration};
 
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
 
-use crate::record::{Codec, Delays, FirstBox, Run, TestId, TrackerName};
+use crate::{
+    record::{Codec, Delays, FirstBox, Run, TestId, TrackerName},
+    still::Recording,
+};
+
+/// When picture `number` is taken: in the middle of its time, as the virtual camera does for its own streams, so that no
+/// rounding makes it that of a recording's neighbouring picture.
+pub(crate) fn exposure(number: u32, period: Duration) -> Duration {
+    number * period + period / 2
+}
+
+/// What pictures are of.
+#[derive(Debug, Clone)]
+pub enum Place {
+    /// What a camera sees that the tracker steers.
+    World(World),
+    /// A recording as it is: no camera, no codec, no delays.
+    Recording(Recording),
+}
 
 /// A world with somebody to follow in it.
 #[derive(Debug, Clone)]
@@ -14,8 +32,8 @@ pub struct Scene {
     /// For tables.
     pub title: String,
     /// What there is to see.
-    pub world: World,
-    /// From the start of the world to the last picture that counts.
+    pub place: Place,
+    /// From the start of the world to the last picture that counts; a recording is seen to its end.
     pub duration: Duration,
     /// Who is to be followed; `None` where there is only one.
     pub person: Option<u32>,
@@ -29,7 +47,7 @@ impl Scene {
             test: Some(test),
             title: format!("test {test}"),
             duration: room.duration(),
-            world: World::Room(room),
+            place: Place::World(World::Room(room)),
             person: None,
         })
     }
@@ -81,10 +99,9 @@ impl Experiment {
         }
     }
 
-    /// The camera, at home at time zero.
-    pub(crate) fn camera(&self, clock: Clock) -> Result<VirtualCamera, virtual_camera::Error> {
-        let mut settings =
-            Settings { auth: Auth::None, world: self.scene.world.clone(), clock, ..Settings::default() };
+    /// The camera in `world`, at home at time zero.
+    pub(crate) fn camera(&self, world: &World, clock: Clock) -> Result<VirtualCamera, virtual_camera::Error> {
+        let mut settings = Settings { auth: Auth::None, world: world.clone(), clock, ..Settings::default() };
         settings.service_time = Duration::ZERO;
         settings.video.delay = self.delays.video;
         settings.video.size = Some(self.size);
@@ -92,15 +109,20 @@ impl Experiment {
         VirtualCamera::start(settings)
     }
 
+    /// Numbers of all pictures.
+    pub(crate) fn pictures(&self, period: Duration) -> impl Iterator<Item = u32> {
+        (0..).take_while(move |number| exposure(*number, period) <= self.scene.duration)
+    }
+
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
     /// was never moved; `None` where there is none.
     pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
         let (period, home) = (camera.frame_period(), camera.home());
         let whole = |number: &u32| {
-            let people = camera.ground_truth_from(&home, *number * period, self.size);
+            let people = camera.ground_truth_from(&home, exposure(*number, period), self.size);
             self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
         };
-        (0..).take_while(|number| *number * period <= self.scene.duration).find(whole)
+        self.pictures(period).find(whole)
     }
 
     /// What it will be recorded as.

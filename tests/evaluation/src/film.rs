@@ -6,7 +6,7 @@ use gst::prelude::*;
 use gst_video::prelude::*;
 
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{Elements, PipelineError, lock},
     record::Bounds,
     trackers::CurrentCue,
 };
@@ -30,7 +30,7 @@ pub(crate) fn description(sink: &str, file: &Path) -> String {
 
 /// Draws the true box of the cue into every picture; all of them are of the format `info`.
 pub(crate) fn attach(
-    pipeline: &Pipeline,
+    pipeline: &gst::Pipeline,
     cue: &CurrentCue,
     info: &gst_video::VideoInfo,
 ) -> Result<(), PipelineError> {

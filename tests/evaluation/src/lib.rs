@@ -13,16 +13,22 @@ pub mod cli;
 mod codec;
 mod experiment;
 mod film;
+mod footage;
 mod lockstep;
 pub mod metrics;
+mod people;
 mod pipeline;
 pub mod record;
 pub mod report;
+mod still;
 mod trackers;
 
 pub use batch::run_all;
-pub use experiment::{Experiment, Scene};
+pub use experiment::{Experiment, Place, Scene};
+pub use footage::SceneError;
 pub use lockstep::run;
+pub use people::TruthError;
+pub use still::Recording;
 pub use trackers::missing;
 
 /// Makes GStreamer and our elements ready; again does nothing.

@@ -1,26 +1,27 @@
 //! One experiment in virtual time: camera and pipeline take turns, and nobody looks at a clock.
 //!
-//! Picture n is exposed at n frame periods and reaches the pipeline when it is as old as the video delay; the camera's
-//! time is that of its arrival. The pipeline finishes it, with every command that it leads to sent over HTTP and
-//! answered, before the camera's time goes on.
+//! Picture n is exposed n and a half frame periods after the camera's start and reaches the pipeline when it is as old
+//! as the video delay; the camera's time is that of its arrival. The pipeline finishes it, with every command that it
+//! leads to sent over HTTP and answered, before the camera's time goes on.
 
 use std::time::Duration;
 
 use ptztrack_contract::{TargetMeta, TargetState};
-use virtual_camera::{Clock, Picture, VirtualCamera};
+use virtual_camera::{Clock, Picture, VirtualCamera, World};
 
 use crate::{
     album::Album,
-    experiment::Experiment,
+    experiment::{self, Experiment, Place},
     film,
     pipeline::{Pipeline, PipelineError, SINK, SOURCE},
     record::{Bounds, Estimate, FrameRecord, Run},
+    still,
     trackers::{Cue, Phase, Tracker},
 };
 
 /// Why an experiment came to no end.
 #[derive(Debug, thiserror::Error)]
-enum RunError {
+pub(crate) enum RunError {
     #[error("virtual camera: {0}")]
     Camera(#[from] virtual_camera::Error),
     #[error("virtual camera: {0}")]
@@ -36,19 +37,23 @@ enum RunError {
 /// Runs one experiment from the start of its world to its end. A fault ends it early and is told in the run.
 pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
-    if let Err(error) = drive(experiment, &mut run) {
+    let driven = match &experiment.scene.place {
+        Place::World(world) => drive(experiment, world, &mut run),
+        Place::Recording(recording) => still::drive(experiment, recording, &mut run),
+    };
+    if let Err(error) = driven {
         run.error = Some(error.to_string());
     }
     run
 }
 
-fn drive(experiment: &Experiment, run: &mut Run) -> Result<(), RunError> {
-    let mut stage = Stage::set(experiment)?;
+fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), RunError> {
+    let mut stage = Stage::set(experiment, world)?;
     let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
     let period = stage.camera.frame_period();
     run.frame_rate = 1.0 / period.as_secs_f64();
     let mut album = Album::default();
-    for number in (0..).take_while(|number| *number * period <= experiment.scene.duration) {
+    for number in experiment.pictures(period) {
         let (record, picture) = stage.picture(number, first)?;
         if number >= first {
             album.look(run.frames.len(), &record, picture);
@@ -74,8 +79,8 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn set(experiment: &'a Experiment) -> Result<Self, RunError> {
-        let camera = experiment.camera(Clock::Stepped)?;
+    fn set(experiment: &'a Experiment, world: &World) -> Result<Self, RunError> {
+        let camera = experiment.camera(world, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let (width, height) = experiment.size;
         let rate = gst::Fraction::approximate_f64(1.0 / camera.frame_period().as_secs_f64());
@@ -97,10 +102,10 @@ impl<'a> Stage<'a> {
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
-        experiment.codec.attach(&pipeline)?;
-        tracker.attach(&pipeline)?;
+        experiment.codec.attach(pipeline.bin())?;
+        tracker.attach(pipeline.bin())?;
         if experiment.film.is_some() {
-            film::attach(&pipeline, tracker.cue(), &info)?;
+            film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;
         Ok(Self { experiment, camera, pipeline, tracker, info, counted: 0 })
@@ -109,7 +114,7 @@ impl<'a> Stage<'a> {
     /// Takes picture `number` and sends it through.
     fn picture(&mut self, number: u32, first: u32) -> Result<(FrameRecord, Picture), RunError> {
         let (period, size) = (self.camera.frame_period(), self.experiment.size);
-        let exposure = number * period;
+        let exposure = experiment::exposure(number, period);
         let arrival = exposure + self.experiment.delays.video;
         self.camera.advance_to(arrival);
         let (truth, others) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
@@ -119,11 +124,11 @@ impl<'a> Stage<'a> {
             std::cmp::Ordering::Equal => Phase::FirstBox,
             std::cmp::Ordering::Greater => Phase::After,
         };
-        self.tracker.next(&self.pipeline, Cue { phase, truth: truth.clone(), size })?;
+        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), size })?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
         let record = FrameRecord {
-            time_s: exposure.saturating_sub(first * period).as_secs_f64(),
+            time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
             truth,
             others,
             estimate: target.map(|target| estimate(&target, size)),

@@ -57,6 +57,21 @@ struct Arrival {
     target: Option<TargetMeta>,
 }
 
+/// Elements by name, with an error that says which is missing.
+pub(crate) trait Elements {
+    fn element(&self, name: &'static str) -> Result<gst::Element, PipelineError>;
+
+    fn pad(&self, element: &'static str, pad: &str) -> Result<gst::Pad, PipelineError> {
+        self.element(element)?.static_pad(pad).ok_or(PipelineError::NoElement(element))
+    }
+}
+
+impl Elements for gst::Pipeline {
+    fn element(&self, name: &'static str) -> Result<gst::Element, PipelineError> {
+        self.by_name(name).ok_or(PipelineError::NoElement(name))
+    }
+}
+
 /// A pipeline without a clock that stands still unless it is given a picture.
 pub(crate) struct Pipeline {
     bin: gst::Pipeline,
@@ -84,20 +99,15 @@ impl Pipeline {
         Ok(Self { bin, source, events, arrival: Arc::default() })
     }
 
-    /// An element of it.
-    pub fn element(&self, name: &'static str) -> Result<gst::Element, PipelineError> {
-        self.bin.by_name(name).ok_or(PipelineError::NoElement(name))
-    }
-
-    /// A pad of one of its elements.
-    pub fn pad(&self, element: &'static str, pad: &str) -> Result<gst::Pad, PipelineError> {
-        self.element(element)?.static_pad(pad).ok_or(PipelineError::NoElement(element))
+    /// The elements.
+    pub fn bin(&self) -> &gst::Pipeline {
+        &self.bin
     }
 
     /// Begins; to be called when everybody else has put up their probes.
     pub fn start(&self) -> Result<(), PipelineError> {
         let arrival = self.arrival.clone();
-        self.pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        self.bin.pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
             if let Some(buffer) = info.buffer() {
                 let target = TargetMeta::of(buffer).and_then(Result::ok);
                 *lock(&arrival) = Arrival { time: buffer.pts(), target };
@@ -214,7 +224,7 @@ mod tests {
                 .unwrap();
         let seen = Arc::new(Mutex::new(0));
         let counted = seen.clone();
-        let pad = pipeline.pad("last", "src").unwrap();
+        let pad = pipeline.bin().pad("last", "src").unwrap();
         pad.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
             *lock(&counted) += 1;
             let meta = TargetMeta { id: *lock(&counted), ..TargetMeta::default() };

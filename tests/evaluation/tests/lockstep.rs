@@ -4,7 +4,7 @@
 use std::time::Duration;
 
 use evaluation::{
-    Experiment, Scene,
+    Experiment, Place, Scene,
     metrics::Metrics,
     record::{Codec, FirstBox, Run, TargetState, TrackerName},
 };
@@ -26,7 +26,7 @@ fn scene() -> Scene {
         wide_fov_deg: FOV_DEG,
         ..Default::default()
     });
-    Scene { test: None, title: "walk".into(), world, duration, person: None }
+    Scene { test: None, title: "walk".into(), place: Place::World(world), duration, person: None }
 }
 
 fn experiment(tracker: TrackerName) -> Experiment {
@@ -104,7 +104,8 @@ fn a_detector_finds_the_person_by_itself() {
 fn a_scene_without_anybody_is_an_error_in_words() {
     evaluation::init().unwrap();
     let mut experiment = experiment(TrackerName::Oracle);
-    experiment.scene.world = World::Synthetic(SyntheticSettings { path: Vec::new(), ..Default::default() });
+    let empty = SyntheticSettings { path: Vec::new(), ..Default::default() };
+    experiment.scene.place = Place::World(World::Synthetic(empty));
     let run = evaluation::run(&experiment);
     assert_eq!(run.error.as_deref(), Some("the person is never wholly in the first view"));
     assert!(run.frames.is_empty());

@@ -6,11 +6,11 @@ use ptztrack_contract::{Point, TargetMeta, TargetState, Vector};
 
 use super::{Cue, CurrentCue, Phase, attach_targets, normalised, rate};
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{Elements, PipelineError, lock},
     record::GroundTruth,
 };
 
-pub(super) fn attach(pipeline: &Pipeline, cue: &CurrentCue) -> Result<(), PipelineError> {
+pub(super) fn attach(pipeline: &gst::Pipeline, cue: &CurrentCue) -> Result<(), PipelineError> {
     let last = Mutex::default();
     attach_targets(&pipeline.pad("tracker", "src")?, cue, move |cue, buffer| {
         tell(cue, buffer.pts(), &mut lock(&last))

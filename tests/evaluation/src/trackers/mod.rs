@@ -6,7 +6,7 @@ use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{PipelineError, lock},
     record::{Bounds, FirstBox, GroundTruth, TrackerName},
 };
 
@@ -91,7 +91,7 @@ impl Tracker {
     }
 
     /// Puts up its probes.
-    pub fn attach(&self, pipeline: &Pipeline) -> Result<(), PipelineError> {
+    pub fn attach(&self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match self.name {
             TrackerName::Ptztrack | TrackerName::Thesis => ours::attach(pipeline, self.first_box, &self.cue),
             TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
@@ -102,7 +102,7 @@ impl Tracker {
     }
 
     /// To be called before each picture.
-    pub fn next(&self, pipeline: &Pipeline, cue: Cue) -> Result<(), PipelineError> {
+    pub fn next(&self, pipeline: &gst::Pipeline, cue: Cue) -> Result<(), PipelineError> {
         *lock(&self.cue) = cue.clone();
         match self.name {
             TrackerName::Ptztrack | TrackerName::Thesis => ours::next(pipeline, self.first_box, &cue),

@@ -9,7 +9,7 @@ use ptztrack_contract::{BufferMeta, MotionMeta, Region};
 
 use super::{Cue, CurrentCue, Phase, normalised};
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{Elements, PipelineError, lock},
     record::FirstBox,
 };
 
@@ -25,7 +25,7 @@ pub(super) const THESIS: &str = "bgavgdetect alpha-interval=0 shed-trail=false c
 const CHOICE: &str = "largest";
 
 pub(super) fn attach(
-    pipeline: &Pipeline,
+    pipeline: &gst::Pipeline,
     first_box: FirstBox,
     cue: &CurrentCue,
 ) -> Result<(), PipelineError> {
@@ -47,7 +47,7 @@ pub(super) fn attach(
     Ok(())
 }
 
-pub(super) fn next(pipeline: &Pipeline, first_box: FirstBox, cue: &Cue) -> Result<(), PipelineError> {
+pub(super) fn next(pipeline: &gst::Pipeline, first_box: FirstBox, cue: &Cue) -> Result<(), PipelineError> {
     if first_box == FirstBox::Detected {
         return Ok(());
     }

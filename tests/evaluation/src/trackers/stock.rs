@@ -12,7 +12,7 @@ use ptztrack_contract::{Rect, TargetMeta, TargetState};
 
 use super::{Cue, CurrentCue, Phase, attach_targets, normalised, rate};
 use crate::{
-    pipeline::{Pipeline, PipelineError, lock},
+    pipeline::{Elements, PipelineError, lock},
     record::{Bounds, TrackerName},
 };
 
@@ -31,7 +31,7 @@ pub(super) fn description(name: TrackerName) -> String {
     )
 }
 
-pub(super) fn attach(pipeline: &Pipeline, cue: &CurrentCue) -> Result<(), PipelineError> {
+pub(super) fn attach(pipeline: &gst::Pipeline, cue: &CurrentCue) -> Result<(), PipelineError> {
     let past = pipeline.pad("tracker", "src")?;
     let waiting = cue.clone();
     pipeline.pad("tracker", "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
@@ -52,7 +52,7 @@ pub(super) fn attach(pipeline: &Pipeline, cue: &CurrentCue) -> Result<(), Pipeli
     Ok(())
 }
 
-pub(super) fn next(pipeline: &Pipeline, cue: &Cue) -> Result<(), PipelineError> {
+pub(super) fn next(pipeline: &gst::Pipeline, cue: &Cue) -> Result<(), PipelineError> {
     let Some(bounds) = cue.given() else { return Ok(()) };
     let tracker = pipeline.element("tracker")?;
     let whole = |number: f64| number.round().max(0.0) as u32;
