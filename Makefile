@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo install packages-build packages-demo packages-test
+.PHONY: help build test lint demo evaluate install packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -10,8 +10,9 @@ BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git
 	libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev
 RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good \
 	gstreamer1.0-plugins-bad gstreamer1.0-plugins-ugly gstreamer1.0-libav
+EVALUATE_PACKAGES := $(RUN_PACKAGES) gstreamer1.0-opencv gnuplot-nox fonts-dejavu-core
 DEMO_PACKAGES := $(RUN_PACKAGES) python3 gnuplot-nox opencv-doc
-TEST_PACKAGES := $(RUN_PACKAGES) ffmpeg chromium fonts-dejavu-core python3 python3-gi python3-venv \
+TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium python3 python3-gi python3-venv \
 	gir1.2-gst-plugins-base-1.0
 
 # rustup puts Rust there; a cargo that is recent enough elsewhere in PATH does as well.
@@ -23,6 +24,10 @@ TEST_TIMEOUT ?= 45m
 CODEC ?= mjpeg
 DURATION ?= 60
 FOOTAGE ?=
+ARGS ?=
+WORLD ?= footage
+ROOM_TEST ?= 1
+SEED ?= 1
 
 ## help: list the targets
 help:
@@ -45,11 +50,22 @@ lint: packages-build
 
 ## demo: follow a person in real footage and leave video, plot and summary in target/demo
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
+##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
 demo: packages-demo
 	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix --package virtual-camera
-	@footage="$(FOOTAGE)"; \
+	@case "$(WORLD)" in \
+	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
+	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \
+	*) echo "WORLD is footage or room, not $(WORLD)" >&2; exit 2;; \
+	esac; \
 	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
-		--footage "$${footage:-$$(scripts/footage)}" --codec $(CODEC) --duration $(DURATION) --out target/demo
+		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
+
+## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
+##       (ARGS="--test 1-6 --tracker all --sweep-delay ..."; ARGS=--help lists the options)
+evaluate: packages-evaluate
+	$(CARGO) build --release --package evaluation
+	target/release/evaluate $(ARGS)
 
 ## install: build, and copy the plugins to a GStreamer plugin folder
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
@@ -62,6 +78,9 @@ packages-build:
 
 packages-demo: packages-build
 	@scripts/install-packages $(DEMO_PACKAGES)
+
+packages-evaluate: packages-build
+	@scripts/install-packages $(EVALUATE_PACKAGES)
 
 packages-test: packages-build
 	@scripts/install-packages $(TEST_PACKAGES)

@@ -117,6 +117,10 @@ impl<'a> Reader<'a> {
         let name = self.get::<String>(field)?;
         T::from_name(&name).ok_or_else(|| self.value_error(field, name))
     }
+
+    pub fn named_optional<T: Named>(&self, field: &str) -> Result<Option<T>, ContractError> {
+        if self.0.has_field(field) { self.named(field).map(Some) } else { Ok(None) }
+    }
 }
 
 /// Flattens items into the list form that [`Reader::tuples`] reads.

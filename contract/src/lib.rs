@@ -27,7 +27,8 @@ pub use error::ContractError;
 pub use events::{CameraEvent, TrackerEvent};
 pub use geometry::{Point, Rect, Vector};
 pub use messages::{
-    CameraChange, CameraMessage, MotionChange, MotionMessage, TargetChange, TargetMessage, Times,
+    CameraChange, CameraMessage, MotionChange, MotionMessage, ReleaseReason, TargetChange, TargetMessage,
+    Times,
 };
 pub use meta::BufferMeta;
 pub use motion::{MOTION_ROI, MotionMeta, Region};

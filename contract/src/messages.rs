@@ -108,10 +108,22 @@ named_enum! {
         Reacquired = "reacquired",
         /// The target was given up.
         Lost = "lost",
-        /// An operator or the application released the target.
+        /// The target was released on purpose; the [`ReleaseReason`] says why.
         Released = "released",
         /// Nothing happened: a periodic report of where the target is.
         Position = "position",
+    }
+}
+
+named_enum! {
+    /// Why a target was released.
+    ReleaseReason {
+        /// An operator or the application asked for it.
+        Request = "request",
+        /// It stood still for longer than `stationary-timeout`.
+        Stationary = "stationary",
+        /// It was tracked for longer than `max-tracking-time`.
+        MaxTrackingTime = "max-tracking-time",
     }
 }
 
@@ -120,6 +132,8 @@ named_enum! {
 pub struct TargetMessage {
     /// What happened.
     pub change: TargetChange,
+    /// Why the target was released, where it was.
+    pub reason: Option<ReleaseReason>,
     /// When.
     pub times: Times,
     /// What the tracker does now.
@@ -143,6 +157,9 @@ impl TargetMessage {
     pub fn to_structure(&self) -> gst::Structure {
         let mut structure = gst::Structure::new_empty(Self::NAME);
         structure.set("change", self.change.name());
+        if let Some(reason) = self.reason {
+            structure.set("reason", reason.name());
+        }
         self.times.write(&mut structure);
         structure.set("state", self.state.name());
         structure.set("id", self.id);
@@ -158,6 +175,7 @@ impl TargetMessage {
         let reader = Reader::new(structure, Self::NAME)?;
         Ok(Self {
             change: reader.named("change")?,
+            reason: reader.named_optional("reason")?,
             times: Times::read(&reader)?,
             state: reader.named("state")?,
             id: reader.get("id")?,

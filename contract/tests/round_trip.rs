@@ -38,6 +38,14 @@ fn clock_time() -> impl Strategy<Value = gst::ClockTime> {
     (0..u64::MAX).prop_map(gst::ClockTime::from_nseconds)
 }
 
+fn release_reason() -> impl Strategy<Value = Option<ReleaseReason>> {
+    prop::option::of(prop::sample::select(vec![
+        ReleaseReason::Request,
+        ReleaseReason::Stationary,
+        ReleaseReason::MaxTrackingTime,
+    ]))
+}
+
 fn target_state() -> impl Strategy<Value = TargetState> {
     prop::sample::select(vec![
         TargetState::Searching,
@@ -119,13 +127,14 @@ proptest! {
     }
 
     #[test]
-    fn messages(times in times(), bounds in rect(), centroid in point(), velocity in vector(), id: u64) {
+    fn messages(times in times(), bounds in rect(), centroid in point(), velocity in vector(), id: u64,
+                reason in release_reason()) {
         gst::init().unwrap();
         let motion = MotionMessage { change: MotionChange::Start, times, regions: 2, bounds: Some(bounds) };
         prop_assert_eq!(MotionMessage::from_structure(&motion.to_structure()).unwrap(), motion);
         let target = TargetMessage {
-            change: TargetChange::Reacquired, times, state: TargetState::Tracking, id, bounds, centroid, velocity,
-            confidence: 0.5,
+            change: TargetChange::Released, reason, times, state: TargetState::Searching, id, bounds, centroid,
+            velocity, confidence: 0.5,
         };
         prop_assert_eq!(TargetMessage::from_structure(&target.to_structure()).unwrap(), target);
         let camera = CameraMessage { change: CameraChange::AtLimit, times, detail: "pan 180°".into() };

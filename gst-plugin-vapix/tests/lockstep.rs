@@ -38,8 +38,11 @@ fn walk(camera: &VirtualCamera) -> Vec<Vec<String>> {
 #[test]
 fn a_buffer_has_passed_when_the_camera_has_answered() {
     let counts: Vec<_> = walk(&camera(Auth::None)).iter().map(Vec::len).collect();
-    // At most ten a second, by the stream's time: at 0, 120, 240, 360 ms.
-    assert_eq!(counts, [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4]);
+    let sending =
+        |picture: &usize| counts[*picture] > picture.checked_sub(1).map_or(0, |before| counts[before]);
+    let sent: Vec<_> = (0..counts.len()).filter(sending).collect();
+    // At most ten a second, by the stream's time: every third picture at the most.
+    assert!(sent.starts_with(&[0, 3]) && sent.windows(2).all(|pair| pair[1] - pair[0] >= 3), "{counts:?}");
 }
 
 #[test]

@@ -13,10 +13,11 @@ class VirtualCamera:
     user = "root"
     password = "demonstration"
 
-    def __init__(self, program, footage, log):
+    def __init__(self, program, world, log):
+        """`world` are the options of the program that say what it looks at."""
         self.process = subprocess.Popen(
             [
-                program, "--footage", footage, "--http-port", "0", "--rtsp-port", "0",
+                program, *world, "--http-port", "0", "--rtsp-port", "0",
                 "--auth", "digest", "--user", self.user, "--password", self.password, "--log", str(log),
             ],
             stdout=subprocess.PIPE,

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The demonstration: a virtual camera in front of real footage, followed by plain gst-launch-1.0.
+"""The demonstration: a virtual camera in front of real footage or in a room, its person followed by plain gst-launch-1.0.
 
 Leaves in --out: followed.mkv (what the camera saw, with what was seen drawn in), plot.png (offset, pan and
 tilt over time), samples.csv (what the plot shows) and summary.json. Ends with 0 only where somebody was
@@ -41,6 +41,13 @@ RECORD = (
     "! matroskamux ! filesink location={out}/followed.mkv"
 )
 SHOW = "drawn. ! queue leaky=downstream ! videoconvert ! autovideosink sync=false"
+
+
+def world_options(arguments):
+    """What the camera looks at, as options of its program."""
+    if arguments.footage:
+        return ["--footage", arguments.footage]
+    return ["--world", "room", "--room-test", arguments.room_test, "--seed", arguments.seed]
 
 
 def pipeline(camera, codec, out):
@@ -94,16 +101,20 @@ def read_messages(lines, progress):
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--camera", required=True, help="the program virtual-camera")
-    parser.add_argument("--footage", required=True, help="a recording by a camera that stood still")
+    world = parser.add_mutually_exclusive_group(required=True)
+    world.add_argument("--footage", help="a recording by a camera that stood still")
+    world.add_argument("--room-test", metavar="NUMBER", help="a made-up room, as in this of the thesis' tests (1 to 72)")
+    parser.add_argument("--seed", default="1", help="of the room; 1 is the reference world")
     parser.add_argument("--codec", choices=CODECS, default="mjpeg")
     parser.add_argument("--duration", type=float, default=60.0, help="seconds")
     parser.add_argument("--out", default="target/demo", type=pathlib.Path)
     arguments = parser.parse_args()
+    arguments.world = world_options(arguments)
     arguments.out.mkdir(parents=True, exist_ok=True)
     # A terminated demonstration cleans up like an interrupted one.
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
 
-    with VirtualCamera(arguments.camera, arguments.footage, arguments.out / "camera.log") as camera:
+    with VirtualCamera(arguments.camera, arguments.world, arguments.out / "camera.log") as camera:
         print(f"The camera: {camera.http}/ (open it to look and steer by hand), {camera.rtsp}")
         command = pipeline(camera, arguments.codec, arguments.out)
         print(shlex.join(command), "\n", flush=True)

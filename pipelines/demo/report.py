@@ -18,7 +18,7 @@ def summarise(progress, status, at_rest, arguments):
     targets = {sample["target"] for sample in progress.samples if sample["target"]}
     return {
         "codec": arguments.codec,
-        "footage": str(arguments.footage),
+        "world": " ".join(arguments.world),
         "duration_s": round(progress.seconds(), 1),
         "frames": progress.frames,
         "targets": len(targets),

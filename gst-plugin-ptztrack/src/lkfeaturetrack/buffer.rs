@@ -65,6 +65,7 @@ pub(super) fn attach(
 pub(super) fn message(report: &Report, change: TargetChange, times: Times) -> TargetMessage {
     TargetMessage {
         change,
+        reason: report.released.filter(|_| change == TargetChange::Released),
         times,
         state: report.state,
         id: report.id,

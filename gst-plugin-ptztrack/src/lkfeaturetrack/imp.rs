@@ -1,3 +1,4 @@
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{LazyLock, Mutex};
 
 use glib::Properties;
@@ -8,7 +9,7 @@ use gst_base::subclass::BaseTransformMode;
 use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
+use ptztrack_contract::{CameraEvent, MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
 
 use super::{Profile, Selection, buffer};
 use crate::lock::lock;
@@ -35,6 +36,8 @@ struct Settings {
     coast_time_ns: u64,
     manual_size: f64,
     message_interval_ns: u64,
+    stationary_timeout_ns: u64,
+    max_tracking_time_ns: u64,
 }
 
 impl Default for Settings {
@@ -47,6 +50,8 @@ impl Default for Settings {
             coast_time_ns: 1_500_000_000,
             manual_size: 0.25,
             message_interval_ns: 0,
+            stationary_timeout_ns: 0,
+            max_tracking_time_ns: 0,
         }
     }
 }
@@ -68,8 +73,17 @@ impl Settings {
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             manual_size: self.manual_size,
             must_move: self.roi_type == MOTION_ROI,
+            limits: vision::Limits {
+                stationary_s: limit_s(self.stationary_timeout_ns),
+                tracked_s: limit_s(self.max_tracking_time_ns),
+            },
         }
     }
+}
+
+/// A time limit in seconds; none where it is 0.
+fn limit_s(limit_ns: u64) -> f64 {
+    if limit_ns == 0 { f64::INFINITY } else { gst::ClockTime::from_nseconds(limit_ns).seconds_f64() }
 }
 
 /// What an operator or the application asked for; carried out with the next frame.
@@ -163,12 +177,24 @@ pub struct LkFeatureTrack {
         maximum = 3_600_000_000_000, default = Settings::default().message_interval_ns,
         blurb = "Time between two position messages while there is a target, in nanoseconds (0: none)"
     )]
+    #[property(
+        name = "stationary-timeout", get, set, type = u64, member = stationary_timeout_ns, mutable_playing,
+        maximum = 86_400_000_000_000, default = Settings::default().stationary_timeout_ns,
+        blurb = "A target that stands still for longer is released and not taken again until it moves, in nanoseconds (0: never)"
+    )]
+    #[property(
+        name = "max-tracking-time", get, set, type = u64, member = max_tracking_time_ns, mutable_playing,
+        maximum = 86_400_000_000_000, default = Settings::default().max_tracking_time_ns,
+        blurb = "A target that is tracked for longer is released and not taken again until it has moved and 3 s have passed, in nanoseconds (0: never)"
+    )]
     settings: Mutex<Settings>,
     /// Taken out by the streaming thread while it computes.
     stream: Mutex<Option<Stream>>,
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
     command: Mutex<Option<Command>>,
+    /// Whether a servo said that the camera turns.
+    camera_moves: AtomicBool,
 }
 
 #[glib::object_subclass]
@@ -253,6 +279,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         }
         *lock(&self.size) = None;
         *lock(&self.command) = None;
+        self.camera_moves.store(false, Ordering::Relaxed);
         Ok(())
     }
 
@@ -269,6 +296,8 @@ impl BaseTransformImpl for LkFeatureTrack {
     fn src_event(&self, event: gst::Event) -> bool {
         if event.type_() == gst::EventType::Navigation {
             self.navigate(&event);
+        } else if let Some(Ok(camera)) = CameraEvent::of(&event) {
+            self.camera_moves.store(camera.moving, Ordering::Relaxed);
         }
         self.parent_src_event(event)
     }
@@ -283,6 +312,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         let command = lock(&self.command).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
+        stream.tracker.set_camera_rests(!self.camera_moves.load(Ordering::Relaxed));
         match command {
             Some(Command::Select(place)) => stream.tracker.select(place),
             Some(Command::Release) => stream.tracker.release(),

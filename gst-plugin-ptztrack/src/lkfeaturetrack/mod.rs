@@ -19,6 +19,26 @@
 //! around it; a right click releases the target. Applications emit `select-target` (x and y in frame sizes, 0
 //! to 1) and `release-target` instead. What was released is not chosen again for three seconds.
 //!
+//! ## Giving up
+//! Both limits are off by default: whoever guards a door wants to see who waits there. A message `released` says
+//! why (`reason`: `request`, `stationary`, `max-tracking-time`), and the tracker searches again.
+//!
+//! `stationary-timeout` releases a target that stands still for longer. It stands while it stays within half its
+//! width of where it was during the last seconds, and keeps its size. What a turning or zooming camera does to the
+//! picture does not count, nor does a sway or a wave of the arms, nor the time in which it is hidden. The camera's
+//! motion is seen in the background; where nothing is to be seen there, and with `profile=thesis`, the servo's
+//! events tell whether the camera rests. Without a servo it does.
+//!
+//! Detections in the place of a target that was given up are not chosen until they have moved by about its width;
+//! anybody elsewhere is, at once. The place goes with the background. It is forgotten after a change of size, a
+//! seek or a gap, and when the camera turns too fast to be followed.
+//!
+//! `max-tracking-time` releases a target however it moves. Who walks on has moved at once, so it is not chosen for
+//! three seconds besides: somebody else has a turn, or else it is followed again, as a new target.
+//!
+//! The limits hold for a target that was selected by hand as well. Selecting who was given up follows them again,
+//! with all the time anew.
+//!
 //! ## Profiles
 //! `profile=thesis` takes the steps of the thesis alone; `robust` adds the motion of the background, the
 //! forward-backward test, new points for lost ones, and a correlation filter that knows the target's looks.
@@ -32,6 +52,10 @@
 //! The thesis as written, the target chosen nearest to the middle:
 //! ```text
 //! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack profile=thesis selection=nearest-centre ! fakesink
+//! ```
+//! Leave who stands for ten seconds to others, and nobody longer than two minutes in view:
+//! ```text
+//! gst-launch-1.0 -m videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack stationary-timeout=10000000000 max-tracking-time=120000000000 ! fakesink
 //! ```
 //! An operator chooses with a click, the detections of another element help:
 //! ```text

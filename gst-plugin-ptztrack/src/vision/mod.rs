@@ -24,6 +24,6 @@ pub use duty::Duty;
 pub use luma::{Luma, LumaError};
 pub use presence::Presence;
 pub use scene::{FrameSize, Parts, Seen, Spot, scene};
-pub use tracker::{Choice, Config, Detection, Profile, Report, Tracker};
+pub use tracker::{Choice, Config, Detection, Limits, Profile, Report, Tracker};
 pub use trail::Trail;
 pub use zones::{ZoneError, Zones, zone_mask};

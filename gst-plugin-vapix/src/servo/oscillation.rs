@@ -68,6 +68,9 @@ impl Swing {
     /// A half wave that lasts longer is the target's own pacing.
     const LONGEST: Duration = Duration::from_secs(2);
 
+    /// A shorter one is no head's: a target that jumps.
+    const SHORTEST: Duration = Duration::from_millis(150);
+
     /// A half wave counts that has at least this part of the size of the one before: else it dies away by itself.
     const STEADY: f64 = 0.8;
 
@@ -82,9 +85,10 @@ impl Swing {
             self.peak = self.peak.abs().max(error.abs()).copysign(error);
             return false;
         }
-        let quick = at.saturating_sub(self.since) <= Self::LONGEST;
+        let lasted = at.saturating_sub(self.since);
+        let swings = (Self::SHORTEST..=Self::LONGEST).contains(&lasted);
         let steady = self.peak.abs() >= Self::STEADY * self.last;
-        self.steady = if quick && steady && self.peak != 0.0 { self.steady + 1 } else { 0 };
+        self.steady = if swings && steady && self.peak != 0.0 { self.steady + 1 } else { 0 };
         (self.last, self.peak, self.since) = (self.peak.abs(), error, at);
         self.steady >= Self::ENOUGH
     }
@@ -119,6 +123,7 @@ mod tests {
         assert_eq!(lowered(&mut guard, |t| 20.0 * (-0.5 * t).exp() * (4.0 * t).sin()), 0);
         assert_eq!(lowered(&mut guard, |t| 8.0 * (1.2 * t).sin()), 0);
         assert_eq!(lowered(&mut guard, |t| 0.9 * (9.0 * t).sin()), 0);
+        assert_eq!(lowered(&mut guard, |t| 9.0 * (35.0 * t).sin()), 0, "jumps");
         assert_eq!(lowered(&mut guard, |t| 5.0 + 3.0 * (4.0 * t).sin()), 0);
         assert_eq!(guard.trust(), 1.0);
     }

@@ -56,7 +56,7 @@ pub enum Error {
     #[error("the camera has no pan, tilt and zoom: it answered a query with nothing")]
     NoPtz,
     /// The camera sends us elsewhere than to its own HTTPS.
-    #[error("the camera redirects to {0}; set `location` to the address that is meant")]
+    #[error("the camera redirects to {0}, which is not its own HTTPS")]
     Redirected(String),
 }
 
@@ -80,7 +80,8 @@ impl Error {
     /// What a person can do about it.
     pub fn advice(&self) -> &'static str {
         match self {
-            Self::Location { .. } | Self::Redirected(_) => "Correct `location`.",
+            Self::Location { .. } => "Correct `location`.",
+            Self::Redirected(_) => "Set `location` to the address that is meant; trying on.",
             Self::Tls(_) => "Check `ca-file`.",
             Self::Unreachable(_) => {
                 "Check `location`, the cable and, with https, the certificate (`ca-file`, `insecure`); trying on."
@@ -92,6 +93,7 @@ impl Error {
             }
             Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
             Self::Status { status: 403, .. } => "Give this user the right to control PTZ; trying on.",
+            Self::Status { status: 500.., .. } => "It may be starting, or busy; trying on.",
             Self::Status { .. } | Self::Unexpected(_) | Self::TooLong(_) => {
                 "Check that `location` is an Axis camera with VAPIX; trying on."
             }

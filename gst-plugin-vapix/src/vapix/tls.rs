@@ -1,6 +1,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use rustls::client::WebPkiServerVerifier;
 use rustls::client::danger::{HandshakeSignatureValid, ServerCertVerified, ServerCertVerifier};
 use rustls::crypto::{CryptoProvider, verify_tls12_signature, verify_tls13_signature};
 use rustls::pki_types::pem::PemObject;
@@ -16,7 +17,8 @@ pub enum Trust {
     /// Those the system trusts.
     #[default]
     System,
-    /// Those signed by an authority in this PEM file.
+    /// Those signed by an authority in this PEM file, and those in the file themselves, for whatever name
+    /// and time: what a camera has signed for itself.
     Authority(PathBuf),
     /// All: who sits on the wire can take the camera, and with Basic authentication the password.
     Anyone,
@@ -35,9 +37,13 @@ impl Trust {
             // A machine without a certificate store can still use plain HTTP.
             _ if !https => builder.with_root_certificates(RootCertStore::empty()),
             Self::System => builder.with_platform_verifier().map_err(tls_error)?,
-            Self::Authority(path) => builder.with_root_certificates(read_authorities(path)?),
+            Self::Authority(path) => {
+                let verifier = Believe::signed_by(read_certificates(path)?, provider)?;
+                builder.dangerous().with_custom_certificate_verifier(Arc::new(verifier))
+            }
             Self::Anyone => {
-                builder.dangerous().with_custom_certificate_verifier(Arc::new(BelieveAnyone(provider)))
+                let verifier = Believe { whom: Whom::Anyone, provider };
+                builder.dangerous().with_custom_certificate_verifier(Arc::new(verifier))
             }
         };
         Ok(builder.with_no_client_auth())
@@ -48,33 +54,65 @@ fn tls_error(err: rustls::Error) -> Error {
     Error::Tls(err.to_string())
 }
 
-fn read_authorities(path: &PathBuf) -> Result<RootCertStore, Error> {
+fn read_certificates(path: &PathBuf) -> Result<Vec<CertificateDer<'static>>, Error> {
     let failed = |reason: String| Error::Tls(format!("{}: {reason}", path.display()));
-    let mut store = RootCertStore::empty();
-    for certificate in CertificateDer::pem_file_iter(path).map_err(|err| failed(err.to_string()))? {
-        let certificate = certificate.map_err(|err| failed(err.to_string()))?;
-        store.add(certificate).map_err(|err| failed(err.to_string()))?;
-    }
-    if store.is_empty() {
+    let certificates: Result<Vec<_>, _> =
+        CertificateDer::pem_file_iter(path).map_err(|err| failed(err.to_string()))?.collect();
+    let certificates = certificates.map_err(|err| failed(err.to_string()))?;
+    if certificates.is_empty() {
         return Err(failed("holds no certificate".to_owned()));
     }
-    Ok(store)
+    Ok(certificates)
 }
 
-/// Believes every certificate, but still checks that the other side holds its key.
+/// Whose certificate will do. That the other side holds its key is checked in any case.
 #[derive(Debug)]
-struct BelieveAnyone(Arc<CryptoProvider>);
+struct Believe {
+    whom: Whom,
+    provider: Arc<CryptoProvider>,
+}
 
-impl ServerCertVerifier for BelieveAnyone {
+#[derive(Debug)]
+enum Whom {
+    Anyone,
+    /// Who shows one of these, or one that they signed.
+    Known {
+        certificates: Vec<CertificateDer<'static>>,
+        authorities: Arc<WebPkiServerVerifier>,
+    },
+}
+
+impl Believe {
+    fn signed_by(
+        certificates: Vec<CertificateDer<'static>>,
+        provider: Arc<CryptoProvider>,
+    ) -> Result<Self, Error> {
+        let mut store = RootCertStore::empty();
+        for certificate in &certificates {
+            store.add(certificate.clone()).map_err(tls_error)?;
+        }
+        let authorities = WebPkiServerVerifier::builder_with_provider(store.into(), provider.clone())
+            .build()
+            .map_err(|err| Error::Tls(err.to_string()))?;
+        Ok(Self { whom: Whom::Known { certificates, authorities }, provider })
+    }
+}
+
+impl ServerCertVerifier for Believe {
     fn verify_server_cert(
         &self,
-        _end_entity: &CertificateDer<'_>,
-        _intermediates: &[CertificateDer<'_>],
-        _server_name: &ServerName<'_>,
-        _ocsp_response: &[u8],
-        _now: UnixTime,
+        end_entity: &CertificateDer<'_>,
+        intermediates: &[CertificateDer<'_>],
+        server_name: &ServerName<'_>,
+        ocsp_response: &[u8],
+        now: UnixTime,
     ) -> Result<ServerCertVerified, rustls::Error> {
-        Ok(ServerCertVerified::assertion())
+        match &self.whom {
+            Whom::Known { certificates, authorities } if !certificates.contains(end_entity) => {
+                authorities.verify_server_cert(end_entity, intermediates, server_name, ocsp_response, now)
+            }
+            Whom::Known { .. } | Whom::Anyone => Ok(ServerCertVerified::assertion()),
+        }
     }
 
     fn verify_tls12_signature(
@@ -83,7 +121,7 @@ impl ServerCertVerifier for BelieveAnyone {
         cert: &CertificateDer<'_>,
         dss: &DigitallySignedStruct,
     ) -> Result<HandshakeSignatureValid, rustls::Error> {
-        verify_tls12_signature(message, cert, dss, &self.0.signature_verification_algorithms)
+        verify_tls12_signature(message, cert, dss, &self.provider.signature_verification_algorithms)
     }
 
     fn verify_tls13_signature(
@@ -92,11 +130,11 @@ impl ServerCertVerifier for BelieveAnyone {
         cert: &CertificateDer<'_>,
         dss: &DigitallySignedStruct,
     ) -> Result<HandshakeSignatureValid, rustls::Error> {
-        verify_tls13_signature(message, cert, dss, &self.0.signature_verification_algorithms)
+        verify_tls13_signature(message, cert, dss, &self.provider.signature_verification_algorithms)
     }
 
     fn supported_verify_schemes(&self) -> Vec<SignatureScheme> {
-        self.0.signature_verification_algorithms.supported_schemes()
+        self.provider.signature_verification_algorithms.supported_schemes()
     }
 }
 

@@ -1,7 +1,51 @@
 //! The thesis' 72 closed-loop experiments (chapter 5), rerun by anyone: real elements in a real pipeline against the
 //! virtual camera, in virtual time, so that the same seed gives the same table on any machine.
+//!
+//! ## What is counted
+//! Counting begins with the *first box*: the first picture, with the camera still at home, in which the person's whole
+//! box lies inside the view. That is decided before anything runs, so that it is the same picture for every tracker,
+//! and in it every tracker is given the true box (`--first-box detected`: those with a detector are not). It ends with
+//! the person's walk. Pictures are counted by when they were taken, whatever the delays.
 
+mod album;
+mod batch;
+pub mod cli;
+mod codec;
+mod experiment;
+mod film;
+mod footage;
+mod lockstep;
 pub mod metrics;
+mod people;
+mod pipeline;
 pub mod record;
 pub mod report;
-mod truth;
+mod still;
+mod trackers;
+
+pub use batch::run_all;
+pub use experiment::{Experiment, Place, Scene};
+pub use footage::SceneError;
+pub use lockstep::run;
+pub use people::TruthError;
+pub use still::Recording;
+pub use trackers::missing;
+
+/// Makes GStreamer and our elements ready; again does nothing.
+///
+/// OpenCV gets one thread: a run shall not depend on how many cores there are, and several go on at once.
+///
+/// # Errors
+/// Where GStreamer does not start.
+pub fn init() -> Result<(), glib::Error> {
+    static READY: std::sync::OnceLock<Result<(), glib::Error>> = std::sync::OnceLock::new();
+    let ready = READY.get_or_init(|| {
+        gst::init()?;
+        opencv::core::set_num_threads(1)
+            .map_err(|error| glib::Error::new(gst::LibraryError::Init, &error.message))?;
+        let register =
+            || gstptztrack::plugin_register_static().and_then(|()| gstvapix::plugin_register_static());
+        register().map_err(|error| glib::Error::new(gst::CoreError::Failed, &error.message))
+    });
+    ready.clone()
+}

@@ -2,8 +2,8 @@
 
 use std::{fmt, str::FromStr, time::Duration};
 
-pub use crate::truth::{Bounds, GroundTruth};
 pub use ptztrack_contract::TargetState;
+pub use virtual_camera::{Bounds, GroundTruth};
 
 /// Number of a test in the order of the thesis' table 5.2, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -164,6 +164,31 @@ pub struct FrameRecord {
     pub commands: u32,
 }
 
+named! {
+    /// A telling moment of a run.
+    Moment, "moment" {
+        /// The tracker has its target for the first time.
+        Acquired = "acquired",
+        /// It says for the first time that the target is hidden.
+        Occluded = "occluded",
+        /// It loses the target for the first time.
+        Lost = "lost",
+        /// The target was never farther from the middle while it was in the picture.
+        Worst = "worst",
+    }
+}
+
+/// A picture to look at.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Snapshot {
+    /// Why it is kept.
+    pub moment: Moment,
+    /// Index of its record in [`Run::frames`].
+    pub frame: usize,
+    /// As the camera sent it, nothing drawn in.
+    pub jpeg: Vec<u8>,
+}
+
 /// One test with one tracker.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Run {
@@ -183,14 +208,16 @@ pub struct Run {
     pub delays: Delays,
     /// Who drew the first box.
     pub first_box: FirstBox,
+    /// Whether it is one of a series over the delay, and so not for the tables.
+    pub sweep: bool,
     /// Pictures a second.
     pub frame_rate: f64,
-    /// From the first counted picture to the first in which the tracker was right; `None` if it never was.
-    pub acquire_s: Option<f64>,
     /// Pictures that were there but never reached the tracker; only in real time, `None` in virtual time.
     pub dropped: Option<u64>,
     /// The counted pictures.
     pub frames: Vec<FrameRecord>,
+    /// Some of them to look at.
+    pub snapshots: Vec<Snapshot>,
     /// When it failed, why; the pictures up to there are kept.
     pub error: Option<String>,
 }

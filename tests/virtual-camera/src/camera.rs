@@ -75,8 +75,8 @@ impl Camera {
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
         let limits = world.limits();
-        let home = settings.home.unwrap_or_else(|| world.home());
-        let head = Head::new(settings.kinematics.clone(), world.optics(), limits, home, memory);
+        let head =
+            Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
         let device = Device::new(&settings, head, limits, world.view_size());
         let state = State {
             device,
@@ -271,7 +271,8 @@ impl Camera {
         self.world.truth(&self.opening(time), size)
     }
 
-    fn silhouette(&self, time: Duration, size: (u32, u32)) -> Option<Mask> {
+    /// Which pixels of it show them.
+    pub fn silhouette(&self, time: Duration, size: (u32, u32)) -> Option<Mask> {
         self.world.silhouette(&self.opening(time), size)
     }
 
@@ -379,6 +380,11 @@ impl VirtualCamera {
         self.camera.ground_truth(exposure, size)
     }
 
+    /// Who would be in a picture at any time, the future too, if the camera looked along `pose`.
+    pub fn ground_truth_from(&self, pose: &Pose, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.camera.world.truth(&Exposure { time, opening: *pose, closing: *pose }, size)
+    }
+
     /// Which pixels of that picture show a person; `None` in worlds that know boxes at best.
     pub fn silhouette(&self, exposure: Duration, size: (u32, u32)) -> Option<Mask> {
         self.camera.silhouette(exposure, size)
@@ -386,7 +392,7 @@ impl VirtualCamera {
 
     /// Where it looks at first, and the preset `Home`.
     pub fn home(&self) -> Pose {
-        self.camera.settings.home.unwrap_or_else(|| self.camera.world.home())
+        self.camera.settings.home_pose()
     }
 
     /// From one picture to the next.

@@ -4,27 +4,37 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Auth, FootageSettings, Kinematics, Pose, PtzApi, Settings, SpeedMap, SyntheticSettings, Video, World,
+    Auth, FootageSettings, Kinematics, Pose, PtzApi, RoomSettings, Settings, SpeedMap, SyntheticSettings,
+    Video, World,
 };
 
 /// A virtual Axis pan-tilt-zoom camera on loopback.
 ///
-/// Serves VAPIX, MJPEG, snapshots and RTSP, and a page to look at and steer by hand at /. Its picture is cut out of a
-/// recording by a camera that stood still, as a turning camera in the same place would have seen it. Prints one line
-/// "ready http=URL rtsp=URL" once it serves, and ends on SIGINT or SIGTERM.
+/// Serves VAPIX, MJPEG, snapshots and RTSP, and a page to look at and steer by hand at /. It looks around in a
+/// recording by a camera that stood still, as a turning camera in the same place would have seen it, or in a made-up
+/// room with a walking person. Prints one line "ready http=URL rtsp=URL" once it serves, and ends on SIGINT or SIGTERM.
 #[derive(Parser)]
 #[command(name = "virtual-camera", version)]
 pub struct Options {
-    /// Recording to look around in; without it the world is a small synthetic one
-    #[arg(long, value_name = "FILE")]
-    footage: Option<PathBuf>,
-    /// Which world; footage needs --footage
+    /// Which world; by default the one that other options are for, else the synthetic one
     #[arg(long, value_enum)]
     world: Option<WorldName>,
+    /// Recording to look around in
+    #[arg(long, value_name = "FILE")]
+    footage: Option<PathBuf>,
+    /// Who is where in the recording, for the live page to draw in (MOTChallenge: frame,id,left,top,width,height,...)
+    #[arg(long, value_name = "FILE", requires = "footage")]
+    ground_truth: Option<PathBuf>,
+    /// Which of the thesis' tests the room shows, again and again: light, occlusion, speed, direction and subject
+    #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=72))]
+    room_test: Option<u32>,
+    /// Another room, other clothes, another way to walk; 1 is the reference world
+    #[arg(long, value_name = "NUMBER")]
+    seed: Option<u64>,
     /// Where in the recording to begin, in seconds
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS", value_parser = not_negative)]
     start: f64,
-    /// Show the recording once and hold its last picture, instead of again and again
+    /// Show the recording once and hold its last picture, or let the person walk once, instead of again and again
     #[arg(long)]
     once: bool,
     /// Horizontal field of view of the recording, in degrees (assumed)
@@ -88,25 +98,29 @@ pub struct Options {
     #[arg(long)]
     extended_api: bool,
 
-    /// Pan at the start and of the preset Home, in degrees to the right
-    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", allow_hyphen_values = true)]
-    pan: f64,
-    /// Tilt at the start and of the preset Home, in degrees upwards
-    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", allow_hyphen_values = true)]
-    tilt: f64,
-    /// Zoom step at the start and of the preset Home, 1 to 9999
-    #[arg(long, default_value_t = 1.0, value_name = "STEP", value_parser = not_negative)]
-    zoom: f64,
+    /// Pan at the start and of the preset Home, in degrees to the right [default: 0; where the person comes in]
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    pan: Option<f64>,
+    /// Tilt at the start and of the preset Home, in degrees upwards [default: 0; in the room at the person]
+    #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
+    tilt: Option<f64>,
+    /// Zoom step at the start and of the preset Home, 1 to 9999 [default: 1]
+    #[arg(long, value_name = "STEP", value_parser = not_negative)]
+    zoom: Option<f64>,
 
     /// Write position, speeds, footage frame and commands to this CSV file, 50 lines a second
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
 }
 
-#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum WorldName {
+    /// Needs --footage
     Footage,
+    /// Small and plain
     Synthetic,
+    /// In true perspective
+    Room,
 }
 
 #[derive(Clone, Copy, ValueEnum)]
@@ -130,7 +144,10 @@ impl TryFrom<Options> for Settings {
     type Error = String;
 
     fn try_from(options: Options) -> Result<Self, String> {
+        let world = options.world()?;
         Ok(Self {
+            home: Some(options.home(&world)),
+            world,
             http_port: options.http_port,
             rtsp_port: options.rtsp_port,
             auth: match options.auth {
@@ -142,7 +159,6 @@ impl TryFrom<Options> for Settings {
             },
             ptz_api: if options.extended_api { PtzApi::Extended } else { PtzApi::Classic },
             service_time: milliseconds(options.service_time),
-            world: options.world()?,
             kinematics: options.kinematics(),
             video: Video {
                 size: options.size,
@@ -151,7 +167,6 @@ impl TryFrom<Options> for Settings {
                 delay: milliseconds(options.video_delay),
                 exposure: milliseconds(options.exposure),
             },
-            home: Some(Pose { pan_deg: options.pan, tilt_deg: options.tilt, zoom_step: options.zoom }),
             user: options.user,
             password: options.password,
             ..Self::default()
@@ -161,17 +176,49 @@ impl TryFrom<Options> for Settings {
 
 impl Options {
     fn world(&self) -> Result<World, String> {
-        match (&self.footage, self.world) {
-            (Some(_), Some(WorldName::Synthetic)) => Err("--world synthetic takes no --footage".into()),
-            (None, Some(WorldName::Footage)) => Err("--world footage needs --footage FILE".into()),
-            (None, _) => Ok(World::Synthetic(SyntheticSettings::default())),
-            (Some(file), _) => Ok(World::Footage(FootageSettings {
-                recording_fov_deg: self.recording_fov,
-                view_width: self.view_width,
-                start: Duration::from_secs_f64(self.start),
-                looped: !self.once,
-                ..FootageSettings::new(file)
-            })),
+        let for_room = self.room_test.is_some() || self.seed.is_some();
+        let name = self.world.unwrap_or(match (&self.footage, for_room) {
+            (Some(_), _) => WorldName::Footage,
+            (None, true) => WorldName::Room,
+            (None, false) => WorldName::Synthetic,
+        });
+        if self.footage.is_some() && name != WorldName::Footage {
+            return Err("--footage is for --world footage".into());
+        }
+        if for_room && name != WorldName::Room {
+            return Err("--room-test and --seed are for --world room".into());
+        }
+        Ok(match name {
+            WorldName::Footage => World::Footage(self.recording()?),
+            WorldName::Synthetic => World::Synthetic(SyntheticSettings::default()),
+            WorldName::Room => World::Room(self.room()?),
+        })
+    }
+
+    fn recording(&self) -> Result<FootageSettings, String> {
+        let file = self.footage.as_ref().ok_or("--world footage needs --footage FILE")?;
+        Ok(FootageSettings {
+            recording_fov_deg: self.recording_fov,
+            view_width: self.view_width,
+            start: Duration::from_secs_f64(self.start),
+            looped: !self.once,
+            ground_truth: self.ground_truth.clone(),
+            ..FootageSettings::new(file)
+        })
+    }
+
+    fn room(&self) -> Result<RoomSettings, String> {
+        let test = RoomSettings::test(self.room_test.unwrap_or(1), self.seed.unwrap_or(1));
+        let test = test.ok_or("--room-test is from 1 to 72")?;
+        Ok(RoomSettings { repeats: !self.once, ..test })
+    }
+
+    fn home(&self, world: &World) -> Pose {
+        let home = world.home();
+        Pose {
+            pan_deg: self.pan.unwrap_or(home.pan_deg),
+            tilt_deg: self.tilt.unwrap_or(home.tilt_deg),
+            zoom_step: self.zoom.unwrap_or(home.zoom_step),
         }
     }
 
@@ -244,7 +291,7 @@ mod tests {
 
     #[test]
     fn options_become_settings() {
-        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250";
+        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250 --ground-truth gt.txt";
         let settings = Settings::try_from(Options::parse_from(line.split(' '))).unwrap();
         assert_eq!(settings.auth, Auth::Digest { qop: false });
         assert_eq!(settings.video.size, Some((320, 240)));
@@ -252,6 +299,43 @@ mod tests {
         assert_eq!(settings.home.unwrap().pan_deg, -5.0);
         let World::Footage(footage) = settings.world else { panic!("no footage") };
         assert_eq!((footage.start, footage.looped), (Duration::from_millis(12_500), true));
+        assert_eq!(footage.ground_truth, Some("gt.txt".into()));
+    }
+
+    fn settings(line: &str) -> Result<Settings, String> {
+        let words = std::iter::once("virtual-camera").chain(line.split_whitespace());
+        Settings::try_from(Options::try_parse_from(words).map_err(|error| error.to_string())?)
+    }
+
+    #[test]
+    fn a_room_is_asked_for_by_name_test_or_seed() {
+        let room = |line| match settings(line).unwrap().world {
+            World::Room(room) => room,
+            world => panic!("{world:?}"),
+        };
+        let repeated = |test, seed| RoomSettings { repeats: true, ..RoomSettings::test(test, seed).unwrap() };
+        assert_eq!(room("--world room"), repeated(1, 1));
+        assert_eq!(room("--room-test 44"), repeated(44, 1));
+        assert_eq!(room("--seed 9 --room-test 7"), repeated(7, 9));
+        assert!(!room("--world room --once").repeats);
+        let home = settings("--world room --zoom 500").unwrap().home.unwrap();
+        assert_eq!(home, Pose { zoom_step: 500.0, ..repeated(1, 1).home() });
+        assert!(matches!(settings("").unwrap().world, World::Synthetic(_)));
+    }
+
+    #[test]
+    fn worlds_take_only_what_is_theirs() {
+        for line in [
+            "--world footage",
+            "--world synthetic --footage a.avi",
+            "--world room --footage a.avi",
+            "--world synthetic --seed 2",
+            "--footage a.avi --room-test 3",
+            "--room-test 73",
+            "--world room --ground-truth gt.txt",
+        ] {
+            assert!(settings(line).is_err(), "{line}");
+        }
     }
 
     #[test]
@@ -262,7 +346,5 @@ mod tests {
             let words = std::iter::once("virtual-camera").chain(line.split(' '));
             assert!(Options::try_parse_from(words).is_err(), "{line}");
         }
-        let options = Options::parse_from(["virtual-camera", "--world", "footage"]);
-        assert!(Settings::try_from(options).is_err());
     }
 }

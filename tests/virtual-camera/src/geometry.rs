@@ -89,11 +89,6 @@ pub fn view_to_recording(pose: &Pose, view: &Pinhole, recording: &Pinhole) -> Ma
     between((pose, view), (&Pose::default(), recording))
 }
 
-/// The other way round.
-pub fn recording_to_view(pose: &Pose, view: &Pinhole, recording: &Pinhole) -> Matrix {
-    between((&Pose::default(), recording), (pose, view))
-}
-
 /// Where a homography takes a point.
 pub fn project(homography: &Matrix, x: f64, y: f64) -> (f64, f64) {
     let [u, v, w] = homogeneous(homography, x, y);
@@ -187,7 +182,7 @@ mod tests {
     #[test]
     fn what_is_behind_a_view_is_nowhere_in_it() {
         let (view, recording) = (Pinhole::new(320, 240, 20.0), Pinhole::new(768, 576, 60.0));
-        let turned = recording_to_view(&pose(70.0, 0.0), &view, &recording);
+        let turned = between((&Pose::default(), &recording), (&pose(70.0, 0.0), &view));
         assert_eq!(project_ahead(&turned, 383.5, 287.5), Some(project(&turned, 383.5, 287.5)));
         assert_eq!(project_ahead(&turned, 0.0, 287.5), None);
     }
@@ -207,7 +202,7 @@ mod tests {
         fn there_and_back_again(pan in -20.0f64..20.0, tilt in -10.0f64..10.0, x in 0.0f64..639.0, y in 0.0f64..479.0) {
             let (view, recording) = (Pinhole::new(640, 480, 25.0), Pinhole::new(768, 576, 60.0));
             let there = view_to_recording(&pose(pan, tilt), &view, &recording);
-            let back = recording_to_view(&pose(pan, tilt), &view, &recording);
+            let back = between((&Pose::default(), &recording), (&pose(pan, tilt), &view));
             let (u, v) = project(&there, x, y);
             let (x2, y2) = project(&back, u, v);
             prop_assert!((x - x2).abs() < 1e-6 && (y - y2).abs() < 1e-6);

@@ -1,7 +1,8 @@
 //! A virtual Axis pan-tilt-zoom camera on loopback: VAPIX over HTTP, MJPEG, RTSP, kinematics and a live page.
 //!
-//! Its world is a wide still recording; the picture is what a turning pinhole camera would see in it. What is known of
-//! the AXIS Q6034-E is its default, what is not known or differs between cameras is a setting.
+//! Its world is a wide still recording or a made-up room; the picture is what a turning pinhole camera would see in it,
+//! and who is in it and where is known. What is known of the AXIS Q6034-E is its default, what is not known or differs
+//! between cameras is a setting. Its time is everybody's, or goes on step by step as its owner says.
 //!
 //! ```no_run
 //! use std::time::Duration;
@@ -43,7 +44,8 @@ pub use settings::{Auth, Clock, FootageSettings, PtzApi, Settings, Video, World}
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Mask};
 pub use world::{
-    Change, FootageError, Lighting, MotError, Occlusion, RoomSettings, Subject, SyntheticSettings, Waypoint,
+    Change, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings, Subject,
+    SyntheticSettings, Waypoint, read_mot,
 };
 
 /// Why a camera does not start.

@@ -54,6 +54,16 @@ pub enum World {
     Room(RoomSettings),
 }
 
+impl World {
+    /// Where a camera looks at first unless told otherwise.
+    pub fn home(&self) -> Pose {
+        match self {
+            Self::Footage(_) | Self::Synthetic(_) => Pose::default(),
+            Self::Room(room) => room.home(),
+        }
+    }
+}
+
 /// A recording to look around in.
 #[derive(Debug, Clone)]
 pub struct FootageSettings {
@@ -164,6 +174,13 @@ impl Default for Settings {
             home: None,
             clock: Clock::Real,
         }
+    }
+}
+
+impl Settings {
+    /// Where the camera looks at first, chosen or the world's own.
+    pub(crate) fn home_pose(&self) -> Pose {
+        self.home.unwrap_or_else(|| self.world.home())
     }
 }
 

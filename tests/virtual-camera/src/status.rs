@@ -66,6 +66,10 @@ pub enum Fault {
     Delay(Duration),
     /// Nobody listens on the HTTP port; requests on open connections are reset.
     Refuse,
+    /// As [`Fault::Refuse`]; and afterwards the camera has another realm and does not know its old nonces.
+    Reboot,
+    /// Nothing comes back: new connections are not answered, requests on open ones neither.
+    BlackHole,
     /// The connection is reset instead of an answer.
     Reset,
     /// These bytes come instead of an answer, then the connection closes.
@@ -74,12 +78,36 @@ pub enum Fault {
     Hang,
     /// This HTTP status with an empty body; nothing is done.
     Status(u16),
+    /// This HTTP status leads to this address; nothing is done.
+    Redirect {
+        /// 301, 302, 307 or 308.
+        status: u16,
+        /// An address.
+        location: String,
+    },
+    /// 403 for everybody once there were this many wrong logins since the camera's start.
+    LockOut(u64),
+    /// 200 with a text that never ends; nothing is done.
+    EndlessBody,
+    /// 200 with a text of one byte in this time, without end; nothing is done.
+    Drip(Duration),
     /// 200 with this text, `Error:...` for instance; nothing is done.
     ErrorBody(String),
     /// 200 with an empty body; nothing is done.
     EmptyOk,
     /// A right answer, then the connection closes without having said so.
     CloseAfterResponse,
+    /// Right answers, in lines that end in LF instead of CRLF.
+    LineFeeds,
+    /// Right answers of a camera whose clock is ahead by this: nonces from before are stale.
+    ClockAhead(Duration),
+}
+
+impl Fault {
+    /// Whether no connection comes about.
+    pub(crate) fn shuts(&self) -> bool {
+        matches!(self, Self::Refuse | Self::Reboot | Self::BlackHole)
+    }
 }
 
 fn seconds<S: Serializer>(time: &Duration, serializer: S) -> Result<S::Ok, S::Error> {

@@ -32,9 +32,9 @@ impl Bounds {
         (self.left + self.width / 2.0, self.top + self.height / 2.0)
     }
 
-    /// Square pixels.
-    pub fn area(&self) -> f64 {
-        self.width * self.height
+    /// Whether a place lies in it, its edges included.
+    pub fn contains(&self, (x, y): (f64, f64)) -> bool {
+        (self.left..=self.left + self.width).contains(&x) && (self.top..=self.top + self.height).contains(&y)
     }
 
     /// What part of it, 0 to 1, is inside a picture of that size.
@@ -87,7 +87,10 @@ mod tests {
     fn boxes_know_their_middle_and_how_much_of_them_is_inside() {
         let bounds = Bounds::around([(-10.0, 5.0), (30.0, 25.0), (0.0, 20.0)]).unwrap();
         assert_eq!(bounds, Bounds { left: -10.0, top: 5.0, width: 40.0, height: 20.0 });
-        assert_eq!((bounds.centre(), bounds.area()), ((10.0, 15.0), 800.0));
+        assert_eq!(bounds.centre(), (10.0, 15.0));
+        assert!(
+            bounds.contains((30.0, 5.0)) && !bounds.contains((30.1, 5.0)) && !bounds.contains((0.0, 4.9))
+        );
         assert_eq!(bounds.part_inside((100, 100)), 0.75);
         assert_eq!(bounds.part_inside((100, 15)), 0.375);
         assert_eq!(bounds.part_inside((20, 4)), 0.0);

@@ -147,3 +147,58 @@ fn video_goes_on_whatever_happens() {
         }
     }
 }
+
+/// The answer to a stop, with its first body bytes.
+fn answer_and_body(camera: &VirtualCamera, bytes: usize) -> String {
+    let mut stream = connect(camera);
+    let mut answer = ask(&mut stream).unwrap();
+    let mut body = vec![0; bytes];
+    stream.read_exact(&mut body).unwrap();
+    answer.extend(body);
+    String::from_utf8(answer).unwrap()
+}
+
+#[test]
+fn a_black_hole_lets_no_connection_come_about() {
+    let camera = VirtualCamera::start(settings()).unwrap();
+    let mut kept = connect(&camera);
+    assert!(ask(&mut kept).unwrap().starts_with(b"HTTP/1.1 204 "));
+    camera.set_fault(Fault::BlackHole);
+    let deadline = Instant::now() + PATIENCE;
+    loop {
+        let attempt = TcpStream::connect_timeout(&camera.http_address(), Duration::from_millis(100));
+        match attempt.map_err(|error| error.kind()) {
+            Err(ErrorKind::TimedOut) => break,
+            _ => assert!(Instant::now() < deadline, "it still answers"),
+        }
+    }
+    kept.set_read_timeout(Some(Duration::from_millis(100))).unwrap();
+    let error = ask(&mut kept).unwrap_err();
+    assert!(matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::TimedOut), "{error}");
+    camera.set_fault(Fault::None);
+    let mut stream = loop {
+        match TcpStream::connect(camera.http_address()) {
+            Ok(stream) => break stream,
+            Err(_) => assert!(Instant::now() < deadline, "it never listens again"),
+        }
+    };
+    assert!(ask(&mut stream).unwrap().starts_with(b"HTTP/1.1 204 "));
+}
+
+#[test]
+fn a_redirect_names_its_goal() {
+    let location = "https://elsewhere.example/".to_owned();
+    let camera = camera_with(Fault::Redirect { status: 307, location });
+    let answer = String::from_utf8(ask(&mut connect(&camera)).unwrap()).unwrap();
+    assert!(answer.starts_with("HTTP/1.1 307 "), "{answer}");
+    assert!(answer.contains("location: https://elsewhere.example/\r\n"), "{answer}");
+}
+
+#[test]
+fn endless_answers_go_on() {
+    for fault in [Fault::EndlessBody, Fault::Drip(Duration::from_millis(1))] {
+        let bytes = if fault == Fault::EndlessBody { 1_000_000 } else { 10 };
+        let answer = answer_and_body(&camera_with(fault), bytes);
+        assert!(answer.starts_with("HTTP/1.1 200 ") && answer.len() > bytes, "{}", answer.len());
+    }
+}

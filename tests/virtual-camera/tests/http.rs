@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use common::{PATIENCE, client, get, settings};
 use digest_auth::{AuthContext, WwwAuthenticateHeader};
-use virtual_camera::{Auth, Kinematics, Settings, VirtualCamera};
+use virtual_camera::{Auth, Clock, Kinematics, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
 #[tokio::test]
 async fn a_continuous_move_runs_until_it_is_stopped() {
@@ -63,6 +63,28 @@ async fn forms_and_queries_do_the_same() {
         .unwrap();
     assert_eq!(posted.status(), 204);
     assert!(camera.wait_for(PATIENCE, |status| status.pan_deg == 3.0 && status.tilt_deg == -2.0));
+}
+
+#[tokio::test]
+async fn the_truth_about_a_picture_comes_as_json() {
+    let here = Waypoint { time: Duration::ZERO, pan_deg: 3.0, tilt_deg: 0.0 };
+    let world = SyntheticSettings { path: vec![here], stays: true, ..SyntheticSettings::default() };
+    let settings = Settings { world: World::Synthetic(world), clock: Clock::Stepped, ..settings() };
+    let camera = VirtualCamera::start(settings).unwrap();
+    camera.advance_to(Duration::from_millis(500));
+    let client = client();
+    let picture = client.get(format!("{}/api/picture.jpg", camera.url())).send().await.unwrap();
+    assert_eq!(picture.headers()["x-exposure"], "0.4");
+    let (status, json) = get(&client, &camera, "/api/truth?at=0.4&resolution=320x240").await;
+    let truth: serde_json::Value = serde_json::from_str(&json).unwrap();
+    let known = camera.ground_truth(Duration::from_millis(400), (320, 240));
+    assert_eq!(known.len(), 1);
+    assert_eq!((status, &truth["size"]), (200, &serde_json::json!([320, 240])));
+    assert!(json.contains(&serde_json::to_string(&known).unwrap()), "{json}");
+    assert_eq!(truth["silhouette"], serde_json::json!([]));
+    for nonsense in ["at=-1", "at=nan", "at=soon"] {
+        assert_eq!(get(&client, &camera, &format!("/api/truth?{nonsense}")).await.0, 400, "{nonsense}");
+    }
 }
 
 #[tokio::test]

@@ -7,11 +7,12 @@ use std::{
     io::{BufRead, BufReader, Write},
     path::{Path, PathBuf},
     process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    time::Duration,
 };
 
 use common::{PATIENCE, settings};
 use serde_json::{Value, json};
-use virtual_camera::{Settings, VirtualCamera};
+use virtual_camera::{Clock, RoomSettings, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
 /// A browser that is spoken to through pipes (Chrome DevTools Protocol, messages end in a zero byte).
 struct Browser {
@@ -24,13 +25,14 @@ struct Browser {
 }
 
 impl Browser {
-    /// `None`, and a line that says so, where there is no Chromium.
-    fn start() -> Option<Self> {
+    /// With a profile of its own. `None`, and a line that says so, where there is no Chromium.
+    fn start(profile: &str) -> Option<Self> {
         if Command::new("chromium").arg("--version").output().is_err() {
             eprintln!("SKIPPED: chromium is not installed (`make test` installs it)");
             return None;
         }
-        let profile = Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("chromium-{}", std::process::id()));
+        let profile =
+            Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("{profile}-{}", std::process::id()));
         // The browser reads commands from descriptor 3 and answers on 4.
         let mut child = Command::new("sh")
             .args(["-c", r#"exec chromium "$@" 3<&0 4>&1 </dev/null >/dev/null 2>&1"#, "chromium"])
@@ -122,13 +124,28 @@ impl Drop for Browser {
     }
 }
 
+const TRUTH_DRAWN: &str = "$('truth').getContext('2d') \
+     .getImageData(0, 0, $('truth').width, $('truth').height).data.some(value => value > 200)";
+
+fn save(shot: &Value, name: &str) {
+    let png = glib::base64_decode(shot["data"].as_str().unwrap());
+    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join(name), png).unwrap();
+}
+
+/// Before somebody who stands a little to the right.
+fn with_a_person() -> Settings {
+    let here = Waypoint { time: Duration::ZERO, pan_deg: 6.0, tilt_deg: -2.0 };
+    let world = SyntheticSettings { size: (512, 384), path: vec![here], stays: true, ..Default::default() };
+    Settings { world: World::Synthetic(world), ..settings() }
+}
+
 #[test]
 fn the_page_shows_the_camera_and_steers_it() {
-    let Some(mut browser) = Browser::start() else {
+    let Some(mut browser) = Browser::start("chromium-steering") else {
         return;
     };
     let auth = virtual_camera::Auth::Digest { qop: true };
-    let camera = VirtualCamera::start(Settings { auth, ..settings() }).unwrap();
+    let camera = VirtualCamera::start(Settings { auth, ..with_a_person() }).unwrap();
     browser.open(&camera.url());
 
     // It shows the picture, the overview with the view drawn in, and the numbers, and asks for no password.
@@ -140,6 +157,15 @@ fn the_page_shows_the_camera_and_steers_it() {
          .data.some(value => value > 200)",
     );
     assert_eq!(browser.value("$('commands').children.length"), json!(0));
+
+    // The truth is drawn in where it is asked for.
+    assert_eq!(browser.value(TRUTH_DRAWN), json!(false));
+    browser.click("show-truth");
+    browser.wait_for(TRUTH_DRAWN);
+    let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
+    save(&shot, "live-page-truth.png");
+    browser.click("show-truth");
+    browser.wait_for(&format!("!({TRUTH_DRAWN})"));
 
     // A button held moves the camera, released it stops.
     browser.mouse("mousePressed", "right");
@@ -157,8 +183,7 @@ fn the_page_shows_the_camera_and_steers_it() {
     browser.mouse("mouseReleased", "zoom-in");
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
     let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
-    let png = glib::base64_decode(shot["data"].as_str().unwrap());
-    std::fs::write(Path::new(env!("CARGO_TARGET_TMPDIR")).join("live-page.png"), png).unwrap();
+    save(&shot, "live-page.png");
     browser.click("home");
     assert!(camera.wait_for(PATIENCE, |status| status.pan_deg == 0.0 && status.zoom_step == 1.0));
     browser.wait_for("$('pan').textContent == '0.00°' && $('zoom').textContent.startsWith('1 (')");
@@ -168,4 +193,22 @@ fn the_page_shows_the_camera_and_steers_it() {
     assert!(camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s < -1.0));
     browser.call("Page.navigate", json!({"url": "about:blank"}));
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
+
+#[test]
+fn the_room_is_shown_with_the_truth_if_the_address_asks_for_it() {
+    let Some(mut browser) = Browser::start("chromium-room") else {
+        return;
+    };
+    let world = World::Room(RoomSettings::test(7, 1).unwrap());
+    let settings = Settings { world, clock: Clock::Stepped, ..Settings::default() };
+    let camera = VirtualCamera::start(settings).unwrap();
+    // Somebody is in the middle of the room and, as nobody steps on, stays there.
+    camera.advance_to(Duration::from_secs(6));
+    browser.open(&format!("{}/?truth=1", camera.url()));
+    browser.wait_for("typeof $ == 'function' && $('overview').naturalWidth == 1280");
+    browser.wait_for(TRUTH_DRAWN);
+    browser.wait_for("$('picture').naturalWidth == 640 && $('fov').textContent == '55.00° wide'");
+    let shot = browser.call("Page.captureScreenshot", json!({"format": "png"}));
+    save(&shot, "live-page-room.png");
 }

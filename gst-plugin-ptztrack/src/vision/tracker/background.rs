@@ -3,7 +3,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::corners::{self, Search};
-use super::ego_motion::EgoMotion;
+use super::ego_motion::{self, EgoMotion};
 use super::flow::Flow;
 use super::geometry::{Frame, around, grown};
 use super::patch::{Cut, Patch};
@@ -74,8 +74,21 @@ impl Background {
         corners::find(patch, &Search { contour: &[], taken: &[], count: POINTS, distance })
     }
 
+    /// How the picture moved since the last frame, in which it moved like `last`; `None` where that cannot be
+    /// seen.
+    pub fn motion(&mut self, luma: &Luma, last: EgoMotion) -> opencv::Result<Option<EgoMotion>> {
+        // The camera goes on as it did, or it has stopped; a blank background says nothing at all.
+        for expected in [last, EgoMotion::default()] {
+            let motion = ego_motion::estimate(&self.follow(luma, expected)?);
+            if motion.is_some() {
+                return Ok(motion);
+            }
+        }
+        Ok(None)
+    }
+
     /// The points that are found again in the new frame, `(from, to)`, expected to move like `expected`.
-    pub fn follow(&mut self, luma: &Luma, expected: EgoMotion) -> opencv::Result<Vec<(Point2f, Point2f)>> {
+    fn follow(&mut self, luma: &Luma, expected: EgoMotion) -> opencv::Result<Vec<(Point2f, Point2f)>> {
         let mut pairs = Vec::new();
         self.newest.clear();
         for (previous, points) in &self.windows {
@@ -94,7 +107,6 @@ impl Background {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ego_motion::estimate;
     use super::super::geometry::length;
     use super::super::synthetic::Scene;
     use super::*;
@@ -110,9 +122,8 @@ mod tests {
             let (before, after) = (scene.background((0.0, 0.0)), scene.background((dx, dy)));
             let mut background = Background::default();
             background.remember(&before.luma(), NOBODY).expect("remember");
-            let still = EgoMotion::translation(Point2f::default());
-            let pairs = background.follow(&after.luma(), still).expect("follow");
-            let motion = estimate(&pairs).expect("textured everywhere");
+            let motion = background.motion(&after.luma(), EgoMotion::default()).expect("follow");
+            let motion = motion.expect("textured everywhere");
             let error = length(motion.at(Point2f::new(320.0, 240.0)) - Point2f::new(dx, dy));
             prop_assert!(error < 0.4, "{error} pixels off");
         }
@@ -123,7 +134,6 @@ mod tests {
         let wall = Scene::new(640, 480).flat(120);
         let mut background = Background::default();
         background.remember(&wall.luma(), NOBODY).expect("remember");
-        let still = EgoMotion::translation(Point2f::default());
-        assert!(background.follow(&wall.luma(), still).expect("follow").is_empty());
+        assert_eq!(background.motion(&wall.luma(), EgoMotion::default()).expect("follow"), None);
     }
 }

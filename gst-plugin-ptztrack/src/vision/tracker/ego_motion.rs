@@ -22,6 +22,13 @@ pub(super) struct EgoMotion {
     shift: Point2f,
 }
 
+impl Default for EgoMotion {
+    /// The picture rests.
+    fn default() -> Self {
+        Self::translation(Point2f::default())
+    }
+}
+
 impl EgoMotion {
     /// The picture moves as a whole.
     pub fn translation(shift: Point2f) -> Self {

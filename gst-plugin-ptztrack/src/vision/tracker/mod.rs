@@ -10,6 +10,8 @@
 //! | points that leave and join | beyond | `points` |
 //! | what it looks like | beyond | `appearance` |
 //! | whether it moves at all | beyond | `proof` |
+//! | how long it is followed | beyond | `patience` |
+//! | who is not taken again | beyond | `given_up` |
 //!
 //! [`Tracker`] is the state machine around one `target`; `steps` says what each profile does.
 
@@ -19,8 +21,10 @@ mod corners;
 mod ego_motion;
 mod flow;
 mod geometry;
+mod given_up;
 mod mean_shift;
 mod patch;
+mod patience;
 mod points;
 mod proof;
 mod selection;
@@ -30,6 +34,7 @@ mod steps;
 mod synthetic;
 mod target;
 
+pub use patience::Limits;
 pub use selection::Choice;
 pub use state::{Config, Detection, Report, Tracker};
 pub use steps::Profile;

@@ -3,6 +3,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::geometry::{Frame, centre, grown, length, overlap, share_inside};
+use super::given_up::GivenUp;
 
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are no target.
 const MIN_SIDE: f32 = 6.0;
@@ -65,6 +66,8 @@ impl Candidate {
 /// Follows detections until one is sure enough to become the target.
 #[derive(Default)]
 pub(super) struct Selection {
+    /// Who is not chosen until they move.
+    pub given_up: GivenUp,
     candidates: Vec<Candidate>,
     released: Option<(Rect2f, f64)>,
 }
@@ -73,6 +76,13 @@ impl Selection {
     /// Forgets all detections.
     pub fn clear(&mut self) {
         self.candidates.clear();
+    }
+
+    /// The detection at `bounds` was taken: the others are forgotten.
+    pub fn take(&mut self, bounds: Rect2f) {
+        let seen = self.candidates.iter().filter(|candidate| candidate.missed == 0);
+        self.given_up.free(bounds, seen.map(|candidate| candidate.sighting.bounds));
+        self.clear();
     }
 
     /// What is at `bounds` was let go on purpose: it is not chosen again for a while.
@@ -123,6 +133,7 @@ impl Selection {
                 && candidate.frames >= confirm_frames
                 && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
                 && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
+                && !self.given_up.holds(bounds)
         });
         let by = |value: fn(&Candidate, Frame) -> f64| {
             let best = move |candidate: &&Candidate| value(candidate, frame);

@@ -1,7 +1,9 @@
 use opencv::core::{Point2f, Rect2f};
-use ptztrack_contract::{Feature, Point, Rect, TargetChange, TargetState, Vector};
+use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, Vector};
 
+use super::ego_motion::EgoMotion;
 use super::geometry::{Frame, around};
+use super::patience::Limits;
 use super::proof::MotionProof;
 use super::selection::{Choice, Selection, Sighting};
 use super::steps::Profile;
@@ -31,6 +33,8 @@ pub struct Config {
     /// Whether a detection that was chosen must soon be seen to move against the background, or is lost: right for
     /// a motion detector, wrong for one that finds people who stand.
     pub must_move: bool,
+    /// How long a target is followed at most.
+    pub limits: Limits,
 }
 
 /// Something that a detector saw, in frame sizes.
@@ -49,6 +53,8 @@ pub struct Report {
     pub state: TargetState,
     /// What happened in this frame, in order.
     pub changes: Vec<TargetChange>,
+    /// Why the target was released, where it was.
+    pub released: Option<ReleaseReason>,
     /// Number of the target, from 1; 0 where there is none.
     pub id: u64,
     /// Box of the target; predicted while it is hidden.
@@ -82,6 +88,7 @@ pub struct Tracker {
     phase: Phase,
     selection: Selection,
     command: Option<Command>,
+    camera_rests: bool,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
     last_id: u64,
@@ -95,6 +102,7 @@ impl Tracker {
             phase: Phase::Searching,
             selection: Selection::default(),
             command: None,
+            camera_rests: true,
             size: None,
             last_id: 0,
         }
@@ -103,6 +111,11 @@ impl Tracker {
     /// Changes how it works from the next frame on.
     pub fn configure(&mut self, config: Config) {
         self.config = config;
+    }
+
+    /// What is known of the camera where the background cannot be seen; without any news it rests.
+    pub fn set_camera_rests(&mut self, rests: bool) {
+        self.camera_rests = rests;
     }
 
     /// With the next frame, follows what is at `place`: the detection there, or else a box of
@@ -134,7 +147,9 @@ impl Tracker {
         if !same_stream {
             // Another picture, or one from another time: nothing that was remembered holds.
             self.selection.clear();
+            self.selection.given_up.clear();
         }
+        self.selection.given_up.watch(luma, self.camera_rests)?;
         self.watch(detections, frame, dt_s);
         let command = self.command.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
@@ -152,7 +167,9 @@ impl Tracker {
             Some(Command::Select(place)) => {
                 self.take_over(phase, luma, place, frame, &mut report, &mut changes)?
             }
-            Some(Command::Release) => self.let_go(phase, frame, &mut report, &mut changes),
+            Some(Command::Release) => {
+                self.let_go(phase, ReleaseReason::Request, frame, &mut report, &mut changes)
+            }
             None => phase,
         };
         if matches!(phase, Phase::Searching) && changes.is_empty() {
@@ -186,6 +203,7 @@ impl Tracker {
             Phase::Tracking(target) => (target, None),
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
+        let before = target.bounds;
         let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
         let sight = match hidden_s {
             None => target.follow(luma, dt_s as f32)?,
@@ -209,8 +227,26 @@ impl Tracker {
         if let (TargetState::Occluded, Some(hidden_s)) = (state, hidden_s) {
             target.confidence *= (1.0 - dt_s / (coast_s - hidden_s + 2.0 * dt_s)).max(0.0) as f32;
         }
+        target.patience.pass(dt_s);
+        if let (Sight::Seen, Some(ego)) = (sight, self.ego(&target)) {
+            target.patience.watch(before, target.bounds, ego, dt_s);
+        }
+        let exhausted = target.patience.exhausted(self.config.limits);
         *report = self.report(state, Some(&target), frame);
-        Ok(phase_of(target, hidden_s.unwrap_or(0.0)))
+        let bounds = target.bounds;
+        let phase = phase_of(target, hidden_s.unwrap_or(0.0));
+        match exhausted {
+            Some(reason) if state != TargetState::Lost => {
+                self.selection.given_up.add(luma, bounds)?;
+                Ok(self.let_go(phase, reason, frame, report, changes))
+            }
+            _ => Ok(phase),
+        }
+    }
+
+    /// How the background moved, as seen or, where it cannot be, as the camera says.
+    fn ego(&self, target: &Target) -> Option<EgoMotion> {
+        target.ego().or(self.camera_rests.then(EgoMotion::default))
     }
 
     /// Looks for a hidden target where it should be and where a detector saw something.
@@ -242,7 +278,7 @@ impl Tracker {
             .at(pixels)
             .cloned()
             .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), ..Sighting::default() });
-        let old = self.let_go(old, frame, report, changes);
+        let old = self.let_go(old, ReleaseReason::Request, frame, report, changes);
         match Target::acquire(luma, &sighting, self.config.profile.steps())? {
             Some(target) => Ok(self.begin(target, frame, report, changes)),
             None => Ok(old),
@@ -257,14 +293,19 @@ impl Tracker {
     fn let_go(
         &mut self,
         phase: Phase,
+        reason: ReleaseReason,
         frame: Frame,
         report: &mut Report,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
         if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
-            self.selection.release(target.bounds);
+            if reason != ReleaseReason::Stationary {
+                // It may move, and would be taken again at once.
+                self.selection.release(target.bounds);
+            }
             *report = self.report(TargetState::Searching, Some(&target), frame);
             report.features.clear();
+            report.released = Some(reason);
             changes.push(TargetChange::Released);
         }
         Phase::Searching
@@ -296,7 +337,7 @@ impl Tracker {
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
         self.last_id += 1;
-        self.selection.clear();
+        self.selection.take(target.bounds);
         changes.push(TargetChange::Acquired);
         *report = self.report(TargetState::Tracking, Some(&target), frame);
         Phase::Tracking(Box::new(target))
@@ -311,6 +352,7 @@ impl Tracker {
         Report {
             state,
             changes: Vec::new(),
+            released: None,
             id: self.last_id,
             bounds: frame.rect(target.bounds),
             centroid: frame.point(target.centroid),
@@ -328,6 +370,7 @@ impl Default for Report {
         Self {
             state: TargetState::Searching,
             changes: Vec::new(),
+            released: None,
             id: 0,
             bounds: Rect::default(),
             centroid: Point::default(),
@@ -356,6 +399,7 @@ mod tests {
             coast_s: 1.5,
             manual_size: 0.3,
             must_move: false,
+            limits: Limits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
         }
     }
 

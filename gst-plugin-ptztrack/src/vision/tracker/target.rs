@@ -5,11 +5,12 @@ use opencv::core::{Point2f, Rect2f};
 use super::appearance::Appearance;
 use super::background::Background;
 use super::corners::{self, Search};
-use super::ego_motion::{self, EgoMotion};
+use super::ego_motion::EgoMotion;
 use super::flow::Flow;
 use super::geometry::{Frame, around, centre, grown, in_ellipse, length, mean, scaled, share_inside};
 use super::mean_shift::{GreyModel, near_the_middle};
 use super::patch::{Cut, Patch};
+use super::patience::Patience;
 use super::points::{Consensus, Points};
 use super::proof::MotionProof;
 use super::selection::Sighting;
@@ -84,6 +85,7 @@ pub(super) struct Target {
     /// Motion of the background at the target, pixels per second; `None` where it could not be seen.
     pub ego_velocity: Option<Point2f>,
     pub proof: MotionProof,
+    pub patience: Patience,
     steps: Steps,
     first_size: (f32, f32),
     patch: Patch,
@@ -127,11 +129,12 @@ impl Target {
             own_velocity: sighting.velocity,
             ego_velocity: None,
             proof: MotionProof::new(false),
+            patience: Patience::default(),
             steps,
             first_size: (bounds.width, bounds.height),
             patch,
             background,
-            ego: EgoMotion::translation(Point2f::default()),
+            ego: EgoMotion::default(),
             greys,
             appearance: Appearance::new(luma, bounds)?,
             usual_peak: 0.6,
@@ -183,6 +186,11 @@ impl Target {
         Ok(if self.is_gone(luma) { Sight::Gone } else { sight })
     }
 
+    /// How the background moved into this frame; `None` where it could not be seen.
+    pub fn ego(&self) -> Option<EgoMotion> {
+        self.ego_velocity.map(|_| self.ego)
+    }
+
     /// Whether a detection may be this target, hidden until now, and takes it up if so.
     pub fn recognise(&mut self, luma: &Luma, sighting: &Sighting) -> opencv::Result<bool> {
         let place = around(centre(sighting.bounds), self.bounds.width, self.bounds.height);
@@ -204,18 +212,12 @@ impl Target {
     fn watch_background(&mut self, luma: &Luma, dt_s: f32) -> opencv::Result<()> {
         self.ego_velocity = None;
         if !self.steps.ego_motion {
-            self.ego = EgoMotion::translation(Point2f::default());
+            self.ego = EgoMotion::default();
             return Ok(());
         }
-        // The camera goes on as it did, or it has stopped; a blank background says nothing at all.
-        let still = EgoMotion::translation(Point2f::default());
-        for expected in [self.ego, still] {
-            let pairs = self.background.follow(luma, expected)?;
-            if let Some(ego) = ego_motion::estimate(&pairs) {
-                self.ego = ego;
-                self.ego_velocity = Some(ego.at(centre(self.bounds)) / dt_s);
-                break;
-            }
+        if let Some(ego) = self.background.motion(luma, self.ego)? {
+            self.ego = ego;
+            self.ego_velocity = Some(ego.at(centre(self.bounds)) / dt_s);
         }
         Ok(())
     }

@@ -1,1 +1,164 @@
-//! What runs are written down as.
+//! What runs are written down as: CSV for machines, Markdown and one page for people, plots and pictures.
+//!
+//! | file | what is in it |
+//! |---|---|
+//! | `results.csv` | one line a run |
+//! | `conditions.csv` | means a tracker and condition, the thesis' beside them |
+//! | `frames/…/….csv` | one line a picture of a run |
+//! | `summary.md` | trackers × figures, trackers × conditions |
+//! | `tests.md` | every test of every tracker beside the thesis' figures |
+//! | `plots/….png` | d_gc and d_gp over time; figures against delay |
+//! | `index.html` | all of it in one file |
+//!
+//! The same runs give the same bytes, in whichever order they come.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+};
+
+use judged::{Judged, Section};
+use plot::Plot;
+use table::Table;
+
+use crate::record::{Run, TestId};
+
+mod column;
+mod csv;
+mod definitions;
+mod judged;
+mod page;
+mod plot;
+mod strip;
+mod table;
+mod tables;
+mod thesis;
+
+#[cfg(test)]
+pub(crate) mod made_up;
+#[cfg(test)]
+mod tests;
+
+/// The tests of the thesis' figures 5.10 to 5.13, and the first with a full occlusion.
+const SHOWN: [TestId; 5] = [TestId(1), TestId(7), TestId(13), TestId(19), TestId(37)];
+
+/// What there is to say when all is written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Report {
+    /// Tables for a terminal, which are Markdown too.
+    pub summary: String,
+    /// What could not be done, and what to do about it.
+    pub notes: Vec<String>,
+}
+
+/// Why nothing was written.
+#[derive(Debug, thiserror::Error)]
+#[error("cannot write {}: {source}; is there room, and may you write there?", path.display())]
+pub struct ReportError {
+    path: PathBuf,
+    source: io::Error,
+}
+
+/// Writes everything about `runs` into the folder `out`, which is made where it is missing.
+///
+/// # Errors
+/// Where a file cannot be written. A missing gnuplot is no error but a note.
+pub fn write(runs: &[Run], out: &Path) -> Result<Report, ReportError> {
+    let judged = Judged::all(runs);
+    let content = Content::of(&judged);
+    save(&out.join("results.csv"), &csv::results(&judged))?;
+    save(&out.join("conditions.csv"), &csv::by_condition(&content.sections))?;
+    for one in &judged {
+        let file = format!("frames/{}/{}.csv", one.setup.folder(), one.file());
+        save(&out.join(file), &csv::frames(&one.run.frames))?;
+    }
+    let plots = out.join("plots");
+    fs::create_dir_all(&plots).map_err(|source| ReportError { path: plots.clone(), source })?;
+    let mut notes: Vec<_> = content.failures().map(|(what, why)| format!("{what} failed: {why}")).collect();
+    notes.extend(content.draw(&plots));
+    let summary = content.summary();
+    save(&out.join("summary.md"), &summary)?;
+    save(&out.join("tests.md"), &content.test_by_test())?;
+    save(&out.join("index.html"), &page::html(&content, &plots))?;
+    Ok(Report { summary, notes })
+}
+
+fn save(path: &Path, text: &str) -> Result<(), ReportError> {
+    let folder = path.parent().unwrap_or(Path::new("."));
+    fs::create_dir_all(folder)
+        .and_then(|()| fs::write(path, text))
+        .map_err(|source| ReportError { path: path.into(), source })
+}
+
+/// What tables, plots and page are made from.
+struct Content<'a> {
+    /// Comparable runs.
+    sections: Vec<Section<'a>>,
+    /// Runs that differ in delay, in order of delay.
+    sweep: Vec<Section<'a>>,
+}
+
+impl<'a> Content<'a> {
+    fn of(judged: &'a [Judged<'a>]) -> Self {
+        let (sweep, sections) = Section::all(judged).into_iter().partition(|section| section.setup.sweep);
+        Self { sections, sweep }
+    }
+
+    /// What is looked at closely: the thesis' figures, or else the first there is.
+    fn shown(&self, section: &Section<'a>) -> Vec<&'a str> {
+        let titles = section.titles();
+        let chosen = titles.iter().filter(|(test, _)| test.is_none_or(|test| SHOWN.contains(&test)));
+        let chosen: Vec<_> = chosen.map(|(_, title)| *title).collect();
+        if chosen.is_empty() { titles.first().map(|(_, title)| *title).into_iter().collect() } else { chosen }
+    }
+
+    fn plots_against_delay(&self) -> Vec<Plot> {
+        let plots = plot::AGAINST_DELAY.iter().map(|column| Plot::against_delay(&self.sweep, column));
+        plots.filter(|_| !self.sweep.is_empty()).collect()
+    }
+
+    fn tables_against_delay(&self) -> Vec<Table> {
+        let tables = plot::AGAINST_DELAY.iter().map(|column| tables::against_delay(&self.sweep, column));
+        tables.filter(|_| !self.sweep.is_empty()).collect()
+    }
+
+    /// Draws all plots; says what went wrong, once.
+    fn draw(&self, folder: &Path) -> Option<String> {
+        let over_time = self.sections.iter().flat_map(|section| {
+            self.shown(section).into_iter().map(|title| Plot::over_time(section, title)).collect::<Vec<_>>()
+        });
+        let plots = over_time.chain(self.plots_against_delay());
+        let failed: Vec<_> = plots.filter_map(|plot| plot.draw(folder).err()).collect();
+        failed.first().map(|error| format!("no plots: {error}; install gnuplot (Debian: gnuplot-nox)"))
+    }
+
+    fn failures(&self) -> impl Iterator<Item = (String, &'a str)> {
+        self.sections.iter().chain(&self.sweep).flat_map(|section| section.runs).filter_map(|one| {
+            Some((format!("{}, {}", one.run.title, one.run.tracker), one.run.error.as_deref()?))
+        })
+    }
+
+    fn summary(&self) -> String {
+        let of_section = |section: &Section| {
+            let figures = [column::DP, column::TF, column::MEAN_DGC];
+            let tests = std::iter::once(tables::overview(section))
+                .chain(figures.iter().map(|column| tables::by_condition(section, column)))
+                .filter(|_| !section.printed().is_empty());
+            let recordings = Some(tables::recordings(section)).filter(|table| !table.rows.is_empty());
+            tests.chain(recordings).collect::<Vec<_>>()
+        };
+        let tables = self.sections.iter().flat_map(of_section).chain(self.tables_against_delay());
+        joined(tables)
+    }
+
+    fn test_by_test(&self) -> String {
+        let tables = self.sections.iter().flat_map(|section| {
+            section.trackers().map(|tracker| tables::per_test(section, tracker)).collect::<Vec<_>>()
+        });
+        joined(tables.filter(|table| !table.rows.is_empty()))
+    }
+}
+
+fn joined(tables: impl Iterator<Item = Table>) -> String {
+    tables.map(|table| table.markdown()).collect::<Vec<_>>().join("\n")
+}

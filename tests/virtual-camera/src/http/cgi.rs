@@ -1,16 +1,19 @@
 //! `ptz.cgi` and `param.cgi`, with the faults they can have.
 
-use std::{future::pending, sync::Arc};
+use std::{future::pending, io, sync::Arc, time::Duration};
 
 use axum::{
-    body::{Body, to_bytes},
+    body::{Body, Bytes, to_bytes},
     extract::{ConnectInfo, Request, State},
     http::{Method, StatusCode, header},
     response::{IntoResponse, Response},
 };
 
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+
 use super::{
-    Site,
+    Site, auth,
     connection::{Connection, Ending},
 };
 use crate::{
@@ -47,13 +50,13 @@ async fn answer(
 ) -> Response {
     let camera = &site.camera;
     let _counted = camera.request_begins();
-    let refusal = site.guard.refuse(&request);
+    let fault = camera.fault.borrow().clone();
+    let refusal = site.guard.refuse(&request, auth::time(&fault));
     let query = match arguments(request).await {
         Ok(query) => query,
         Err(response) => return response,
     };
-    let fault = camera.fault.borrow().clone();
-    match trouble(&fault) {
+    match trouble(&fault, site.guard.wrong_logins()) {
         Trouble::None => {}
         Trouble::Answer(response) => {
             note(camera, &query, response.status().as_u16());
@@ -78,6 +81,7 @@ async fn answer(
         tokio::time::sleep(camera.service_time()).await;
         match run(camera, &parse_args(query.as_bytes())) {
             Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
+            Answer::Text(text) if fault == Fault::LineFeeds => plain(text.replace("\r\n", "\n")),
             Answer::Text(text) => plain(text),
         }
     };
@@ -93,6 +97,18 @@ async fn answer(
 
 fn plain(text: String) -> Response {
     ([(header::CONTENT_TYPE, "text/plain")], text).into_response()
+}
+
+/// This text again and again, each time after a pause, until the client has enough.
+fn endless(text: Bytes, pause: Duration) -> Response {
+    let (sender, receiver) = mpsc::channel(1);
+    tokio::spawn(async move {
+        while sender.send(Ok::<_, io::Error>(text.clone())).await.is_ok() {
+            tokio::time::sleep(pause).await;
+        }
+    });
+    let body = Body::from_stream(ReceiverStream::new(receiver));
+    ([(header::CONTENT_TYPE, "text/plain")], body).into_response()
 }
 
 /// The query, or the form of a POST.
@@ -118,16 +134,24 @@ enum Trouble {
     Silence,
 }
 
-fn trouble(fault: &Fault) -> Trouble {
+fn trouble(fault: &Fault, wrong_logins: u64) -> Trouble {
+    let status = |code: u16| StatusCode::from_u16(code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     match fault {
         Fault::None | Fault::Delay(_) | Fault::CloseAfterResponse => Trouble::None,
-        Fault::Refuse | Fault::Reset => Trouble::Cut(Ending::Reset),
+        Fault::LineFeeds | Fault::ClockAhead(_) => Trouble::None,
+        Fault::Refuse | Fault::Reboot | Fault::Reset => Trouble::Cut(Ending::Reset),
         Fault::Garbage(bytes) => Trouble::Cut(Ending::Garbage(bytes.clone())),
-        Fault::Hang => Trouble::Silence,
-        Fault::Status(code) => {
-            let status = StatusCode::from_u16(*code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
-            Trouble::Answer(status.into_response())
+        Fault::Hang | Fault::BlackHole => Trouble::Silence,
+        Fault::Status(code) => Trouble::Answer(status(*code).into_response()),
+        Fault::Redirect { status: code, location } => {
+            Trouble::Answer((status(*code), [(header::LOCATION, location.clone())]).into_response())
         }
+        Fault::LockOut(after) if wrong_logins >= *after => {
+            Trouble::Answer(StatusCode::FORBIDDEN.into_response())
+        }
+        Fault::LockOut(_) => Trouble::None,
+        Fault::EndlessBody => Trouble::Answer(endless(Bytes::from_static(&[b'x'; 8192]), Duration::ZERO)),
+        Fault::Drip(pause) => Trouble::Answer(endless(Bytes::from_static(b"x"), *pause)),
         Fault::ErrorBody(text) => Trouble::Answer(plain(text.clone())),
         Fault::EmptyOk => Trouble::Answer(Response::new(Body::empty())),
     }

@@ -122,14 +122,24 @@ impl Door {
         self.address
     }
 
-    /// Refuses connections until the fault is over. A socket that does not listen keeps the port from others.
-    async fn refuse(&mut self) {
+    /// Lets no connection come about until the fault is over, and keeps the port from others meanwhile.
+    async fn shut(&mut self) {
         self.listener = None;
-        let reserved = reserve(self.address);
-        if self.fault.wait_for(|fault| *fault != Fault::Refuse).await.is_err() {
+        let silent = *self.fault.borrow() == Fault::BlackHole;
+        if silent {
+            let _full = full_queue(self.address).await;
+            self.fault_over().await;
+        } else {
+            // A socket that does not listen refuses.
+            let _reserved = reserve(self.address);
+            self.fault_over().await;
+        }
+    }
+
+    async fn fault_over(&mut self) {
+        if self.fault.wait_for(|fault| !fault.shuts()).await.is_err() {
             pending::<()>().await;
         }
-        self.listener = reserved.and_then(|socket| socket.listen(BACKLOG)).ok();
     }
 
     async fn next(&mut self) -> Option<(TcpStream, SocketAddr)> {
@@ -137,9 +147,16 @@ impl Door {
         let mut fault = self.fault.clone();
         tokio::select! {
             accepted = listener.accept() => accepted.ok(),
-            _ = fault.wait_for(|fault| *fault == Fault::Refuse) => None,
+            _ = fault.wait_for(Fault::shuts) => None,
         }
     }
+}
+
+/// A socket whose queue is full, and what fills it: the kernel drops whatever else comes.
+async fn full_queue(address: SocketAddr) -> io::Result<(TcpListener, TcpStream)> {
+    let listener = reserve(address)?.listen(0)?;
+    let filling = TcpStream::connect(address).await?;
+    Ok((listener, filling))
 }
 
 impl Listener for Door {
@@ -148,8 +165,8 @@ impl Listener for Door {
 
     async fn accept(&mut self) -> (Wire, SocketAddr) {
         loop {
-            if *self.fault.borrow() == Fault::Refuse {
-                self.refuse().await;
+            if self.fault.borrow().shuts() {
+                self.shut().await;
             }
             if let Some((stream, address)) = self.next().await {
                 // Commands are small and must not wait for one another.
@@ -157,7 +174,7 @@ impl Listener for Door {
                 return (Wire { stream, connection: Connection::default(), answered: false }, address);
             }
             if self.listener.is_none() {
-                // The port was lost to somebody else: try again as long as it takes.
+                // Unless the port was lost to somebody else meanwhile, this works at once.
                 self.listener = reserve(self.address).and_then(|socket| socket.listen(BACKLOG)).ok();
                 tokio::task::yield_now().await;
             }

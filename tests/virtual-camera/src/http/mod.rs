@@ -6,6 +6,7 @@ mod connection;
 mod mjpeg;
 mod page;
 mod picture;
+mod truth;
 
 use std::{net::SocketAddr, sync::Arc, thread::JoinHandle};
 
@@ -16,7 +17,7 @@ use axum::{
 };
 use tokio::{net::TcpSocket, sync::oneshot};
 
-use crate::{Error, camera::Camera, threads::Threads};
+use crate::{Error, Fault, camera::Camera, threads::Threads};
 use auth::Guard;
 use connection::{Connection, Door};
 
@@ -58,6 +59,7 @@ impl HttpServer {
             streams: streams.clone(),
         });
         let (stop, stopped) = oneshot::channel();
+        let reboots = reboots(site.clone());
         let service = routes(site).into_make_service_with_connect_info::<Connection>();
         let thread = std::thread::Builder::new()
             .name("camera-http".into())
@@ -66,6 +68,7 @@ impl HttpServer {
                     tokio::select! {
                         // Serving never ends by itself; a dropped handle stops it as well.
                         _ = axum::serve(door, service) => {}
+                        () = reboots => {}
                         _ = stopped => {}
                     }
                 });
@@ -91,6 +94,16 @@ impl HttpServer {
     }
 }
 
+/// Lets the camera forget what a reboot makes it forget, each time there is one.
+async fn reboots(site: Arc<Site>) {
+    let mut fault = site.camera.fault.subscribe();
+    // The sender is the camera's own: it is there as long as this is.
+    while fault.wait_for(|fault| *fault == Fault::Reboot).await.is_ok() {
+        site.guard.reboot();
+        let _ = fault.wait_for(|fault| *fault != Fault::Reboot).await;
+    }
+}
+
 fn routes(site: Arc<Site>) -> Router {
     let guarded = Router::new()
         .route("/axis-cgi/jpg/image.cgi", get(picture::snapshot))
@@ -105,7 +118,8 @@ fn routes(site: Arc<Site>) -> Router {
     let page = Router::new()
         .route("/", get(page::page))
         .route("/api/status", get(page::status))
-        .route("/api/picture.jpg", get(picture::snapshot))
+        .route("/api/picture.jpg", get(page::picture))
+        .route("/api/truth", get(truth::truth))
         .route("/api/overview.jpg", get(page::overview))
         .route("/api/ptz", any(page::steer));
     guarded.merge(faulty).merge(page).with_state(site)

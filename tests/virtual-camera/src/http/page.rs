@@ -54,6 +54,18 @@ pub(super) async fn status(
     Ok(([(header::CONTENT_TYPE, "application/json")], json).into_response())
 }
 
+/// The newest picture. `X-Exposure` says when it was taken, in seconds, so that the truth about it can be asked for.
+pub(super) async fn picture(State(site): State<Arc<Site>>) -> Result<Response, PictureError> {
+    let camera = site.camera.clone();
+    let wish = Wish::parse(&Vec::new(), &camera)?;
+    let exposure = camera.newest_exposure();
+    let mut response = jpeg(wish, move || camera.picture(exposure, wish.size)).await?;
+    if let Ok(seconds) = exposure.as_secs_f64().to_string().parse() {
+        response.headers_mut().insert("x-exposure", seconds);
+    }
+    Ok(response)
+}
+
 pub(super) async fn overview(State(site): State<Arc<Site>>) -> Result<Response, PictureError> {
     let camera = site.camera.clone();
     let wish = Wish::parse(&Vec::new(), &camera)?;

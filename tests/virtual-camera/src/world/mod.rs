@@ -12,8 +12,9 @@ mod warp;
 use std::{sync::Arc, time::Duration};
 
 pub use footage::FootageError;
-pub use mot::MotError;
+pub use mot::{MotError, People, read as read_mot};
 use panorama::Panorama;
+pub use panorama::Person;
 pub use room::{Change, Lighting, Occlusion, RoomSettings, Subject};
 pub use synthetic::{SyntheticSettings, Waypoint};
 
@@ -42,8 +43,6 @@ pub(crate) trait World: Send + Sync {
     fn optics(&self) -> Optics;
     /// How far the camera turns in it.
     fn limits(&self) -> Limits;
-    /// Where the camera looks at first unless told otherwise.
-    fn home(&self) -> Pose;
     /// Width and height in pixels that the camera sends unless asked for others.
     fn view_size(&self) -> (u32, u32);
     /// Pictures per second unless asked for others.
@@ -69,6 +68,15 @@ pub(crate) trait World: Send + Sync {
         let half_width = (self.optics().fov_deg(zoom_step) / 2.0).to_radians().tan();
         let narrowed = half_width * (aspect(self.view_size()) / aspect(size)).min(1.0);
         Pinhole::new(size.0, size.1, 2.0 * narrowed.atan().to_degrees())
+    }
+
+    /// By how many pixels the middle of a picture moves to the right and down while it is exposed.
+    fn sweep(&self, exposure: &Exposure, size: (u32, u32)) -> (f64, f64) {
+        let view = |pose: &Pose| self.pinhole(pose.zoom_step, size);
+        let (opening, closing) = (view(&exposure.opening), view(&exposure.closing));
+        let moved = geometry::between((&exposure.opening, &opening), (&exposure.closing, &closing));
+        let (x, y) = geometry::project(&moved, opening.centre_x, opening.centre_y);
+        (x - opening.centre_x, y - opening.centre_y)
     }
 
     /// From a pixel of the overview to the pixel of a view of `size`.
@@ -103,12 +111,7 @@ pub(crate) fn open(settings: &Settings) -> Result<Box<dyn World>, FootageError> 
             let recording = Box::new(footage::Footage::open(footage)?);
             Box::new(Panorama::new(recording, footage.recording_fov_deg, wide, settings))
         }
-        // Stands in until the room is built.
-        settings::World::Room(_) => {
-            let synthetic = SyntheticSettings::default();
-            let recording = Box::new(synthetic::Synthetic::new(&synthetic));
-            Box::new(Panorama::new(recording, synthetic.recording_fov_deg, synthetic.wide_fov_deg, settings))
-        }
+        settings::World::Room(room) => Box::new(room::Room::new(room, settings)),
         settings::World::Synthetic(synthetic) => {
             let recording = Box::new(synthetic::Synthetic::new(synthetic));
             Box::new(Panorama::new(recording, synthetic.recording_fov_deg, synthetic.wide_fov_deg, settings))

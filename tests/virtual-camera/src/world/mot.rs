@@ -37,9 +37,13 @@ pub enum MotError {
 }
 
 /// People by the number of the picture, from 0.
-pub(super) type People = BTreeMap<u64, Vec<Person>>;
+pub type People = BTreeMap<u64, Vec<Person>>;
 
-pub(super) fn read(path: &Path) -> Result<People, MotError> {
+/// Reads a file.
+///
+/// # Errors
+/// Where it cannot be read, or a line of it is not as it should be.
+pub fn read(path: &Path) -> Result<People, MotError> {
     let path = path.to_owned();
     match std::fs::read_to_string(&path) {
         Ok(text) => parse(&text).map_err(|(line, reason)| MotError::Line { path, line, reason }),

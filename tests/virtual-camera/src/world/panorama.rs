@@ -29,7 +29,7 @@ pub(crate) trait Recording: Send {
 
 /// Somebody in a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Person {
+pub struct Person {
     /// The same in all pictures.
     pub id: u32,
     /// In pixels of the recording.
@@ -118,10 +118,6 @@ impl World for Panorama {
         )
     }
 
-    fn home(&self) -> Pose {
-        Pose::default()
-    }
-
     fn view_size(&self) -> (u32, u32) {
         self.view_size
     }
@@ -144,10 +140,8 @@ impl World for Panorama {
             let homography = if index == 0 { &luma } else { &chroma };
             warp(&source.planes[index], target, homography);
         }
-        let centre = (view.centre_x, view.centre_y);
-        let (x, y) = geometry::project(&luma, centre.0, centre.1);
-        let (x, y) = geometry::project(&self.overview_to_view(&exposure.closing, size), x, y);
-        motion_blur(&mut picture, x - centre.0, y - centre.1);
+        let (x, y) = self.sweep(exposure, size);
+        motion_blur(&mut picture, x, y);
         Ok(picture)
     }
 

@@ -19,13 +19,13 @@ impl Light {
             let squared = dot(way, way);
             // Half Lambert: light thrown back by the walls comes from everywhere.
             let facing = 0.5 + 0.5 * dot(scale(way, 1.0 / squared.sqrt().max(1e-6)), normal);
-            strength * facing * facing / (1.0 + squared / (radius * radius))
+            strength * facing / (1.0 + squared / (radius * radius))
         };
-        let lamps: f64 = self.lamps.iter().map(|lamp| falling(lamp, 0.42, 2.4)).sum();
-        let windows: f64 = self.windows.iter().map(|window| falling(window, 0.35, 1.6)).sum();
+        let lamps: f64 = self.lamps.iter().map(|lamp| falling(lamp, 0.62, 2.4)).sum();
+        let windows: f64 = self.windows.iter().map(|window| falling(window, 0.5, 1.5)).sum();
         let upwards = 0.06 * normal[1];
         // Bright places saturate as film does.
-        let sum = 0.36 + lamps + windows + upwards;
-        1.25 * (1.0 - (-1.05 * sum).exp())
+        let sum = 0.42 + lamps + windows + upwards;
+        1.22 * (1.0 - (-1.3 * sum).exp())
     }
 }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::walker::Walk;
 use crate::kinematics::Pose;
 
 /// How much light there is.
@@ -94,14 +95,22 @@ impl RoomSettings {
         })
     }
 
+    /// The number of the test of this kind.
+    pub fn number(&self) -> u32 {
+        let (direction, speed) = (self.direction as u32, self.speed as u32);
+        let (occlusion, lighting, subject) =
+            (self.occlusion as u32, self.lighting as u32, self.subject as u32);
+        1 + 36 * direction + 18 * speed + 6 * occlusion + 3 * lighting + subject
+    }
+
     /// From the start of the world, empty for two seconds, to the end of the person's way.
     pub fn duration(&self) -> Duration {
-        Duration::from_secs(12)
+        Duration::from_secs_f64(Walk::new(self).duration())
     }
 
     /// Where the camera looks at first: the person comes in at the side of the widest view.
     pub fn home(&self) -> Pose {
-        Pose { tilt_deg: -10.0, ..Pose::default() }
+        Walk::new(self).home()
     }
 }
 

@@ -50,9 +50,8 @@ impl View {
     /// A direction of the world in the axes of the camera.
     pub fn turned(&self, direction: Vector) -> Vector {
         let [x, y, z] = direction;
-        [0, 1, 2].map(|axis| {
-            self.rotation[0][axis] * x - self.rotation[1][axis] * y + self.rotation[2][axis] * z
-        })
+        [0, 1, 2]
+            .map(|axis| self.rotation[0][axis] * x - self.rotation[1][axis] * y + self.rotation[2][axis] * z)
     }
 
     /// A place of the world in the axes of the camera; the last is its depth.

@@ -1,140 +1,17 @@
 //! `lkfeaturetrack` in a harness and in pipelines.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod bench;
+mod giving_up;
+
+use bench::*;
 use gst::prelude::*;
 use gst_check::Harness;
 use gst_video::{NavigationEvent, VideoRegionOfInterestMeta};
 use gstptztrack::luma_source::FORMATS;
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMessage, TargetMeta,
-    TargetState, TrackerEvent,
+    BufferMeta, CameraEvent, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMeta, TargetState,
 };
-
-const WIDTH: usize = 320;
-const HEIGHT: usize = 240;
-const FRAME_MS: u64 = 40;
-/// Size of the person in pixels.
-const PERSON: (usize, usize) = (32, 72);
-
-fn init() {
-    static ONCE: std::sync::Once = std::sync::Once::new();
-    ONCE.call_once(|| {
-        gst::init().unwrap();
-        gstptztrack::plugin_register_static().unwrap();
-    });
-}
-
-/// Blocks of 5x5 pixels of any grey, the same for the same place and seed.
-fn texture(seed: usize, x: usize, y: usize) -> u8 {
-    let mut hash = seed.wrapping_mul(0x9e37_79b9)
-        ^ (x / 5).wrapping_mul(0x85eb_ca6b)
-        ^ (y / 5).wrapping_mul(0xc2b2_ae35);
-    hash ^= hash >> 13;
-    hash = hash.wrapping_mul(0x27d4_eb2f);
-    (hash >> 9) as u8
-}
-
-/// The street with a person whose left upper corner is at `person`, behind a wall where `wall` says.
-fn picture(person: Option<(i32, i32)>, wall: Option<std::ops::Range<usize>>) -> Vec<u8> {
-    let mut pixels: Vec<u8> =
-        (0..WIDTH * HEIGHT).map(|index| 64 + texture(1, index % WIDTH, index / WIDTH) / 4).collect();
-    if let Some((left, top)) = person {
-        for v in 0..PERSON.1 {
-            for u in 0..PERSON.0 {
-                let (x, y) = (left + u as i32, top + v as i32);
-                if (0..WIDTH as i32).contains(&x) && (0..HEIGHT as i32).contains(&y) {
-                    pixels[y as usize * WIDTH + x as usize] = texture(7, u, v);
-                }
-            }
-        }
-    }
-    for y in wall.iter().flat_map(|_| 0..HEIGHT) {
-        pixels[y * WIDTH..][wall.clone().unwrap()].fill(150);
-    }
-    pixels
-}
-
-/// Name and pixels of a region of interest.
-type Seen<'a> = (&'a str, (u32, u32, u32, u32));
-
-struct Bench {
-    harness: Harness,
-    frames: u64,
-    bus: gst::Bus,
-}
-
-impl Bench {
-    fn new(configure: impl Fn(&gst::Element)) -> Self {
-        init();
-        let mut harness = Harness::new("lkfeaturetrack");
-        let element = harness.element().unwrap();
-        configure(&element);
-        let bus = gst::Bus::new();
-        element.set_bus(Some(&bus));
-        harness.set_src_caps_str("video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1");
-        harness.set_sink_caps_str("video/x-raw");
-        Self { harness, frames: 0, bus }
-    }
-
-    fn push(&mut self, pixels: Vec<u8>, detections: &[Seen]) -> TargetMeta {
-        let out = self.push_through(pixels, detections);
-        TargetMeta::of(&out).expect("a meta on every frame").expect("readable")
-    }
-
-    fn push_through(&mut self, pixels: Vec<u8>, detections: &[Seen]) -> gst::Buffer {
-        let mut buffer = gst::Buffer::from_mut_slice(pixels);
-        {
-            let buffer = buffer.get_mut().unwrap();
-            buffer.set_pts(gst::ClockTime::from_mseconds(self.frames * FRAME_MS));
-            for (name, bounds) in detections {
-                VideoRegionOfInterestMeta::add(buffer, name, *bounds);
-            }
-        }
-        self.frames += 1;
-        self.harness.push_and_pull(buffer).unwrap()
-    }
-
-    /// Shows a person at `place` who is detected.
-    fn detected(&mut self, place: (i32, i32)) -> TargetMeta {
-        let bounds = (place.0 as u32, place.1 as u32, PERSON.0 as u32, PERSON.1 as u32);
-        self.push(picture(Some(place), None), &[("motion", bounds)])
-    }
-
-    /// A person who stands still until the tracker has them.
-    fn acquire(&mut self, place: (i32, i32)) -> TargetMeta {
-        (0..2).for_each(|_| assert_eq!(self.detected(place).state, TargetState::Searching));
-        let meta = self.detected(place);
-        assert_eq!((meta.state, meta.id), (TargetState::Tracking, 1));
-        meta
-    }
-
-    fn messages(&self) -> Vec<TargetMessage> {
-        self.bus
-            .iter()
-            .filter_map(|message| TargetMessage::from_structure(message.structure()?).ok())
-            .collect()
-    }
-
-    fn changes(&self) -> Vec<TargetChange> {
-        self.messages().into_iter().map(|message| message.change).collect()
-    }
-
-    fn events(&mut self) -> Vec<TargetState> {
-        std::iter::from_fn(|| self.harness.try_pull_upstream_event())
-            .filter_map(|event| TrackerEvent::of(&event)?.ok())
-            .map(|event| event.state)
-            .collect()
-    }
-}
-
-#[track_caller]
-fn assert_box_at(meta: &TargetMeta, place: (i32, i32)) {
-    let (x, y) = (meta.bounds.x * WIDTH as f64, meta.bounds.y * HEIGHT as f64);
-    assert!(
-        (x - f64::from(place.0)).abs() < 6.0 && (y - f64::from(place.1)).abs() < 8.0,
-        "{x} {y} {place:?}"
-    );
-}
 
 #[test]
 fn a_walking_person_is_followed() {
@@ -383,12 +260,12 @@ fn survives(format: gst_video::VideoFormat, width: u32, height: u32) {
 #[test]
 fn the_pipelines_of_the_documentation_run() {
     init();
-    let pipelines: Vec<_> = include_str!("../src/lkfeaturetrack/mod.rs")
+    let pipelines: Vec<_> = include_str!("../../src/lkfeaturetrack/mod.rs")
         .lines()
         .filter_map(|line| line.strip_prefix("//! gst-launch-1.0 "))
         .map(|line| line.trim_start_matches("-m "))
         .collect();
-    assert_eq!(pipelines.len(), 3);
+    assert_eq!(pipelines.len(), 4);
     for description in pipelines {
         let pipeline = gst::parse::launch(description).expect(description);
         pipeline.set_state(gst::State::Playing).unwrap();

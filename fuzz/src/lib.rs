@@ -1,0 +1,72 @@
+//! What is fuzzed: each parser of something a camera says. `cargo +nightly fuzz run TARGET` feeds one of
+//! them; a test of gst-plugin-vapix runs all of them over the seeds in `corpus`.
+#![allow(missing_docs)]
+
+use gstvapix::vapix::{
+    Attributes, Credentials, Limits, Parameters, Position, QueuePlace, Secret, answer_to_challenge,
+    parse_move_speed,
+};
+
+/// A target: takes anything, says whether it was understood, and never panics.
+pub type Target = fn(&[u8]) -> bool;
+
+pub const TARGETS: [(&str, Target); 7] = [
+    ("challenge", challenge),
+    ("position", position),
+    ("limits", limits),
+    ("attributes", attributes),
+    ("move_speed", move_speed),
+    ("parameters", parameters),
+    ("queue", queue),
+];
+
+/// As the client reads a body.
+fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
+    String::from_utf8_lossy(bytes)
+}
+
+pub fn challenge(bytes: &[u8]) -> bool {
+    let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
+    answer_to_challenge(text(bytes).trim_end(), credentials, "/axis-cgi/com/ptz.cgi?query=position").is_ok()
+}
+
+pub fn position(bytes: &[u8]) -> bool {
+    let Ok(position) = Position::parse(&text(bytes)) else { return false };
+    let told = [position.pan_deg, position.tilt_deg, position.zoom_steps];
+    assert!(told.into_iter().flatten().all(f64::is_finite), "{position:?}");
+    true
+}
+
+pub fn limits(bytes: &[u8]) -> bool {
+    let Ok(limits) = Limits::parse(&text(bytes)) else { return false };
+    let told = [limits.pan_deg, limits.tilt_deg, limits.zoom_steps, limits.field_angle_deg];
+    assert!(told.into_iter().flatten().all(|range| range.min < range.max), "{limits:?}");
+    true
+}
+
+pub fn attributes(bytes: &[u8]) -> bool {
+    let Ok(attributes) = Attributes::parse(&text(bytes)) else { return false };
+    for table in [&attributes.speeds, &attributes.zooms] {
+        let grows = |pair: &[_]| matches!(pair, [a, b] if grow(a, b));
+        assert!(table.windows(2).all(grows), "{table:?}");
+    }
+    true
+}
+
+fn grow(a: &gstvapix::vapix::StepMeaning, b: &gstvapix::vapix::StepMeaning) -> bool {
+    a.step < b.step && a.value <= b.value
+}
+
+pub fn move_speed(bytes: &[u8]) -> bool {
+    parse_move_speed(&text(bytes)).inspect(|speed| assert!((1..=100).contains(speed))).is_ok()
+}
+
+pub fn parameters(bytes: &[u8]) -> bool {
+    Parameters::parse(&text(bytes), 1).is_ok()
+}
+
+pub fn queue(bytes: &[u8]) -> bool {
+    let Ok(place) = QueuePlace::parse(&text(bytes)) else { return false };
+    assert!((5..=3600).contains(&place.poll_every.as_secs()), "{place:?}");
+    true
+}

@@ -1,0 +1,190 @@
+//! How long a target is followed.
+
+use opencv::core::{Point2f, Rect2f};
+use ptztrack_contract::ReleaseReason;
+
+use super::ego_motion::EgoMotion;
+use super::geometry::{centre, length};
+
+/// Time over which the place of a target is averaged, seconds: longer than a sway, shorter than it takes the
+/// errors of the measured camera motion to add up.
+const MEMORY_S: f32 = 3.0;
+/// How far from there a target has moved, in its widths: who sways or waves does not get there, who walks does
+/// from a sixth of a width per second on.
+const REACH: f32 = 0.5;
+/// By which factor, as a logarithm, its size has changed then: it comes nearer, or leaves.
+const GROWTH: f32 = 0.2;
+
+/// After how many seconds a target is given up; infinite: never.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Of standing still.
+    pub stationary_s: f64,
+    /// Of being followed, hidden or not.
+    pub tracked_s: f64,
+}
+
+/// What a target has used up of the patience with it.
+///
+/// Whether it stands is asked of the world, not of the picture: the motion of the background is taken off.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Patience {
+    tracked_s: f64,
+    still_s: f64,
+    /// From its average place, in its widths.
+    offset: Point2f,
+    /// From its average size, as a logarithm.
+    growth: f32,
+}
+
+impl Patience {
+    /// Takes a frame, `dt_s` seconds after the last one, in which the target was seen or not.
+    pub fn pass(&mut self, dt_s: f64) {
+        self.tracked_s += dt_s;
+    }
+
+    /// Takes the target's box before and after those seconds, and how the background moved.
+    ///
+    /// Only frames in which both were seen tell whether the target stands: the others do not count.
+    pub fn watch(&mut self, before: Rect2f, after: Rect2f, ego: EgoMotion, dt_s: f64) {
+        let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
+        let own = centre(after) - ego.apply(centre(before));
+        self.offset = (self.offset + own / after.width.max(1.0)) * keep;
+        self.growth = (self.growth + (after.height / (before.height * ego.scale())).ln()) * keep;
+        // What is not a number fails as well, and is forgotten.
+        let stands = length(self.offset) <= REACH && self.growth.abs() <= GROWTH;
+        *self = if stands {
+            Self { still_s: self.still_s + dt_s, ..*self }
+        } else {
+            Self { tracked_s: self.tracked_s, ..Self::default() }
+        };
+    }
+
+    /// Why the target is to be given up now, if it is.
+    pub fn exhausted(&self, limits: Limits) -> Option<ReleaseReason> {
+        if self.still_s > limits.stationary_s {
+            Some(ReleaseReason::Stationary)
+        } else {
+            (self.tracked_s > limits.tracked_s).then_some(ReleaseReason::MaxTrackingTime)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::ego_motion::estimate;
+    use super::super::geometry::around;
+    use super::*;
+    use proptest::prelude::*;
+
+    const DT: f64 = 0.04;
+    const WIDTH: f32 = 40.0;
+    const LIMITS: Limits = Limits { stationary_s: 10.0, tracked_s: f64::INFINITY };
+
+    /// Whether a target is given up as standing within `seconds`, its middle in pixels and its size by time, in a
+    /// picture that moves as `ego` every frame.
+    fn given_up(seconds: f32, ego: EgoMotion, path: impl Fn(f32) -> (Point2f, f32)) -> bool {
+        let mut patience = Patience::default();
+        let box_at = |time| {
+            let (middle, size) = path(time);
+            around(middle, WIDTH * size, 2.25 * WIDTH * size)
+        };
+        let mut carried = box_at(0.0);
+        (1..=(seconds / DT as f32) as usize).any(|frame| {
+            let (before, now) = (box_at((frame - 1) as f32 * DT as f32), box_at(frame as f32 * DT as f32));
+            // The camera carries the box from where the picture had it; its own way comes on top.
+            let scale = ego.scale() * now.height / before.height;
+            let middle = ego.apply(centre(carried)) + (centre(now) - centre(before));
+            let after = around(middle, carried.width * scale, carried.height * scale);
+            patience.pass(DT);
+            patience.watch(carried, after, ego, DT);
+            carried = after;
+            patience.exhausted(LIMITS).is_some()
+        })
+    }
+
+    fn along(x: f32) -> (Point2f, f32) {
+        (Point2f::new(x, 0.0), 1.0)
+    }
+
+    #[test]
+    fn who_stands_is_given_up_when_the_time_is_over_and_not_before() {
+        let still = EgoMotion::default();
+        assert!(!given_up(9.9, still, |_| along(0.0)));
+        assert!(given_up(10.2, still, |_| along(0.0)));
+    }
+
+    #[test]
+    fn who_comes_straight_towards_the_camera_does_not_stand() {
+        assert!(!given_up(30.0, EgoMotion::default(), |time| (Point2f::default(), (0.1 * time).exp())));
+    }
+
+    #[test]
+    fn who_stands_is_given_up_under_a_camera_that_zooms() {
+        for zoom in [0.99, 1.01] {
+            let corners = (0..36).map(|n| Point2f::new(100.0 * (n % 6) as f32, 80.0 * (n / 6) as f32));
+            let pairs: Vec<_> = corners.map(|corner| (corner, corner * zoom)).collect();
+            let ego = estimate(&pairs).expect("plenty of points");
+            assert!(given_up(11.0, ego, |_| along(0.0)), "{zoom}");
+            assert!(!given_up(11.0, ego, |time| (Point2f::default(), (0.1 * time).exp())), "{zoom}");
+        }
+    }
+
+    #[test]
+    fn who_stops_has_all_the_time_again() {
+        let walk_then_stand = |time: f32| along(60.0 * time.min(30.0));
+        assert!(!given_up(39.0, EgoMotion::default(), walk_then_stand));
+        assert!(given_up(41.0, EgoMotion::default(), walk_then_stand));
+    }
+
+    #[test]
+    fn the_time_of_tracking_counts_however_it_moves() {
+        let limits = Limits { stationary_s: f64::INFINITY, tracked_s: 2.0 };
+        let mut patience = Patience::default();
+        for frame in 0..8 {
+            patience.pass(0.25);
+            let (before, after) = (60.0 * frame as f32, 60.0 * (frame + 1) as f32);
+            let at = |x| around(Point2f::new(x, 0.0), WIDTH, 90.0);
+            patience.watch(at(before), at(after), EgoMotion::default(), 0.25);
+            assert_eq!(patience.exhausted(limits), None);
+        }
+        patience.pass(0.25);
+        assert_eq!(patience.exhausted(limits), Some(ReleaseReason::MaxTrackingTime));
+    }
+
+    #[test]
+    fn nonsense_is_forgotten() {
+        let mut patience = Patience::default();
+        patience.watch(Rect2f::default(), Rect2f::default(), EgoMotion::default(), f64::INFINITY);
+        let person = around(Point2f::default(), WIDTH, 90.0);
+        for _ in 0..20 {
+            patience.watch(person, person, EgoMotion::default(), 1.0);
+        }
+        assert_eq!(patience.exhausted(LIMITS), Some(ReleaseReason::Stationary));
+    }
+
+    proptest! {
+        #[test]
+        fn a_sway_is_no_motion(reach in 0.0_f32..0.2, period_s in 0.5_f32..6.0, phase in 0.0_f32..6.0) {
+            let sway = |time: f32| along(reach * WIDTH * (std::f32::consts::TAU * time / period_s + phase).sin());
+            prop_assert!(given_up(20.0, EgoMotion::default(), sway));
+        }
+
+        #[test]
+        fn the_camera_s_motion_is_not_the_target_s(pan in -20.0_f32..20.0, tilt in -8.0_f32..8.0) {
+            let ego = EgoMotion::translation(Point2f::new(pan, tilt));
+            prop_assert!(given_up(11.0, ego, |_| along(0.0)));
+            // The camera keeps a walker where they are in the picture.
+            prop_assert!(!given_up(11.0, ego, |time| along(-25.0 * pan.signum() * pan.abs().max(2.0) * time)));
+        }
+
+        #[test]
+        fn a_walk_is_a_motion(speed in 0.3_f32..5.0, angle in 0.0_f32..6.3) {
+            let walk = |time: f32| {
+                let way = speed * WIDTH * time;
+                (Point2f::new(way * angle.cos(), way * angle.sin()), 1.0)
+            };
+            prop_assert!(!given_up(30.0, EgoMotion::default(), walk));
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! Runs every fault that can come between `vapixptzsink` and its camera, and prints a table in Markdown of
+//! what the user sees and how long it takes:
+//!
+//! ```sh
+//! cargo run -p gst-plugin-vapix --example faults > docs/faults.md
+//! ```
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+#[path = "../tests/surviving/mod.rs"]
+mod surviving;
+
+use std::thread;
+use std::time::Duration;
+
+use surviving::{Case, Outcome, cases, survive, unknown_host, wrong_password};
+use virtual_camera::Fault;
+
+/// As the element has it by default.
+const TIMEOUT: Duration = Duration::from_secs(2);
+
+/// How long faults last. They end at different moments of the pauses between attempts.
+const LAST: [Duration; 3] =
+    [Duration::from_millis(4100), Duration::from_millis(5000), Duration::from_millis(5350)];
+
+/// A real camera needs about this long.
+const REBOOT: Duration = Duration::from_secs(60);
+
+fn main() {
+    common::init();
+    println!("# What can go wrong with the camera\n");
+    println!(
+        "Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the properties'"
+    );
+    println!(
+        "defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s; the worst"
+    );
+    println!(
+        "of three runs that end it at different moments between two attempts; of the last two rows one run."
+    );
+    println!(
+        "The element took pictures at once all the time. Where the user sees something, that is one warning"
+    );
+    println!(
+        "as the fault begins and one `connected` as it is over. A request that hangs is waited for as long as"
+    );
+    println!("`timeout` says, 2 s by default: with a longer one it takes that long to be back.\n");
+    println!("| Fault | What the user sees | Requests per second meanwhile | Back in control after |");
+    println!("|---|---|---|---|");
+    for case in cases() {
+        let lasts = if case.fault == Fault::Reboot { [REBOOT; 3] } else { LAST };
+        row(&case, lasts);
+    }
+    print("unknown host name (then corrected)", "0", &unknown_host(TIMEOUT));
+    print("wrong password (then corrected)", "2 in all", &wrong_password());
+}
+
+/// Runs a case three times at once.
+fn row(case: &Case, lasts: [Duration; 3]) {
+    let outcomes: Vec<(Outcome, Duration)> = thread::scope(|scope| {
+        let runs = lasts.map(|lasts| scope.spawn(move || (survive(case, TIMEOUT, lasts), lasts)));
+        runs.into_iter().map(|run| run.join().unwrap()).collect()
+    });
+    let rate = |(outcome, lasts): &(Outcome, Duration)| outcome.requests as f64 / lasts.as_secs_f64();
+    let most = outcomes.iter().map(rate).fold(0.0, f64::max);
+    let worst = outcomes.iter().map(|(outcome, _)| outcome).max_by_key(|outcome| outcome.back_after);
+    print(case.name, &format!("{most:.1}"), worst.unwrap());
+}
+
+fn print(name: &str, requests: &str, outcome: &Outcome) {
+    let (seen, back) = match &outcome.warning {
+        Some(warning) => (warning.as_str(), format!("{:.2} s", outcome.back_after.as_secs_f64())),
+        None => ("nothing, it goes on", "—".to_owned()),
+    };
+    println!("| {name} | {seen} | {requests} | {back} |");
+}

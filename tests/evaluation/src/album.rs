@@ -1,0 +1,161 @@
+//! Pictures of a run's telling moments, chosen while it goes on.
+
+use std::{
+    collections::BTreeMap,
+    sync::{Arc, Mutex},
+};
+
+use gst::prelude::*;
+
+use virtual_camera::Picture;
+
+use crate::{
+    codec, metrics,
+    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE, lock},
+    record::{FrameRecord, Moment, Snapshot, TargetState},
+};
+
+/// The first box is at the edge of the picture: how long the camera may take to bring it to the middle, seconds.
+const APPROACH_S: f64 = 2.0;
+
+struct Page {
+    frame: usize,
+    picture: Picture,
+}
+
+/// What is kept so far: one picture for a moment.
+#[derive(Default)]
+pub(crate) struct Album {
+    pages: BTreeMap<Moment, Page>,
+    /// d_gc of the worst one.
+    worst: f64,
+}
+
+impl Album {
+    /// Keeps `picture`, number `frame` of those that count, if it tells something.
+    pub fn look(&mut self, frame: usize, record: &FrameRecord, picture: Picture) {
+        let first = match record.estimate.as_ref().map(|estimate| estimate.state) {
+            Some(TargetState::Tracking) => Some(Moment::Acquired),
+            Some(TargetState::Occluded) => Some(Moment::Occluded),
+            Some(TargetState::Lost) => Some(Moment::Lost),
+            Some(TargetState::Searching) | None => None,
+        };
+        let first = first.filter(|moment| !self.pages.contains_key(moment));
+        let distance = metrics::d_gc(record)
+            .filter(|distance| first.is_none() && record.time_s >= APPROACH_S && *distance > self.worst);
+        self.worst = distance.unwrap_or(self.worst);
+        if let Some(moment) = first.or(distance.map(|_| Moment::Worst)) {
+            self.pages.insert(moment, Page { frame, picture });
+        }
+    }
+
+    /// The pictures, as a camera would send them, in order of time.
+    pub fn develop(self, info: &gst_video::VideoInfo) -> Result<Vec<Snapshot>, PipelineError> {
+        let encoder = Encoder::new(info)?;
+        let mut snapshots = Vec::new();
+        for (moment, Page { frame, picture }) in self.pages {
+            snapshots.push(Snapshot { moment, frame, jpeg: encoder.encode(&picture, info, frame)? });
+        }
+        snapshots.sort_by_key(|snapshot| (snapshot.frame, snapshot.moment));
+        Ok(snapshots)
+    }
+}
+
+/// Makes JPEGs.
+struct Encoder {
+    pipeline: Pipeline,
+    jpeg: Arc<Mutex<Vec<u8>>>,
+}
+
+impl Encoder {
+    fn new(info: &gst_video::VideoInfo) -> Result<Self, PipelineError> {
+        let description = format!(
+            "appsrc name={SOURCE} ! {} ! fakesink name={SINK} sync=false async=false",
+            codec::jpeg_encoder()
+        );
+        let pipeline = Pipeline::new(&description, info)?;
+        let jpeg = Arc::new(Mutex::new(Vec::new()));
+        let out = jpeg.clone();
+        pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+            let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
+            *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
+            gst::PadProbeReturn::Ok
+        });
+        pipeline.start()?;
+        Ok(Self { pipeline, jpeg })
+    }
+
+    fn encode(
+        &self,
+        picture: &Picture,
+        info: &gst_video::VideoInfo,
+        number: usize,
+    ) -> Result<Vec<u8>, PipelineError> {
+        let mut buffer = picture.to_buffer(info).ok_or(PipelineError::NoElement(SOURCE))?;
+        if let Some(buffer) = buffer.get_mut() {
+            buffer.set_pts(gst::ClockTime::from_mseconds(number as u64));
+        }
+        self.pipeline.finish(buffer)?;
+        Ok(std::mem::take(&mut *lock(&self.jpeg)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Bounds, Estimate, GroundTruth};
+
+    const SIZE: (u32, u32) = (64, 48);
+
+    fn record(time_s: f64, x: f64, state: TargetState) -> FrameRecord {
+        let bounds = Bounds { left: x - 4.0, top: 10.0, width: 8.0, height: 28.0 };
+        let truth = GroundTruth {
+            id: 1,
+            bounds,
+            centroid: bounds.centre(),
+            visible: 1.0,
+            unhidden: 1.0,
+            in_view: 1.0,
+            position_m: None,
+            direction_deg: None,
+        };
+        FrameRecord {
+            time_s,
+            truth: Some(truth),
+            others: Vec::new(),
+            estimate: Some(Estimate { state, centroid: bounds.centre(), bounds, id: 1, features: 9 }),
+            size: SIZE,
+            pan_deg: 0.0,
+            tilt_deg: 0.0,
+            zoom: 1.0,
+            commands: 0,
+        }
+    }
+
+    #[test]
+    fn keeps_firsts_and_the_worst_after_the_approach() {
+        gst::init().unwrap();
+        use TargetState::{Lost, Occluded, Searching, Tracking};
+        let run = [
+            (0.0, 4.0, Tracking),
+            (2.5, 40.0, Tracking),
+            (3.0, 33.0, Occluded),
+            (3.5, 33.0, Lost),
+            (4.0, 50.0, Searching),
+            (4.5, 33.0, Tracking),
+            (5.0, 45.0, Lost),
+        ];
+        let mut album = Album::default();
+        for (frame, (time_s, x, state)) in run.into_iter().enumerate() {
+            let picture = Picture::grey(SIZE.0, SIZE.1, 20 * frame as u8);
+            album.look(frame, &record(time_s, x, state), picture);
+        }
+        let info =
+            gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, SIZE.0, SIZE.1).build().unwrap();
+        let snapshots = album.develop(&info).unwrap();
+        let moments: Vec<_> = snapshots.iter().map(|snapshot| (snapshot.moment, snapshot.frame)).collect();
+        let expected = [(Moment::Acquired, 0), (Moment::Occluded, 2), (Moment::Lost, 3), (Moment::Worst, 4)];
+        assert_eq!(moments, expected);
+        assert!(snapshots.iter().all(|snapshot| snapshot.jpeg.starts_with(&[0xff, 0xd8])));
+    }
+}

@@ -1,0 +1,266 @@
+//! The command line: which experiments are run, how many at once, and where the report goes.
+
+use std::{ops::RangeInclusive, path::PathBuf, str::FromStr, time::Duration};
+
+use clap::Parser;
+
+use crate::{
+    experiment::{Experiment, Scene},
+    footage::SceneError,
+    record::{Codec, Delays, FirstBox, TestId, TrackerName},
+    trackers::missing,
+};
+
+/// Runs the thesis' tests against the virtual camera and writes CSV, tables, plots and one page.
+#[derive(Debug, Clone, Parser)]
+#[command(name = "evaluate", version)]
+pub struct Args {
+    /// Tests by number, `7` or `1-6`; all 72 unless given
+    #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
+    pub test: Vec<Tests>,
+    /// Trackers by name, or `all`
+    #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
+    pub tracker: Vec<Trackers>,
+    /// What the pictures go through: mjpeg or mpeg4
+    #[arg(long, default_value = "mjpeg")]
+    pub codec: Codec,
+    /// Width and height of the pictures
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    pub size: (u32, u32),
+    /// Number of the world; 1 is the reference
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// From light on the sensor to the picture at the tracker, in milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 100)]
+    pub video_delay: u64,
+    /// From a command's arrival to the first movement, in milliseconds
+    #[arg(long, value_name = "MS", default_value_t = 60)]
+    pub command_delay: u64,
+    /// Run tests 1, 19, 37 and 55 with delays of 0 to 600 ms as well
+    #[arg(long)]
+    pub sweep_delay: bool,
+    /// Who draws the first box: given (the truth, to every tracker) or detected (by those that can)
+    #[arg(long, default_value = "given")]
+    pub first_box: FirstBox,
+    /// Write a video of each run as well, with everything drawn in: the truth in white
+    #[arg(long)]
+    pub record: bool,
+    /// Instead of the tests, follow one person in a still camera's recording, cut out of it as a turning camera sees it
+    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
+    pub footage: Option<PathBuf>,
+    /// Instead of the tests, follow one person in a recording as it is, without a camera
+    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
+    pub still_recording: Option<PathBuf>,
+    /// Who is where in the recording: MOTChallenge; for --still-recording also a box a line, by size or corners
+    #[arg(long, value_name = "FILE")]
+    pub truth: Option<PathBuf>,
+    /// Number of the person to follow in the recording, or auto: who is there longest
+    #[arg(long, value_name = "ID|auto", default_value = "auto")]
+    pub person: Whom,
+    /// How many runs go on at once
+    #[arg(long, default_value_t = 2)]
+    pub jobs: usize,
+    /// Folder for everything that is written
+    #[arg(long, default_value = "target/evaluation")]
+    pub out: PathBuf,
+}
+
+/// Tests from one number to another.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Tests(RangeInclusive<u32>);
+
+impl FromStr for Tests {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<u32>().ok();
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let range = number(first).zip(number(last)).map(|(first, last)| first..=last);
+        let known = 1..=TestId::COUNT;
+        range
+            .filter(|range| known.contains(range.start()) && known.contains(range.end()) && !range.is_empty())
+            .map(Self)
+            .ok_or_else(|| {
+                format!("tests are numbers from 1 to {} or ranges of them, not `{text}`", TestId::COUNT)
+            })
+    }
+}
+
+/// Whom to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Whom(Option<u32>);
+
+impl FromStr for Whom {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "auto" => Ok(Self(None)),
+            number => number
+                .parse()
+                .map(|id| Self(Some(id)))
+                .map_err(|_| format!("`{text}` is no number, nor auto")),
+        }
+    }
+}
+
+/// One tracker, or all of them.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Trackers(Vec<TrackerName>);
+
+impl FromStr for Trackers {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        match name {
+            "all" => Ok(Self(TrackerName::ALL.to_vec())),
+            name => Ok(Self(vec![name.parse()?])),
+        }
+    }
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let sides =
+        text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
+    sides
+        .filter(|(width, height)| (16..=4096).contains(width) && (16..=4096).contains(height))
+        .ok_or_else(|| format!("a size is WIDTHxHEIGHT, 16 to 4096 pixels each, not `{text}`"))
+}
+
+/// Tests of the series over the delay: nothing hidden, best light, one for each way of walking.
+const SWEPT: [u32; 4] = [1, 19, 37, 55];
+
+impl Args {
+    /// The tests asked for, in order and each once.
+    pub fn tests(&self) -> Vec<TestId> {
+        let asked = |test: &TestId| {
+            self.test.is_empty() || self.test.iter().any(|Tests(range)| range.contains(&test.0))
+        };
+        TestId::all().filter(asked).collect()
+    }
+
+    /// The trackers asked for, in the order of the tables, and what is to be said of those that are left out.
+    pub fn trackers(&self) -> (Vec<TrackerName>, Vec<String>) {
+        let asked = |name: &TrackerName| self.tracker.iter().any(|Trackers(names)| names.contains(name));
+        let (mut there, mut left_out) = (Vec::new(), Vec::new());
+        for name in TrackerName::ALL.iter().copied().filter(asked) {
+            match missing(name) {
+                None => there.push(name),
+                Some(reason) => left_out.push(reason),
+            }
+        }
+        (there, left_out)
+    }
+
+    fn experiment(&self, scene: Scene, tracker: TrackerName) -> Experiment {
+        let delays = Delays {
+            video: Duration::from_millis(self.video_delay),
+            command: Duration::from_millis(self.command_delay),
+        };
+        let name = scene.title.replace([' ', ',', '/'], "-");
+        Experiment {
+            codec: self.codec,
+            size: self.size,
+            delays,
+            first_box: self.first_box,
+            film: self.record.then(|| self.out.join(format!("{name}-{tracker}.mkv"))),
+            ..Experiment::new(scene, tracker, self.seed)
+        }
+    }
+
+    /// What is to be followed.
+    fn scenes(&self) -> Result<Vec<Scene>, SceneError> {
+        let Whom(person) = self.person;
+        match (&self.footage, &self.still_recording, &self.truth) {
+            (Some(file), _, Some(truth)) => Ok(vec![Scene::footage(file, truth, person, self.size)?]),
+            (None, Some(file), Some(truth)) => Ok(vec![Scene::recording(file, truth, person)?]),
+            _ => Ok(self.tests().into_iter().filter_map(|test| Scene::room(test, self.seed)).collect()),
+        }
+    }
+
+    /// Everything asked for, tracker after tracker.
+    ///
+    /// # Errors
+    /// Where a recording or its ground truth cannot be used.
+    pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
+        let scenes = self.scenes()?;
+        let mut experiments = Vec::new();
+        for tracker in trackers {
+            experiments.extend(scenes.iter().map(|scene| self.experiment(scene.clone(), *tracker)));
+            if self.sweep_delay {
+                experiments.extend(self.sweep(*tracker));
+            }
+        }
+        Ok(experiments)
+    }
+
+    /// The command takes its 60 ms where there are as many, the video what is left.
+    fn sweep(&self, tracker: TrackerName) -> Vec<Experiment> {
+        let delays = (0..=6).map(|n| Duration::from_millis(100 * n)).map(|total| {
+            let command = total.min(Delays::default().command);
+            Delays { video: total - command, command }
+        });
+        let at = |delays: Delays| {
+            let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), self.seed));
+            let experiments = scenes.map(move |scene| self.experiment(scene, tracker));
+            experiments.map(move |experiment| Experiment { delays, sweep: true, film: None, ..experiment })
+        };
+        delays.flat_map(at).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(line: &str) -> Result<Args, clap::Error> {
+        Args::try_parse_from(["evaluate"].into_iter().chain(line.split_whitespace()))
+    }
+
+    #[test]
+    fn all_tests_of_ours_unless_asked_for_others() {
+        let args = parse("").unwrap();
+        assert_eq!(args.tests().len(), 72);
+        assert_eq!(args.trackers().0, [TrackerName::Ptztrack]);
+        let args = parse("--test 7,1-3,2 --tracker oracle,thesis").unwrap();
+        assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
+        assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
+        assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
+    }
+
+    #[test]
+    fn all_means_all_that_are_there() {
+        crate::init().unwrap();
+        let (there, left_out) = parse("--tracker all").unwrap().trackers();
+        assert_eq!(there.len() + left_out.len(), TrackerName::ALL.len());
+    }
+
+    #[test]
+    fn the_sweep_goes_to_600_ms_and_is_marked() {
+        let args = parse("--test 1 --sweep-delay --size 320x240 --seed 5").unwrap();
+        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
+        assert_eq!(experiments.iter().filter(|experiment| experiment.sweep).count(), 28);
+        let mut totals: Vec<_> =
+            experiments.iter().filter(|e| e.sweep).map(|e| e.delays.total().as_millis()).collect();
+        totals.dedup();
+        assert_eq!(totals, [0, 100, 200, 300, 400, 500, 600]);
+        assert!(experiments.iter().all(|e| e.size == (320, 240) && e.seed == 5));
+    }
+
+    #[test]
+    fn nonsense_is_refused_with_what_would_be_right() {
+        for (line, hint) in [
+            ("--test 73", "1 to 72"),
+            ("--test 5-3", "1 to 72"),
+            ("--size 640", "WIDTHxHEIGHT"),
+            ("--tracker best", "ptztrack, thesis"),
+            ("--codec h264", "mjpeg, mpeg4"),
+            ("--first-box drawn", "given, detected"),
+            ("--footage x.avi", "--truth"),
+            ("--person somebody", "auto"),
+        ] {
+            let error = parse(line).unwrap_err().to_string();
+            assert!(error.contains(hint), "{line}: {error}");
+        }
+    }
+}

@@ -1,0 +1,147 @@
+//! What is run: who is followed where, by whom, and seen through what.
+
+use std::{path::PathBuf, time::Duration};
+
+use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
+
+use crate::{
+    record::{Codec, Delays, FirstBox, Run, TestId, TrackerName},
+    still::Recording,
+};
+
+/// When picture `number` is taken: in the middle of its time, as the virtual camera does for its own streams, so that no
+/// rounding makes it that of a recording's neighbouring picture.
+pub(crate) fn exposure(number: u32, period: Duration) -> Duration {
+    number * period + period / 2
+}
+
+/// What pictures are of.
+#[derive(Debug, Clone)]
+pub enum Place {
+    /// What a camera sees that the tracker steers.
+    World(World),
+    /// A recording as it is: no camera, no codec, no delays.
+    Recording(Recording),
+}
+
+/// A world with somebody to follow in it.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// Which test it is; `None` for a recording.
+    pub test: Option<TestId>,
+    /// For tables.
+    pub title: String,
+    /// What there is to see.
+    pub place: Place,
+    /// From the start of the world to the last picture that counts; a recording is seen to its end.
+    pub duration: Duration,
+    /// Who is to be followed; `None` where there is only one.
+    pub person: Option<u32>,
+}
+
+impl Scene {
+    /// One of the 72 tests in the room of that seed; `None` where there is no such test.
+    pub fn room(test: TestId, seed: u64) -> Option<Self> {
+        let room = RoomSettings::test(test.0, seed)?;
+        Some(Self {
+            test: Some(test),
+            title: format!("test {test}"),
+            duration: room.duration(),
+            place: Place::World(World::Room(room)),
+            person: None,
+        })
+    }
+
+    /// Of those in a picture the one to follow, and the others.
+    pub(crate) fn split(&self, people: Vec<GroundTruth>) -> (Option<GroundTruth>, Vec<GroundTruth>) {
+        let (mut person, others): (Vec<_>, _) =
+            people.into_iter().partition(|one| self.person.is_none_or(|person| one.id == person));
+        (person.pop(), others)
+    }
+}
+
+/// One test with one tracker.
+#[derive(Debug, Clone)]
+pub struct Experiment {
+    /// Who is followed where.
+    pub scene: Scene,
+    /// What follows.
+    pub tracker: TrackerName,
+    /// What the pictures go through.
+    pub codec: Codec,
+    /// Width and height of the pictures.
+    pub size: (u32, u32),
+    /// Number of the world.
+    pub seed: u64,
+    /// How late everything is.
+    pub delays: Delays,
+    /// Who draws the first box.
+    pub first_box: FirstBox,
+    /// Whether it is one of a series over the delay.
+    pub sweep: bool,
+    /// Where to write a video of it, with everything drawn in (Matroska); nowhere unless given.
+    pub film: Option<PathBuf>,
+}
+
+impl Experiment {
+    /// Tracker `tracker` in `scene` with everything else as it is by default.
+    pub fn new(scene: Scene, tracker: TrackerName, seed: u64) -> Self {
+        Self {
+            scene,
+            tracker,
+            codec: Codec::Mjpeg,
+            size: (640, 480),
+            seed,
+            delays: Delays::default(),
+            first_box: FirstBox::Given,
+            sweep: false,
+            film: None,
+        }
+    }
+
+    /// The camera in `world`, at home at time zero.
+    pub(crate) fn camera(&self, world: &World, clock: Clock) -> Result<VirtualCamera, virtual_camera::Error> {
+        let mut settings = Settings { auth: Auth::None, world: world.clone(), clock, ..Settings::default() };
+        settings.service_time = Duration::ZERO;
+        settings.video.delay = self.delays.video;
+        settings.video.size = Some(self.size);
+        settings.kinematics.command_delay = self.delays.command;
+        VirtualCamera::start(settings)
+    }
+
+    /// Numbers of all pictures.
+    pub(crate) fn pictures(&self, period: Duration) -> impl Iterator<Item = u32> {
+        (0..).take_while(move |number| exposure(*number, period) <= self.scene.duration)
+    }
+
+    /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
+    /// was never moved; `None` where there is none.
+    pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
+        let (period, home) = (camera.frame_period(), camera.home());
+        let whole = |number: &u32| {
+            let people = camera.ground_truth_from(&home, exposure(*number, period), self.size);
+            self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
+        };
+        self.pictures(period).find(whole)
+    }
+
+    /// What it will be recorded as.
+    pub(crate) fn blank(&self) -> Run {
+        Run {
+            test: self.scene.test,
+            title: self.scene.title.clone(),
+            tracker: self.tracker,
+            codec: self.codec,
+            size: self.size,
+            seed: self.seed,
+            delays: self.delays,
+            first_box: self.first_box,
+            sweep: self.sweep,
+            frame_rate: 0.0,
+            dropped: None,
+            frames: Vec::new(),
+            snapshots: Vec::new(),
+            error: None,
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! One experiment in virtual time: camera and pipeline take turns, and nobody looks at a clock.
+//!
+//! Picture n is exposed n and a half frame periods after the camera's start and reaches the pipeline when it is as old
+//! as the video delay; the camera's time is that of its arrival. The pipeline finishes it, with every command that it
+//! leads to sent over HTTP and answered, before the camera's time goes on.
+
+use std::time::Duration;
+
+use ptztrack_contract::{TargetMeta, TargetState};
+use virtual_camera::{Clock, Picture, VirtualCamera, World};
+
+use crate::{
+    album::Album,
+    experiment::{self, Experiment, Place},
+    film,
+    pipeline::{Pipeline, PipelineError, SINK, SOURCE},
+    record::{Bounds, Estimate, FrameRecord, Run},
+    still,
+    trackers::{Cue, Phase, Tracker},
+};
+
+/// Why an experiment came to no end.
+#[derive(Debug, thiserror::Error)]
+pub(crate) enum RunError {
+    #[error("virtual camera: {0}")]
+    Camera(#[from] virtual_camera::Error),
+    #[error("virtual camera: {0}")]
+    Picture(#[from] virtual_camera::FootageError),
+    #[error(transparent)]
+    Pipeline(#[from] PipelineError),
+    #[error("pictures of {0}x{1} cannot be made")]
+    Size(u32, u32),
+    #[error("the person is never wholly in the first view")]
+    Nobody,
+}
+
+/// Runs one experiment from the start of its world to its end. A fault ends it early and is told in the run.
+pub fn run(experiment: &Experiment) -> Run {
+    let mut run = experiment.blank();
+    let driven = match &experiment.scene.place {
+        Place::World(world) => drive(experiment, world, &mut run),
+        Place::Recording(recording) => still::drive(experiment, recording, &mut run),
+    };
+    if let Err(error) = driven {
+        run.error = Some(error.to_string());
+    }
+    run
+}
+
+fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), RunError> {
+    let mut stage = Stage::set(experiment, world)?;
+    let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
+    let period = stage.camera.frame_period();
+    run.frame_rate = 1.0 / period.as_secs_f64();
+    let mut album = Album::default();
+    for number in experiment.pictures(period) {
+        let (record, picture) = stage.picture(number, first)?;
+        if number >= first {
+            album.look(run.frames.len(), &record, picture);
+            run.frames.push(record);
+        }
+    }
+    if experiment.film.is_some() {
+        stage.pipeline.end()?;
+    }
+    run.snapshots = album.develop(&stage.info)?;
+    Ok(())
+}
+
+/// Camera, pipeline and tracker of one run.
+struct Stage<'a> {
+    experiment: &'a Experiment,
+    camera: VirtualCamera,
+    pipeline: Pipeline,
+    tracker: Tracker,
+    info: gst_video::VideoInfo,
+    /// Number of the last command that was counted.
+    counted: u64,
+}
+
+impl<'a> Stage<'a> {
+    fn set(experiment: &'a Experiment, world: &World) -> Result<Self, RunError> {
+        let camera = experiment.camera(world, Clock::Stepped)?;
+        let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
+        let (width, height) = experiment.size;
+        let rate = gst::Fraction::approximate_f64(1.0 / camera.frame_period().as_secs_f64());
+        let info = gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, width, height)
+            .fps(rate.unwrap_or(gst::Fraction::new(25, 1)))
+            .par(gst::Fraction::new(1, 1))
+            .build()
+            .map_err(|_| RunError::Size(width, height))?;
+        let sink = if tracker.steers() {
+            format!(
+                "vapixptzsink name={SINK} location={} lockstep=true timeout=60000 {}",
+                camera.url(),
+                tracker.servo()
+            )
+        } else {
+            format!("fakesink name={SINK} sync=false async=false")
+        };
+        let sink = experiment.film.as_ref().map_or(sink.clone(), |file| film::description(&sink, file));
+        let (codec, elements) = (experiment.codec.description(), tracker.description());
+        let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
+        let pipeline = Pipeline::new(&description, &info)?;
+        experiment.codec.attach(pipeline.bin())?;
+        tracker.attach(pipeline.bin())?;
+        if experiment.film.is_some() {
+            film::attach(pipeline.bin(), tracker.cue(), &info)?;
+        }
+        pipeline.start()?;
+        Ok(Self { experiment, camera, pipeline, tracker, info, counted: 0 })
+    }
+
+    /// Takes picture `number` and sends it through.
+    fn picture(&mut self, number: u32, first: u32) -> Result<(FrameRecord, Picture), RunError> {
+        let (period, size) = (self.camera.frame_period(), self.experiment.size);
+        let exposure = experiment::exposure(number, period);
+        let arrival = exposure + self.experiment.delays.video;
+        self.camera.advance_to(arrival);
+        let (truth, others) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
+        let pose = self.camera.pose_at(exposure);
+        let phase = match number.cmp(&first) {
+            std::cmp::Ordering::Less => Phase::Before,
+            std::cmp::Ordering::Equal => Phase::FirstBox,
+            std::cmp::Ordering::Greater => Phase::After,
+        };
+        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), size })?;
+        let picture = self.camera.picture(exposure, size)?;
+        let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
+        let record = FrameRecord {
+            time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
+            truth,
+            others,
+            estimate: target.map(|target| estimate(&target, size)),
+            size,
+            pan_deg: pose.pan_deg,
+            tilt_deg: pose.tilt_deg,
+            zoom: pose.zoom_step,
+            commands: self.count_commands(),
+        };
+        Ok((record, picture))
+    }
+
+    fn buffer(&self, picture: &Picture, arrival: Duration) -> Result<gst::Buffer, RunError> {
+        let (width, height) = self.experiment.size;
+        let mut buffer = picture.to_buffer(&self.info).ok_or(RunError::Size(width, height))?;
+        if let Some(buffer) = buffer.get_mut() {
+            buffer.set_pts(clock_time(arrival));
+            buffer.set_duration(clock_time(self.camera.frame_period()));
+        }
+        Ok(buffer)
+    }
+
+    /// Commands that arrived since the last call; questions do not count.
+    fn count_commands(&mut self) -> u32 {
+        let commands = self.camera.commands_after(self.counted);
+        self.counted = commands.last().map_or(self.counted, |command| command.number);
+        commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
+    }
+}
+
+fn clock_time(time: Duration) -> gst::ClockTime {
+    gst::ClockTime::from_nseconds(time.as_nanos() as u64)
+}
+
+/// What a tracker said, in pixels.
+pub(crate) fn estimate(target: &TargetMeta, size: (u32, u32)) -> Estimate {
+    let (width, height) = (f64::from(size.0), f64::from(size.1));
+    let followed = matches!(target.state, TargetState::Tracking | TargetState::Occluded);
+    Estimate {
+        state: target.state,
+        centroid: (target.centroid.x * width, target.centroid.y * height),
+        bounds: Bounds {
+            left: target.bounds.x * width,
+            top: target.bounds.y * height,
+            width: target.bounds.width * width,
+            height: target.bounds.height * height,
+        },
+        id: if followed { target.id } else { 0 },
+        features: target.features.iter().filter(|feature| feature.kept).count(),
+    }
+}

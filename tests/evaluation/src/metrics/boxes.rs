@@ -1,0 +1,42 @@
+//! What trackers are judged by on a recording from a camera that stands still (Wu, Lim and Yang, "Online object
+//! tracking: a benchmark", 2013).
+
+use super::{contains_target, distance, mean, tracked};
+use crate::record::{Bounds, FrameRecord};
+
+/// How far apart the middles of two boxes may be, pixels.
+const NEAR_PX: f64 = 20.0;
+
+/// Success: the area under the success plot, which is the mean overlap (intersection over union) of the two boxes over
+/// the frames that contain the target; zero where nothing is tracked.
+pub fn success(frames: &[FrameRecord]) -> Option<f64> {
+    let overlaps: Vec<_> = frames.iter().filter(|frame| contains_target(frame)).map(overlap).collect();
+    mean(&overlaps)
+}
+
+/// Precision at 20 pixels: share of the frames that contain the target in which the middles of the boxes are near.
+pub fn box_precision(frames: &[FrameRecord]) -> Option<f64> {
+    let near = |frame: &FrameRecord| f64::from(u8::from(is_near(frame)));
+    let near: Vec<_> = frames.iter().filter(|frame| contains_target(frame)).map(near).collect();
+    mean(&near)
+}
+
+/// The true and the tracked box.
+fn boxes(frame: &FrameRecord) -> Option<(Bounds, Bounds)> {
+    tracked(frame)?;
+    Some((frame.truth.as_ref()?.bounds, frame.estimate.as_ref()?.bounds))
+}
+
+fn is_near(frame: &FrameRecord) -> bool {
+    let middle = |b: Bounds| (b.left + b.width / 2.0, b.top + b.height / 2.0);
+    boxes(frame).is_some_and(|(truth, ours)| distance(middle(truth), middle(ours)) <= NEAR_PX)
+}
+
+fn overlap(frame: &FrameRecord) -> f64 {
+    let Some((a, b)) = boxes(frame) else { return 0.0 };
+    let common = |from: (f64, f64), to: (f64, f64)| (from.1.min(to.1) - from.0.max(to.0)).max(0.0);
+    let wide = common((a.left, a.left + a.width), (b.left, b.left + b.width));
+    let high = common((a.top, a.top + a.height), (b.top, b.top + b.height));
+    let union = a.width * a.height + b.width * b.height - wide * high;
+    if union > 0.0 { wide * high / union } else { 0.0 }
+}

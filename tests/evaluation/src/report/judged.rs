@@ -1,0 +1,132 @@
+//! Runs with their metrics, in an order that does not depend on which ended first.
+
+use std::fmt;
+
+use super::thesis::{self, Row};
+use crate::{
+    metrics::Metrics,
+    record::{Codec, Delays, FirstBox, Run, TestId, TrackerName},
+};
+
+/// What makes runs comparable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Setup {
+    /// Only one point of a series over the delay.
+    pub sweep: bool,
+    /// Number of the world.
+    pub seed: u64,
+    /// What the pictures go through.
+    pub codec: Codec,
+    /// Width and height in pixels.
+    pub size: (u32, u32),
+    /// Who draws the first box.
+    pub first_box: FirstBox,
+    /// How late things are.
+    pub delays: Delays,
+}
+
+impl Setup {
+    fn of(run: &Run) -> Self {
+        let Run { sweep, seed, codec, size, first_box, delays, .. } = *run;
+        Self { sweep, seed, codec, size, first_box, delays }
+    }
+
+    /// Name of a folder.
+    pub fn folder(&self) -> String {
+        let Self { seed, codec, size: (width, height), first_box, delays, sweep } = self;
+        let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
+        let sweep = if *sweep { "sweep-" } else { "" };
+        format!("{sweep}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms")
+    }
+}
+
+impl fmt::Display for Setup {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { seed, codec, size: (width, height), first_box, delays, .. } = self;
+        let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
+        write!(
+            f,
+            "seed {seed}, {codec}, {width}x{height}, first box {first_box}, delays: video {video} ms, command {command} ms"
+        )
+    }
+}
+
+/// A run and what it is judged by.
+pub struct Judged<'a> {
+    /// What was run.
+    pub run: &'a Run,
+    /// With what it is comparable.
+    pub setup: Setup,
+    /// What came out.
+    pub metrics: Metrics,
+}
+
+impl<'a> Judged<'a> {
+    /// All of them, sorted.
+    pub fn all(runs: &'a [Run]) -> Vec<Self> {
+        let mut all: Vec<_> =
+            runs.iter().map(|run| Self { run, setup: Setup::of(run), metrics: Metrics::of(run) }).collect();
+        all.sort_by_key(|one| (one.setup, one.run.test, &one.run.title, one.run.tracker));
+        all
+    }
+
+    /// The thesis' row of the same test.
+    pub fn printed(&self) -> Option<&'static Row> {
+        thesis::row_of(self.run.test?)
+    }
+
+    /// Name of a file.
+    pub fn file(&self) -> String {
+        format!("{}-{}", slug(&self.run.title), self.run.tracker)
+    }
+}
+
+/// A title as part of a file name.
+pub fn slug(title: &str) -> String {
+    title.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect()
+}
+
+/// Comparable runs.
+pub struct Section<'a> {
+    /// What they have in common.
+    pub setup: Setup,
+    /// In order of test and tracker.
+    pub runs: &'a [Judged<'a>],
+}
+
+impl<'a> Section<'a> {
+    /// Sorted runs, cut where the setup changes.
+    pub fn all(judged: &'a [Judged<'a>]) -> Vec<Self> {
+        let same = |a: &Judged, b: &Judged| a.setup == b.setup;
+        judged.chunk_by(same).map(|runs| Self { setup: runs[0].setup, runs }).collect()
+    }
+
+    /// Who was run, in the order of the tables.
+    pub fn trackers(&self) -> impl Iterator<Item = TrackerName> {
+        TrackerName::ALL.iter().copied().filter(|name| self.of(*name).next().is_some())
+    }
+
+    /// The runs of one tracker.
+    pub fn of(&self, tracker: TrackerName) -> impl Iterator<Item = &'a Judged<'a>> + use<'a> {
+        self.runs.iter().filter(move |judged| judged.run.tracker == tracker)
+    }
+
+    /// What was shown, each once.
+    pub fn titles(&self) -> Vec<(Option<TestId>, &'a str)> {
+        let mut titles: Vec<_> = self.runs.iter().map(|one| (one.run.test, one.run.title.as_str())).collect();
+        titles.dedup();
+        titles
+    }
+
+    /// The runs of what was shown.
+    pub fn showing(&self, title: &str) -> impl Iterator<Item = &'a Judged<'a>> + use<'a, '_> {
+        let title = title.to_owned();
+        self.runs.iter().filter(move |judged| judged.run.title == title)
+    }
+
+    /// The thesis' rows of the tests that were run.
+    pub fn printed(&self) -> Vec<&'static Row> {
+        let was_run = |row: &&Row| self.runs.iter().any(|one| one.run.test == Some(row.test));
+        thesis::rows().iter().filter(was_run).collect()
+    }
+}

@@ -1,0 +1,196 @@
+//! Plots, drawn by gnuplot where it is installed.
+
+use std::{
+    fs,
+    io::{self, Write},
+    path::Path,
+    process::{Command, Stdio},
+};
+
+use super::{
+    column::{self, Column},
+    judged::{Judged, Section, slug},
+    tables::swept,
+};
+use crate::{
+    metrics::{d_gc, d_gp, is_hidden},
+    record::{FrameRecord, TrackerName},
+};
+
+/// A picture that is still to be drawn.
+pub struct Plot {
+    /// Name of the file without folder.
+    pub file: String,
+    /// What it shows.
+    pub caption: String,
+    script: String,
+}
+
+impl Plot {
+    /// d_gc and d_gp over time of all trackers in one test, as in the thesis' figures 5.10 to 5.13.
+    pub fn over_time(section: &Section, title: &str) -> Self {
+        let runs: Vec<&Judged> = section.showing(title).collect();
+        let file = format!("time-{}-{}.png", slug(title), section.setup.folder());
+        let panel = |block: &str, axis: &str, top: &str| {
+            let data = runs.iter().map(|one| Curve::of(block, one.run.tracker));
+            format!("set ylabel \"{axis}\"\nset yrange [0:{top}]\n{}", plot(data))
+        };
+        let data: String = runs
+            .iter()
+            .map(|one| {
+                block("gc", one.run.tracker, &one.run.frames, d_gc)
+                    + &block("gp", one.run.tracker, &one.run.frames, d_gp)
+            })
+            .collect();
+        let hidden: String = runs.first().map(|one| shade_hidden(&one.run.frames)).unwrap_or_default();
+        let header = header(&file, 800, "seconds since the first box");
+        let last = runs.iter().filter_map(|one| one.run.frames.last()).map(|frame| frame.time_s);
+        // A range of nothing is an error.
+        let end = last.fold(0.1, f64::max);
+        let title = title.replace('\'', "''");
+        let frame =
+            format!("set xrange [0:{end:.3}]\nset multiplot layout 2, 1 title '{title}' noenhanced\n");
+        let above = panel("gc", "d_{gc} (1: surely outside)", "*<1.5");
+        let below = panel("gp", "d_{gp} (while tracking)", "0.05<*<0.75");
+        Self {
+            caption: format!(
+                "{title}: d_gc (above) and d_gp (below) over time; grey: the person is wholly hidden"
+            ),
+            script: format!("{header}{data}{hidden}{frame}{above}{below}unset multiplot\n"),
+            file,
+        }
+    }
+
+    /// A figure against the delay of a sweep.
+    pub fn against_delay(sweep: &[Section], column: &Column) -> Self {
+        let file = format!("delay-{}.png", column.key);
+        let trackers = swept(sweep);
+        let data: String = trackers
+            .iter()
+            .map(|name| {
+                let points = sweep.iter().map(|section| {
+                    let mean = column.mean(section.of(*name).map(|one| &one.metrics));
+                    (section.setup.delays.total().as_secs_f64() * 1e3, mean)
+                });
+                datablock("delay", *name, points)
+            })
+            .collect();
+        let curves = plot(trackers.iter().map(|name| Curve { points: true, ..Curve::of("delay", *name) }));
+        let header = header(&file, 450, "delay of video and command together, ms");
+        Self {
+            caption: format!("{} against delay", column.heading),
+            script: format!(
+                "{header}{data}set ylabel \"{}\"\nset yrange [0:*]\n{curves}",
+                subscripts(column.heading)
+            ),
+            file,
+        }
+    }
+
+    /// Draws it into a folder.
+    ///
+    /// # Errors
+    /// Where gnuplot is missing or fails.
+    pub fn draw(&self, folder: &Path) -> io::Result<()> {
+        // One of an earlier run would otherwise be taken for this one's.
+        match fs::remove_file(folder.join(&self.file)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+        let mut gnuplot = Command::new("gnuplot")
+            .current_dir(folder)
+            .stdin(Stdio::piped())
+            .stderr(Stdio::null())
+            .spawn()?;
+        if let Some(mut input) = gnuplot.stdin.take() {
+            input.write_all(self.script.as_bytes())?;
+        }
+        let status = gnuplot.wait()?;
+        if status.success() { Ok(()) } else { Err(io::Error::other(format!("gnuplot failed ({status})"))) }
+    }
+}
+
+/// Both figures that the delay spoils.
+pub const AGAINST_DELAY: [Column; 2] = [column::MEAN_DGC, column::TF];
+
+struct Curve {
+    block: String,
+    tracker: TrackerName,
+    points: bool,
+}
+
+impl Curve {
+    fn of(block: &str, tracker: TrackerName) -> Self {
+        Self { block: format!("${block}_{tracker}"), tracker, points: false }
+    }
+}
+
+fn header(file: &str, height: u32, x: &str) -> String {
+    format!(
+        "set terminal pngcairo size 1200, {height} font \"DejaVu Sans,11\" background \"white\"\n\
+         set output \"{file}\"\nset grid back linecolor rgb \"#dddddd\"\n\
+         set key outside right top vertical\nset xlabel \"{x}\"\n"
+    )
+}
+
+/// One line a tracker, ours the thickest.
+fn plot(curves: impl Iterator<Item = Curve>) -> String {
+    let curves: Vec<_> = curves
+        .map(|Curve { block, tracker, points }| {
+            let with = if points { "linespoints pointtype 7" } else { "lines" };
+            let width = if tracker == TrackerName::Ptztrack { 3 } else { 2 };
+            let colour = colour(tracker);
+            format!("{block} using 1:2 with {with} linewidth {width} linecolor rgb \"{colour}\" title \"{tracker}\"")
+        })
+        .collect();
+    if curves.is_empty() { String::new() } else { format!("plot {}\n", curves.join(", \\\n  ")) }
+}
+
+fn block(
+    name: &str,
+    tracker: TrackerName,
+    frames: &[FrameRecord],
+    of: fn(&FrameRecord) -> Option<f64>,
+) -> String {
+    datablock(name, tracker, frames.iter().map(|frame| (frame.time_s, of(frame))))
+}
+
+/// Data in the script itself; no line is drawn across what is missing.
+fn datablock(name: &str, tracker: TrackerName, points: impl Iterator<Item = (f64, Option<f64>)>) -> String {
+    let line = |(x, y): (f64, Option<f64>)| match y {
+        Some(y) => format!("{x:.6} {y:.6}\n"),
+        None => format!("{x:.6} NaN\n"),
+    };
+    format!("${name}_{tracker} << END\n{}END\n", points.map(line).collect::<String>())
+}
+
+fn shade_hidden(frames: &[FrameRecord]) -> String {
+    let stretches =
+        frames.chunk_by(|a, b| is_hidden(a) == is_hidden(b)).filter(|stretch| is_hidden(&stretch[0]));
+    stretches
+        .filter_map(|stretch| {
+            let (from, to) = (stretch.first()?.time_s, stretch.last()?.time_s);
+            Some(format!(
+                "set object rectangle from {from:.3}, graph 0 to {to:.3}, graph 1 behind fillcolor rgb \"#dddddd\" fillstyle solid noborder\n"
+            ))
+        })
+        .collect()
+}
+
+fn subscripts(heading: &str) -> String {
+    heading.replace("d_gc", "d_{gc}").replace("d_gp", "d_{gp}")
+}
+
+/// Told apart by people who do not see red or green, too (Okabe and Ito).
+pub fn colour(tracker: TrackerName) -> &'static str {
+    match tracker {
+        TrackerName::Ptztrack => "#0072b2",
+        TrackerName::Thesis => "#d55e00",
+        TrackerName::Csrt => "#009e73",
+        TrackerName::Kcf => "#cc79a7",
+        TrackerName::Mosse => "#e69f00",
+        TrackerName::MedianFlow => "#56b4e9",
+        TrackerName::Oracle => "#000000",
+        TrackerName::Still => "#999999",
+    }
+}

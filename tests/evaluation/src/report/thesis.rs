@@ -1,0 +1,130 @@
+//! The figures of the thesis, tables 5.2 and 5.3, to stand beside ours.
+
+use std::sync::LazyLock;
+
+use crate::{metrics::Metrics, record::TestId};
+
+/// Table 5.3 with the conditions of table 5.2.
+const TABLE: &str = include_str!("../../thesis.csv");
+
+/// One of the 72 tests.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Its number.
+    pub test: TestId,
+    /// What was varied.
+    pub conditions: Conditions,
+    /// What the thesis measured; the rest of the metrics it does not give.
+    pub metrics: Metrics,
+}
+
+/// Table 5.2, in its own words.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Conditions {
+    /// `optimal` or `dim`.
+    pub lighting: &'static str,
+    /// `none`, `partial` or `full`.
+    pub occlusion: &'static str,
+    /// `fixed` or `variable`.
+    pub speed: &'static str,
+    /// `fixed` or `variable`.
+    pub direction: &'static str,
+    /// `a`, `b` or `c`.
+    pub subject: &'static str,
+}
+
+/// A kind of test over which figures are averaged.
+pub struct Condition {
+    /// For machines.
+    pub name: &'static str,
+    /// For people.
+    pub heading: &'static str,
+    /// Whether a test is one of them.
+    pub includes: fn(&Conditions) -> bool,
+}
+
+/// The kinds of test that the tables have a column for.
+pub const CONDITIONS: &[Condition] = &[
+    Condition { name: "all", heading: "all", includes: |_| true },
+    Condition { name: "lighting=optimal", heading: "optimal light", includes: |c| c.lighting == "optimal" },
+    Condition { name: "lighting=dim", heading: "dim light", includes: |c| c.lighting == "dim" },
+    Condition { name: "occlusion=none", heading: "no occlusion", includes: |c| c.occlusion == "none" },
+    Condition {
+        name: "occlusion=partial",
+        heading: "partial occlusion",
+        includes: |c| c.occlusion == "partial",
+    },
+    Condition { name: "occlusion=full", heading: "full occlusion", includes: |c| c.occlusion == "full" },
+    Condition { name: "speed=fixed", heading: "fixed speed", includes: |c| c.speed == "fixed" },
+    Condition { name: "speed=variable", heading: "variable speed", includes: |c| c.speed == "variable" },
+    Condition { name: "direction=fixed", heading: "fixed direction", includes: |c| c.direction == "fixed" },
+    Condition {
+        name: "direction=variable",
+        heading: "variable direction",
+        includes: |c| c.direction == "variable",
+    },
+    Condition { name: "subject=a", heading: "subject A", includes: |c| c.subject == "a" },
+    Condition { name: "subject=b", heading: "subject B", includes: |c| c.subject == "b" },
+    Condition { name: "subject=c", heading: "subject C", includes: |c| c.subject == "c" },
+];
+
+/// All rows, in order of their numbers.
+pub fn rows() -> &'static [Row] {
+    static ROWS: LazyLock<Vec<Row>> = LazyLock::new(|| TABLE.lines().skip(1).filter_map(row).collect());
+    &ROWS
+}
+
+/// The row of a test.
+pub fn row_of(test: TestId) -> Option<&'static Row> {
+    rows().iter().find(|row| row.test == test)
+}
+
+fn row(line: &'static str) -> Option<Row> {
+    let cells: Vec<&str> = line.split(',').collect();
+    let [test, lighting, occlusion, speed, direction, subject, figures @ ..] = cells.as_slice() else {
+        return None;
+    };
+    let figures: Vec<f64> = figures.iter().map(|cell| cell.parse().ok()).collect::<Option<_>>()?;
+    let &[precision, detection_precision, fragmentation, mean_dgc, var_dgc, mean_dgp, var_dgp] =
+        figures.as_slice()
+    else {
+        return None;
+    };
+    Some(Row {
+        test: TestId(test.parse().ok()?),
+        conditions: Conditions { lighting, occlusion, speed, direction, subject },
+        metrics: Metrics {
+            precision: Some(precision / 100.0),
+            detection_precision: Some(detection_precision / 100.0),
+            track_fragmentation: Some(fragmentation / 100.0),
+            mean_dgc: Some(mean_dgc),
+            var_dgc: Some(var_dgc),
+            mean_dgp: Some(mean_dgp),
+            var_dgp: Some(var_dgp),
+            ..Metrics::default()
+        },
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_rows_are_read_in_order() {
+        assert!(rows().iter().map(|row| row.test).eq(TestId::all()));
+        let seven = row_of(TestId(7)).unwrap();
+        assert_eq!((seven.conditions.occlusion, seven.conditions.subject), ("partial", "a"));
+        assert_eq!(row_of(TestId(1)).unwrap().metrics.mean_dgp, Some(0.062754));
+        assert_eq!(row_of(TestId(73)), None);
+    }
+
+    #[test]
+    fn the_tests_are_a_full_factorial() {
+        let sizes: Vec<_> = CONDITIONS
+            .iter()
+            .map(|condition| rows().iter().filter(|row| (condition.includes)(&row.conditions)).count())
+            .collect();
+        assert_eq!(sizes, [72, 36, 36, 24, 24, 24, 36, 36, 36, 36, 24, 24, 24]);
+    }
+}

@@ -1,0 +1,161 @@
+//! What follows the person: each a few elements between decoder and servo, and the same first box for all.
+
+use std::sync::{Arc, Mutex};
+
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
+
+use crate::{
+    pipeline::{PipelineError, lock},
+    record::{Bounds, FirstBox, GroundTruth, TrackerName},
+};
+
+mod bounds;
+mod ours;
+mod stock;
+
+/// Where a picture stands in its run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Phase {
+    /// Nobody is to be followed yet.
+    Before,
+    /// The picture of the first box.
+    FirstBox,
+    /// Any picture after it.
+    After,
+}
+
+/// What is known of the picture that comes next. The bounds see the truth; everybody else sees it once, in the
+/// picture of the first box.
+#[derive(Debug, Clone)]
+pub(crate) struct Cue {
+    pub phase: Phase,
+    pub truth: Option<GroundTruth>,
+    pub size: (u32, u32),
+}
+
+/// The cue of the picture that is under way.
+pub(crate) type CurrentCue = Arc<Mutex<Cue>>;
+
+impl Cue {
+    pub fn new(size: (u32, u32)) -> Self {
+        Self { phase: Phase::Before, truth: None, size }
+    }
+
+    /// The box that trackers are given with this picture.
+    fn given(&self) -> Option<Bounds> {
+        self.truth.as_ref().filter(|_| self.phase == Phase::FirstBox).map(|truth| truth.bounds)
+    }
+}
+
+/// A tracker's part in one pipeline.
+pub(crate) struct Tracker {
+    name: TrackerName,
+    first_box: FirstBox,
+    cue: CurrentCue,
+}
+
+impl Tracker {
+    pub fn new(name: TrackerName, first_box: FirstBox, size: (u32, u32)) -> Self {
+        Self { name, first_box, cue: Arc::new(Mutex::new(Cue::new(size))) }
+    }
+
+    /// What it is told of the picture that is under way.
+    pub fn cue(&self) -> &CurrentCue {
+        &self.cue
+    }
+
+    /// Its elements, from decoded pictures to pictures with or without a target meta.
+    pub fn description(&self) -> String {
+        match self.name {
+            TrackerName::Ptztrack => ours::DEFAULTS.to_owned(),
+            TrackerName::Thesis => ours::THESIS.to_owned(),
+            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
+                stock::description(self.name)
+            }
+            TrackerName::Oracle | TrackerName::Still => "identity name=tracker".to_owned(),
+        }
+    }
+
+    /// What the servo is set to beside what is the same for all.
+    pub fn servo(&self) -> &'static str {
+        match self.name {
+            TrackerName::Thesis => "prediction=average",
+            _ => "",
+        }
+    }
+
+    /// Whether it moves the camera.
+    pub fn steers(&self) -> bool {
+        self.name != TrackerName::Still
+    }
+
+    /// Puts up its probes.
+    pub fn attach(&self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
+        match self.name {
+            TrackerName::Ptztrack | TrackerName::Thesis => ours::attach(pipeline, self.first_box, &self.cue),
+            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
+                stock::attach(pipeline, &self.cue)
+            }
+            TrackerName::Oracle | TrackerName::Still => bounds::attach(pipeline, &self.cue),
+        }
+    }
+
+    /// To be called before each picture.
+    pub fn next(&self, pipeline: &gst::Pipeline, cue: Cue) -> Result<(), PipelineError> {
+        *lock(&self.cue) = cue.clone();
+        match self.name {
+            TrackerName::Ptztrack | TrackerName::Thesis => ours::next(pipeline, self.first_box, &cue),
+            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
+                stock::next(pipeline, &cue)
+            }
+            TrackerName::Oracle | TrackerName::Still => Ok(()),
+        }
+    }
+}
+
+/// Why `name` cannot run here: `None` where it can.
+pub fn missing(name: TrackerName) -> Option<String> {
+    let stock =
+        matches!(name, TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow);
+    (stock && gst::ElementFactory::find("cvtracker").is_none())
+        .then(|| format!("{name} is skipped: GStreamer has no `cvtracker`; install gstreamer1.0-opencv"))
+}
+
+/// A box in frame sizes.
+fn normalised(bounds: Bounds, size: (u32, u32)) -> Rect {
+    let (width, height) = (f64::from(size.0), f64::from(size.1));
+    Rect {
+        x: bounds.left / width,
+        y: bounds.top / height,
+        width: bounds.width / width,
+        height: bounds.height / height,
+    }
+}
+
+/// A place in a picture, in frame sizes, and the picture's time.
+type Place = (Point, Option<gst::ClockTime>);
+
+/// Motion from one place to another, in frame sizes a second; `None` where no time passed.
+fn rate(from: Place, to: Place) -> Option<Vector> {
+    let step_s = to.1.zip(from.1).and_then(|(now, then)| now.checked_sub(then))?.seconds_f64();
+    (step_s > 0.0).then(|| Vector { x: (to.0.x - from.0.x) / step_s, y: (to.0.y - from.0.y) / step_s })
+}
+
+/// Lets `say` put a target meta onto every picture that passes `pad`.
+fn attach_targets(
+    pad: &gst::Pad,
+    cue: &CurrentCue,
+    say: impl Fn(&Cue, &mut gst::BufferRef) -> TargetMeta + Send + Sync + 'static,
+) {
+    let cue = cue.clone();
+    pad.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        if let Some(buffer) = info.buffer_mut().map(gst::Buffer::make_mut) {
+            let target = say(&lock(&cue), buffer);
+            if let Err(error) = target.attach(buffer) {
+                gst::error!(gst::CAT_DEFAULT, "no target meta: {error}");
+            }
+        }
+        gst::PadProbeReturn::Ok
+    });
+}

@@ -1,0 +1,64 @@
+//! Detector and feature point tracker, with their defaults or as the thesis has them.
+//!
+//! Until the first box the tracker is told to wait for an operator, while the detector learns the background. The first
+//! box is given in the place of what the detector saw in that picture, and a click into its middle takes it. From
+//! the next picture on the tracker chooses for itself, so that it can find the person again after a loss.
+
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, MotionMeta, Region};
+
+use super::{Cue, CurrentCue, Phase, normalised};
+use crate::{
+    pipeline::{Elements, PipelineError, lock},
+    record::FirstBox,
+};
+
+/// Ours as it stands.
+pub(super) const DEFAULTS: &str = "bgavgdetect ! lkfeaturetrack name=tracker";
+
+/// Thesis 3.2 to 3.5, no more: every picture weighs the same, at its own size, and a region counts as soon as it is
+/// seen and as it is seen.
+pub(super) const THESIS: &str = "bgavgdetect alpha-interval=0 shed-trail=false confirm-frames=1 analysis-width=0 \
+                                 ! lkfeaturetrack name=tracker profile=thesis confirm-frames=1";
+
+/// How the tracker chooses by itself: its default.
+const CHOICE: &str = "largest";
+
+pub(super) fn attach(
+    pipeline: &gst::Pipeline,
+    first_box: FirstBox,
+    cue: &CurrentCue,
+) -> Result<(), PipelineError> {
+    if first_box == FirstBox::Detected {
+        return Ok(());
+    }
+    pipeline.element("tracker")?.set_property_from_str("selection", "manual");
+    let cue = cue.clone();
+    pipeline.pad("tracker", "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        let cue = lock(&cue);
+        if let Some((bounds, buffer)) = cue.given().zip(info.buffer_mut().map(gst::Buffer::make_mut)) {
+            let region = Region { bounds: normalised(bounds, cue.size), ..Region::default() };
+            if let Err(error) = (MotionMeta { regions: vec![region] }).attach(buffer) {
+                gst::error!(gst::CAT_DEFAULT, "no first box: {error}");
+            }
+        }
+        gst::PadProbeReturn::Ok
+    });
+    Ok(())
+}
+
+pub(super) fn next(pipeline: &gst::Pipeline, first_box: FirstBox, cue: &Cue) -> Result<(), PipelineError> {
+    if first_box == FirstBox::Detected {
+        return Ok(());
+    }
+    let tracker = pipeline.element("tracker")?;
+    match (cue.phase, cue.given()) {
+        (Phase::FirstBox, Some(bounds)) => {
+            let middle = normalised(bounds, cue.size).centre();
+            tracker.emit_by_name::<()>("select-target", &[&middle.x, &middle.y]);
+        }
+        (Phase::After, _) => tracker.set_property_from_str("selection", CHOICE),
+        (Phase::Before | Phase::FirstBox, _) => {}
+    }
+    Ok(())
+}

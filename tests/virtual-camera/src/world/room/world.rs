@@ -1,0 +1,214 @@
+//! Scene, person and sensor together: a world for the camera.
+
+use std::{sync::Arc, time::Duration};
+
+use super::{
+    scene::{Scene, Side},
+    sensor::{Sensor, soften},
+    settings::RoomSettings,
+    view::View,
+    walker::{BodyPose, Walker},
+};
+use crate::{
+    geometry::{Pinhole, aim},
+    kinematics::{Limits, Optics, Pose},
+    picture::{Picture, Plane},
+    seeded::Seeded,
+    settings::Settings,
+    truth::{Bounds, GroundTruth, Mask},
+    world::{Exposure, FootageError, World, blur::motion_blur},
+};
+
+const FRAME_RATE: u64 = 25;
+const VIEW_SIZE: (u32, u32) = (640, 480);
+/// Horizontal fields of view from 55° to 3°.
+const WIDE_FOV_DEG: f64 = 55.0;
+const MAX_MAGNIFICATION: f64 = 19.885;
+/// The camera hangs: it looks down further than up.
+const LIMITS: Limits = Limits { pan_deg: (-170.0, 170.0), tilt_deg: (-80.0, 20.0) };
+/// What the overview shows: the whole of the person's way.
+const OVERVIEW_SIZE: (u32, u32) = (1280, 480);
+const OVERVIEW_FOV_DEG: f64 = 130.0;
+const OVERVIEW_POSE: Pose = Pose { pan_deg: 0.0, tilt_deg: -10.0, zoom_step: 1.0 };
+/// A body is measured in no more pixels than this across and down: one seen larger is measured as if it were smaller.
+const MEASURED: f64 = 400.0;
+/// Stream of chance of the sensor.
+const SENSOR: u64 = 0x5e25;
+
+/// A room with a person in it.
+pub(crate) struct Room {
+    scene: Scene,
+    walker: Walker,
+    sensor: Sensor,
+    optics: Optics,
+    view_size: (u32, u32),
+}
+
+impl Room {
+    pub fn new(room: &RoomSettings, settings: &Settings) -> Self {
+        let seeded = Seeded::new(room.seed);
+        let walker = Walker::new(room);
+        let obstacle = walker.obstacle(room);
+        let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
+        Self {
+            scene: Scene::new(&seeded, obstacle.as_slice()),
+            walker,
+            sensor: Sensor::new(room.lighting, &seeded.fork(SENSOR).fork(u64::from(room.number()))),
+            optics: Optics { wide_fov_deg: WIDE_FOV_DEG, max_magnification },
+            view_size: settings.video.size.unwrap_or(VIEW_SIZE),
+        }
+    }
+
+    fn body_at(&self, time: Duration) -> BodyPose {
+        self.walker.pose_at(time.as_secs_f64())
+    }
+
+    fn view(&self, pose: &Pose, size: (u32, u32)) -> View {
+        View::new(pose, self.pinhole(pose.zoom_step, size), size)
+    }
+
+    /// The light of a view at a time, `sweep` pixels of movement included, as the sensor counts it.
+    fn take(&self, time: Duration, view: &View, sweep: (f64, f64)) -> Picture {
+        let body = self.body_at(time);
+        let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
+        self.scene.draw(Side::Behind, body.place, view, &mut canvas);
+        self.walker.draw_shadow(&body, view, &mut canvas);
+        self.walker.draw(&body, view, &self.scene.light, &mut canvas);
+        self.scene.draw(Side::Before, body.place, view, &mut canvas);
+        canvas.planes.iter_mut().for_each(soften);
+        motion_blur(&mut canvas, sweep.0, sweep.1);
+        self.sensor.expose(&mut canvas, self.frame_at(time), time.as_secs_f64());
+        canvas
+    }
+
+    /// What of the body is seen through a view: all of it, and what nothing hides.
+    fn body(&self, body: &BodyPose, view: &View) -> [Plane; 2] {
+        let mut whole = Plane::filled(view.size.0, view.size.1, 0);
+        self.walker.silhouette(body, view, &mut whole);
+        let mut unhidden = whole.clone();
+        self.scene.hide(body.place, view, &mut unhidden);
+        [whole, unhidden]
+    }
+
+    /// The person in a view, inside of it or not; `None` unless all of them is ahead of the camera.
+    fn person(&self, time: Duration, pose: &Pose, size: (u32, u32)) -> Option<GroundTruth> {
+        let (body, view) = (self.body_at(time), self.view(pose, size));
+        let [left, top, right, bottom] = self.walker.bounds(&body, &view)?;
+        let bounds = Bounds { left, top, width: right - left, height: bottom - top };
+        // A picture of the body alone, with a pixel around it.
+        let scale = (MEASURED / bounds.width.max(bounds.height)).min(1.0);
+        let pinhole = Pinhole {
+            focal: view.pinhole.focal * scale,
+            centre_x: (view.pinhole.centre_x + 0.5 - left) * scale + 0.5,
+            centre_y: (view.pinhole.centre_y + 0.5 - top) * scale + 0.5,
+        };
+        let length = |length: f64| (length * scale).ceil() as usize + 2;
+        let close = view.through(pinhole, (length(bounds.width), length(bounds.height)));
+        let [whole, unhidden] = self.body(&body, &close);
+        let place = |column: usize, row: usize| {
+            ((column as f64 - 0.5) / scale + left, (row as f64 - 0.5) / scale + top)
+        };
+        let all = Weight::of(&whole, |_, _| true);
+        let inside = |column, row| {
+            let (x, y) = place(column, row);
+            (0.0..f64::from(size.0)).contains(&x) && (0.0..f64::from(size.1)).contains(&y)
+        };
+        let share = |weight: Weight| if all.sum > 0.0 { weight.sum / all.sum } else { 0.0 };
+        let centroid = if all.sum > 0.0 {
+            let (column, row) = (all.columns / all.sum, all.rows / all.sum);
+            ((column - 0.5) / scale + left, (row - 0.5) / scale + top)
+        } else {
+            bounds.centre()
+        };
+        let ray = |place: f64, centre: f64| (place - 0.5 - centre) / view.pinhole.focal;
+        let (x, y) = (ray(centroid.0, view.pinhole.centre_x), ray(centroid.1, view.pinhole.centre_y));
+        Some(GroundTruth {
+            id: 1,
+            bounds,
+            centroid,
+            visible: share(Weight::of(&unhidden, inside)),
+            unhidden: share(Weight::of(&unhidden, |_, _| true)),
+            in_view: share(Weight::of(&whole, inside)),
+            position_m: Some(body.place),
+            direction_deg: Some(aim(pose, x, y)),
+        })
+    }
+}
+
+/// How much of a mask is set, and where.
+struct Weight {
+    sum: f64,
+    columns: f64,
+    rows: f64,
+}
+
+impl Weight {
+    /// Of the pixels (column, row) that are to be counted.
+    fn of(mask: &Plane, counted: impl Fn(usize, usize) -> bool) -> Self {
+        let mut weight = Self { sum: 0.0, columns: 0.0, rows: 0.0 };
+        for (row, line) in mask.data.chunks_exact(mask.width.max(1)).enumerate() {
+            for (column, &value) in line.iter().enumerate() {
+                if value > 0 && counted(column, row) {
+                    let value = f64::from(value);
+                    weight.sum += value;
+                    weight.columns += value * column as f64;
+                    weight.rows += value * row as f64;
+                }
+            }
+        }
+        weight
+    }
+}
+
+impl World for Room {
+    fn optics(&self) -> Optics {
+        self.optics
+    }
+
+    fn limits(&self) -> Limits {
+        LIMITS
+    }
+
+    fn view_size(&self) -> (u32, u32) {
+        self.view_size
+    }
+
+    fn frame_rate(&self) -> f64 {
+        FRAME_RATE as f64
+    }
+
+    fn frame_at(&self, time: Duration) -> u64 {
+        (time.as_nanos() * u128::from(FRAME_RATE) / 1_000_000_000) as u64
+    }
+
+    fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
+        let sweep = self.sweep(exposure, size);
+        Ok(self.take(exposure.time, &self.view(&exposure.opening, size), sweep))
+    }
+
+    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.person(exposure.time, &exposure.opening, size).into_iter().collect()
+    }
+
+    fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask> {
+        let [_, Plane { width, height, mut data }] =
+            self.body(&self.body_at(exposure.time), &self.view(&exposure.opening, size));
+        for pixel in &mut data {
+            *pixel = if *pixel > 127 { 255 } else { 0 };
+        }
+        Some(Mask { width, height, data })
+    }
+
+    fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
+        let (pose, pinhole) = self.overview_view();
+        Ok(Arc::new(self.take(time, &View::new(&pose, pinhole, OVERVIEW_SIZE), (0.0, 0.0))))
+    }
+
+    fn overview_size(&self) -> (u32, u32) {
+        OVERVIEW_SIZE
+    }
+
+    fn overview_view(&self) -> (Pose, Pinhole) {
+        (OVERVIEW_POSE, Pinhole::new(OVERVIEW_SIZE.0, OVERVIEW_SIZE.1, OVERVIEW_FOV_DEG))
+    }
+}
