@@ -20,7 +20,7 @@ use crate::{
     rtsp::RtspServer,
     sync::lock,
     truth::{GroundTruth, Mask},
-    vapix::{Answer, Args, device::Device},
+    vapix::{Answer, Args, device::Device, parse_args},
     world::{self, Exposure, FootageError, World},
 };
 
@@ -149,8 +149,28 @@ impl Camera {
         self.update(|state| state.device.ptz(args, self.now()))
     }
 
+    /// Runs `ptz.cgi` for the client with this cookie, if the control queue lets it.
+    pub fn queued_ptz(&self, args: &Args, cookie: Option<&str>) -> Answer {
+        self.update(|state| {
+            let (now, moves) = (self.now(), args.iter().all(|arg| arg.0 != "query"));
+            let queue = state.device.queue.as_mut();
+            match queue.and_then(|queue| queue.objection(cookie, moves, now)) {
+                Some(objection) => Answer::error(objection),
+                None => state.device.ptz(args, now),
+            }
+        })
+    }
+
+    /// Runs `ptzqueue.cgi`.
+    pub fn queue(&self, args: &Args, cookie: Option<&str>) -> Answer {
+        self.update(|state| match &mut state.device.queue {
+            Some(queue) => queue.answer(args, cookie, self.now()),
+            None => Answer::error("control queue is off"),
+        })
+    }
+
     /// Runs `param.cgi`.
-    pub fn param(&self, args: &Args) -> Answer {
+    pub fn param(&self, args: &Args, _cookie: Option<&str>) -> Answer {
         self.update(|state| state.device.param(args))
     }
 
@@ -353,6 +373,17 @@ impl VirtualCamera {
     /// Those after the one of this [`ReceivedCommand::number`].
     pub fn commands_after(&self, number: u64) -> Vec<ReceivedCommand> {
         self.camera.commands_after(number)
+    }
+
+    /// An operator at the camera's own controls: does what `ptz.cgi` would do with this query, past password, queue
+    /// and faults, and not among [`Self::commands`]. Returns whether the camera takes it.
+    pub fn operate(&self, query: &str) -> bool {
+        self.camera.ptz(&parse_args(query.as_bytes())) == Answer::Accepted
+    }
+
+    /// An operator goes to the front of the control queue, or leaves it. Without a queue nothing happens.
+    pub fn queue_operator(&self, there: bool) {
+        self.camera.update(|state| state.device.queue.as_mut().map(|queue| queue.operator(there)));
     }
 
     /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is not touched.

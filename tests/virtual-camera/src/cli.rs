@@ -98,6 +98,13 @@ pub struct Options {
     #[arg(long)]
     extended_api: bool,
 
+    /// Have a control queue, in which clients must ask at least every so many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(5..=3600))]
+    control_queue: Option<u32>,
+    /// Another preset, as Gate=10,-5,3868 (pan and tilt in degrees, zoom step); can be given again
+    #[arg(long = "preset", value_name = "NAME=PAN,TILT,ZOOM", value_parser = preset)]
+    presets: Vec<(String, Pose)>,
+
     /// Pan at the start and of the preset Home, in degrees to the right [default: 0; where the person comes in]
     #[arg(long, value_name = "DEGREES", allow_hyphen_values = true)]
     pan: Option<f64>,
@@ -159,6 +166,7 @@ impl TryFrom<Options> for Settings {
             },
             ptz_api: if options.extended_api { PtzApi::Extended } else { PtzApi::Classic },
             service_time: milliseconds(options.service_time),
+            control_queue: options.control_queue.map(|seconds| Duration::from_secs(seconds.into())),
             kinematics: options.kinematics(),
             video: Video {
                 size: options.size,
@@ -167,6 +175,7 @@ impl TryFrom<Options> for Settings {
                 delay: milliseconds(options.video_delay),
                 exposure: milliseconds(options.exposure),
             },
+            presets: options.presets,
             user: options.user,
             password: options.password,
             ..Self::default()
@@ -249,6 +258,16 @@ fn number(text: &str, range: std::ops::RangeInclusive<f64>) -> Result<f64, Strin
     } else {
         Err(format!("must be from {} to {}", range.start(), range.end()))
     }
+}
+
+fn preset(text: &str) -> Result<(String, Pose), String> {
+    let read = || {
+        let (name, place) = text.rsplit_once('=')?;
+        let numbers: Vec<f64> = place.split(',').map(|part| part.parse().ok()).collect::<Option<_>>()?;
+        let [pan_deg, tilt_deg, zoom_step] = numbers[..] else { return None };
+        Some((name.to_owned(), Pose { pan_deg, tilt_deg, zoom_step }))
+    };
+    read().ok_or_else(|| "must be like Gate=10,-5,3868".into())
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {
@@ -339,10 +358,25 @@ mod tests {
     }
 
     #[test]
+    fn presets_and_queue_are_options() {
+        let settings = settings("--control-queue 20 --preset Gate=10,-5,3868 --preset Door=0,0,1").unwrap();
+        assert_eq!(settings.control_queue, Some(Duration::from_secs(20)));
+        let gate = Pose { pan_deg: 10.0, tilt_deg: -5.0, zoom_step: 3868.0 };
+        assert_eq!(settings.presets[0], ("Gate".into(), gate));
+        assert_eq!(settings.presets.len(), 2);
+    }
+
+    #[test]
     fn nonsense_is_refused() {
-        for line in
-            ["--size 640", "--size 641x480", "--fps 0", "--view-width 2", "--auth maybe", "--start -1"]
-        {
+        for line in [
+            "--preset Gate=1,2",
+            "--size 640",
+            "--size 641x480",
+            "--fps 0",
+            "--view-width 2",
+            "--auth maybe",
+            "--start -1",
+        ] {
             let words = std::iter::once("virtual-camera").chain(line.split(' '));
             assert!(Options::try_parse_from(words).is_err(), "{line}");
         }

@@ -150,6 +150,11 @@ pub struct Settings {
     pub kinematics: Kinematics,
     /// What it sends.
     pub video: Video,
+    /// Named places to go to, besides `Home`; numbered from 2.
+    pub presets: Vec<(String, Pose)>,
+    /// Whether it has a control queue (`PTZ.Various.V1.CtlQueueing`): who is first in it moves the camera, and must
+    /// ask at least this often.
+    pub control_queue: Option<Duration>,
     /// Where it looks at first, and the preset `Home`; `None` is what suits the world.
     pub home: Option<Pose>,
     /// Who moves its time on.
@@ -171,6 +176,8 @@ impl Default for Settings {
             world: World::Synthetic(SyntheticSettings::default()),
             kinematics: Kinematics::default(),
             video: Video::default(),
+            presets: Vec::new(),
+            control_queue: None,
             home: None,
             clock: Clock::Real,
         }

@@ -1,4 +1,4 @@
-//! `ptz.cgi` and `param.cgi`, with the faults they can have.
+//! `ptz.cgi`, `ptzqueue.cgi` and `param.cgi`, with the faults they can have.
 
 use std::{future::pending, io, sync::Arc, time::Duration};
 
@@ -19,7 +19,7 @@ use super::{
 use crate::{
     Fault,
     camera::Camera,
-    vapix::{Answer, Args, parse_args},
+    vapix::{Answer, Args, parse_args, queue::Queue},
 };
 
 /// More than any request needs.
@@ -30,7 +30,15 @@ pub(super) async fn ptz(
     ConnectInfo(connection): ConnectInfo<Connection>,
     request: Request,
 ) -> Response {
-    answer(&site, &connection, request, Camera::ptz, Camera::note_command).await
+    answer(&site, &connection, request, Camera::queued_ptz, Camera::note_command).await
+}
+
+pub(super) async fn queue(
+    State(site): State<Arc<Site>>,
+    ConnectInfo(connection): ConnectInfo<Connection>,
+    request: Request,
+) -> Response {
+    answer(&site, &connection, request, Camera::queue, |_, _, _| {}).await
 }
 
 pub(super) async fn param(
@@ -45,13 +53,14 @@ async fn answer(
     site: &Site,
     connection: &Connection,
     request: Request,
-    run: fn(&Camera, &Args) -> Answer,
+    run: fn(&Camera, &Args, Option<&str>) -> Answer,
     note: fn(&Camera, &str, u16),
 ) -> Response {
     let camera = &site.camera;
     let _counted = camera.request_begins();
     let fault = camera.fault.borrow().clone();
     let refusal = site.guard.refuse(&request, auth::time(&fault));
+    let cookie = cookie(&request);
     let query = match arguments(request).await {
         Ok(query) => query,
         Err(response) => return response,
@@ -79,10 +88,13 @@ async fn answer(
     let response = {
         let _turn = site.turn.lock().await;
         tokio::time::sleep(camera.service_time()).await;
-        match run(camera, &parse_args(query.as_bytes())) {
+        match run(camera, &parse_args(query.as_bytes()), cookie.as_deref()) {
             Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
             Answer::Text(text) if fault == Fault::LineFeeds => plain(text.replace("\r\n", "\n")),
             Answer::Text(text) => plain(text),
+            Answer::Introduced { cookie, text } => {
+                ([(header::SET_COOKIE, cookie)], plain(text)).into_response()
+            }
         }
     };
     note(camera, &query, response.status().as_u16());
@@ -109,6 +121,13 @@ fn endless(text: Bytes, pause: Duration) -> Response {
     });
     let body = Body::from_stream(ReceiverStream::new(receiver));
     ([(header::CONTENT_TYPE, "text/plain")], body).into_response()
+}
+
+/// By what the control queue knows the client.
+fn cookie(request: &Request) -> Option<String> {
+    let cookies = request.headers().get(header::COOKIE)?.to_str().ok()?;
+    let mut pairs = cookies.split(';').filter_map(|pair| pair.trim().split_once('='));
+    pairs.find(|(name, _)| *name == Queue::COOKIE).map(|(_, id)| id.to_owned())
 }
 
 /// The query, or the form of a POST.

@@ -114,6 +114,7 @@ fn routes(site: Arc<Site>) -> Router {
     // Faults come before authentication, so these ask for it themselves.
     let faulty = Router::new()
         .route("/axis-cgi/com/ptz.cgi", any(cgi::ptz))
+        .route("/axis-cgi/com/ptzqueue.cgi", any(cgi::queue))
         .route("/axis-cgi/param.cgi", any(cgi::param));
     let page = Router::new()
         .route("/", get(page::page))

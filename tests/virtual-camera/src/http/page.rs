@@ -77,7 +77,7 @@ pub(super) async fn steer(State(site): State<Arc<Site>>, RawQuery(query): RawQue
     let query = query.unwrap_or_default();
     let response = match site.camera.ptz(&parse_args(query.as_bytes())) {
         Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
-        Answer::Text(text) => text.into_response(),
+        Answer::Text(text) | Answer::Introduced { text, .. } => text.into_response(),
     };
     site.camera.note_command(&query, response.status().as_u16());
     response

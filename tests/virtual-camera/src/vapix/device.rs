@@ -6,6 +6,7 @@ use super::{
     Answer, Args, help,
     params::Params,
     ptz::{Adjustment, Preset, Question, Request},
+    queue::Queue,
 };
 use crate::{
     kinematics::{Head, Limits, Motion, Pose, ZOOM_RANGE},
@@ -16,9 +17,12 @@ use crate::{
 pub(crate) struct Device {
     pub head: Head,
     pub params: Params,
+    /// The control queue, if it has one.
+    pub queue: Option<Queue>,
     api: PtzApi,
     limits: Limits,
-    home: Pose,
+    /// Their numbers count from 1.
+    presets: Vec<(String, Pose)>,
     view_size: (u32, u32),
     /// Focus, iris and brightness in steps.
     lens: BTreeMap<&'static str, f64>,
@@ -27,13 +31,14 @@ pub(crate) struct Device {
 
 impl Device {
     pub fn new(settings: &Settings, head: Head, limits: Limits, view_size: (u32, u32)) -> Self {
-        let home = head.now().pose;
+        let home = ("Home".to_owned(), head.now().pose);
         Self {
             params: Params::new(settings, &head, limits, view_size),
             head,
             api: settings.ptz_api,
             limits,
-            home,
+            presets: std::iter::once(home).chain(settings.presets.iter().cloned()).collect(),
+            queue: settings.control_queue.map(Queue::new),
             view_size,
             lens: BTreeMap::from([("iris", 5748.0), ("focus", 4642.0), ("brightness", 4999.0)]),
             switches: BTreeMap::from([("autofocus", true), ("autoiris", true)]),
@@ -70,17 +75,36 @@ impl Device {
     }
 
     fn preset(&self, preset: &Preset) -> Result<Motion, String> {
-        match preset {
-            Preset::Named(name) if name == "Home" => {}
-            Preset::Numbered(1) => {}
-            Preset::Named(name) => return Err(format!("gotoserverpresetname: no such preset: {name}")),
-            Preset::Numbered(number) => return Err(format!("gotoserverpresetno: no such preset: {number}")),
-        }
+        let found = match preset {
+            Preset::Named(name) => self.presets.iter().find(|(known, _)| known == name),
+            Preset::Numbered(number) => {
+                (*number as usize).checked_sub(1).and_then(|index| self.presets.get(index))
+            }
+        };
+        let (_, place) = found.ok_or_else(|| match preset {
+            Preset::Named(name) => format!("gotoserverpresetname: no such preset: {name}"),
+            Preset::Numbered(number) => format!("gotoserverpresetno: no such preset: {number}"),
+        })?;
         Ok(Motion::Absolute {
-            pan_deg: Some(self.home.pan_deg),
-            tilt_deg: Some(self.home.tilt_deg),
-            zoom_step: Some(self.home.zoom_step),
+            pan_deg: Some(place.pan_deg),
+            tilt_deg: Some(place.tilt_deg),
+            zoom_step: Some(place.zoom_step),
         })
+    }
+
+    fn tell_presets(&self, with_data: bool) -> String {
+        let mut text = String::from("Preset Positions for camera 1\r\n");
+        for (number, (name, place)) in (1..).zip(&self.presets) {
+            let _ = write!(text, "presetposno{number}={name}\r\n");
+            if with_data {
+                let Pose { pan_deg, tilt_deg, zoom_step } = place;
+                let _ = write!(
+                    text,
+                    "presetposno{number}.data=tilt={tilt_deg:.6}:pan={pan_deg:.6}:zoom={zoom_step:.6}\r\n"
+                );
+            }
+        }
+        text
     }
 
     fn adjust(&mut self, adjustment: Adjustment) {
@@ -100,13 +124,8 @@ impl Device {
             "limits" => self.limits(),
             "speed" => format!("speed={}\r\n", self.head.move_speed()),
             "mode" => "mode=normal\r\n".into(),
-            "presetposall" => "Preset Positions for camera 1\r\npresetposno1=Home\r\n".into(),
-            "presetposcam" => "Preset Positions for camera 1\r\npresetposno1=Home\r\n".into(),
-            "presetposcamdata" => format!(
-                "Preset Positions for camera 1\r\npresetposno1=Home\r\n\
-                 presetposno1.data=tilt={:.6}:pan={:.6}:zoom={:.6}\r\n",
-                self.home.tilt_deg, self.home.pan_deg, self.home.zoom_step
-            ),
+            "presetposall" | "presetposcam" => self.tell_presets(false),
+            "presetposcamdata" => self.tell_presets(true),
             "auxiliary" => "Available auxiliary commands for camera 1\r\n".into(),
             "attributes" if self.api == PtzApi::Extended => self.attributes(),
             _ => return Err(format!("query: unknown value: {subject}")),
@@ -206,7 +225,7 @@ mod tests {
     fn text(answer: Answer) -> String {
         match answer {
             Answer::Text(text) => text,
-            Answer::Accepted => panic!("no text"),
+            answer => panic!("no text: {answer:?}"),
         }
     }
 
@@ -264,6 +283,25 @@ mod tests {
             device.head.advance(Duration::from_millis(1064));
             assert!((device.head.now().tilt_rate_deg_s - expected).abs() < 1e-6, "{:?}", device.head.now());
         }
+    }
+
+    #[test]
+    fn presets_go_by_name_and_by_number() {
+        let gate = Pose { pan_deg: 8.0, tilt_deg: -3.0, zoom_step: 500.0 };
+        let mut device = device(PtzApi::Classic);
+        device.presets.push(("Gate".into(), gate));
+        let list = text(ask(&mut device, "query=presetposcam", 0));
+        assert_eq!(list, "Preset Positions for camera 1\r\npresetposno1=Home\r\npresetposno2=Gate\r\n");
+        for (query, pan) in
+            [("gotoserverpresetno=2", 8.0), ("move=home", 0.0), ("gotoserverpresetname=Gate", 8.0)]
+        {
+            let now = device.head.now().time.as_secs();
+            assert_eq!(ask(&mut device, query, now + 1), Answer::Accepted);
+            device.head.advance(Duration::from_secs(now + 20));
+            assert_eq!(device.head.now().pose.pan_deg, pan, "{query}");
+        }
+        assert!(text(ask(&mut device, "gotoserverpresetno=3", 90)).starts_with("Error:"));
+        assert!(text(ask(&mut device, "gotoserverpresetno=0", 90)).starts_with("Error:"));
     }
 
     #[test]

@@ -4,6 +4,7 @@ pub(crate) mod device;
 mod help;
 pub(crate) mod params;
 mod ptz;
+pub(crate) mod queue;
 
 /// Name and value pairs of a request, decoded, in their order.
 pub(crate) type Args = Vec<(String, String)>;
@@ -20,11 +21,13 @@ pub(crate) enum Answer {
     Accepted,
     /// 200 with text.
     Text(String),
+    /// 200 with text, and a cookie by which the client is to be known.
+    Introduced { cookie: String, text: String },
 }
 
 impl Answer {
     /// A failure, which VAPIX reports as success with a text.
-    fn error(message: impl std::fmt::Display) -> Self {
+    pub fn error(message: impl std::fmt::Display) -> Self {
         Self::Text(format!("Error:{message}\r\n"))
     }
 }

@@ -146,9 +146,9 @@ impl Params {
                 ("AutoFocus", "true".into()),
                 ("AutoIris", "true".into()),
                 ("BackLight", "false".into()),
-                ("CtlQueueing", "false".into()),
+                ("CtlQueueing", settings.control_queue.is_some().to_string()),
                 ("CtlQueueLimit", "20".into()),
-                ("CtlQueuePollTime", "20".into()),
+                ("CtlQueuePollTime", settings.control_queue.map_or(20, |poll| poll.as_secs()).to_string()),
                 ("HomePresetSet", "true".into()),
                 ("IrCutFilter", "auto".into()),
                 ("Locked", "false".into()),
@@ -274,7 +274,7 @@ mod tests {
     fn ask(params: &mut Params, query: &str) -> String {
         match params.answer(&parse_args(query.as_bytes())) {
             Answer::Text(text) => text,
-            Answer::Accepted => panic!("no text"),
+            answer => panic!("no text: {answer:?}"),
         }
     }
 
