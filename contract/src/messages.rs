@@ -200,6 +200,8 @@ named_enum! {
         AtLimit = "at-limit",
         /// Somebody else moves it.
         TakenOver = "taken-over",
+        /// Nobody else moves it any more: it is under control again.
+        Resumed = "resumed",
         /// It was told to move.
         Moving = "moving",
         /// It was told to stop and said yes.

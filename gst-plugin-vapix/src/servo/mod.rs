@@ -9,12 +9,16 @@
 //! [`Pilot`] is the whole of it; [`Link`] judges what the camera answers.
 
 mod aim;
+mod authority;
 mod camera;
+mod control_queue;
 mod controller;
+mod home;
 mod learning;
 mod link;
 #[cfg(test)]
 mod motion_tests;
+mod operator;
 mod optics;
 mod oscillation;
 mod pan_tilt;
@@ -30,10 +34,14 @@ mod steps;
 mod talk;
 
 pub use aim::{Aim, Prediction, Sight, Visibility};
+pub use authority::{Authority, Finding, Holder};
 pub use camera::{CameraModel, LimitGuard};
+pub use control_queue::ControlQueue;
 pub use controller::{ControlLaw, Controller, Offset};
+pub use home::{Home, Homing};
 pub use learning::{Calibration, Turn};
 pub use link::{Link, LinkChange};
+pub use operator::{OperatorWatch, Verdict};
 pub use optics::{Lens, View, magnified};
 pub use oscillation::OscillationGuard;
 pub use pan_tilt::PanTilt;

@@ -1,13 +1,15 @@
+mod answers;
+
 use std::collections::VecDeque;
 use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Answer, Calibration, CameraModel, CommandHistory, ControlLaw, Controller, Job, LimitGuard, Link,
-    Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap, Status,
-    Steps, View, Visibility, magnified,
+    Aim, Authority, Calibration, CameraModel, CommandHistory, ControlLaw, Controller, Holder, Homing, Job,
+    LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
+    SpeedMap, Status, Steps, View, Visibility, magnified,
 };
-use crate::vapix::{Command, Error};
+use crate::vapix::Command;
 
 /// Steers one camera: takes what is seen, says what to send, hears what is answered. Sends nothing
 /// itself, and has no clock: both are the caller's.
@@ -18,6 +20,8 @@ pub struct Pilot {
     link: Link,
     scheduler: Scheduler,
     steps: Steps,
+    authority: Authority,
+    homing: Homing,
     aim: Aim,
     history: CommandHistory,
     calibration: Calibration,
@@ -71,11 +75,12 @@ impl Pilot {
             aim: Aim::new(settings.prediction),
             calibration: Calibration::new(settings.latency),
             map: settings.speed_map(),
-            settings,
             camera: CameraModel::default(),
             link: Link::default(),
             scheduler: Scheduler::default(),
             steps: Steps::default(),
+            authority: Authority::default(),
+            homing: Homing::new(settings.home.clone(), settings.home_timeout, settings.home_at_start),
             history: CommandHistory::default(),
             controller: Controller::default(),
             oscillation: OscillationGuard::default(),
@@ -89,6 +94,7 @@ impl Pilot {
             at_limit: false,
             overtaken: 0,
             reports: Vec::new(),
+            settings,
         }
     }
 
@@ -99,6 +105,7 @@ impl Pilot {
         }
         let before = mem::replace(&mut self.settings, settings);
         let now = &self.settings;
+        self.homing.configure(now.home.as_ref(), now.home_timeout);
         if !now.learn {
             self.calibration = Calibration::new(now.latency);
         }
@@ -122,9 +129,13 @@ impl Pilot {
         let last_seen = match (sight.visibility, &self.target) {
             (Visibility::Seen, _) => now,
             (Visibility::Predicted, Some(target)) => target.last_seen,
-            (Visibility::Predicted, None) | (Visibility::Gone, _) => return self.rest(),
+            (Visibility::Predicted, None) | (Visibility::Gone, _) => {
+                self.lose();
+                return self.homing.alone(now, now + self.settings.stale_timeout);
+            }
         };
-        if self.settings.learn {
+        self.homing.not_alone();
+        if self.settings.learn && self.authority.is_ours(now) {
             self.calibration.see(&sight, &self.view(&sight), &self.history, &self.map);
             self.revise();
         }
@@ -138,8 +149,18 @@ impl Pilot {
         self.target = Some(Target { sight, last_seen, considered: false });
     }
 
-    /// Forgets the target; the camera is to be stopped.
+    /// Forgets the target; the camera is to be stopped, whatever it does.
     pub fn rest(&mut self) {
+        self.lose();
+        self.homing.interrupt();
+    }
+
+    /// It is the end: with the stop, what is ours is given back.
+    pub fn leave(&mut self) {
+        self.authority.queue.leave();
+    }
+
+    fn lose(&mut self) {
         self.target = None;
         self.aim.clear();
         self.controller.rest();
@@ -150,6 +171,9 @@ impl Pilot {
     pub fn next(&mut self, now: Duration) -> Next {
         if self.link.halted() {
             return Next::Wait(None);
+        }
+        if let Some(holder) = self.authority.change(now) {
+            self.reports.push(holder.map_or(Report::Resumed, Report::TakenOver));
         }
         let interval = Duration::from_secs_f64(1.0 / self.settings.max_rate_hz);
         let retry_at = self.link.retry_at();
@@ -162,12 +186,26 @@ impl Pilot {
         if due.is_some_and(|due| due <= now) {
             return Next::Do(Job::Command(command));
         }
-        let query = self.introduction.front().copied().unwrap_or(Query::Position);
-        let query_due = if self.introduction.is_empty() { self.next_poll.max(retry_at) } else { retry_at };
+        let (query, query_due) = self.question();
+        let query_due = query_due.max(retry_at);
         if query_due <= now {
             return Next::Do(Job::Query(query));
         }
-        Next::Wait([due, Some(query_due), self.stale_at()].into_iter().flatten().min())
+        let operator_until = self.authority.operator_until(now);
+        Next::Wait([due, Some(query_due), self.stale_at(), operator_until].into_iter().flatten().min())
+    }
+
+    /// What to ask next, and when.
+    fn question(&self) -> (Query, Duration) {
+        let (query, at) = match self.introduction.front() {
+            Some(query) => (*query, Duration::ZERO),
+            None if self.homing.wants_presets() => (Query::Presets, Duration::ZERO),
+            None => (Query::Position, self.next_poll),
+        };
+        match self.authority.queue.next() {
+            Some((request, due)) if due <= at => (Query::Queue(request), due),
+            _ => (query, at),
+        }
     }
 
     /// Something is being sent.
@@ -176,7 +214,9 @@ impl Pilot {
         self.scheduler.attempted(command, now);
         match command {
             Command::Velocity { .. } => self.stop = Command::Halt,
-            Command::Absolute { .. } | Command::Centre { .. } => self.stop = Command::Stop,
+            Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
+                self.stop = Command::Stop;
+            }
             Command::Halt | Command::Stop => {}
         }
     }
@@ -184,20 +224,7 @@ impl Pilot {
     /// The answer is waited for no longer, as something else is more urgent: no fault of the camera's.
     pub fn abandoned(&mut self, job: &Job, now: Duration) {
         if let Job::Command(command) = job {
-            self.scheduler.failed(command, true, now);
-        }
-    }
-
-    /// The camera answered what was sent then, or did not.
-    pub fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration, now: Duration) {
-        match (job, answer) {
-            (Job::Command(command), Ok(_)) => self.command_accepted(command, sent, now),
-            (Job::Command(command), Err(err)) => {
-                self.scheduler.failed(command, err.may_have_acted(), now);
-                self.failed(&err, true, now);
-            }
-            (Job::Query(query), Ok(answer)) => self.told(*query, answer, sent, now),
-            (Job::Query(query), Err(err)) => self.not_told(*query, &err, now),
+            self.unanswered(command, now);
         }
     }
 
@@ -211,14 +238,24 @@ impl Pilot {
         self.overtaken
     }
 
-    /// Whether there is a target to follow.
-    pub fn has_target(&self, now: Duration) -> bool {
+    /// Whether there is something to move the camera for.
+    pub fn has_errand(&self, now: Duration) -> bool {
+        let going_home = self.steps.under_way() && self.homing.is_settled() || self.homing.due(now).is_some();
+        self.authority.holder(now).is_none() && (self.has_target(now) || going_home)
+    }
+
+    fn has_target(&self, now: Duration) -> bool {
         self.stale_at().is_some_and(|at| now < at)
     }
 
     /// When the target will not have been seen for too long, where there is one.
     pub fn stale_at(&self) -> Option<Duration> {
         self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout)
+    }
+
+    /// Whether the camera counts on hearing from us.
+    pub fn is_queued(&self) -> bool {
+        self.authority.queue.is_in()
     }
 
     /// Whether nothing may be sent until a setting changes.
@@ -236,6 +273,7 @@ impl Pilot {
         Status {
             connected: self.link.connected(),
             moving: self.scheduler.may_move(),
+            taken_over: self.authority.holder(now).is_some(),
             position: self.camera.position,
             rate: self.history.rate_at(now),
             fov_deg: self.known_fov_deg(),
@@ -248,16 +286,35 @@ impl Pilot {
     }
 
     fn wish(&mut self, now: Duration) -> Wish {
-        if !self.has_target(now) {
-            self.rest();
+        match self.authority.holder(now) {
+            // What moves it is his; what we last said must not outlive our hold on it.
+            Some(Holder::Operator) => return Wish::Rest,
+            // It would be refused.
+            Some(Holder::Queue) => return Wish::AsIs,
+            None => {}
         }
-        let Some(target) = &mut self.target else { return Wish::Rest };
+        if !self.has_target(now) {
+            self.lose();
+        }
+        let Some(target) = &mut self.target else { return self.wait(now) };
+        if !self.authority.is_ours(now) {
+            return Wish::AsIs;
+        }
         target.considered = true;
         let sight = target.sight;
         match self.settings.mode {
             Mode::Velocity => self.velocity(&sight, now),
             Mode::Absolute | Mode::Centre => self.step(&sight, now),
         }
+    }
+
+    /// Without a target.
+    fn wait(&self, now: Duration) -> Wish {
+        if self.steps.under_way() && self.homing.is_settled() {
+            return Wish::AsIs;
+        }
+        let home = self.homing.due(now).filter(|_| self.authority.is_ours(now));
+        home.map_or(Wish::Rest, Wish::Move)
     }
 
     fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
@@ -328,111 +385,6 @@ impl Pilot {
             height: sight.size.1,
             zoom_percent: None,
         }
-    }
-
-    fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
-        let was_moving = self.scheduler.may_move();
-        self.scheduler.accepted(command, now);
-        self.exchange = now.saturating_sub(sent);
-        // Counted from its sending on: that is when it can begin to act, however late the answer is.
-        match command {
-            Command::Velocity { pan, tilt, .. } => {
-                self.history.push_steps(sent, (*pan, *tilt), &self.map);
-            }
-            _ => self.history.push(sent, PanTilt::default()),
-        }
-        match command {
-            Command::Absolute { .. } | Command::Centre { .. } => {
-                self.steps.begin(now);
-                self.next_poll = now + Steps::POLL;
-            }
-            Command::Halt | Command::Stop => {
-                self.speed_steps = (0, 0);
-                self.steps.rest(now);
-                // Where it came to rest.
-                self.next_poll = now + Self::POLL_MOVING;
-            }
-            Command::Velocity { .. } => {
-                // A step under way, from before the mode was changed, is over.
-                self.steps.rest(now);
-                if !was_moving {
-                    self.next_poll = now + Self::POLL_MOVING;
-                }
-            }
-        }
-        self.succeeded(true);
-        match (was_moving, self.scheduler.may_move()) {
-            (false, true) => self.reports.push(Report::Moving),
-            (true, false) => self.reports.push(Report::Stopped),
-            _ => {}
-        }
-    }
-
-    fn told(&mut self, query: Query, answer: Answer, sent: Duration, now: Duration) {
-        self.introduction.retain(|pending| *pending != query);
-        match answer {
-            Answer::Position(position) => {
-                let before = mem::replace(&mut self.camera.position, position);
-                if position.zoom_steps != before.zoom_steps {
-                    self.calibration.zoomed();
-                }
-                if let Some(position) = self.camera.pan_tilt() {
-                    self.calibration.positioned((sent + now) / 2, position);
-                }
-                self.positioned(self.camera.pan_tilt(), now);
-            }
-            Answer::Limits(limits) => self.camera.limits = limits,
-            Answer::Parameters(parameters) => self.camera.parameters = parameters,
-            Answer::Attributes(attributes) => {
-                self.camera.attributes = attributes;
-                self.assume_speeds();
-            }
-            Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
-            Answer::Accepted => {}
-        }
-        self.revise();
-        self.succeeded(false);
-    }
-
-    fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
-        if query != Query::Position {
-            // Optional; a camera that is gone will be missed by the next position.
-            if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
-                self.introduction.retain(|pending| *pending != query);
-                return;
-            }
-        } else if self.link.connected()
-            && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
-        {
-            self.positioned(None, now);
-            if !self.steps.under_way() {
-                self.next_poll = now + Self::POLL_REFUSED;
-            }
-            return;
-        }
-        self.failed(err, false, now);
-    }
-
-    fn positioned(&mut self, position: Option<PanTilt>, now: Duration) {
-        if self.steps.position(position, now) {
-            self.scheduler.arrived();
-            self.reports.push(Report::Stopped);
-        }
-        self.next_poll = now
-            + match (self.steps.under_way(), self.scheduler.may_move()) {
-                (true, _) => Steps::POLL,
-                (false, true) => Self::POLL_MOVING,
-                (false, false) => Self::POLL_RESTING,
-            };
-    }
-
-    fn succeeded(&mut self, of_command: bool) {
-        let idle = self.target.is_none() && !self.scheduler.may_move();
-        self.reports.extend(self.link.succeeded(of_command, idle).map(Report::Link));
-    }
-
-    fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {
-        self.reports.extend(self.link.failed(err, of_command, now).map(Report::Link));
     }
 
     fn report_limit(&mut self) {

@@ -1,7 +1,8 @@
 use super::*;
+use crate::servo::Answer;
 use crate::servo::LinkChange;
 use crate::servo::aim::tests::sight;
-use crate::vapix::{Limits, Position, Range};
+use crate::vapix::{Error, Limits, Position, Range};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Duration {

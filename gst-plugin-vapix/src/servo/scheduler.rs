@@ -20,7 +20,7 @@ impl Scheduler {
     const KEEP_ALIVE: Duration = Duration::from_secs(2);
 
     /// A camera that answers a command later than this is not expected to act on it any more.
-    const DOUBT: Duration = Duration::from_secs(6);
+    pub const DOUBT: Duration = Duration::from_secs(6);
 
     /// When to send a stop; `None`: no need to.
     pub fn stop_due(&self, now: Duration, interval: Duration, retry_at: Duration) -> Option<Duration> {
@@ -74,6 +74,12 @@ impl Scheduler {
     pub fn arrived(&mut self) {
         self.accepted = None;
         self.may_move = false;
+    }
+
+    /// It moves at the word of somebody who is not there any more.
+    pub fn found_moving(&mut self) {
+        self.may_move = true;
+        self.stop_tried = false;
     }
 
     /// Whether the camera may be moving on our behalf.

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Prediction, SpeedCurve, SpeedMap};
+use super::{Home, Prediction, SpeedCurve, SpeedMap};
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -43,6 +43,14 @@ pub struct ServoSettings {
     pub speed_curve: SpeedCurve,
     /// Whether latency, field of view and speed map are learned; the settings above are where that begins.
     pub learn: bool,
+    /// Where the camera waits for a target; `None`: where the last one left it.
+    pub home: Option<Home>,
+    /// It goes there when nobody was there for this long, ...
+    pub home_timeout: Duration,
+    /// ... and as soon as it was met, unless somebody is there.
+    pub home_at_start: bool,
+    /// An operator who moves the camera keeps it until it was not moved for this long; zero: he is not looked for.
+    pub override_timeout: Duration,
 }
 
 impl ServoSettings {
@@ -68,6 +76,10 @@ impl Default for ServoSettings {
             camera_speed_deg_s: 450.0,
             speed_curve: SpeedCurve::default(),
             learn: true,
+            home: None,
+            home_timeout: Duration::from_secs(10),
+            home_at_start: false,
+            override_timeout: Duration::from_secs(10),
         }
     }
 }

@@ -207,6 +207,7 @@ impl Simulation {
                 });
                 self.goal = Some((self.pose + turn, zoomed));
             }
+            Command::Preset { .. } => self.goal = Some((PanTilt::default(), None)),
             Command::Halt | Command::Stop => {
                 self.goal = None;
                 self.wanted = PanTilt::default();

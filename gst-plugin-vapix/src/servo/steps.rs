@@ -25,7 +25,10 @@ impl Steps {
     /// How often the position is asked for while under way.
     pub const POLL: Duration = Duration::from_millis(150);
 
-    /// No move lasts longer; also the wait for a camera that does not tell its position.
+    /// A slower turn between two polls is noise, once a move has lasted long.
+    const NOISE_DEG: f64 = 0.5;
+
+    /// A move that lasts longer shows; also the wait for a camera that does not tell its position.
     const LONGEST: Duration = Duration::from_secs(3);
 
     /// Whether the picture taken then, with everything `latency` late, shows the camera at rest.
@@ -51,11 +54,13 @@ impl Steps {
     /// The camera told its position, or would not; returns whether it has come to rest by this.
     pub fn position(&mut self, position: Option<PanTilt>, now: Duration) -> bool {
         let Phase::UnderWay { since, seen } = &mut self.0 else { return false };
-        let same = match (*seen, position) {
-            (Some(before), Some(now)) => (now - before).largest() < Self::SAME_DEG,
-            _ => false,
+        let turn_deg = seen.zip(position).map(|(before, now)| (now - before).largest());
+        let long = now.saturating_sub(*since) > Self::LONGEST;
+        let rests = match turn_deg {
+            Some(turn_deg) => turn_deg < if long { Self::NOISE_DEG } else { Self::SAME_DEG },
+            None => long,
         };
-        if same || now.saturating_sub(*since) > Self::LONGEST {
+        if rests {
             self.rest(now);
             return true;
         }

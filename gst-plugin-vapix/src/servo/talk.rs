@@ -3,8 +3,10 @@
 use std::fmt;
 use std::time::Duration;
 
-use super::{LinkChange, PanTilt};
-use crate::vapix::{Attributes, Command, Limits, Parameters, Position};
+use super::{Holder, LinkChange, PanTilt};
+use crate::vapix::{
+    Attributes, Command, Error, Limits, Parameters, Position, Presets, QueuePlace, QueueRequest,
+};
 
 /// Something to ask the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +21,10 @@ pub enum Query {
     Attributes,
     /// How fast its moves to a position are.
     MoveSpeed,
+    /// Which presets it has.
+    Presets,
+    /// For its control.
+    Queue(QueueRequest),
 }
 
 impl Query {
@@ -60,6 +66,10 @@ pub enum Answer {
     Attributes(Attributes),
     /// To [`Query::MoveSpeed`]: a speed step.
     MoveSpeed(u8),
+    /// To [`Query::Presets`].
+    Presets(Presets),
+    /// To [`Query::Queue`]: where we stand; `None`: no more than yes.
+    Place(Option<QueuePlace>),
 }
 
 /// What is to be done now.
@@ -84,6 +94,16 @@ pub enum Report {
     AtLimit,
     /// The camera swung to and fro about the target: from now on only this part of the speed is asked for.
     Swinging(f64),
+    /// Somebody else moves the camera: it is left to him.
+    TakenOver(Holder),
+    /// Nobody else does any more: it is moved again.
+    Resumed,
+    /// The camera moved when it was met, and is being stopped.
+    Orphan,
+    /// The camera has no preset of the name that is to be its home.
+    NoSuchPreset(String),
+    /// The camera will not go home.
+    HomeRefused(Error),
 }
 
 /// The camera as it is known.
@@ -93,6 +113,8 @@ pub struct Status {
     pub connected: bool,
     /// It may be moving on our behalf.
     pub moving: bool,
+    /// Somebody else moves it.
+    pub taken_over: bool,
     /// Where it last said it looks.
     pub position: Position,
     /// What it was last told, degrees per second.

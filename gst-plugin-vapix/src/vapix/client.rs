@@ -1,13 +1,14 @@
 use std::time::Duration;
 
-use reqwest::header::{AUTHORIZATION, LOCATION};
+use reqwest::header::{AUTHORIZATION, HeaderMap, LOCATION};
 use reqwest::{Response, StatusCode, redirect};
 
 use super::auth::Authenticator;
+use super::cookies::Cookies;
 use super::location::without_user_info;
 use super::text::{complaint, excerpt, unexpected};
 use super::{
-    Attributes, Command, Credentials, Error, Limits, Location, Parameters, Position, QueuePlace,
+    Attributes, Command, Credentials, Error, Limits, Location, Parameters, Position, Presets, QueuePlace,
     QueueRequest, Trust, parse_move_speed,
 };
 
@@ -38,6 +39,7 @@ pub struct Client {
     settings: ClientSettings,
     http: reqwest::Client,
     authenticator: Authenticator,
+    cookies: Cookies,
     /// Set once user and password were refused: asking again could lock the account.
     locked_out: bool,
     /// Whether the connection may be one that the camera has closed since its last answer.
@@ -59,6 +61,7 @@ impl Client {
         Ok(Self {
             http: http_client(&settings)?,
             authenticator: Authenticator::new(settings.credentials.clone()),
+            cookies: Cookies::default(),
             settings,
             locked_out: false,
             connected: false,
@@ -132,6 +135,14 @@ impl Client {
         parse_move_speed(&self.query("speed").await?)
     }
 
+    /// Asks which presets the camera has.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn presets(&mut self) -> Result<Presets, Error> {
+        Presets::parse(&self.query("presetposcam").await?)
+    }
+
     /// Asks for control where the camera has a control queue. `None`: accepted without a place.
     ///
     /// # Errors
@@ -200,7 +211,10 @@ impl Client {
         if let Some(authorization) = self.authenticator.authorization(target)? {
             request = request.header(AUTHORIZATION, authorization);
         }
-        let response = request.send().await.map_err(|err| self.failure(&err))?;
+        let mut headers = HeaderMap::new();
+        self.cookies.put(&mut headers);
+        let response = request.headers(headers).send().await.map_err(|err| self.failure(&err))?;
+        self.cookies.take(response.headers());
         self.connected = true;
         Ok(response)
     }

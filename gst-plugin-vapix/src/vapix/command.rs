@@ -36,6 +36,11 @@ pub enum Command {
         /// Magnify what is seen by so many per cent; `None` leaves the zoom as it is.
         zoom_percent: Option<u32>,
     },
+    /// `gotoserverpresetno`: go to one of the camera's presets.
+    Preset {
+        /// Its number.
+        number: u32,
+    },
     /// `continuouspantiltmove=0,0`: end a continuous move.
     Halt,
     /// `move=stop`: end a move to a position.
@@ -43,6 +48,9 @@ pub enum Command {
 }
 
 impl Command {
+    /// Ends a continuous move of all axes.
+    pub const REST: Self = Self::Velocity { pan: 0, tilt: 0, zoom: Some(0) };
+
     /// Whether the camera is at rest once it has accepted this.
     pub fn is_stop(&self) -> bool {
         matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0) })
@@ -67,6 +75,7 @@ impl fmt::Display for Command {
                 }
                 write!(f, "&imagewidth={width}&imageheight={height}")
             }
+            Self::Preset { number } => write!(f, "gotoserverpresetno={number}"),
             Self::Halt => f.write_str("continuouspantiltmove=0,0"),
             Self::Stop => f.write_str("move=stop"),
         }
@@ -101,6 +110,7 @@ mod tests {
                 Command::Centre { x: 960, y: 270, width: 1280, height: 720, zoom_percent: Some(150) },
                 "areazoom=960,270,150&imagewidth=1280&imageheight=720",
             ),
+            (Command::Preset { number: 4 }, "gotoserverpresetno=4"),
             (Command::Halt, "continuouspantiltmove=0,0"),
             (Command::Stop, "move=stop"),
         ];

@@ -110,6 +110,8 @@ pub struct Parameters {
     pub continuous_pan: Option<bool>,
     /// `PTZ.Support.S#.AbsolutePan`.
     pub absolute_pan: Option<bool>,
+    /// `PTZ.Various.V#.CtlQueueing`: only who holds the control queue may move the camera.
+    pub control_queue: Option<bool>,
 }
 
 impl Parameters {
@@ -137,6 +139,7 @@ impl Parameters {
                 .filter(|fields_of_view| *fields_of_view > 0.0),
             continuous_pan: fields.flag(&format!("{support}ContinuousPan")),
             absolute_pan: fields.flag(&format!("{support}AbsolutePan")),
+            control_queue: fields.flag(&format!("{various}CtlQueueing")),
         })
     }
 }
@@ -184,6 +187,10 @@ impl<'a> Fields<'a> {
             Some((key.strip_prefix("root.").unwrap_or(key), value.trim()))
         });
         Self(fields.take(MAX_FIELDS).collect())
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = (&'a str, &'a str)> {
+        self.0.iter().copied()
     }
 
     pub fn text(&self, key: &str) -> Option<&'a str> {

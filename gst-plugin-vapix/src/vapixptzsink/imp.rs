@@ -6,19 +6,19 @@ use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
-use ptztrack_contract::{BufferMeta, CameraChange, CameraMessage, TargetMeta, Times};
+use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::clock::Clock;
 use super::news::camera_event;
 use super::picture::Picture;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
-use super::worker::{self, Event, Worker};
+use super::worker::{self, Worker};
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
-use crate::servo::{LinkChange, Report, Sight, Status};
+use crate::servo::{Sight, Status};
 
-static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
+pub(super) static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("vapixptzsink", gst::DebugColorFlags::empty(), Some("VAPIX PTZ servo"))
 });
 
@@ -138,6 +138,25 @@ pub struct VapixPtzSink {
         blurb = "Learn latency, field of view and speed map while following; what is set or told is where that begins"
     )]
     #[property(
+        name = "home", get = Self::home, set = Self::set_home, type = Option<String>, mutable_playing,
+        blurb = "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it was met), or the name of one of its presets (unset: where the last target was)"
+    )]
+    #[property(
+        name = "home-timeout", get, set = Self::set_home_timeout, type = u32, member = home_timeout_ms, mutable_playing,
+        default = Settings::default().home_timeout_ms, maximum = 86_400_000,
+        blurb = "The camera goes home when there was no target for this long, in milliseconds"
+    )]
+    #[property(
+        name = "home-at-start", get, set = Self::set_home_at_start, type = bool, member = home_at_start, mutable_ready,
+        default = Settings::default().home_at_start,
+        blurb = "The camera goes home before the first target too, without waiting"
+    )]
+    #[property(
+        name = "override-timeout", get, set = Self::set_override_timeout, type = u32, member = override_timeout_ms, mutable_playing,
+        default = Settings::default().override_timeout_ms, maximum = 86_400_000,
+        blurb = "Whoever else moves the camera keeps it until it was not moved for this long, in milliseconds (0: nobody is given way)"
+    )]
+    #[property(
         name = "lockstep", get, set, type = bool, member = lockstep, mutable_ready,
         default = Settings::default().lockstep,
         blurb = "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras"
@@ -146,7 +165,7 @@ pub struct VapixPtzSink {
     worker: Mutex<Option<Worker>>,
     stream: Mutex<Stream>,
     /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
-    news: Mutex<Option<Status>>,
+    pub(super) news: Mutex<Option<Status>>,
 }
 
 #[glib::object_subclass]
@@ -392,74 +411,6 @@ impl VapixPtzSink {
                 ("a target meta cannot be read ({err}); are all plugins of the same version?")
             );
         }
-    }
-
-    /// Called by the worker.
-    fn happened(&self, event: Event) {
-        match event {
-            Event::Exchanged { job, failure: None, round_trip } => {
-                gst::log!(CAT, imp = self, "{job} answered in {round_trip:?}");
-            }
-            Event::Exchanged { job, failure: Some(err), round_trip } => {
-                gst::debug!(CAT, imp = self, "{job} failed after {round_trip:?}: {err}");
-            }
-            Event::Report(Report::Link(change)) => self.link_changed(&change),
-            Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
-            Event::Report(Report::Stopped) => self.post(CameraChange::Stopped, "the camera has stopped"),
-            Event::Report(Report::AtLimit) => {
-                self.post(
-                    CameraChange::AtLimit,
-                    "the target is beyond the end of the camera's pan or tilt range",
-                );
-            }
-            Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
-                self,
-                gst::ResourceError::Settings,
-                (
-                    "the camera swings to and fro about the target; its speed is lowered to {:.0} % until it is calm. Lower `gain`, or set `latency` and `camera-speed` right",
-                    trust * 100.0
-                )
-            ),
-            Event::Status(status) => *lock(&self.news) = Some(status),
-            Event::GaveUp => gst::element_imp_warning!(
-                self,
-                gst::ResourceError::Write,
-                ("the camera has not confirmed its stop in time and may still be moving; stop it by hand")
-            ),
-            Event::Died(reason) => gst::element_imp_error!(
-                self,
-                gst::LibraryError::Failed,
-                ("the camera's task broke ({reason}); the camera may still be moving; restart the pipeline")
-            ),
-        }
-    }
-
-    fn link_changed(&self, change: &LinkChange) {
-        match change {
-            LinkChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
-            LinkChange::Disconnected(err) => {
-                self.post(CameraChange::Disconnected, &err.to_string());
-                gst::element_imp_warning!(self, gst::ResourceError::Write, ("{err}. {}", err.advice()));
-            }
-            LinkChange::Refused(err) => {
-                self.post(CameraChange::Refused, &err.to_string());
-                gst::element_imp_warning!(
-                    self,
-                    gst::ResourceError::NotAuthorized,
-                    ("{err}. {}", err.advice())
-                );
-            }
-        }
-    }
-
-    fn post(&self, change: CameraChange, detail: &str) {
-        gst::info!(CAT, imp = self, "{}: {detail}", change.name());
-        let sink = self.obj();
-        let times = Times { running_time: sink.current_running_time(), ..Times::default() };
-        let message = CameraMessage { change, times, detail: detail.to_owned() };
-        let message = gst::message::Element::builder(message.to_structure()).src(&*sink).build();
-        // Without a bus there is nobody to tell.
-        let _ = sink.post_message(message);
     }
 
     /// Tells upstream what the camera does, if that has changed.

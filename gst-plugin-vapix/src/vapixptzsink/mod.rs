@@ -27,9 +27,16 @@
 //! then gives the same run every time, at any speed. It is for simulations: a camera that does not answer
 //! holds the stream for up to `timeout`.
 //!
+//! Without a target for `home-timeout` the camera goes to `home`, where one is set.
+//!
+//! An operator comes first. When the camera's position contradicts what it was told, or its control queue says
+//! that it is somebody else's turn, it is not steered until nobody has moved it for `override-timeout`, or until
+//! our turn. Only a turn that no command explains, of more than 1.5 degrees, counts; zooming by hand does not. A
+//! camera that is found moving at the start is stopped: whoever set it going may not be there any more.
+//!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
-//! `at-limit`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end,
+//! `at-limit`, `taken-over`, `resumed`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end,
 //! and one that comes and goes is said no more often than every 10 s.
 //! Upstream events `ptztrack-camera-state` tell detector and tracker what the camera does.
 //!
@@ -50,6 +57,7 @@ mod clock;
 #[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
 mod imp;
 mod inbox;
+mod messages;
 mod news;
 mod picture;
 mod setters;

@@ -6,6 +6,7 @@ use super::imp::VapixPtzSink;
 use super::settings::{Settings, environment};
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
+use crate::servo::Home;
 use crate::vapix::{Location, Secret};
 
 impl VapixPtzSink {
@@ -27,6 +28,21 @@ impl VapixPtzSink {
                 self,
                 gst::ResourceError::Settings,
                 ("{err}; `location` stays as it was")
+            ),
+        }
+    }
+
+    pub(super) fn home(&self) -> Option<String> {
+        lock(&self.settings).home.as_ref().map(ToString::to_string)
+    }
+
+    pub(super) fn set_home(&self, text: Option<String>) {
+        match text.filter(|text| !text.is_empty()).map(|text| text.parse::<Home>()).transpose() {
+            Ok(home) => self.change_servo(|settings| settings.home = home),
+            Err(reason) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("{reason}; `home` stays as it was")
             ),
         }
     }
@@ -82,4 +98,7 @@ servo_setters! {
     set_camera_speed: camera_speed_deg_s, f64;
     set_speed_curve: speed_curve, SpeedCurve;
     set_learn: learn, bool;
+    set_home_timeout: home_timeout_ms, u32;
+    set_home_at_start: home_at_start, bool;
+    set_override_timeout: override_timeout_ms, u32;
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::{Mode, Prediction, SpeedCurve};
-use crate::servo::ServoSettings;
+use crate::servo::{Home, ServoSettings};
 use crate::vapix::{ClientSettings, Credentials, Location, Secret, Trust};
 
 /// One field for one property, in the property's unit. The servo's defaults are the servo's own.
@@ -30,6 +30,10 @@ pub struct Settings {
     pub camera_speed_deg_s: f64,
     pub speed_curve: SpeedCurve,
     pub learn: bool,
+    pub home: Option<Home>,
+    pub home_timeout_ms: u32,
+    pub home_at_start: bool,
+    pub override_timeout_ms: u32,
     pub lockstep: bool,
 }
 
@@ -57,6 +61,10 @@ impl Default for Settings {
             camera_speed_deg_s: servo.camera_speed_deg_s,
             speed_curve: SpeedCurve::default(),
             learn: servo.learn,
+            home: servo.home,
+            home_timeout_ms: servo.home_timeout.as_millis() as u32,
+            home_at_start: servo.home_at_start,
+            override_timeout_ms: servo.override_timeout.as_millis() as u32,
             lockstep: false,
         }
     }
@@ -79,6 +87,10 @@ impl Settings {
             camera_speed_deg_s: self.camera_speed_deg_s,
             speed_curve: self.speed_curve.into(),
             learn: self.learn,
+            home: self.home.clone(),
+            home_timeout: milliseconds(self.home_timeout_ms),
+            home_at_start: self.home_at_start,
+            override_timeout: milliseconds(self.override_timeout_ms),
         }
     }
 

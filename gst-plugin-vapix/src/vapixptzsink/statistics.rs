@@ -33,6 +33,7 @@ impl Statistics {
         let state = match self {
             Self { halted: true, .. } => "refused",
             Self { status: Status { connected: false, .. }, .. } => "disconnected",
+            Self { status: Status { taken_over: true, .. }, .. } => "taken-over",
             Self { status: Status { moving: true, .. }, .. } => "moving",
             _ => "at-rest",
         };
@@ -92,6 +93,8 @@ mod tests {
         assert_eq!(state(&statistics), "at-rest");
         statistics.status.moving = true;
         assert_eq!(state(&statistics), "moving");
+        statistics.status.taken_over = true;
+        assert_eq!(state(&statistics), "taken-over");
         statistics.halted = true;
         assert_eq!(state(&statistics), "refused");
     }

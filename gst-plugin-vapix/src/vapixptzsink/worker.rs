@@ -200,7 +200,8 @@ impl<O: Fn(Event)> Desk<O> {
     /// Whether the end has come: at rest, out of time, or with no right to speak.
     fn is_over(&self) -> bool {
         self.deadline.is_some_and(|deadline| {
-            self.pilot.is_at_rest() || self.pilot.halted() || deadline <= self.inbox.now()
+            let done = self.pilot.is_at_rest() && !self.pilot.is_queued();
+            done || self.pilot.halted() || deadline <= self.inbox.now()
         })
     }
 
@@ -216,6 +217,7 @@ impl<O: Fn(Event)> Desk<O> {
         }
         if finish {
             self.deadline.get_or_insert(now + FINISH_BUDGET);
+            self.pilot.leave();
         }
         if let Some(sight) = sight.filter(|_| self.deadline.is_none()) {
             self.pilot.see(sight, now);
@@ -241,7 +243,7 @@ impl<O: Fn(Event)> Desk<O> {
             Job::Command(command) => !command.is_stop(),
             Job::Query(_) => !self.pilot.is_at_rest(),
         };
-        may_move && !self.pilot.has_target(now)
+        may_move && !self.pilot.has_errand(now)
     }
 
     fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration) {
@@ -317,6 +319,8 @@ async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
         Job::Query(Query::Parameters) => client.parameters().await.map(Answer::Parameters),
         Job::Query(Query::Attributes) => client.attributes().await.map(Answer::Attributes),
         Job::Query(Query::MoveSpeed) => client.move_speed().await.map(Answer::MoveSpeed),
+        Job::Query(Query::Presets) => client.presets().await.map(Answer::Presets),
+        Job::Query(Query::Queue(request)) => client.queue(*request).await.map(Answer::Place),
     }
 }
 

@@ -1,0 +1,231 @@
+use std::time::Duration;
+
+use super::{CommandHistory, ControlQueue, OperatorWatch, PanTilt, Verdict};
+
+/// Whether the camera is ours to move: an operator comes first, and so does whoever holds the control queue.
+#[derive(Debug, Default)]
+pub struct Authority {
+    watch: OperatorWatch,
+    /// The camera's own queue.
+    pub queue: ControlQueue,
+    /// An operator moved the camera; until then it is his.
+    operator_until: Option<Duration>,
+    /// Where the camera was first seen, while it may still be moving at a dead predecessor's word.
+    found: Option<Found>,
+    met: bool,
+    told: Option<Holder>,
+}
+
+#[derive(Debug)]
+struct Found {
+    position: PanTilt,
+    zoom_steps: Option<f64>,
+    at: Duration,
+}
+
+/// Who else moves the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Holder {
+    /// Somebody who moved it.
+    Operator,
+    /// Whoever is before us in the control queue.
+    Queue,
+}
+
+/// What a position says of others.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Finding {
+    /// Nothing.
+    Nothing,
+    /// The camera moves since before we came.
+    Orphan {
+        /// It zooms too.
+        zooms: bool,
+    },
+    /// An operator moves it.
+    Operator,
+}
+
+impl Authority {
+    /// For so long a camera just met is watched for a move that a predecessor left behind.
+    const FIRST_LOOK: Duration = Duration::from_secs(10);
+
+    /// More than the noise of a camera at rest, in so short a time.
+    const DRIFT_DEG: f64 = 0.3;
+    const DRIFT_ZOOM_STEPS: f64 = 20.0;
+
+    /// Judges where the camera looks. An operator found keeps it for `give_way`; zero: none is looked for.
+    pub fn positioned(
+        &mut self,
+        (position, zoom_steps): (PanTilt, Option<f64>),
+        (asked, answered): (Duration, Duration),
+        commands: &CommandHistory,
+        give_way: Duration,
+    ) -> Finding {
+        let verdict = self.watch.position(position, asked, answered, commands);
+        if let Some(orphan) = self.orphan(position, zoom_steps, answered) {
+            return orphan;
+        }
+        if verdict != Verdict::Foreign || give_way.is_zero() {
+            return Finding::Nothing;
+        }
+        self.operator_until = Some(answered + give_way);
+        Finding::Operator
+    }
+
+    fn orphan(&mut self, position: PanTilt, zoom_steps: Option<f64>, now: Duration) -> Option<Finding> {
+        if !self.met {
+            self.met = true;
+            self.found = Some(Found { position, zoom_steps, at: now });
+            return None;
+        }
+        let found = self.found.as_ref().filter(|found| now <= found.at + Self::FIRST_LOOK)?;
+        let zoomed = found.zoom_steps.zip(zoom_steps).map_or(0.0, |(before, now)| (now - before).abs());
+        let zooms = zoomed > Self::DRIFT_ZOOM_STEPS;
+        let moves = (position - found.position).largest() > Self::DRIFT_DEG;
+        if !moves && !zooms {
+            return None;
+        }
+        self.found = None;
+        Some(Finding::Orphan { zooms })
+    }
+
+    /// We moved the camera, or may have, in a way that nobody can foresee.
+    pub fn excuse(&mut self, now: Duration) {
+        self.watch.excuse(now);
+    }
+
+    /// We command the camera: what it does now is no predecessor's.
+    pub fn commanded(&mut self) {
+        (self.met, self.found) = (true, None);
+    }
+
+    /// The camera is out of sight.
+    pub fn forget(&mut self) {
+        self.watch.forget();
+        self.queue.forget();
+    }
+
+    /// Whether the camera is to be asked at once where it looks.
+    pub fn asks(&self) -> bool {
+        self.watch.suspects()
+    }
+
+    /// Whether a camera just met is still watched for somebody else's move.
+    pub fn looks(&self, now: Duration) -> bool {
+        self.found.as_ref().is_some_and(|found| now <= found.at + Self::FIRST_LOOK)
+    }
+
+    /// Who else moves the camera, if anybody.
+    pub fn holder(&self, now: Duration) -> Option<Holder> {
+        if self.queue.is_held() {
+            return Some(Holder::Queue);
+        }
+        self.operator_until.filter(|until| now < *until).map(|_| Holder::Operator)
+    }
+
+    /// Whether we may move the camera now; not while that is still being found out.
+    pub fn is_ours(&self, now: Duration) -> bool {
+        self.holder(now).is_none() && self.queue.lets_us() && !self.asks()
+    }
+
+    /// When an operator's time is over, where one is there.
+    pub fn operator_until(&self, now: Duration) -> Option<Duration> {
+        self.operator_until.filter(|until| now < *until)
+    }
+
+    /// Who holds the camera, if that is another than the last time this was asked.
+    pub fn change(&mut self, now: Duration) -> Option<Option<Holder>> {
+        let holder = self.holder(now);
+        (std::mem::replace(&mut self.told, holder) != holder).then_some(holder)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vapix::{QueuePlace, QueueRequest};
+
+    const GIVE_WAY: Duration = Duration::from_secs(10);
+
+    fn s(s: u64) -> Duration {
+        Duration::from_secs(s)
+    }
+
+    fn tell(authority: &mut Authority, pan: f64, at: Duration) -> Finding {
+        let place = (PanTilt::new(pan, 0.0), Some(1.0));
+        authority.positioned(place, (at, at), &CommandHistory::default(), GIVE_WAY)
+    }
+
+    fn met() -> Authority {
+        let mut authority = Authority::default();
+        for second in 1..30 {
+            assert_eq!(tell(&mut authority, 0.0, s(second)), Finding::Nothing);
+        }
+        assert_eq!(authority.change(s(30)), None);
+        authority
+    }
+
+    #[test]
+    fn an_operator_has_the_camera_until_he_lets_it_rest() {
+        let mut authority = met();
+        assert_eq!(tell(&mut authority, 9.0, s(30)), Finding::Nothing);
+        assert!(authority.asks() && !authority.is_ours(s(30)));
+        assert_eq!(tell(&mut authority, 9.0, s(30)), Finding::Operator);
+        assert_eq!(authority.change(s(30)), Some(Some(Holder::Operator)));
+        assert_eq!(authority.change(s(31)), None);
+        tell(&mut authority, 20.0, s(35));
+        assert_eq!(tell(&mut authority, 20.0, s(35)), Finding::Operator);
+        assert!(!authority.is_ours(s(44)));
+        assert_eq!(authority.operator_until(s(44)), Some(s(45)));
+        assert!(authority.is_ours(s(45)));
+        assert_eq!(authority.change(s(45)), Some(None));
+    }
+
+    #[test]
+    fn nobody_is_given_way_where_that_is_not_wanted() {
+        let mut authority = met();
+        for pan in [9.0, 9.0, 30.0, 30.0] {
+            let place = (PanTilt::new(pan, 0.0), None);
+            let finding =
+                authority.positioned(place, (s(30), s(30)), &CommandHistory::default(), Duration::ZERO);
+            assert_eq!(finding, Finding::Nothing);
+        }
+    }
+
+    #[test]
+    fn a_camera_found_moving_is_an_orphan_once() {
+        let mut authority = Authority::default();
+        assert_eq!(tell(&mut authority, 0.0, s(1)), Finding::Nothing);
+        assert!(authority.looks(s(1)));
+        assert_eq!(tell(&mut authority, 0.5, s(2)), Finding::Orphan { zooms: false });
+        assert_eq!(tell(&mut authority, 1.0, s(3)), Finding::Nothing);
+        assert!(!authority.looks(s(3)));
+        let mut authority = Authority::default();
+        tell(&mut authority, 0.0, s(1));
+        let zoomed = (PanTilt::default(), Some(100.0));
+        let finding = authority.positioned(zoomed, (s(2), s(2)), &CommandHistory::default(), GIVE_WAY);
+        assert_eq!(finding, Finding::Orphan { zooms: true });
+    }
+
+    #[test]
+    fn what_we_command_is_no_orphan() {
+        let mut authority = Authority::default();
+        tell(&mut authority, 0.0, s(1));
+        authority.commanded();
+        assert_eq!(tell(&mut authority, 1.0, s(2)), Finding::Nothing);
+    }
+
+    #[test]
+    fn whoever_is_before_us_in_the_queue_has_the_camera() {
+        let mut authority = met();
+        authority.queue.told(Some(true));
+        assert!(!authority.is_ours(s(30)));
+        let place = |position| Some(QueuePlace { position, left: None, poll_every: s(20) });
+        authority.queue.answered(QueueRequest::Request, place(2), s(30));
+        assert_eq!(authority.change(s(30)), Some(Some(Holder::Queue)));
+        authority.queue.answered(QueueRequest::Query, place(1), s(31));
+        assert!(authority.is_ours(s(31)));
+        assert_eq!(authority.change(s(31)), Some(None));
+    }
+}

@@ -1,0 +1,205 @@
+use std::time::Duration;
+
+use crate::vapix::{QueuePlace, QueueRequest};
+
+/// Our place in the camera's control queue, where it has one.
+#[derive(Debug, Default)]
+pub struct ControlQueue {
+    state: State,
+    ask_at: Duration,
+    leaving: bool,
+    /// A command was refused in our turn, and none was accepted since.
+    doubted: bool,
+    /// The camera said that it is not our turn.
+    held: bool,
+}
+
+#[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Nobody said whether there is one.
+    #[default]
+    Unknown,
+    /// There is none.
+    Absent,
+    /// The camera refused something, as it would in others' hands: perhaps there is one.
+    Presumed,
+    /// There is one, and we are not in it.
+    Outside,
+    /// We wait.
+    Waiting,
+    /// It is our turn.
+    InControl,
+}
+
+impl ControlQueue {
+    /// A camera that names no time, or does not answer, is asked again after this.
+    const PAUSE: Duration = Duration::from_secs(5);
+
+    /// The camera's parameters tell whether there is a queue.
+    pub fn told(&mut self, queueing: Option<bool>) {
+        match (queueing, self.state) {
+            (Some(true), State::Unknown | State::Absent) => self.state = State::Outside,
+            (Some(false), State::Unknown) => self.state = State::Absent,
+            _ => {}
+        }
+    }
+
+    /// The camera refused something with words; returns whether a queue may be the reason, and is worth asking.
+    pub fn refused(&mut self, now: Duration) -> bool {
+        match self.state {
+            State::Unknown => self.state = State::Presumed,
+            State::InControl if !self.doubted => self.state = State::Waiting,
+            _ => return false,
+        }
+        self.doubted = true;
+        self.ask_at = now;
+        true
+    }
+
+    /// The camera did as it was told.
+    pub fn obeyed(&mut self) {
+        self.doubted = false;
+    }
+
+    /// What to ask, and when.
+    pub fn next(&self) -> Option<(QueueRequest, Duration)> {
+        match self.state {
+            State::Unknown | State::Absent => None,
+            State::Waiting | State::InControl if self.leaving => Some((QueueRequest::Drop, Duration::ZERO)),
+            _ if self.leaving => None,
+            State::Presumed | State::Outside => Some((QueueRequest::Request, self.ask_at)),
+            State::Waiting | State::InControl => Some((QueueRequest::Query, self.ask_at)),
+        }
+    }
+
+    /// The camera answered; `None`: it said no more than yes.
+    pub fn answered(&mut self, request: QueueRequest, place: Option<QueuePlace>, now: Duration) {
+        self.state = match (request, place.map(|place| place.position)) {
+            (QueueRequest::Drop, _) => State::Outside,
+            (_, None | Some(1)) => State::InControl,
+            (_, Some(0)) if self.state == State::Presumed => State::Absent,
+            (_, Some(0)) => State::Outside,
+            (_, Some(_)) => State::Waiting,
+        };
+        self.held = !matches!(self.state, State::InControl | State::Absent) && request != QueueRequest::Drop;
+        // Twice as often as it wants, so that one lost question does not cost the place.
+        self.ask_at = now + place.map_or(Self::PAUSE, |place| place.poll_every) / 2;
+    }
+
+    /// The camera refused to say.
+    pub fn failed(&mut self, now: Duration) {
+        self.state = if self.state == State::Presumed { State::Absent } else { State::Outside };
+        self.ask_at = now + Self::PAUSE;
+    }
+
+    /// The connection was lost, and may be with it our place.
+    pub fn forget(&mut self) {
+        if self.exists() {
+            *self = Self { state: State::Outside, ask_at: Duration::ZERO, held: false, ..*self };
+        }
+    }
+
+    /// It is the end: give up the place.
+    pub fn leave(&mut self) {
+        self.leaving = true;
+    }
+
+    /// Whether there is a place to be given up.
+    pub fn is_in(&self) -> bool {
+        matches!(self.state, State::Waiting | State::InControl)
+    }
+
+    /// Whether the camera said that it is somebody else's turn.
+    pub fn is_held(&self) -> bool {
+        self.held
+    }
+
+    fn exists(&self) -> bool {
+        !matches!(self.state, State::Unknown | State::Absent | State::Presumed)
+    }
+
+    /// Whether we may move the camera.
+    pub fn lets_us(&self) -> bool {
+        matches!(self.state, State::Unknown | State::Absent | State::InControl)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn s(s: u64) -> Duration {
+        Duration::from_secs(s)
+    }
+
+    fn place(position: u32) -> Option<QueuePlace> {
+        Some(QueuePlace { position, left: None, poll_every: s(20) })
+    }
+
+    #[test]
+    fn a_camera_without_a_queue_is_asked_nothing() {
+        let mut queue = ControlQueue::default();
+        assert!(queue.lets_us() && queue.next().is_none());
+        queue.told(Some(false));
+        assert!(!queue.refused(s(1)));
+        assert!(queue.lets_us() && queue.next().is_none());
+    }
+
+    #[test]
+    fn it_queues_waits_and_comes_to_its_turn() {
+        let mut queue = ControlQueue::default();
+        queue.told(Some(true));
+        assert!(!queue.lets_us() && !queue.is_held(), "that is not known yet");
+        assert_eq!(queue.next(), Some((QueueRequest::Request, s(0))));
+        queue.answered(QueueRequest::Request, place(2), s(1));
+        assert!(!queue.lets_us() && queue.is_in() && queue.is_held());
+        assert_eq!(queue.next(), Some((QueueRequest::Query, s(11))));
+        queue.answered(QueueRequest::Query, place(1), s(11));
+        assert!(queue.lets_us() && !queue.is_held());
+        queue.answered(QueueRequest::Query, place(0), s(21));
+        assert!(!queue.lets_us());
+        assert_eq!(queue.next(), Some((QueueRequest::Request, s(31))));
+    }
+
+    #[test]
+    fn a_refusal_makes_it_look_once() {
+        let mut queue = ControlQueue::default();
+        assert!(queue.refused(s(3)));
+        assert_eq!(queue.next(), Some((QueueRequest::Request, s(3))));
+        assert!(!queue.refused(s(3)), "there is something else amiss");
+        queue.failed(s(3));
+        assert!(queue.lets_us() && queue.next().is_none() && !queue.refused(s(4)));
+        let mut queue = ControlQueue::default();
+        queue.refused(s(3));
+        queue.answered(QueueRequest::Request, place(1), s(3));
+        assert!(queue.lets_us() && queue.exists());
+        queue.obeyed();
+        assert!(queue.refused(s(4)), "somebody pushed in");
+        assert_eq!(queue.next(), Some((QueueRequest::Query, s(4))));
+        queue.answered(QueueRequest::Query, place(1), s(4));
+        assert!(!queue.refused(s(5)), "it is our turn, so there is something else amiss");
+    }
+
+    #[test]
+    fn at_the_end_the_place_is_given_up() {
+        let mut queue = ControlQueue::default();
+        queue.leave();
+        assert_eq!(queue.next(), None);
+        queue.told(Some(true));
+        queue.answered(QueueRequest::Request, place(1), s(0));
+        assert_eq!(queue.next(), Some((QueueRequest::Drop, s(0))));
+        queue.answered(QueueRequest::Drop, None, s(0));
+        assert!(queue.next().is_none() && !queue.is_in());
+    }
+
+    #[test]
+    fn after_an_outage_it_queues_anew() {
+        let mut queue = ControlQueue::default();
+        queue.forget();
+        assert!(queue.lets_us());
+        queue.told(Some(true));
+        queue.answered(QueueRequest::Request, place(1), s(0));
+        queue.forget();
+        assert_eq!(queue.next(), Some((QueueRequest::Request, s(0))));
+    }
+}

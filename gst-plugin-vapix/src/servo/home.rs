@@ -1,0 +1,298 @@
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use crate::vapix::{Command, Position, Presets};
+
+/// Where the camera waits for a target.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Home {
+    /// Where it looked when it was met.
+    Start,
+    /// A direction, and a zoom step where one is given.
+    Position(Position),
+    /// One of the camera's own presets.
+    Preset(String),
+}
+
+impl FromStr for Home {
+    type Err = String;
+
+    /// Reads `start`, `pan,tilt` or `pan,tilt,zoom` in degrees and zoom steps, or the name of a preset.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "start" {
+            return Ok(Self::Start);
+        }
+        let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+        match numbers.as_deref() {
+            // A preset may be called 7; a direction has two parts.
+            None | Some([_]) => Ok(Self::Preset(text.to_owned())),
+            Some([pan, tilt]) => Self::position(*pan, *tilt, None),
+            Some([pan, tilt, zoom]) => Self::position(*pan, *tilt, Some(*zoom)),
+            Some(_) => Err(format!("`{text}` has more than pan,tilt,zoom")),
+        }
+    }
+}
+
+impl fmt::Display for Home {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Start => f.write_str("start"),
+            Self::Position(position) => {
+                write!(f, "{},{}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))?;
+                position.zoom_steps.map_or(Ok(()), |zoom| write!(f, ",{zoom}"))
+            }
+            Self::Preset(name) => f.write_str(name),
+        }
+    }
+}
+
+impl Home {
+    fn position(pan: f64, tilt: f64, zoom: Option<f64>) -> Result<Self, String> {
+        let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
+        let zooms = zoom.is_none_or(|zoom| (1.0..=9999.0).contains(&zoom));
+        if !turns || !zooms {
+            return Err("pan and tilt are from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
+        }
+        Ok(Self::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }))
+    }
+}
+
+/// Sends the camera home when nobody was seen for a while, once.
+#[derive(Debug, Default)]
+pub struct Homing {
+    home: Option<Home>,
+    timeout: Duration,
+    /// When it was first seen that nobody is there.
+    alone_since: Option<Duration>,
+    /// Pictures are coming until about then: without any it is not known that nobody is there.
+    looking_until: Duration,
+    /// Nothing was commanded since the camera was met.
+    untouched: bool,
+    at_start: bool,
+    start: Option<Position>,
+    /// The number of the preset.
+    preset: Option<u32>,
+    /// It is there, or on its way, or cannot get there.
+    settled: bool,
+}
+
+impl Homing {
+    /// Takes the settings. `at_start`: go there before the first target too, without waiting.
+    pub fn new(home: Option<Home>, timeout: Duration, at_start: bool) -> Self {
+        let settled = home == Some(Home::Start);
+        Self { home, timeout, at_start, settled, untouched: true, ..Self::default() }
+    }
+
+    /// Takes other settings.
+    pub fn configure(&mut self, home: Option<&Home>, timeout: Duration) {
+        self.timeout = timeout;
+        if home != self.home.as_ref() {
+            *self = Self { home: home.cloned(), preset: None, settled: false, at_start: false, ..*self };
+        }
+    }
+
+    /// A picture came without a target; the next is awaited until `next`.
+    pub fn alone(&mut self, now: Duration, next: Duration) {
+        self.alone_since.get_or_insert(now);
+        self.looking_until = next;
+    }
+
+    /// Somebody is there, or it is not known whether anybody is.
+    pub fn not_alone(&mut self) {
+        self.alone_since = None;
+    }
+
+    /// The camera looks there; the first place is where it started.
+    pub fn positioned(&mut self, position: Position) {
+        if self.untouched {
+            self.start.get_or_insert(position);
+        }
+    }
+
+    /// The camera does something else at our word, or at somebody's.
+    pub fn strayed(&mut self) {
+        self.settled = false;
+        self.untouched = false;
+        self.at_start = false;
+    }
+
+    /// It has taken the command to go home, or will not.
+    pub fn settled(&mut self) {
+        self.strayed();
+        self.settled = true;
+    }
+
+    /// It was stopped, perhaps on its way, and what was seen before is void.
+    pub fn interrupt(&mut self) {
+        self.alone_since = None;
+        self.settled &= self.home == Some(Home::Start) && self.untouched;
+    }
+
+    /// Whether it is there, or on its way.
+    pub fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Whether the camera is to be asked for its presets.
+    pub fn wants_presets(&self) -> bool {
+        self.preset.is_none() && !self.settled && matches!(self.home, Some(Home::Preset(_)))
+    }
+
+    /// The camera told its presets; returns the name where it has none of that name.
+    pub fn told_presets(&mut self, presets: &Presets) -> Option<String> {
+        let Some(Home::Preset(name)) = &self.home else { return None };
+        self.preset = presets.number(name);
+        self.settled |= self.preset.is_none();
+        self.preset.is_none().then(|| name.clone())
+    }
+
+    /// The camera would not tell its presets.
+    pub fn no_presets(&mut self) -> Option<String> {
+        self.told_presets(&Presets::default())
+    }
+
+    /// The command to go home, where it is time.
+    pub fn due(&self, now: Duration) -> Option<Command> {
+        let wait = if self.at_start { Duration::ZERO } else { self.timeout };
+        let alone = self.alone_since.is_some_and(|since| since + wait <= now) && now <= self.looking_until;
+        if self.settled || !alone { None } else { self.command() }
+    }
+
+    /// Whether this command leads home.
+    pub fn leads(&self, command: &Command) -> bool {
+        self.command().as_ref() == Some(command)
+    }
+
+    fn command(&self) -> Option<Command> {
+        match self.home.as_ref()? {
+            Home::Start => self.start.and_then(command),
+            Home::Position(position) => command(*position),
+            Home::Preset(_) => self.preset.map(|number| Command::Preset { number }),
+        }
+    }
+}
+
+fn command(position: Position) -> Option<Command> {
+    Some(Command::Absolute {
+        pan_deg: position.pan_deg?,
+        tilt_deg: position.tilt_deg?,
+        speed: 100,
+        // Within 1 to 9999.
+        zoom: position.zoom_steps.map(|zoom| zoom.clamp(1.0, 9999.0) as u16),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn s(s: u64) -> Duration {
+        Duration::from_secs(s)
+    }
+
+    fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {
+        Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }
+    }
+
+    fn alone(homing: &mut Homing, from: u64, to: u64) -> Vec<(u64, Command)> {
+        (from..to)
+            .filter_map(|second| {
+                homing.alone(s(second), s(second + 1));
+                let command = homing.due(s(second))?;
+                homing.settled();
+                Some((second, command))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn homes_are_read() {
+        assert_eq!("start".parse(), Ok(Home::Start));
+        assert_eq!("-12.5, 3".parse(), Ok(Home::Position(at(-12.5, 3.0, None))));
+        assert_eq!("10,-5,3868".parse(), Ok(Home::Position(at(10.0, -5.0, Some(3868.0)))));
+        for name in ["Gate", "7", "Gate, left", "north,south"] {
+            assert_eq!(name.parse(), Ok(Home::Preset(name.to_owned())), "{name}");
+        }
+        for wrong in ["200,0", "0,-190", "0,0,0", "0,0,20000", "NaN,1", "1,2,3,4"] {
+            assert!(wrong.parse::<Home>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn it_goes_home_once_when_nobody_was_seen_for_a_while() {
+        let home = Home::Position(at(5.0, 1.0, Some(20.0)));
+        let mut homing = Homing::new(Some(home), s(10), false);
+        let there = Command::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 100, zoom: Some(20) };
+        assert_eq!(alone(&mut homing, 3, 60), [(13, there)]);
+        homing.not_alone();
+        homing.strayed();
+        assert_eq!(homing.due(s(61)), None);
+        assert_eq!(alone(&mut homing, 70, 100), [(80, there)]);
+        homing.strayed();
+        assert_eq!(alone(&mut homing, 100, 110), [(100, there)], "somebody else took it away");
+    }
+
+    #[test]
+    fn without_pictures_nobody_knows_that_nobody_is_there() {
+        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
+        homing.alone(s(0), s(1));
+        assert_eq!(homing.due(s(20)), None);
+    }
+
+    #[test]
+    fn at_the_start_it_does_not_wait() {
+        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        assert_eq!(alone(&mut homing, 0, 30).len(), 1);
+        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        homing.strayed();
+        assert_eq!(alone(&mut homing, 0, 30)[0].0, 10, "there was a target first");
+    }
+
+    #[test]
+    fn where_it_started_is_where_it_was_before_our_first_command() {
+        let mut homing = Homing::new(Some(Home::Start), s(10), true);
+        homing.positioned(at(7.0, -2.0, Some(1.0)));
+        assert_eq!(alone(&mut homing, 0, 30), [], "it is there");
+        homing.positioned(at(7.5, -2.0, Some(1.0)));
+        homing.strayed();
+        homing.positioned(at(90.0, 0.0, Some(500.0)));
+        let start = Command::Absolute { pan_deg: 7.0, tilt_deg: -2.0, speed: 100, zoom: Some(1) };
+        homing.not_alone();
+        assert_eq!(alone(&mut homing, 40, 80), [(50, start)]);
+    }
+
+    #[test]
+    fn a_preset_goes_by_its_number() {
+        let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        assert!(homing.wants_presets());
+        assert_eq!(alone(&mut homing, 0, 30), []);
+        assert_eq!(homing.told_presets(&Presets(vec![(1, "Home".to_owned()), (4, "Gate".to_owned())])), None);
+        assert!(!homing.wants_presets());
+        assert_eq!(alone(&mut homing, 30, 60), [(30, Command::Preset { number: 4 })]);
+    }
+
+    #[test]
+    fn a_preset_that_is_none_is_told_once() {
+        let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        assert_eq!(homing.told_presets(&Presets::default()), Some("Gate".to_owned()));
+        assert!(!homing.wants_presets());
+        assert_eq!(alone(&mut homing, 0, 30), []);
+        homing.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10));
+        assert_eq!(alone(&mut homing, 30, 60).len(), 1);
+    }
+
+    proptest! {
+        #[test]
+        fn a_home_is_read_back(pan in -180.0..180.0f64, tilt in -180.0..180.0f64, zoom in prop::option::of(1.0..9999.0f64)) {
+            let home = Home::Position(at(pan, tilt, zoom));
+            prop_assert_eq!(home.to_string().parse(), Ok(home));
+        }
+
+        #[test]
+        fn any_text_is_a_home_or_refused(text in ".{0,40}") {
+            let _ = text.parse::<Home>();
+        }
+    }
+}

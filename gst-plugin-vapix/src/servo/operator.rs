@@ -1,0 +1,284 @@
+use std::time::Duration;
+
+use super::{CommandHistory, PanTilt};
+
+/// Tells from the positions a camera reports whether somebody else moves it.
+///
+/// A hand that is taken for the camera's own noise costs a moment of quarrel; one that is seen where there is none
+/// costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn
+/// of an axis in a direction that it was not told, of more than any noise, and still there when asked again.
+#[derive(Debug, Default)]
+pub struct OperatorWatch {
+    /// Where the camera was when last nothing was amiss.
+    place: Option<Place>,
+    /// One turn of the camera was seen that is ours, or none: what follows is not its way of starting up.
+    armed: bool,
+    suspects: bool,
+    /// Until then it may turn any way at our word.
+    excused_until: Duration,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    position: PanTilt,
+    asked: Duration,
+}
+
+/// What a position tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing that we, or nobody, could not have done.
+    Ours,
+    /// Something; the camera is to be asked again before anything else.
+    Suspicious,
+    /// Somebody else moves it.
+    Foreign,
+}
+
+impl OperatorWatch {
+    /// Turns up to this come from noise, from whole degrees told, from an end that springs back.
+    const TOLERANCE_DEG: f64 = 1.5;
+
+    /// A command acts no later than this, rest included, and positions are no older.
+    const LATEST: Duration = Duration::from_secs(2);
+
+    /// Of a moving camera that was not asked for longer, nobody can tell which way it went.
+    const LONGEST: Duration = Duration::from_secs(3);
+
+    /// A pan by more may have gone either way round.
+    const CLEAR_DEG: f64 = 90.0;
+
+    /// Tilted this steeply, a camera may swing round by itself to keep the picture upright (AutoFlip).
+    const STEEP_DEG: f64 = 75.0;
+
+    /// Judges a position that was asked for and answered then.
+    pub fn position(
+        &mut self,
+        position: PanTilt,
+        asked: Duration,
+        answered: Duration,
+        commands: &CommandHistory,
+    ) -> Verdict {
+        let place = Place { position, asked };
+        let Some(before) = self.place else {
+            self.place = Some(place);
+            return Verdict::Ours;
+        };
+        if self.explains(&before, position, answered, commands) {
+            *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
+            return Verdict::Ours;
+        }
+        if !self.armed {
+            self.place = Some(place);
+            return Verdict::Ours;
+        }
+        if !self.suspects {
+            self.suspects = true;
+            return Verdict::Suspicious;
+        }
+        *self = Self { place: Some(place), suspects: false, ..*self };
+        Verdict::Foreign
+    }
+
+    /// At this time the camera may turn any way at our word.
+    pub fn excuse(&mut self, now: Duration) {
+        self.excused_until = self.excused_until.max(now + Self::LATEST);
+    }
+
+    /// The camera was out of sight: what it did meanwhile, and does until it is seen at rest, is nobody's.
+    pub fn forget(&mut self) {
+        *self = Self { excused_until: self.excused_until, ..Self::default() };
+    }
+
+    /// Whether the next position decides.
+    pub fn suspects(&self) -> bool {
+        self.suspects
+    }
+
+    fn explains(
+        &self,
+        before: &Place,
+        position: PanTilt,
+        answered: Duration,
+        commands: &CommandHistory,
+    ) -> bool {
+        if before.asked <= self.excused_until {
+            return true;
+        }
+        let turn = position - before.position;
+        let since = before.asked.saturating_sub(Self::LATEST);
+        let rates: Vec<PanTilt> = commands.rates_between(since, answered).collect();
+        let still = rates.iter().all(|rate| rate.largest() == 0.0);
+        if !still {
+            let steep = before.position.tilt.abs().max(position.tilt.abs()) > Self::STEEP_DEG;
+            let long = answered.saturating_sub(before.asked) > Self::LONGEST;
+            if steep || long {
+                return true;
+            }
+        }
+        let commanded = commands.rotation(since, answered);
+        let pan = (turn.pan + 180.0).rem_euclid(360.0) - 180.0;
+        let unclear = !still && pan.abs().max(commanded.pan.abs()) > Self::CLEAR_DEG;
+        (unclear || told(pan, rates.iter().map(|rate| rate.pan)))
+            && told(turn.tilt, rates.iter().map(|rate| rate.tilt))
+    }
+}
+
+/// Whether an axis was told to turn that way at any time.
+fn told(turn_deg: f64, mut rates: impl Iterator<Item = f64>) -> bool {
+    turn_deg.abs() <= OperatorWatch::TOLERANCE_DEG || rates.any(|rate| rate * turn_deg > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// A watch that is told positions, one a second, each answered after 100 ms.
+    #[derive(Default)]
+    struct Rig {
+        watch: OperatorWatch,
+        commands: CommandHistory,
+        now: Duration,
+    }
+
+    impl Rig {
+        fn armed() -> Self {
+            let mut rig = Self { now: ms(10_000), ..Self::default() };
+            assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+            assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+            rig
+        }
+
+        fn tell(&mut self, pan: f64, tilt: f64) -> Verdict {
+            self.tell_after(ms(1000), pan, tilt)
+        }
+
+        fn tell_after(&mut self, wait: Duration, pan: f64, tilt: f64) -> Verdict {
+            self.now += wait;
+            let asked = self.now.saturating_sub(ms(100));
+            self.watch.position(PanTilt::new(pan, tilt), asked, self.now, &self.commands)
+        }
+
+        fn command(&mut self, pan: f64, tilt: f64) {
+            self.commands.push(self.now, PanTilt::new(pan, tilt));
+        }
+    }
+
+    #[test]
+    fn a_resting_camera_that_turns_is_moved_by_somebody() {
+        for (pan, tilt) in [(10.0, 0.0), (-2.0, 0.0), (0.0, 3.0), (170.0, -80.0)] {
+            let mut rig = Rig::armed();
+            assert_eq!(rig.tell(pan, tilt), Verdict::Suspicious);
+            assert!(rig.watch.suspects());
+            assert_eq!(rig.tell_after(ms(100), pan, tilt), Verdict::Foreign);
+            assert_eq!(rig.tell(pan, tilt), Verdict::Ours, "it rests there");
+        }
+    }
+
+    #[test]
+    fn a_camera_that_turns_against_its_command_is_moved_by_somebody() {
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell(4.0, 0.0), Verdict::Ours);
+        assert_eq!(rig.tell(-3.0, 0.0), Verdict::Suspicious);
+        assert_eq!(rig.tell_after(ms(100), -4.0, 0.0), Verdict::Foreign);
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell(5.0, 4.0), Verdict::Suspicious, "an axis that was told nothing");
+    }
+
+    #[test]
+    fn one_wrong_answer_is_no_operator() {
+        let mut rig = Rig::armed();
+        for _ in 0..10 {
+            assert_eq!(rig.tell(60.0, -20.0), Verdict::Suspicious);
+            assert_eq!(rig.tell_after(ms(100), 0.0, 0.0), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn a_camera_at_its_end_is_no_operator() {
+        let mut rig = Rig::armed();
+        rig.command(30.0, 0.0);
+        for pan in [20.0, 20.0, 19.2, 20.0, 20.0] {
+            assert_eq!(rig.tell(pan, 0.0), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn whole_degrees_are_no_operator() {
+        let mut rig = Rig::armed();
+        for second in 0..60 {
+            assert_eq!(rig.tell(f64::from(second % 2), f64::from(second % 3 - 1) * 0.7), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn a_camera_out_of_sight_may_come_back_anywhere_and_turn_to_find_its_zero() {
+        let mut rig = Rig::armed();
+        rig.watch.forget();
+        for pan in [120.0, -60.0, 170.0, 20.0, 0.0, 0.0] {
+            assert_eq!(rig.tell(pan, 0.0), Verdict::Ours);
+        }
+        assert_eq!(rig.tell(5.0, 0.0), Verdict::Suspicious, "that was at rest");
+    }
+
+    #[test]
+    fn a_move_of_unknown_course_is_excused_while_it_may_last() {
+        let mut rig = Rig::armed();
+        rig.watch.excuse(rig.now);
+        assert_eq!(rig.tell(40.0, 5.0), Verdict::Ours);
+        assert_eq!(rig.tell(60.0, 5.0), Verdict::Ours);
+        rig.tell(60.0, 5.0);
+        rig.tell(60.0, 5.0);
+        assert_eq!(rig.tell(20.0, 5.0), Verdict::Suspicious);
+    }
+
+    #[test]
+    fn flips_and_long_silences_of_a_moving_camera_say_nothing() {
+        let mut rig = Rig::armed();
+        rig.command(0.0, -20.0);
+        assert_eq!(rig.tell(175.0, -80.0), Verdict::Ours, "AutoFlip");
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell_after(ms(5000), -80.0, 0.0), Verdict::Ours);
+    }
+
+    proptest! {
+        /// Whatever we command: late by up to the longest latency, and as fast or slow as it will, it is ours.
+        #[test]
+        fn our_own_commands_are_no_operator(
+            moves in prop::collection::vec((-60.0..60.0f64, -30.0..30.0f64, 1u32..20), 1..12),
+            latency_steps in 0usize..19, slow_or_fast in 0.1..1.4f64, end in 15.0..200.0f64,
+            coarse in prop::sample::select(vec![0.001, 0.1, 1.0]), noise in 0.0..0.2f64,
+        ) {
+            const STEP: Duration = Duration::from_millis(100);
+            let mut rig = Rig::armed();
+            let (mut at, mut late) = (PanTilt::default(), vec![PanTilt::default(); latency_steps]);
+            let wobble = |tick: u64| noise * if tick % 3 == 0 { 1.0 } else { -1.0 };
+            let mut ticks = 0u64;
+            for (pan, tilt, steps) in moves.into_iter().chain([(0.0, 0.0, 60)]) {
+                rig.command(pan, tilt);
+                for _ in 0..steps {
+                    late.push(PanTilt::new(pan, tilt));
+                    let rate = late.remove(0) * slow_or_fast;
+                    at = at + rate * STEP.as_secs_f64();
+                    at = PanTilt::new(at.pan.clamp(-end, end), at.tilt.clamp(-70.0, 20.0));
+                    ticks += 1;
+                    if ticks % 10 == 0 {
+                        let told = |angle: f64| ((angle + wobble(ticks / 10)) / coarse).round() * coarse;
+                        let told_pan = (told(at.pan) + 180.0).rem_euclid(360.0) - 180.0;
+                        prop_assert_eq!(rig.tell_after(STEP, told_pan, told(at.tilt)), Verdict::Ours);
+                    } else {
+                        rig.now += STEP;
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! What the camera's answers mean to the pilot.
+
+use std::mem;
+use std::time::Duration;
+
+use super::Pilot;
+use crate::servo::{Answer, Finding, Job, PanTilt, Query, Report, Scheduler, Steps};
+use crate::vapix::{Command, Error};
+
+impl Pilot {
+    /// The camera answered what was sent then, or did not.
+    pub fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration, now: Duration) {
+        match (job, answer) {
+            (Job::Command(command), Ok(_)) => self.command_accepted(command, sent, now),
+            (Job::Command(command), Err(err)) => self.command_failed(command, &err, now),
+            (Job::Query(query), Ok(answer)) => self.told(*query, answer, sent, now),
+            (Job::Query(query), Err(err)) => self.not_told(*query, &err, now),
+        }
+    }
+
+    fn command_failed(&mut self, command: &Command, err: &Error, now: Duration) {
+        if err.may_have_acted() {
+            self.unanswered(command, now);
+        } else {
+            self.scheduler.failed(command, false, now);
+        }
+        if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
+            return;
+        }
+        if self.homing.leads(command) && err.is_refusal() && !err.is_final() {
+            self.homing.settled();
+            self.reports.push(Report::HomeRefused(err.clone()));
+            return;
+        }
+        self.failed(err, true, now);
+    }
+
+    /// What the camera does from here on is unknown.
+    pub(super) fn unanswered(&mut self, command: &Command, now: Duration) {
+        self.scheduler.failed(command, true, now);
+        self.authority.excuse(now + Scheduler::DOUBT);
+    }
+
+    fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
+        let was_moving = self.scheduler.may_move();
+        self.scheduler.accepted(command, now);
+        self.authority.commanded();
+        self.authority.queue.obeyed();
+        self.exchange = now.saturating_sub(sent);
+        // Counted from its sending on: that is when it can begin to act, however late the answer is.
+        match command {
+            Command::Velocity { pan, tilt, .. } => {
+                self.history.push_steps(sent, (*pan, *tilt), &self.map);
+            }
+            _ => self.history.push(sent, PanTilt::default()),
+        }
+        match command {
+            Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
+                self.steps.begin(now);
+                self.authority.excuse(now);
+                self.next_poll = now + Steps::POLL;
+            }
+            Command::Halt | Command::Stop => {
+                self.speed_steps = (0, 0);
+                self.steps.rest(now);
+                // Where it came to rest.
+                self.next_poll = now + Self::POLL_MOVING;
+            }
+            Command::Velocity { .. } => {
+                // A step under way, from before the mode was changed, is over.
+                self.steps.rest(now);
+                if !was_moving {
+                    self.next_poll = now + Self::POLL_MOVING;
+                }
+            }
+        }
+        if self.homing.leads(command) {
+            self.homing.settled();
+        } else if !command.is_stop() {
+            self.homing.strayed();
+        }
+        self.succeeded(true);
+        match (was_moving, self.scheduler.may_move()) {
+            (false, true) => self.reports.push(Report::Moving),
+            (true, false) => self.reports.push(Report::Stopped),
+            _ => {}
+        }
+    }
+
+    fn told(&mut self, query: Query, answer: Answer, sent: Duration, now: Duration) {
+        self.introduction.retain(|pending| *pending != query);
+        match answer {
+            Answer::Position(position) => {
+                let before = mem::replace(&mut self.camera.position, position);
+                self.homing.positioned(position);
+                if position.zoom_steps != before.zoom_steps {
+                    self.calibration.zoomed();
+                }
+                if let Some(position) = self.camera.pan_tilt() {
+                    self.look_for_others(position, sent, now);
+                    if self.authority.is_ours(now) {
+                        self.calibration.positioned((sent + now) / 2, position);
+                    }
+                }
+                self.positioned(self.camera.pan_tilt(), now);
+            }
+            Answer::Limits(limits) => self.camera.limits = limits,
+            Answer::Parameters(parameters) => {
+                self.camera.parameters = parameters;
+                self.authority.queue.told(parameters.control_queue);
+            }
+            Answer::Presets(presets) => {
+                self.reports.extend(self.homing.told_presets(&presets).map(Report::NoSuchPreset));
+            }
+            Answer::Place(place) => {
+                if let Query::Queue(request) = query {
+                    self.authority.queue.answered(request, place, now);
+                }
+            }
+            Answer::Attributes(attributes) => {
+                self.camera.attributes = attributes;
+                self.assume_speeds();
+            }
+            Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
+            Answer::Accepted => {}
+        }
+        self.revise();
+        self.succeeded(false);
+    }
+
+    fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
+        if query != Query::Position {
+            // Optional; a camera that is gone will be missed by the next position.
+            if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
+                self.will_not_tell(query, now);
+                return;
+            }
+        } else if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
+            return;
+        } else if self.link.connected()
+            && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
+        {
+            self.positioned(None, now);
+            if !self.steps.under_way() {
+                self.next_poll = now + Self::POLL_REFUSED;
+            }
+            return;
+        }
+        self.failed(err, false, now);
+    }
+
+    fn will_not_tell(&mut self, query: Query, now: Duration) {
+        match query {
+            Query::Queue(_) => self.authority.queue.failed(now),
+            Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
+            _ => self.introduction.retain(|pending| *pending != query),
+        }
+    }
+
+    /// What the position tells of others who move the camera.
+    fn look_for_others(&mut self, position: PanTilt, asked: Duration, now: Duration) {
+        if self.steps.under_way() {
+            self.authority.excuse(now);
+        }
+        let place = (position, self.camera.position.zoom_steps);
+        let give_way = self.settings.override_timeout;
+        match self.authority.positioned(place, (asked, now), &self.history, give_way) {
+            Finding::Nothing => {}
+            Finding::Orphan { zooms } => {
+                self.stop = if zooms { Command::REST } else { Command::Halt };
+                self.scheduler.found_moving();
+                self.reports.push(Report::Orphan);
+            }
+            Finding::Operator => self.homing.strayed(),
+        }
+    }
+
+    fn positioned(&mut self, position: Option<PanTilt>, now: Duration) {
+        if self.steps.position(position, now) {
+            self.scheduler.arrived();
+            self.reports.push(Report::Stopped);
+        }
+        self.next_poll = now
+            + match (self.steps.under_way(), self.scheduler.may_move()) {
+                (true, _) => Steps::POLL,
+                (false, _) if self.authority.asks() => Duration::ZERO,
+                (false, true) => Self::POLL_MOVING,
+                (false, false) if self.is_wanted(now) => Self::POLL_MOVING,
+                (false, false) => Self::POLL_RESTING,
+            };
+    }
+
+    fn succeeded(&mut self, of_command: bool) {
+        let idle = self.target.is_none() && !self.scheduler.may_move();
+        self.reports.extend(self.link.succeeded(of_command, idle).map(Report::Link));
+    }
+
+    /// A camera that somebody may be about to move, or that may be, is asked more often.
+    fn is_wanted(&self, now: Duration) -> bool {
+        self.target.is_some() || self.authority.holder(now).is_some() || self.authority.looks(now)
+    }
+
+    fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {
+        if !err.is_refusal() {
+            self.authority.forget();
+        }
+        self.reports.extend(self.link.failed(err, of_command, now).map(Report::Link));
+    }
+}

@@ -1,0 +1,102 @@
+//! What the worker tells, told to the user.
+
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+use ptztrack_contract::{CameraChange, CameraMessage, Times};
+
+use super::imp::{CAT, VapixPtzSink};
+use super::worker::Event;
+use crate::lock::lock;
+use crate::servo::{Holder, LinkChange, Report};
+
+impl VapixPtzSink {
+    /// Called by the worker.
+    pub(super) fn happened(&self, event: Event) {
+        match event {
+            Event::Exchanged { job, failure: None, round_trip } => {
+                gst::log!(CAT, imp = self, "{job} answered in {round_trip:?}");
+            }
+            Event::Exchanged { job, failure: Some(err), round_trip } => {
+                gst::debug!(CAT, imp = self, "{job} failed after {round_trip:?}: {err}");
+            }
+            Event::Report(Report::Link(change)) => self.link_changed(&change),
+            Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
+            Event::Report(Report::Stopped) => self.post(CameraChange::Stopped, "the camera has stopped"),
+            Event::Report(Report::AtLimit) => {
+                self.post(
+                    CameraChange::AtLimit,
+                    "the target is beyond the end of the camera's pan or tilt range",
+                );
+            }
+            Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                (
+                    "the camera swings to and fro about the target; its speed is lowered to {:.0} % until it is calm. Lower `gain`, or set `latency` and `camera-speed` right",
+                    trust * 100.0
+                )
+            ),
+            Event::Report(Report::TakenOver(Holder::Operator)) => self.post(
+                CameraChange::TakenOver,
+                "somebody else moves the camera; it is not steered until nobody has moved it for `override-timeout`",
+            ),
+            Event::Report(Report::TakenOver(Holder::Queue)) => self.post(
+                CameraChange::TakenOver,
+                "somebody else is in control by the camera's control queue; it is not steered until our turn",
+            ),
+            Event::Report(Report::Resumed) => self.post(CameraChange::Resumed, "the camera is steered again"),
+            Event::Report(Report::Orphan) => {
+                gst::warning!(CAT, imp = self, "the camera was already moving when it was met: stopping it");
+            }
+            Event::Report(Report::NoSuchPreset(name)) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera tells of no preset `{name}`; it stays where it is. Correct `home`")
+            ),
+            Event::Report(Report::HomeRefused(err)) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera does not go home: {err}; it stays where it is. Correct `home`")
+            ),
+            Event::Status(status) => *lock(&self.news) = Some(status),
+            Event::GaveUp => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Write,
+                ("the camera has not confirmed its stop in time and may still be moving; stop it by hand")
+            ),
+            Event::Died(reason) => gst::element_imp_error!(
+                self,
+                gst::LibraryError::Failed,
+                ("the camera's task broke ({reason}); the camera may still be moving; restart the pipeline")
+            ),
+        }
+    }
+
+    fn link_changed(&self, change: &LinkChange) {
+        match change {
+            LinkChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
+            LinkChange::Disconnected(err) => {
+                self.post(CameraChange::Disconnected, &err.to_string());
+                gst::element_imp_warning!(self, gst::ResourceError::Write, ("{err}. {}", err.advice()));
+            }
+            LinkChange::Refused(err) => {
+                self.post(CameraChange::Refused, &err.to_string());
+                gst::element_imp_warning!(
+                    self,
+                    gst::ResourceError::NotAuthorized,
+                    ("{err}. {}", err.advice())
+                );
+            }
+        }
+    }
+
+    fn post(&self, change: CameraChange, detail: &str) {
+        gst::info!(CAT, imp = self, "{}: {detail}", change.name());
+        let sink = self.obj();
+        let times = Times { running_time: sink.current_running_time(), ..Times::default() };
+        let message = CameraMessage { change, times, detail: detail.to_owned() };
+        let message = gst::message::Element::builder(message.to_structure()).src(&*sink).build();
+        // Without a bus there is nobody to tell.
+        let _ = sink.post_message(message);
+    }
+}
