@@ -25,17 +25,9 @@ pub struct CameraModel {
 }
 
 impl CameraModel {
-    /// A range this wide is no end: the camera turns round and round.
-    const ENDLESS_DEG: f64 = 359.0;
-
     /// How far it can look and zoom, by whichever of its answers.
     pub fn limits(&self) -> Limits {
         self.limits.or(self.parameters.limits)
-    }
-
-    /// Whether pan turns round and round; `None` where it did not tell.
-    pub fn endless_pan(&self) -> Option<bool> {
-        self.limits().pan_deg.map(|range| range.max - range.min >= Self::ENDLESS_DEG)
     }
 
     /// Its lens; `None` where it told neither field of view nor zoom.
@@ -54,15 +46,19 @@ impl CameraModel {
         Some(Lens::linear(wide_deg, Range { max, ..steps }, most))
     }
 
-    /// Horizontal field of view in degrees at the present zoom. `wide_fov_deg`: that of the lens zoomed out, where
-    /// it is set; else what the camera told, or what is common.
-    pub fn fov_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
-        let lens = match (self.lens(), wide_fov_deg) {
+    /// Its lens, with another field of view zoomed out where one is set; one that does not zoom where it did not tell.
+    pub fn lens_or_fixed(&self, wide_fov_deg: Option<f64>) -> Lens {
+        match (self.lens(), wide_fov_deg) {
             (Some(lens), Some(wide_deg)) => lens.with_wide_fov(wide_deg),
             (Some(lens), None) => lens,
             (None, wide_deg) => Lens::fixed(wide_deg.unwrap_or(ASSUMED_FOV_DEG)),
-        };
-        lens.fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
+        }
+    }
+
+    /// Horizontal field of view in degrees at the zoom it last told. `wide_fov_deg`: that of the lens zoomed out, where
+    /// it is set; else what the camera told, or what is common.
+    pub fn fov_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
+        self.lens_or_fixed(wide_fov_deg).fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
     }
 
     /// Whether it told its field of view.
@@ -96,70 +92,10 @@ impl CameraModel {
     }
 }
 
-/// Keeps the camera from being driven against its ends, and knows when it has got there.
-#[derive(Debug, Default)]
-pub struct LimitGuard {
-    at_limit: bool,
-}
-
-impl LimitGuard {
-    /// This near to its end an axis counts as there.
-    const NEAR_DEG: f64 = 0.1;
-
-    /// `rate` without the part that would drive an axis on beyond its end.
-    pub fn apply(&mut self, rate: PanTilt, camera: &CameraModel) -> PanTilt {
-        let limits = camera.limits();
-        let pan_limits = limits.pan_deg.filter(|_| camera.endless_pan() == Some(false));
-        let pan = held(rate.pan, camera.position.pan_deg, pan_limits);
-        let tilt = held(rate.tilt, camera.position.tilt_deg, limits.tilt_deg);
-        self.at_limit = pan.is_some() || tilt.is_some();
-        PanTilt::new(pan.unwrap_or(rate.pan), tilt.unwrap_or(rate.tilt))
-    }
-
-    /// Whether the last rate was held back.
-    pub fn at_limit(&self) -> bool {
-        self.at_limit
-    }
-}
-
-/// The rate that is left of one that drives outwards at an end; `None` where it is free.
-fn held(rate: f64, position: Option<f64>, limits: Option<Range>) -> Option<f64> {
-    let (position, limits) = (position?, limits?);
-    let outwards = (rate > 0.0 && position >= limits.max - LimitGuard::NEAR_DEG)
-        || (rate < 0.0 && position <= limits.min + LimitGuard::NEAR_DEG);
-    outwards.then_some(0.0)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::vapix::StepMeaning;
-
-    fn camera(pan: f64, min: f64, max: f64) -> CameraModel {
-        CameraModel {
-            limits: Limits { pan_deg: Some(Range { min, max }), ..Limits::default() },
-            position: Position { pan_deg: Some(pan), tilt_deg: Some(0.0), zoom_steps: None },
-            ..CameraModel::default()
-        }
-    }
-
-    #[test]
-    fn at_its_end_an_axis_only_moves_back() {
-        let mut guard = LimitGuard::default();
-        let (right, left) = (PanTilt::new(10.0, 3.0), PanTilt::new(-10.0, 3.0));
-        assert_eq!(guard.apply(right, &camera(169.95, -170.0, 170.0)), PanTilt::new(0.0, 3.0));
-        assert!(guard.at_limit());
-        assert_eq!(guard.apply(left, &camera(169.95, -170.0, 170.0)), left);
-        assert!(!guard.at_limit());
-    }
-
-    #[test]
-    fn endless_pan_has_no_end() {
-        let mut guard = LimitGuard::default();
-        let right = PanTilt::new(10.0, 0.0);
-        assert_eq!(guard.apply(right, &camera(180.0, -180.0, 180.0)), right);
-        assert_eq!(guard.apply(right, &CameraModel::default()), right);
-    }
 
     #[test]
     fn field_of_view_follows_the_zoom() {

@@ -15,6 +15,7 @@ mod control_queue;
 mod controller;
 mod home;
 mod learning;
+mod limits;
 mod link;
 #[cfg(test)]
 mod motion_tests;
@@ -32,14 +33,20 @@ mod simulation;
 mod speed;
 mod steps;
 mod talk;
+mod zoom;
+mod zoom_drive;
+#[cfg(test)]
+mod zoom_tests;
+mod zoom_track;
 
 pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use authority::{Authority, Finding, Holder};
-pub use camera::{CameraModel, LimitGuard};
+pub use camera::CameraModel;
 pub use control_queue::ControlQueue;
 pub use controller::{ControlLaw, Controller, Offset};
 pub use home::{Home, Homing};
 pub use learning::{Calibration, Turn};
+pub use limits::{LimitGuard, SoftLimits, narrower};
 pub use link::{Link, LinkChange};
 pub use operator::{OperatorWatch, Verdict};
 pub use optics::{Lens, View, magnified};
@@ -53,3 +60,6 @@ pub use settings::{Mode, ServoSettings};
 pub use speed::{SpeedCurve, SpeedMap};
 pub use steps::Steps;
 pub use talk::{Answer, Job, Next, Query, Report, Status};
+pub use zoom::ZoomController;
+pub use zoom_drive::{ZoomDrive, ZoomGoal};
+pub use zoom_track::ZoomTrack;

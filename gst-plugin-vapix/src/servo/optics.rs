@@ -95,6 +95,11 @@ impl Lens {
         interpolate(&self.magnifications, step, |row| (row.step, row.value)).unwrap_or(1.0)
     }
 
+    /// The zoom step that magnifies so much more than another; `None` where it does not zoom.
+    pub fn step_magnified(&self, step: f64, factor: f64) -> Option<f64> {
+        self.step(magnified(self.fov_deg(step), factor))
+    }
+
     /// The zoom step with a horizontal field of view nearest to this, in degrees; `None` where it does not zoom.
     pub fn step(&self, fov_deg: f64) -> Option<f64> {
         let wanted = Self::magnification_between(self.wide_fov_deg, fov_deg);
@@ -169,6 +174,11 @@ mod tests {
         near(lens.fov_deg(20_000.0), 3.2, 1e-9);
         near(lens.magnification(5000.0), (1.0 + max) / 2.0, 1e-9);
         near(lens.step(lens.fov_deg(1234.0)).unwrap(), 1234.0, 1e-6);
+        near(
+            lens.magnification(lens.step_magnified(1000.0, 1.5).unwrap()),
+            1.5 * lens.magnification(1000.0),
+            1e-9,
+        );
         assert_eq!((lens.step(90.0), lens.step(0.1)), (Some(1.0), Some(9999.0)));
     }
 

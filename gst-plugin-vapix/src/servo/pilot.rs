@@ -1,13 +1,14 @@
 mod answers;
+mod motion;
 
 use std::collections::VecDeque;
 use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Calibration, CameraModel, CommandHistory, ControlLaw, Controller, Holder, Homing, Job,
-    LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
-    SpeedMap, Status, Steps, View, Visibility, magnified,
+    Aim, Authority, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
+    LimitGuard, Link, Mode, Next, OscillationGuard, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap,
+    Status, Steps, View, Visibility, ZoomDrive, magnified,
 };
 use crate::vapix::Command;
 
@@ -32,6 +33,7 @@ pub struct Pilot {
     /// How long the last command took.
     exchange: Duration,
     guard: LimitGuard,
+    zoom: ZoomDrive,
     target: Option<Target>,
     /// What is still to be asked of a camera just met.
     introduction: VecDeque<Query>,
@@ -62,7 +64,9 @@ enum Wish {
 }
 
 impl Pilot {
-    /// A position is asked for this often while the camera moves, and ...
+    /// A position is asked for this often while the zoom moves, by which the picture changes most, ...
+    const POLL_ZOOMING: Duration = Duration::from_millis(400);
+    /// ... while the camera only turns, and ...
     const POLL_MOVING: Duration = Duration::from_secs(1);
     /// ... while it rests, so that an operator's zoom or a lost connection is noticed.
     const POLL_RESTING: Duration = Duration::from_secs(5);
@@ -86,6 +90,7 @@ impl Pilot {
             oscillation: OscillationGuard::default(),
             exchange: Duration::ZERO,
             guard: LimitGuard::default(),
+            zoom: ZoomDrive::default(),
             target: None,
             introduction: Query::INTRODUCTION.into(),
             next_poll: Duration::ZERO,
@@ -135,9 +140,13 @@ impl Pilot {
             }
         };
         self.homing.not_alone();
-        if self.settings.learn && self.authority.is_ours(now) {
+        let zooms = self.zoom.moves(sight.taken_at, self.calibration.latency(), now);
+        if self.settings.learn && self.authority.is_ours(now) && !zooms {
             self.calibration.see(&sight, &self.view(&sight), &self.history, &self.map);
             self.revise();
+        }
+        if self.settings.target_height.is_some() {
+            self.zoom.see(&sight, &self.lens(), self.calibration.latency());
         }
         let view = self.view(&sight);
         self.aim.see(&sight, &view, &self.history, self.calibration.latency());
@@ -165,6 +174,7 @@ impl Pilot {
         self.aim.clear();
         self.controller.rest();
         self.oscillation.clear();
+        self.zoom.forget();
     }
 
     /// What to send now, if anything.
@@ -213,6 +223,8 @@ impl Pilot {
         let Job::Command(command) = job else { return };
         self.scheduler.attempted(command, now);
         match command {
+            _ if command.is_stop() => {}
+            Command::Velocity { zoom: Some(_), .. } => self.stop = Command::REST,
             Command::Velocity { .. } => self.stop = Command::Halt,
             Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
                 self.stop = Command::Stop;
@@ -317,100 +329,32 @@ impl Pilot {
         home.map_or(Wish::Rest, Wish::Move)
     }
 
-    fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
-        let law = self.control_law(&self.view(sight));
-        let latency = self.calibration.latency();
-        let offset = self.aim.offset(now, &self.history, latency);
-        let wanted = self.controller.rate(&offset, self.history.rate_at(now), &law);
-        let rate = self.guard.apply(wanted, &self.camera);
-        self.report_limit();
-        let map = &self.map;
-        self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
-        match self.speed_steps {
-            (0, 0) => Wish::Rest,
-            (pan, tilt) => Wish::Move(Command::Velocity { pan, tilt, zoom: None }),
-        }
-    }
-
-    fn control_law(&self, view: &View) -> ControlLaw {
-        let settings = &self.settings;
-        let interval_s = (1.0 / settings.max_rate_hz).max(self.exchange.as_secs_f64());
-        // No error is worth a move that would leave nearly as large a one on the other side.
-        let shortest_move_deg = self.map.deg_s(1) * interval_s;
-        ControlLaw {
-            gain: settings.gain,
-            trust: self.oscillation.trust(),
-            dead_zone_deg: (settings.dead_zone * view.horizontal_fov_deg).max(0.75 * shortest_move_deg),
-            max_deg_s: settings.max_speed_deg_s,
-            max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
-        }
-    }
-
-    /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
-    fn step(&mut self, sight: &Sight, now: Duration) -> Wish {
-        if self.scheduler.may_move() && !self.steps.under_way() {
-            // By speed, before the mode was changed; or who knows, as a step went unanswered.
-            return Wish::Rest;
-        }
-        if !self.steps.shows_rest(sight.taken_at, self.calibration.latency()) {
-            return Wish::AsIs;
-        }
-        let view = self.view(sight);
-        let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
-        if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg {
-            return Wish::AsIs;
-        }
-        match self.settings.mode {
-            Mode::Centre => Wish::Move(self.centre(sight, now)),
-            _ => self.camera.pan_tilt().map_or(Wish::AsIs, |position| {
-                let turn = self.guard.apply(error, &self.camera);
-                self.report_limit();
-                if turn == PanTilt::default() { Wish::AsIs } else { Wish::Move(absolute(position + turn)) }
-            }),
-        }
-    }
-
-    /// The pixel where the target will be when the camera begins to move.
-    fn centre(&self, sight: &Sight, now: Duration) -> Command {
-        let ahead_s = (now.saturating_sub(sight.taken_at) + self.calibration.latency()).as_secs_f64();
-        let pixel = |place: f64, velocity: f64, size: u32| {
-            let last = f64::from(size.saturating_sub(1));
-            // Saturates; inside the picture by the clamp.
-            ((place + velocity * ahead_s) * f64::from(size)).round().clamp(0.0, last) as u32
-        };
-        Command::Centre {
-            x: pixel(sight.centroid.x, sight.velocity.x, sight.size.0),
-            y: pixel(sight.centroid.y, sight.velocity.y, sight.size.1),
-            width: sight.size.0,
-            height: sight.size.1,
-            zoom_percent: None,
-        }
-    }
-
-    fn report_limit(&mut self) {
-        let at_limit = self.guard.at_limit();
-        if at_limit && !self.at_limit {
-            self.reports.push(Report::AtLimit);
-        }
-        self.at_limit = at_limit;
-    }
-
     fn view(&self, sight: &Sight) -> View {
         View {
-            horizontal_fov_deg: self.fov_deg(),
+            horizontal_fov_deg: self
+                .fov_deg(self.zoom.step_shown(sight.taken_at, self.calibration.latency())),
             aspect: sight.aspect,
             tilt_deg: self.camera.position.tilt_deg.unwrap_or(0.0),
         }
     }
 
-    fn fov_deg(&self) -> f64 {
-        magnified(self.camera.fov_deg(self.settings.fov_deg), 1.0 / self.calibration.field_factor())
+    /// The field of view at a zoom step, or at the last told one.
+    fn fov_deg(&self, zoom_step: Option<f64>) -> f64 {
+        let assumed = match zoom_step {
+            Some(step) => self.lens().fov_deg(step),
+            None => self.camera.fov_deg(self.settings.fov_deg),
+        };
+        magnified(assumed, 1.0 / self.calibration.field_factor())
+    }
+
+    fn lens(&self) -> Lens {
+        self.camera.lens_or_fixed(self.settings.fov_deg)
     }
 
     fn known_fov_deg(&self) -> Option<f64> {
         let known = self.settings.fov_deg.is_some() || self.camera.tells_fov();
         // To a tenth of a degree: those who are told need not hear of every picture's.
-        known.then(|| (self.fov_deg() * 10.0).round() / 10.0)
+        known.then(|| (self.fov_deg(None) * 10.0).round() / 10.0)
     }
 
     fn assume_speeds(&mut self) {
@@ -419,21 +363,11 @@ impl Pilot {
 
     /// Brings the speed map up to what is known by now.
     fn revise(&mut self) {
-        let fov_deg = self.fov_deg();
+        let fov_deg = self.fov_deg(None);
         let assumed = self.camera.told_speeds().unwrap_or_else(|| self.settings.speed_map());
         let map = self.calibration.correct(&assumed, fov_deg);
         self.map = map.capped(self.camera.proportional_cap_deg_s(fov_deg));
         self.history.revise(&self.map);
-    }
-}
-
-/// The command to look there, the short way round.
-fn absolute(position: PanTilt) -> Command {
-    Command::Absolute {
-        pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
-        tilt_deg: position.tilt.clamp(-180.0, 180.0),
-        speed: 100,
-        zoom: None,
     }
 }
 

@@ -77,7 +77,12 @@ impl Samples {
         Self(samples.collect())
     }
 
-    fn mean(&self, value: impl Fn(&(f64, f64)) -> f64) -> f64 {
+    /// Mean of the values.
+    pub fn mean(&self) -> f64 {
+        self.mean_of(|(_, value)| *value)
+    }
+
+    fn mean_of(&self, value: impl Fn(&(f64, f64)) -> f64) -> f64 {
         self.0.iter().map(value).sum::<f64>() / self.0.len() as f64
     }
 
@@ -89,7 +94,7 @@ impl Samples {
     }
 
     fn certain_mean(&self) -> f64 {
-        certain(self.mean(|(_, rate)| *rate), self.variance() / self.0.len() as f64)
+        certain(self.mean(), self.variance() / self.0.len() as f64)
     }
 
     /// The rate to expect `lead_s` after the newest.
@@ -106,7 +111,7 @@ impl Samples {
 
     /// Slope per second of the straight line through them, as far as it stands out of the noise.
     pub fn slope(&self) -> f64 {
-        let (middle, mean) = (self.mean(|(time, _)| *time), self.mean(|(_, rate)| *rate));
+        let (middle, mean) = (self.mean_of(|(time, _)| *time), self.mean());
         let spread: f64 = self.0.iter().map(|(time, _)| (time - middle).powi(2)).sum();
         let together: f64 = self.0.iter().map(|(time, rate)| (time - middle) * (rate - mean)).sum();
         certain(together / spread, self.variance() / spread)
@@ -114,7 +119,7 @@ impl Samples {
 
     /// A line of that slope through their middle, `lead_s` after the newest.
     pub fn line(&self, slope: f64, lead_s: f64) -> f64 {
-        self.mean(|(_, rate)| *rate) + slope * (lead_s - self.mean(|(time, _)| *time))
+        self.mean() + slope * (lead_s - self.mean_of(|(time, _)| *time))
     }
 }
 

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Home, Prediction, SpeedCurve, SpeedMap};
+use super::{Home, Prediction, SoftLimits, SpeedCurve, SpeedMap};
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -41,6 +41,10 @@ pub struct ServoSettings {
     pub camera_speed_deg_s: f64,
     /// How its speed grows up to there.
     pub speed_curve: SpeedCurve,
+    /// How far the camera may be moved.
+    pub limits: SoftLimits,
+    /// The target's height that the zoom keeps, as a part of the picture's; `None` leaves the zoom as it is.
+    pub target_height: Option<f64>,
     /// Whether latency, field of view and speed map are learned; the settings above are where that begins.
     pub learn: bool,
     /// Where the camera waits for a target; `None`: where the last one left it.
@@ -75,6 +79,8 @@ impl Default for ServoSettings {
             stale_timeout: Duration::from_secs(1),
             camera_speed_deg_s: 450.0,
             speed_curve: SpeedCurve::default(),
+            limits: SoftLimits::default(),
+            target_height: None,
             learn: true,
             home: None,
             home_timeout: Duration::from_secs(10),

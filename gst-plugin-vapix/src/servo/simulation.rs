@@ -223,6 +223,7 @@ impl Simulation {
         if let Some((goal, zoom)) = self.goal {
             // Fast, and slower near the end.
             let way = goal - self.pose;
+            let way = PanTilt::new((way.pan + 180.0).rem_euclid(360.0) - 180.0, way.tilt);
             let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
             self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
             self.zoom_rate = zoom.map_or(0.0, |zoom| {

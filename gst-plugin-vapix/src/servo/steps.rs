@@ -1,6 +1,7 @@
 use std::time::Duration;
 
 use super::PanTilt;
+use crate::vapix::Position;
 
 /// Moves from position to position: the next begins when the camera is at rest and was looked through since.
 #[derive(Debug)]
@@ -9,7 +10,7 @@ pub struct Steps(Phase);
 #[derive(Debug)]
 enum Phase {
     AtRest { since: Duration },
-    UnderWay { since: Duration, seen: Option<PanTilt> },
+    UnderWay { since: Duration, seen: Option<Position> },
 }
 
 impl Default for Steps {
@@ -21,6 +22,9 @@ impl Default for Steps {
 impl Steps {
     /// Positions this near to each other are the same.
     const SAME_DEG: f64 = 0.05;
+
+    /// Zoom steps this near to each other are the same.
+    const SAME_ZOOM: f64 = 10.0;
 
     /// How often the position is asked for while under way.
     pub const POLL: Duration = Duration::from_millis(150);
@@ -52,12 +56,12 @@ impl Steps {
     }
 
     /// The camera told its position, or would not; returns whether it has come to rest by this.
-    pub fn position(&mut self, position: Option<PanTilt>, now: Duration) -> bool {
+    pub fn position(&mut self, position: Option<Position>, now: Duration) -> bool {
         let Phase::UnderWay { since, seen } = &mut self.0 else { return false };
-        let turn_deg = seen.zip(position).map(|(before, now)| (now - before).largest());
         let long = now.saturating_sub(*since) > Self::LONGEST;
-        let rests = match turn_deg {
-            Some(turn_deg) => turn_deg < if long { Self::NOISE_DEG } else { Self::SAME_DEG },
+        let tolerance_deg = if long { Self::NOISE_DEG } else { Self::SAME_DEG };
+        let rests = match seen.zip(position) {
+            Some((before, now)) => same(&before, &now, tolerance_deg),
             None => long,
         };
         if rests {
@@ -69,9 +73,21 @@ impl Steps {
     }
 }
 
+fn same(before: &Position, now: &Position, tolerance_deg: f64) -> bool {
+    let angles = |position: &Position| Some(PanTilt::new(position.pan_deg?, position.tilt_deg?));
+    let turned = angles(before).zip(angles(now)).map(|(before, now)| (now - before).largest());
+    let zoomed = before.zoom_steps.zip(now.zoom_steps).map(|(before, now)| (now - before).abs());
+    turned.is_some_and(|turned| turned < tolerance_deg)
+        && zoomed.is_none_or(|zoomed| zoomed < Steps::SAME_ZOOM)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn at(pan_deg: f64, zoom: f64) -> Option<Position> {
+        Some(Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom_steps: Some(zoom) })
+    }
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
@@ -83,9 +99,10 @@ mod tests {
         assert!(steps.shows_rest(ms(0), ms(200)));
         steps.begin(ms(1000));
         assert!(!steps.shows_rest(ms(5000), ms(200)));
-        assert!(!steps.position(Some(PanTilt::new(1.0, 0.0)), ms(1150)));
-        assert!(!steps.position(Some(PanTilt::new(2.0, 0.0)), ms(1300)));
-        assert!(steps.position(Some(PanTilt::new(2.01, 0.0)), ms(1450)));
+        assert!(!steps.position(at(1.0, 500.0), ms(1000)));
+        assert!(!steps.position(at(2.0, 900.0), ms(1150)));
+        assert!(!steps.position(at(2.0, 999.0), ms(1300)));
+        assert!(steps.position(at(2.01, 1000.0), ms(1450)));
         assert!(!steps.shows_rest(ms(1600), ms(200)));
         assert!(steps.shows_rest(ms(1650), ms(200)));
     }

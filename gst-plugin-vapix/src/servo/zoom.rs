@@ -52,6 +52,9 @@ impl ZoomController {
     /// From a target that is growing or shrinking less than this, per second, the zoom may rest.
     const STEADY: f64 = 0.03;
 
+    /// A zoom from rest to rest aims at the target's height this much later: for as long at least it will do.
+    const STEP: Duration = Duration::from_millis(800);
+
     /// A target farther than this from the middle, in picture widths or heights, is not zoomed in on.
     const OFF_CENTRE: f64 = 0.25;
 
@@ -91,9 +94,15 @@ impl ZoomController {
             self.zooming = true;
             return -Self::WIDENING;
         }
-        let Some((error, growth)) = self.error(target_height, magnification, lead) else { return 0.0 };
-        let tolerated = if self.zooming { Self::REST } else { Self::START };
-        self.zooming = error.abs() > tolerated || (self.zooming && growth.abs() > Self::STEADY);
+        let Some(size) = self.size(lead) else { return 0.0 };
+        let wanted = target_height.ln() - magnification.ln();
+        let (error, growth) = (wanted - size.expected, size.growth);
+        self.zooming = if self.zooming {
+            error.abs() > Self::REST || growth.abs() > Self::STEADY
+        } else {
+            // Nothing that is foreseen only: a gesture looks like growth.
+            (wanted - size.seen).abs() > Self::START
+        };
         if !self.zooming {
             return 0.0;
         }
@@ -105,20 +114,28 @@ impl ZoomController {
     pub fn factor(&self, target_height: f64, magnification: f64) -> Option<f64> {
         let error = match self.view {
             Outlook::Uncertain => -Self::WIDENING,
-            _ => self.error(target_height, magnification, Duration::ZERO)?.0,
+            _ => target_height.ln() - magnification.ln() - self.size(Self::STEP)?.expected,
         };
         let allowed = if self.view == Outlook::OffCentre { error.min(0.0) } else { error };
         (allowed.abs() > Self::START).then(|| allowed.clamp(-Self::FASTEST, Self::FASTEST).exp())
     }
 
-    /// How much the magnification's logarithm is off, and how fast the target grows by itself.
-    fn error(&self, target_height: f64, magnification: f64, lead: Duration) -> Option<(f64, f64)> {
+    fn size(&self, lead: Duration) -> Option<Size> {
         let (newest, _) = self.sizes.back()?;
         let sizes = Samples::new(self.sizes.iter().map(|(at, size)| (-(*newest - *at).as_secs_f64(), *size)));
         let growth = sizes.slope();
-        let size = sizes.line(growth, lead.as_secs_f64());
-        Some((target_height.ln() - size - magnification.ln(), growth))
+        Some(Size { seen: sizes.mean(), expected: sizes.line(growth, lead.as_secs_f64()), growth })
     }
+}
+
+/// Logarithm of the target's height in a picture that nothing magnifies.
+struct Size {
+    /// Its mean over the window.
+    seen: f64,
+    /// After the lead.
+    expected: f64,
+    /// Per second.
+    growth: f64,
 }
 
 fn outlook(sight: &Sight) -> Outlook {
@@ -175,9 +192,8 @@ mod tests {
 
     #[test]
     fn a_target_that_walks_away_is_zoomed_after() {
-        let rate = seen(|time| 0.35 * (-0.2 * time).exp()).rate(0.3, 1.0, Duration::ZERO);
-        let error = (0.3f64 / 0.35).ln() + 0.2;
-        assert!((rate - (error + 0.2)).abs() < 0.02, "{rate}");
+        let rate = seen(|time| 0.3 * (-0.3 * time).exp()).rate(0.3, 1.0, Duration::ZERO);
+        assert!((rate - (0.3 + 0.3)).abs() < 0.01, "{rate}");
     }
 
     #[test]

@@ -26,7 +26,7 @@ impl ZoomTrack {
     const PLAUSIBLE_STEP_S: (f64, f64) = (100.0, 50_000.0);
 
     /// Less than so many steps tell nothing of the speed.
-    const TELLING_STEPS: f64 = 50.0;
+    const TELLING_STEPS: f64 = 20.0;
 
     /// From a time on the zoom moves at a speed step (-100 to 100).
     pub fn commanded(&mut self, at: Duration, speed: i8) {

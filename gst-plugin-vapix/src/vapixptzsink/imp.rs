@@ -138,6 +138,46 @@ pub struct VapixPtzSink {
         blurb = "Learn latency, field of view and speed map while following; what is set or told is where that begins"
     )]
     #[property(
+        name = "auto-zoom", get, set = Self::set_auto_zoom, type = bool, member = auto_zoom, mutable_playing,
+        default = Settings::default().auto_zoom,
+        blurb = "Zoom so that the target stays as tall as `target-height`, and out where it is not seen well"
+    )]
+    #[property(
+        name = "target-height", get, set = Self::set_target_height, type = f64, member = target_height, mutable_playing,
+        default = Settings::default().target_height, minimum = 0.05, maximum = 0.9,
+        blurb = "Height that `auto-zoom` gives the target, as a part of the picture's"
+    )]
+    #[property(
+        name = "pan-min", get, set = Self::set_pan_min, type = f64, member = pan_min_deg, mutable_playing,
+        default = Settings::default().pan_min_deg, minimum = -180.0, maximum = 180.0,
+        blurb = "The camera is turned no farther left than this, in degrees (-180 and 180 together: no limit)"
+    )]
+    #[property(
+        name = "pan-max", get, set = Self::set_pan_max, type = f64, member = pan_max_deg, mutable_playing,
+        default = Settings::default().pan_max_deg, minimum = -180.0, maximum = 180.0,
+        blurb = "The camera is turned no farther right than this, in degrees (-180 and 180 together: no limit)"
+    )]
+    #[property(
+        name = "tilt-min", get, set = Self::set_tilt_min, type = f64, member = tilt_min_deg, mutable_playing,
+        default = Settings::default().tilt_min_deg, minimum = -180.0, maximum = 180.0,
+        blurb = "The camera is tilted no farther down than this, in degrees"
+    )]
+    #[property(
+        name = "tilt-max", get, set = Self::set_tilt_max, type = f64, member = tilt_max_deg, mutable_playing,
+        default = Settings::default().tilt_max_deg, minimum = -180.0, maximum = 180.0,
+        blurb = "The camera is tilted no farther up than this, in degrees"
+    )]
+    #[property(
+        name = "zoom-min", get, set = Self::set_zoom_min, type = u32, member = zoom_min, mutable_playing,
+        default = Settings::default().zoom_min, minimum = 1, maximum = 19_999,
+        blurb = "`auto-zoom` zooms out no farther than this, in zoom steps"
+    )]
+    #[property(
+        name = "zoom-max", get, set = Self::set_zoom_max, type = u32, member = zoom_max, mutable_playing,
+        default = Settings::default().zoom_max, minimum = 1, maximum = 19_999,
+        blurb = "`auto-zoom` zooms in no farther than this, in zoom steps"
+    )]
+    #[property(
         name = "home", get = Self::home, set = Self::set_home, type = Option<String>, mutable_playing,
         blurb = "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it was met), or the name of one of its presets (unset: where the last target was)"
     )]

@@ -98,6 +98,14 @@ servo_setters! {
     set_camera_speed: camera_speed_deg_s, f64;
     set_speed_curve: speed_curve, SpeedCurve;
     set_learn: learn, bool;
+    set_auto_zoom: auto_zoom, bool;
+    set_target_height: target_height, f64;
+    set_pan_min: pan_min_deg, f64;
+    set_pan_max: pan_max_deg, f64;
+    set_tilt_min: tilt_min_deg, f64;
+    set_tilt_max: tilt_max_deg, f64;
+    set_zoom_min: zoom_min, u32;
+    set_zoom_max: zoom_max, u32;
     set_home_timeout: home_timeout_ms, u32;
     set_home_at_start: home_at_start, bool;
     set_override_timeout: override_timeout_ms, u32;

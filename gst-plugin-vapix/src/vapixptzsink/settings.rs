@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use super::{Mode, Prediction, SpeedCurve};
-use crate::servo::{Home, ServoSettings};
-use crate::vapix::{ClientSettings, Credentials, Location, Secret, Trust};
+use crate::servo::{Home, ServoSettings, SoftLimits};
+use crate::vapix::{ClientSettings, Credentials, Location, Range, Secret, Trust};
 
 /// One field for one property, in the property's unit. The servo's defaults are the servo's own.
 #[derive(Debug, Clone)]
@@ -30,6 +30,14 @@ pub struct Settings {
     pub camera_speed_deg_s: f64,
     pub speed_curve: SpeedCurve,
     pub learn: bool,
+    pub auto_zoom: bool,
+    pub target_height: f64,
+    pub pan_min_deg: f64,
+    pub pan_max_deg: f64,
+    pub tilt_min_deg: f64,
+    pub tilt_max_deg: f64,
+    pub zoom_min: u32,
+    pub zoom_max: u32,
     pub home: Option<Home>,
     pub home_timeout_ms: u32,
     pub home_at_start: bool,
@@ -61,6 +69,14 @@ impl Default for Settings {
             camera_speed_deg_s: servo.camera_speed_deg_s,
             speed_curve: SpeedCurve::default(),
             learn: servo.learn,
+            auto_zoom: servo.target_height.is_some(),
+            target_height: 0.4,
+            pan_min_deg: servo.limits.pan_deg.min,
+            pan_max_deg: servo.limits.pan_deg.max,
+            tilt_min_deg: servo.limits.tilt_deg.min,
+            tilt_max_deg: servo.limits.tilt_deg.max,
+            zoom_min: servo.limits.zoom_steps.min as u32,
+            zoom_max: servo.limits.zoom_steps.max as u32,
             home: servo.home,
             home_timeout_ms: servo.home_timeout.as_millis() as u32,
             home_at_start: servo.home_at_start,
@@ -87,10 +103,20 @@ impl Settings {
             camera_speed_deg_s: self.camera_speed_deg_s,
             speed_curve: self.speed_curve.into(),
             learn: self.learn,
+            limits: self.limits(),
+            target_height: Some(self.target_height).filter(|_| self.auto_zoom),
             home: self.home.clone(),
             home_timeout: milliseconds(self.home_timeout_ms),
             home_at_start: self.home_at_start,
             override_timeout: milliseconds(self.override_timeout_ms),
+        }
+    }
+
+    fn limits(&self) -> SoftLimits {
+        SoftLimits {
+            pan_deg: Range { min: self.pan_min_deg, max: self.pan_max_deg },
+            tilt_deg: Range { min: self.tilt_min_deg, max: self.tilt_max_deg },
+            zoom_steps: Range { min: self.zoom_min.into(), max: self.zoom_max.into() },
         }
     }
 

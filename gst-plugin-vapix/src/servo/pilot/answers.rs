@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::Pilot;
 use crate::servo::{Answer, Finding, Job, PanTilt, Query, Report, Scheduler, Steps};
-use crate::vapix::{Command, Error};
+use crate::vapix::{Command, Error, Position};
 
 impl Pilot {
     /// The camera answered what was sent then, or did not.
@@ -49,8 +49,9 @@ impl Pilot {
         self.exchange = now.saturating_sub(sent);
         // Counted from its sending on: that is when it can begin to act, however late the answer is.
         match command {
-            Command::Velocity { pan, tilt, .. } => {
+            Command::Velocity { pan, tilt, zoom } => {
                 self.history.push_steps(sent, (*pan, *tilt), &self.map);
+                self.zoom.commanded(sent, zoom.unwrap_or(0));
             }
             _ => self.history.push(sent, PanTilt::default()),
         }
@@ -60,13 +61,13 @@ impl Pilot {
                 self.authority.excuse(now);
                 self.next_poll = now + Steps::POLL;
             }
-            Command::Halt | Command::Stop => {
+            _ if command.is_stop() => {
                 self.speed_steps = (0, 0);
                 self.steps.rest(now);
                 // Where it came to rest.
                 self.next_poll = now + Self::POLL_MOVING;
             }
-            Command::Velocity { .. } => {
+            _ => {
                 // A step under way, from before the mode was changed, is over.
                 self.steps.rest(now);
                 if !was_moving {
@@ -102,7 +103,7 @@ impl Pilot {
                         self.calibration.positioned((sent + now) / 2, position);
                     }
                 }
-                self.positioned(self.camera.pan_tilt(), now);
+                self.positioned(Some(position), (sent + now) / 2, now);
             }
             Answer::Limits(limits) => self.camera.limits = limits,
             Answer::Parameters(parameters) => {
@@ -140,7 +141,7 @@ impl Pilot {
         } else if self.link.connected()
             && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
         {
-            self.positioned(None, now);
+            self.positioned(None, now, now);
             if !self.steps.under_way() {
                 self.next_poll = now + Self::POLL_REFUSED;
             }
@@ -175,7 +176,10 @@ impl Pilot {
         }
     }
 
-    fn positioned(&mut self, position: Option<PanTilt>, now: Duration) {
+    /// The camera told its position as of a time, or does not tell.
+    fn positioned(&mut self, position: Option<Position>, at: Duration, now: Duration) {
+        self.guard.told(at, position.and(self.camera.pan_tilt()));
+        self.zoom.told(at, position.and_then(|position| position.zoom_steps), self.calibration.latency());
         if self.steps.position(position, now) {
             self.scheduler.arrived();
             self.reports.push(Report::Stopped);
@@ -184,6 +188,7 @@ impl Pilot {
             + match (self.steps.under_way(), self.scheduler.may_move()) {
                 (true, _) => Steps::POLL,
                 (false, _) if self.authority.asks() => Duration::ZERO,
+                (false, true) if self.zoom.is_moving(now) => Self::POLL_ZOOMING,
                 (false, true) => Self::POLL_MOVING,
                 (false, false) if self.is_wanted(now) => Self::POLL_MOVING,
                 (false, false) => Self::POLL_RESTING,

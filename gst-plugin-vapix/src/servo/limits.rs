@@ -1,0 +1,147 @@
+use std::time::Duration;
+
+use super::{CommandHistory, PanTilt};
+use crate::vapix::{Limits, Range};
+
+/// How far the camera may be moved, whatever it could.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoftLimits {
+    /// Degrees; the whole circle is no limit.
+    pub pan_deg: Range,
+    /// Degrees above the horizon.
+    pub tilt_deg: Range,
+    /// Zoom steps.
+    pub zoom_steps: Range,
+}
+
+impl Default for SoftLimits {
+    fn default() -> Self {
+        Self {
+            pan_deg: Range { min: -180.0, max: 180.0 },
+            tilt_deg: Range { min: -180.0, max: 180.0 },
+            zoom_steps: Range { min: 1.0, max: 9999.0 },
+        }
+    }
+}
+
+/// Keeps the camera from being driven against its ends, and knows when it has got there.
+#[derive(Debug, Default)]
+pub struct LimitGuard {
+    at_limit: bool,
+    told: Option<(Duration, PanTilt)>,
+}
+
+impl LimitGuard {
+    /// This near to its end an axis counts as there.
+    const NEAR_DEG: f64 = 0.1;
+
+    /// A range this wide is no end: the camera turns round and round.
+    const ENDLESS_DEG: f64 = 359.0;
+
+    /// The camera told where it looks, or would not.
+    pub fn told(&mut self, at: Duration, position: Option<PanTilt>) {
+        self.told = position.map(|position| (at, position));
+    }
+
+    /// Where everything commanded so far takes the camera. `delay`: of commands.
+    pub fn position(&self, history: &CommandHistory, delay: Duration, now: Duration) -> Option<PanTilt> {
+        let (at, position) = self.told?;
+        Some(position + history.rotation(at.saturating_sub(delay), now))
+    }
+
+    /// `rate` without the part that would take an axis from `position` beyond its end in the next `lasting` seconds.
+    pub fn apply(
+        &mut self,
+        rate: PanTilt,
+        position: Option<PanTilt>,
+        (hard, soft): (&Limits, &SoftLimits),
+        lasting_s: f64,
+    ) -> PanTilt {
+        let Some(position) = position else {
+            self.at_limit = false;
+            return rate;
+        };
+        let pan = Some(narrower(hard.pan_deg, soft.pan_deg))
+            .filter(|range| range.max - range.min < Self::ENDLESS_DEG);
+        let tilt = Some(narrower(hard.tilt_deg, soft.tilt_deg));
+        let (pan, pan_held) = held(rate.pan, position.pan, pan, lasting_s);
+        let (tilt, tilt_held) = held(rate.tilt, position.tilt, tilt, lasting_s);
+        self.at_limit = pan_held || tilt_held;
+        PanTilt::new(pan, tilt)
+    }
+
+    /// Whether the last rate was held back at an end.
+    pub fn at_limit(&self) -> bool {
+        self.at_limit
+    }
+}
+
+/// What both allow.
+pub fn narrower(hard: Option<Range>, soft: Range) -> Range {
+    let hard = hard.unwrap_or(soft);
+    Range { min: hard.min.max(soft.min), max: hard.max.min(soft.max) }
+}
+
+/// The rate that is left of one that drives outwards near an end, and whether the end is reached.
+fn held(rate: f64, position: f64, limits: Option<Range>, lasting_s: f64) -> (f64, bool) {
+    let Some(limits) = limits else { return (rate, false) };
+    let room = if rate > 0.0 { limits.max - position } else { position - limits.min };
+    let there = rate != 0.0 && room <= LimitGuard::NEAR_DEG;
+    let left = if there { 0.0 } else { rate.abs().min(room / lasting_s) };
+    (left.copysign(rate), there)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn limits(pan: Option<(f64, f64)>) -> Limits {
+        Limits { pan_deg: pan.map(|(min, max)| Range { min, max }), ..Limits::default() }
+    }
+
+    fn apply(rate: f64, pan: f64, limits: &Limits, soft: &SoftLimits) -> (f64, bool) {
+        let mut guard = LimitGuard::default();
+        let rate = guard.apply(PanTilt::new(rate, 3.0), Some(PanTilt::new(pan, 0.0)), (limits, soft), 0.5);
+        assert_eq!(rate.tilt, 3.0);
+        (rate.pan, guard.at_limit())
+    }
+
+    #[test]
+    fn at_its_end_an_axis_only_moves_back() {
+        let (hard, soft) = (limits(Some((-170.0, 170.0))), SoftLimits::default());
+        assert_eq!(apply(10.0, 169.95, &hard, &soft), (0.0, true));
+        assert_eq!(apply(-10.0, 169.95, &hard, &soft), (-10.0, false));
+        assert_eq!(apply(10.0, 168.0, &hard, &soft), (4.0, false));
+        assert_eq!(apply(0.0, 175.0, &hard, &soft), (0.0, false));
+    }
+
+    #[test]
+    fn endless_pan_has_no_end_but_where_one_is_set() {
+        let endless = limits(Some((-180.0, 180.0)));
+        let soft = SoftLimits { pan_deg: Range { min: -30.0, max: 40.0 }, ..SoftLimits::default() };
+        assert_eq!(apply(10.0, 180.0, &endless, &SoftLimits::default()), (10.0, false));
+        assert_eq!(apply(10.0, 180.0, &limits(None), &SoftLimits::default()), (10.0, false));
+        assert_eq!(apply(10.0, 40.0, &endless, &soft), (0.0, true));
+        assert_eq!(apply(-10.0, 60.0, &endless, &soft), (-10.0, false), "back in");
+        assert_eq!(apply(10.0, 40.0, &limits(None), &soft), (0.0, true));
+    }
+
+    #[test]
+    fn between_answers_the_commands_tell_where_it_is() {
+        let (mut guard, mut history) = (LimitGuard::default(), CommandHistory::default());
+        let ms = Duration::from_millis;
+        assert_eq!(guard.position(&history, ms(100), ms(0)), None);
+        guard.told(ms(1000), Some(PanTilt::new(5.0, 0.0)));
+        history.push(ms(800), PanTilt::new(10.0, 0.0));
+        assert_eq!(guard.position(&history, ms(100), ms(1400)), Some(PanTilt::new(10.0, 0.0)));
+    }
+
+    proptest! {
+        #[test]
+        fn no_rate_leads_out(rate in -200.0..200.0f64, pan in -170.0..170.0f64) {
+            let (held, _) = apply(rate, pan, &limits(Some((-170.0, 170.0))), &SoftLimits::default());
+            prop_assert!((-170.0..=170.0).contains(&(pan + 0.5 * held)) && held * rate >= 0.0);
+        }
+    }
+}

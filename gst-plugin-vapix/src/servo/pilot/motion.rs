@@ -1,0 +1,127 @@
+//! What the target's place means to the pilot.
+
+use std::time::Duration;
+
+use super::{Pilot, Wish};
+use crate::servo::{ControlLaw, Mode, PanTilt, Report, Sight, View, ZoomGoal, narrower};
+use crate::vapix::Command;
+
+impl Pilot {
+    pub(super) fn velocity(&mut self, sight: &Sight, now: Duration) -> Wish {
+        let law = self.control_law(&self.view(sight));
+        let latency = self.calibration.latency();
+        let offset = self.aim.offset(now, &self.history, latency);
+        let wanted = self.controller.rate(&offset, self.history.rate_at(now), &law);
+        let position = self.guard.position(&self.history, latency / 2, now);
+        let rate = self.limited(wanted, position, (latency + self.interval()).as_secs_f64());
+        let map = &self.map;
+        self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
+        let (pan, tilt) = self.speed_steps;
+        let command = Command::Velocity { pan, tilt, zoom: self.zoom_speed(sight, now) };
+        if command.is_stop() { Wish::Rest } else { Wish::Move(command) }
+    }
+
+    /// What the zoom is to do; `None` leaves it alone.
+    fn zoom_speed(&mut self, sight: &Sight, now: Duration) -> Option<i8> {
+        let latency = self.calibration.latency();
+        let wanted = self
+            .zoom_goal()
+            .and_then(|goal| self.zoom.speed(&goal, &self.camera.lens()?, sight, latency, now));
+        wanted.or(self.zoom.is_moving(now).then_some(0))
+    }
+
+    fn zoom_goal(&self) -> Option<ZoomGoal> {
+        let steps = narrower(self.camera.limits().zoom_steps, self.settings.limits.zoom_steps);
+        Some(ZoomGoal { target_height: self.settings.target_height?, steps })
+    }
+
+    /// What of a motion from `position` the limits leave, if it goes on for so long.
+    fn limited(&mut self, motion: PanTilt, position: Option<PanTilt>, lasting_s: f64) -> PanTilt {
+        let hard = self.camera.limits();
+        let limited = self.guard.apply(motion, position, (&hard, &self.settings.limits), lasting_s);
+        self.report_limit();
+        limited
+    }
+
+    /// From one command to the next.
+    fn interval(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.settings.max_rate_hz).max(self.exchange)
+    }
+
+    fn control_law(&self, view: &View) -> ControlLaw {
+        let settings = &self.settings;
+        let interval_s = self.interval().as_secs_f64();
+        // No error is worth a move that would leave nearly as large a one on the other side.
+        let shortest_move_deg = self.map.deg_s(1) * interval_s;
+        ControlLaw {
+            gain: settings.gain,
+            trust: self.oscillation.trust(),
+            dead_zone_deg: (settings.dead_zone * view.horizontal_fov_deg).max(0.75 * shortest_move_deg),
+            max_deg_s: settings.max_speed_deg_s,
+            max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
+        }
+    }
+
+    /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
+    pub(super) fn step(&mut self, sight: &Sight, now: Duration) -> Wish {
+        if self.scheduler.may_move() && !self.steps.under_way() {
+            // By speed, before the mode was changed; or who knows, as a step went unanswered.
+            return Wish::Rest;
+        }
+        if !self.steps.shows_rest(sight.taken_at, self.calibration.latency()) {
+            return Wish::AsIs;
+        }
+        let view = self.view(sight);
+        let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
+        let jump = self
+            .zoom_goal()
+            .and_then(|goal| self.zoom.jump(&goal, &self.camera.lens()?, now, self.calibration.latency()));
+        if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg && jump.is_none() {
+            return Wish::AsIs;
+        }
+        match self.settings.mode {
+            Mode::Centre => Wish::Move(self.centre(sight, jump.map(|jump| jump.factor), now)),
+            _ => self.camera.pan_tilt().map_or(Wish::AsIs, |position| {
+                let turn = self.limited(error, Some(position), 1.0);
+                let still = turn == PanTilt::default() && jump.is_none();
+                let command = absolute(position + turn, jump.map(|jump| jump.step));
+                if still { Wish::AsIs } else { Wish::Move(command) }
+            }),
+        }
+    }
+
+    /// The pixel where the target will be when the camera begins to move.
+    fn centre(&self, sight: &Sight, magnify: Option<f64>, now: Duration) -> Command {
+        let ahead_s = (now.saturating_sub(sight.taken_at) + self.calibration.latency()).as_secs_f64();
+        let pixel = |place: f64, velocity: f64, size: u32| {
+            let last = f64::from(size.saturating_sub(1));
+            // Saturates; inside the picture by the clamp.
+            ((place + velocity * ahead_s) * f64::from(size)).round().clamp(0.0, last) as u32
+        };
+        Command::Centre {
+            x: pixel(sight.centroid.x, sight.velocity.x, sight.size.0),
+            y: pixel(sight.centroid.y, sight.velocity.y, sight.size.1),
+            width: sight.size.0,
+            height: sight.size.1,
+            zoom_percent: magnify.map(|factor| (factor * 100.0).round() as u32),
+        }
+    }
+
+    fn report_limit(&mut self) {
+        let at_limit = self.guard.at_limit();
+        if at_limit && !self.at_limit {
+            self.reports.push(Report::AtLimit);
+        }
+        self.at_limit = at_limit;
+    }
+}
+
+/// The command to look there, the short way round.
+fn absolute(position: PanTilt, zoom: Option<u16>) -> Command {
+    Command::Absolute {
+        pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
+        tilt_deg: position.tilt.clamp(-180.0, 180.0),
+        speed: 100,
+        zoom,
+    }
+}

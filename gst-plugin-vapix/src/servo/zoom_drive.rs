@@ -1,0 +1,177 @@
+use std::time::Duration;
+
+use super::{Lens, Sight, ZoomController, ZoomTrack};
+use crate::vapix::Range;
+
+/// Turns the wish for a target of some height into zoom speeds and zoom steps of one lens.
+#[derive(Debug, Default)]
+pub struct ZoomDrive {
+    controller: ZoomController,
+    track: ZoomTrack,
+}
+
+/// What is wanted of the zoom.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ZoomGoal {
+    /// The target's height as a part of the picture's.
+    pub target_height: f64,
+    /// Zoom steps that are not left.
+    pub steps: Range,
+}
+
+/// A zoom from rest to rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Jump {
+    /// Zoom step to go to.
+    pub step: u16,
+    /// By what that magnifies.
+    pub factor: f64,
+}
+
+impl ZoomDrive {
+    /// A rate of the magnification is made a zoom speed over this time: where the lens ends, the speed runs out.
+    const AHEAD_S: f64 = 0.25;
+
+    /// Takes a picture.
+    pub fn see(&mut self, sight: &Sight, lens: &Lens, latency: Duration) {
+        if let Some(step) = self.step_shown(sight.taken_at, latency) {
+            self.controller.see(sight, lens.magnification(step));
+        }
+    }
+
+    /// Forgets the target.
+    pub fn forget(&mut self) {
+        self.controller.forget();
+    }
+
+    /// The camera told its zoom step, or does not tell.
+    pub fn told(&mut self, at: Duration, step: Option<f64>, latency: Duration) {
+        if let Some(step) = step {
+            self.track.told(at, step, delay(latency));
+        }
+    }
+
+    /// From then on the zoom moves at a speed step.
+    pub fn commanded(&mut self, at: Duration, speed: i8) {
+        self.track.commanded(at, speed);
+    }
+
+    /// Whether a picture shows the zoom moving, or some that is to come does.
+    pub fn moves(&self, taken_at: Duration, latency: Duration, now: Duration) -> bool {
+        self.track.moves(taken_at.saturating_sub(latency)) || self.track.moves(now)
+    }
+
+    /// Whether it was last told to move.
+    pub fn is_moving(&self, now: Duration) -> bool {
+        self.track.moves(now)
+    }
+
+    /// The zoom step that a picture shows.
+    pub fn step_shown(&self, taken_at: Duration, latency: Duration) -> Option<f64> {
+        self.track.step(taken_at.saturating_sub(latency), delay(latency))
+    }
+
+    /// The zoom speed for a command sent now, -100 to 100; `None` where the camera does not tell its zoom.
+    pub fn speed(
+        &mut self,
+        goal: &ZoomGoal,
+        lens: &Lens,
+        sight: &Sight,
+        latency: Duration,
+        now: Duration,
+    ) -> Option<i8> {
+        let step = self.track.step(now, delay(latency))?;
+        let lead = now.saturating_sub(sight.taken_at) + latency;
+        let rate = self.controller.rate(goal.target_height, lens.magnification(step), lead);
+        let there = lens.step_magnified(step, (rate * Self::AHEAD_S).exp())?;
+        let steps_s = (within(there, goal.steps) - step) / Self::AHEAD_S;
+        // Saturates.
+        Some((steps_s / self.track.full_step_s() * 100.0).round().clamp(-100.0, 100.0) as i8)
+    }
+
+    /// The zoom to do at once; `None`: it is well as it is.
+    pub fn jump(&self, goal: &ZoomGoal, lens: &Lens, now: Duration, latency: Duration) -> Option<Jump> {
+        let step = self.track.step(now, delay(latency))?;
+        let factor = self.controller.factor(goal.target_height, lens.magnification(step))?;
+        let there = within(lens.step_magnified(step, factor)?, goal.steps).round();
+        let factor = lens.magnification(there) / lens.magnification(step);
+        // Less than a hundredth is what rounding leaves at the lens' ends.
+        ((factor - 1.0).abs() > 0.01).then_some(Jump { step: there as u16, factor })
+    }
+}
+
+/// How much of the latency is the command's, not the picture's: nobody knows, so half.
+fn delay(latency: Duration) -> Duration {
+    latency / 2
+}
+
+fn within(step: f64, steps: Range) -> f64 {
+    step.min(steps.max).max(steps.min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::aim::tests::sight;
+    use ptztrack_contract::Rect;
+
+    const STEPS: Range = Range { min: 1.0, max: 9999.0 };
+    const GOAL: ZoomGoal = ZoomGoal { target_height: 0.4, steps: STEPS };
+    const LATENCY: Duration = Duration::from_millis(200);
+
+    fn lens() -> Lens {
+        Lens::linear(60.0, STEPS, 10.0)
+    }
+
+    /// A drive that has seen a target of this height, at a zoom step.
+    fn drive(step: f64, height: f64) -> (ZoomDrive, Sight, Duration) {
+        let mut drive = ZoomDrive::default();
+        drive.told(Duration::from_millis(100), Some(step), LATENCY);
+        let bounds = Rect { x: 0.45, y: 0.5 - height / 2.0, width: 0.1, height };
+        let mut seen = sight(0.5, 0.5, Duration::ZERO);
+        for picture in 10..40 {
+            seen = Sight { bounds, taken_at: Duration::from_millis(40 * picture), ..seen };
+            drive.see(&seen, &lens(), LATENCY);
+        }
+        let now = seen.taken_at;
+        (drive, seen, now)
+    }
+
+    fn speed(goal: ZoomGoal, step: f64, height: f64) -> i8 {
+        let (mut drive, seen, now) = drive(step, height);
+        drive.speed(&goal, &lens(), &seen, LATENCY, now).unwrap()
+    }
+
+    #[test]
+    fn it_zooms_in_on_a_small_target_and_out_of_a_tall_one() {
+        assert!(speed(GOAL, 1000.0, 0.2) > 0);
+        assert!(speed(GOAL, 1000.0, 0.8) < 0);
+        assert_eq!(speed(GOAL, 1000.0, 0.4), 0);
+    }
+
+    #[test]
+    fn it_ends_where_the_lens_or_the_limits_do() {
+        assert_eq!(speed(GOAL, 9999.0, 0.2), 0);
+        assert_eq!(speed(GOAL, 1.0, 0.8), 0);
+        let narrow = ZoomGoal { steps: Range { min: 500.0, max: 1000.0 }, ..GOAL };
+        assert_eq!((speed(narrow, 1000.0, 0.2), speed(narrow, 500.0, 0.8)), (0, 0));
+        assert!(speed(narrow, 3000.0, 0.4) < 0, "back into the limits");
+    }
+
+    #[test]
+    fn at_once_it_goes_where_the_height_is_right() {
+        let (drive_, _, now) = drive(1.0, 0.25);
+        let Jump { step, factor } = drive_.jump(&GOAL, &lens(), now, LATENCY).unwrap();
+        assert!((factor - 1.6).abs() < 0.01 && (lens().magnification(step.into()) - 1.6).abs() < 0.01);
+        let (drive_, _, now) = drive(9999.0, 0.25);
+        assert_eq!(drive_.jump(&GOAL, &lens(), now, LATENCY), None);
+    }
+
+    #[test]
+    fn a_zoom_that_is_not_told_is_left_alone() {
+        let mut drive = ZoomDrive::default();
+        let seen = sight(0.5, 0.5, Duration::from_secs(1));
+        drive.see(&seen, &lens(), LATENCY);
+        assert_eq!(drive.speed(&GOAL, &lens(), &seen, LATENCY, seen.taken_at), None);
+    }
+}
