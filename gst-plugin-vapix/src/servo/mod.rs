@@ -15,6 +15,8 @@ mod control_queue;
 mod controller;
 mod home;
 mod learning;
+#[cfg(test)]
+mod learning_tests;
 mod limits;
 mod link;
 #[cfg(test)]

@@ -280,6 +280,13 @@ impl Pilot {
         mem::take(&mut self.reports)
     }
 
+    /// The camera as it was learned.
+    #[cfg(test)]
+    pub fn belief(&self) -> super::simulation::Belief {
+        let latency = self.calibration.latency();
+        super::simulation::Belief { latency, fov_deg: self.fov_deg(None), map: self.map.clone() }
+    }
+
     /// The camera as it is known.
     pub fn status(&self, now: Duration) -> Status {
         Status {

@@ -14,6 +14,7 @@ use crate::vapix::{Command, Error, Limits, Position, Range};
 const TICK: Duration = Duration::from_millis(5);
 const PICTURE: Duration = Duration::from_millis(40);
 pub const ASPECT: f64 = 4.0 / 3.0;
+pub const WIDE_FOV_DEG: f64 = 55.2;
 const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
 
 /// What the world is, whatever the servo believes.
@@ -71,6 +72,7 @@ impl Setup {
             simulation.tick(&|time| target(time - Simulation::START_S), &mut run);
         }
         run.reports = simulation.pilot.take_reports();
+        run.belief = Some(simulation.pilot.belief());
         run
     }
 }
@@ -92,6 +94,8 @@ pub struct Run {
     pub frames: Vec<Frame>,
     pub commands: Vec<(f64, Command)>,
     pub reports: Vec<super::Report>,
+    /// What the servo takes the camera for in the end.
+    pub belief: Option<Belief>,
 }
 
 impl Run {
@@ -115,6 +119,14 @@ impl Run {
     pub fn commands_between(&self, from_s: f64, to_s: f64) -> usize {
         self.commands.iter().filter(|(at, _)| (from_s..to_s).contains(at)).count()
     }
+}
+
+/// A camera as the servo knows it.
+#[derive(Debug, Clone)]
+pub struct Belief {
+    pub latency: Duration,
+    pub fov_deg: f64,
+    pub map: SpeedMap,
 }
 
 struct Shot {
@@ -147,7 +159,6 @@ struct Simulation {
 impl Simulation {
     /// The clock does not begin at zero; by then the camera has introduced itself.
     const START_S: f64 = 2.0;
-    const WIDE_FOV_DEG: f64 = 55.2;
 
     fn new(setup: Setup) -> Self {
         Self {
@@ -158,7 +169,7 @@ impl Simulation {
             wanted: PanTilt::default(),
             goal: None,
             zoom_rate: 0.0,
-            lens: Lens::linear(Self::WIDE_FOV_DEG, ZOOM_STEPS, 18.0),
+            lens: Lens::linear(WIDE_FOV_DEG, ZOOM_STEPS, 18.0),
             under_way: VecDeque::new(),
             in_flight: None,
             shots: VecDeque::new(),

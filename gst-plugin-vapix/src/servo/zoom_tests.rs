@@ -126,10 +126,12 @@ fn endless_pan_takes_the_shortest_way() {
     }
 }
 
+type Refuses = fn(&Command) -> bool;
+
 /// A camera that knows one kind of command only is followed with by that.
 #[test]
 fn each_mode_does_with_its_own_commands() {
-    let cases: [(Mode, fn(&Command) -> bool); 3] = [
+    let cases: [(Mode, Refuses); 3] = [
         (Mode::Velocity, |command| !matches!(command, Command::Velocity { .. } | Command::Halt)),
         (Mode::Absolute, |command| !matches!(command, Command::Absolute { .. } | Command::Stop)),
         (Mode::Centre, |command| !matches!(command, Command::Centre { .. } | Command::Stop)),

@@ -39,6 +39,12 @@ const VARIANCE: f64 = 0.04;
 /// What a resting background seems to move in a second, in fields of view.
 const NOISE_FIELDS_S: f64 = 0.01;
 
+/// A camera that was told to turn so many times as fast and seems to stand is slower than it is taken for ...
+const STRONG: f64 = 8.0;
+
+/// ... if it stands for about a second: before that it may be late.
+const STANDING_VARIANCE: f64 = 20.0;
+
 /// Rates that differ by more than this factor within the time that a picture may show teach nothing.
 const STEADY: f64 = 2.0;
 
@@ -88,14 +94,23 @@ impl SpeedLearner {
     fn see_axis(&mut self, seen: f64, commanded: f64, (low, high): (f64, f64), map: &SpeedMap, fov_deg: f64) {
         let spread = high / low;
         let noise = NOISE_FIELDS_S * fov_deg;
-        // A camera that does not move, or to the other side, obeys somebody or something else; and what
-        // is bounded by proportional speed tells nothing of the map.
-        let follows = low * high > 0.0 && seen * commanded > 0.0 && seen.abs() > 2.0 * noise;
         let ratio = if low > 0.0 { spread } else { 1.0 / spread };
-        if !follows || ratio > STEADY || map.is_capped(commanded) {
+        // What is bounded by proportional speed tells nothing of the map.
+        if low * high <= 0.0 || ratio > STEADY || map.is_capped(commanded) {
             return;
         }
-        let variance = VARIANCE + ratio.ln().powi(2) + (noise / seen).powi(2);
+        let stands = seen.abs() <= 2.0 * noise;
+        let (seen, doubt) = match stands {
+            // Far slower than it is taken for, or only late.
+            true if commanded.abs() > STRONG * noise => (noise.copysign(commanded), STANDING_VARIANCE),
+            true => return,
+            false => (seen, (noise / seen).powi(2)),
+        };
+        // A camera that moves to the other side obeys somebody or something else.
+        if seen * commanded <= 0.0 {
+            return;
+        }
+        let variance = VARIANCE + ratio.ln().powi(2) + doubt;
         let features = features(map.ideal_step(commanded), fov_deg);
         let known = self.regression.predict(&features);
         self.regression.update(&features, known + (seen / commanded).ln(), variance);
