@@ -87,13 +87,32 @@ fn the_speed_map_is_found_within_20_s() {
 
 #[test]
 fn everything_wrong_at_once_is_put_right_within_20_s() {
-    let all = |field: fn(&mut Setup)| {
-        move |setup: &mut Setup| {
-            field(setup);
-            late(setup);
-            linear(setup);
-        }
+    assert_right("all", 200, |setup| {
+        wide(setup);
+        late(setup);
+        linear(setup);
+    });
+}
+
+/// A linear camera that takes a second for each command, where everything else is as by default.
+#[test]
+fn a_slow_camera_of_another_make_is_followed() {
+    let setup = Setup {
+        settings: super::ServoSettings::default(),
+        map: super::SpeedMap::new(100.0, SpeedCurve::Linear),
+        round_trip: Duration::from_secs(1),
+        pan_limits: crate::vapix::Range { min: -170.0, max: 170.0 },
+        jitter: 0.003,
+        ..Setup::new(200, 1.0)
     };
-    assert_right("all, wide", 200, all(wide));
-    assert_right("all, narrow", 200, all(narrow));
+    let run = setup.run(40.0, |time| (PanTilt::new(10.0 * (0.4 * time).sin(), 0.0), 20.0));
+    println!(
+        "FIG {:.3} {:.3}",
+        run.mean_offset(15.0, 40.0),
+        run.farthest(1.0, 0.0, 40.0).max(run.farthest(-1.0, 0.0, 40.0))
+    );
+    assert!(run.mean_offset(15.0, 40.0) < 0.1, "{}", run.mean_offset(15.0, 40.0));
+    for side in [-1.0, 1.0] {
+        assert!(run.farthest(side, 0.0, 40.0) < 0.9, "{}", run.farthest(side, 0.0, 40.0));
+    }
 }

@@ -74,7 +74,7 @@ impl Camera {
         let world = world::open(&settings)?;
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
-        let limits = world.limits();
+        let limits = settings.kinematics.limits.unwrap_or_else(|| world.limits());
         let head =
             Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
         let device = Device::new(&settings, head, limits, world.view_size());
@@ -438,7 +438,7 @@ impl VirtualCamera {
 
     /// How far it turns.
     pub fn limits(&self) -> Limits {
-        self.camera.world.limits()
+        self.camera.settings.kinematics.limits.unwrap_or_else(|| self.camera.world.limits())
     }
 
     /// Width and height in pixels that it sends unless asked for others.

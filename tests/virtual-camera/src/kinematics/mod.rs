@@ -78,6 +78,8 @@ pub struct Kinematics {
     pub acceleration_deg_s2: f64,
     /// From a command's arrival to the first movement.
     pub command_delay: Duration,
+    /// How far it turns; `None` is as far as there is a world to see.
+    pub limits: Option<Limits>,
     /// Magnification at the narrowest view; `None` is the world's own.
     pub max_magnification: Option<f64>,
     /// Zoom steps per second at zoom speed 100. Undocumented.
@@ -95,6 +97,7 @@ impl Default for Kinematics {
             },
             acceleration_deg_s2: 400.0,
             command_delay: Duration::from_millis(60),
+            limits: None,
             max_magnification: None,
             zoom_speed_step_s: 3000.0,
         }
