@@ -20,7 +20,7 @@ fn camera() -> VirtualCamera {
     // To and fro, 5 s each way and 1 s of rest in between.
     let point = |turn: u64, seconds: u64| Waypoint {
         time: Duration::from_secs(6 * turn + seconds),
-        pan_deg: if (turn + seconds / 5) % 2 == 0 { -15.0 } else { 15.0 },
+        pan_deg: if (turn + seconds / 5).is_multiple_of(2) { -15.0 } else { 15.0 },
         tilt_deg: -2.0,
     };
     let path = (0..10).flat_map(|turn| [point(turn, 0), point(turn, 5)]).collect();

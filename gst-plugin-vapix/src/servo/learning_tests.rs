@@ -16,7 +16,7 @@ fn pacing(time_s: f64) -> (PanTilt, f64) {
 fn learned(delay_ms: u64, lie: impl Fn(&mut Setup)) -> (f64, f64, f64, Vec<f64>) {
     let mut setup = Setup { jitter: 0.003, ..Setup::new(delay_ms, 1.0) };
     lie(&mut setup);
-    let real = setup.map.clone();
+    let real = setup.map;
     let delay_s = (setup.video_delay + setup.command_delay).as_secs_f64();
     let belief = setup.run(20.0, pacing).belief.unwrap();
     // The speeds that were used.
@@ -106,13 +106,10 @@ fn a_slow_camera_of_another_make_is_followed() {
         ..Setup::new(200, 1.0)
     };
     let run = setup.run(40.0, |time| (PanTilt::new(10.0 * (0.4 * time).sin(), 0.0), 20.0));
-    println!(
-        "FIG {:.3} {:.3}",
-        run.mean_offset(15.0, 40.0),
-        run.farthest(1.0, 0.0, 40.0).max(run.farthest(-1.0, 0.0, 40.0))
-    );
     assert!(run.mean_offset(15.0, 40.0) < 0.1, "{}", run.mean_offset(15.0, 40.0));
     for side in [-1.0, 1.0] {
-        assert!(run.farthest(side, 0.0, 40.0) < 0.9, "{}", run.farthest(side, 0.0, 40.0));
+        // Only just in view at first: a command a second, and thrice as fast as it was meant.
+        assert!(run.farthest(side, 0.0, 40.0) < 1.0, "{}", run.farthest(side, 0.0, 40.0));
+        assert!(run.farthest(side, 15.0, 40.0) < 0.4, "{}", run.farthest(side, 15.0, 40.0));
     }
 }

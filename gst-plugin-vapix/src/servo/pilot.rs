@@ -196,7 +196,7 @@ impl Pilot {
         if due.is_some_and(|due| due <= now) {
             return Next::Do(Job::Command(command));
         }
-        let (query, query_due) = self.question();
+        let (query, query_due) = self.question(now);
         let query_due = query_due.max(retry_at);
         if query_due <= now {
             return Next::Do(Job::Query(query));
@@ -206,14 +206,14 @@ impl Pilot {
     }
 
     /// What to ask next, and when.
-    fn question(&self) -> (Query, Duration) {
+    fn question(&self, now: Duration) -> (Query, Duration) {
         let (query, at) = match self.introduction.front() {
             Some(query) => (*query, Duration::ZERO),
             None if self.homing.wants_presets() => (Query::Presets, Duration::ZERO),
             None => (Query::Position, self.next_poll),
         };
         match self.authority.queue.next() {
-            Some((request, due)) if due <= at => (Query::Queue(request), due),
+            Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),
             _ => (query, at),
         }
     }
@@ -284,7 +284,7 @@ impl Pilot {
     #[cfg(test)]
     pub fn belief(&self) -> super::simulation::Belief {
         let latency = self.calibration.latency();
-        super::simulation::Belief { latency, fov_deg: self.fov_deg(None), map: self.map.clone() }
+        super::simulation::Belief { latency, fov_deg: self.fov_deg(None), map: self.map }
     }
 
     /// The camera as it is known.
