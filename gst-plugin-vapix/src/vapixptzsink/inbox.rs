@@ -26,6 +26,8 @@ pub struct Mail {
     pub settling: Vec<SyncSender<()>>,
     /// The last thing to do is to stop the camera.
     pub finish: bool,
+    /// Somebody else sees to the camera from here on.
+    pub quit: bool,
 }
 
 /// A letter box with one place for each kind of mail.
@@ -86,6 +88,12 @@ impl Inbox {
         self.clock.run();
         self.mail().finish = true;
         self.rest()
+    }
+
+    /// Asks for an end at once, stop or not: another worker is about to see to the camera.
+    pub fn quit(&self) {
+        self.mail().quit = true;
+        self.arrived.notify_one();
     }
 
     pub fn configure(&self, servo: ServoSettings) {

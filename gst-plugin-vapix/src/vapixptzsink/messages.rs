@@ -62,7 +62,7 @@ impl VapixPtzSink {
             Event::GaveUp => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
-                ("the camera has not confirmed its stop in time and may still be moving; stop it by hand")
+                ("the camera has not confirmed its stop in time and may still be moving; trying on for a minute, or stop it by hand")
             ),
             Event::Died(reason) => gst::element_imp_error!(
                 self,

@@ -1,9 +1,10 @@
 //! The one task that talks to the camera: takes what the streaming thread left, asks the pilot, sends.
 
 use std::cell::Cell;
+use std::mem;
 use std::pin::pin;
 use std::sync::mpsc::{Receiver, SyncSender};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
 use once_cell::sync::OnceCell;
@@ -19,8 +20,12 @@ use crate::vapix::{Client, ClientSettings, Credentials, Error};
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 const STOP_GRACE: Duration = Duration::from_millis(500);
 
-/// At the end the camera is tried to be stopped for this long.
+/// At the end the camera's yes to its stop is waited for this long.
 const FINISH_BUDGET: Duration = Duration::from_secs(2);
+
+/// A stop that was not confirmed by then goes on being tried for this long, with nobody waiting: the network may
+/// come back.
+const LAST_WILL: Duration = Duration::from_secs(60);
 
 /// Something the element tells the world.
 #[derive(Debug)]
@@ -31,7 +36,7 @@ pub enum Event {
     Report(Report),
     /// The camera is known to be otherwise than before.
     Status(Status),
-    /// The end has come, and the camera has not confirmed its stop.
+    /// The end has come, and the camera has not confirmed its stop in time.
     GaveUp,
     /// The worker itself broke.
     Died(String),
@@ -79,6 +84,7 @@ impl Worker {
             waiting: Vec::new(),
             settling: Vec::new(),
             deadline: None,
+            gave_up: false,
         };
         let task = Task { client, desk };
         let running = runtime.spawn(task.run());
@@ -93,6 +99,11 @@ impl Worker {
     /// Where to leave things for it.
     pub fn inbox(&self) -> &Inbox {
         &self.inbox
+    }
+
+    /// The same, also of a worker that was dropped and still tries to stop the camera.
+    pub fn weak_inbox(&self) -> Weak<Inbox> {
+        Arc::downgrade(&self.inbox)
     }
 
     /// The numbers so far.
@@ -136,12 +147,15 @@ struct Desk<O> {
     settling: Vec<SyncSender<()>>,
     /// The end, once it has been asked for.
     deadline: Option<Duration>,
+    /// Nobody waits any more.
+    gave_up: bool,
 }
 
 impl<O: Fn(Event) + Send + Sync> Task<O> {
     async fn run(mut self) {
         loop {
             self.desk.take_mail();
+            self.desk.check_deadline();
             if let Some(credentials) = self.desk.credentials.take() {
                 self.client.set_credentials(credentials);
                 self.desk.pilot.credentials_changed();
@@ -163,9 +177,7 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 }
             }
         }
-        if !self.desk.pilot.is_at_rest() {
-            (self.desk.observer)(Event::GaveUp);
-        }
+        self.desk.give_up();
     }
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
@@ -205,8 +217,24 @@ impl<O: Fn(Event)> Desk<O> {
         })
     }
 
+    /// When the time for a confirmed stop is over, nobody waits for it any more; it is tried on for a while.
+    fn check_deadline(&mut self) {
+        let now = self.inbox.now();
+        if !self.gave_up && self.deadline.is_some_and(|deadline| deadline <= now) {
+            self.give_up();
+            self.deadline = Some(now + LAST_WILL);
+        }
+    }
+
+    fn give_up(&mut self) {
+        if !self.pilot.is_at_rest() && !mem::replace(&mut self.gave_up, true) {
+            (self.observer)(Event::GaveUp);
+        }
+        self.waiting.clear();
+    }
+
     fn take_mail(&mut self) {
-        let Mail { credentials, servo, rest, sight, waiting, settling, finish } = self.inbox.take();
+        let Mail { credentials, servo, rest, sight, waiting, settling, finish, quit } = self.inbox.take();
         let now = self.inbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(servo) = servo {
@@ -218,6 +246,9 @@ impl<O: Fn(Event)> Desk<O> {
         if finish {
             self.deadline.get_or_insert(now + FINISH_BUDGET);
             self.pilot.leave();
+        }
+        if quit {
+            (self.deadline, self.gave_up) = (Some(now), true);
         }
         if let Some(sight) = sight.filter(|_| self.deadline.is_none()) {
             self.pilot.see(sight, now);

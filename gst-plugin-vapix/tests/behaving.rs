@@ -1,0 +1,382 @@
+//! It goes home, gives way to others, and stops what nobody else does. By the stream's time, over real HTTP.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::time::Duration;
+
+use common::{Heard, PATIENCE, Rig, moves, target};
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, CameraChange, TargetMeta, TargetState};
+use virtual_camera::{Clock, Fault, Kinematics, Pose, Settings, SpeedMap, VirtualCamera};
+
+const FRAME: Duration = Duration::from_millis(40);
+const TAKEN_OVER: Heard = Heard::Camera(CameraChange::TakenOver);
+const RESUMED: Heard = Heard::Camera(CameraChange::Resumed);
+
+/// A camera and a sink whose time goes on together, picture by picture.
+struct Stage {
+    camera: VirtualCamera,
+    rig: Rig,
+    now: Duration,
+    heard: Vec<Heard>,
+}
+
+impl Stage {
+    fn new(settings: Settings, set: impl FnOnce(Rig) -> Rig) -> Self {
+        let camera = VirtualCamera::start(Settings { clock: Clock::Stepped, ..settings }).unwrap();
+        Self::before(camera, set)
+    }
+
+    fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
+        let rig = set(Rig::ready(&camera.url()).with("lockstep", true)).play();
+        let now = camera.status().time;
+        Self { camera, rig, now, heard: Vec::new() }
+    }
+
+    fn picture(&mut self, meta: &TargetMeta) {
+        self.now += FRAME;
+        self.camera.advance_to(self.now);
+        let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
+        let content = buffer.get_mut().unwrap();
+        content.set_pts(gst::ClockTime::try_from(self.now).unwrap());
+        meta.attach(content).unwrap();
+        assert_eq!(self.rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+        self.heard.extend(self.rig.heard());
+    }
+
+    fn run(&mut self, seconds: f64, meta: &TargetMeta) {
+        for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
+            self.picture(meta);
+        }
+    }
+
+    /// A person walks to and fro.
+    fn walk(&mut self, seconds: f64) {
+        for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
+            let meta = self.person_at(10.0 * self.now.as_secs_f64().sin());
+            self.picture(&meta);
+        }
+    }
+
+    /// Runs until this is heard; returns how long it took, in seconds.
+    #[track_caller]
+    fn run_until(&mut self, wanted: &Heard, most: f64, meta: &TargetMeta) -> f64 {
+        let begin = self.now;
+        while !self.heard.contains(wanted) {
+            self.picture(meta);
+            let seconds = (self.now - begin).as_secs_f64();
+            assert!(seconds <= most, "{wanted:?} not after {most} s: {:?}", self.heard);
+        }
+        self.heard.retain(|heard| heard != wanted);
+        (self.now - begin).as_secs_f64()
+    }
+
+    fn moves(&self) -> Vec<String> {
+        moves(&self.camera)
+    }
+
+    fn times(&self, wanted: &Heard) -> usize {
+        self.heard.iter().filter(|heard| *heard == wanted).count()
+    }
+
+    /// Where a person at this pan is in the picture.
+    fn person_at(&self, pan_deg: f64) -> TargetMeta {
+        let status = self.camera.status();
+        let wide = (status.horizontal_fov_deg / 2.0).to_radians().tan();
+        let x = 0.5 + (pan_deg - status.pan_deg).to_radians().tan() / (2.0 * wide);
+        target(TargetState::Tracking, x.clamp(0.0, 1.0), 0.5)
+    }
+}
+
+fn centred() -> TargetMeta {
+    target(TargetState::Tracking, 0.5, 0.5)
+}
+
+fn aside() -> TargetMeta {
+    target(TargetState::Tracking, 0.8, 0.5)
+}
+
+fn nobody() -> TargetMeta {
+    target(TargetState::Searching, 0.0, 0.0)
+}
+
+#[test]
+fn an_operator_is_given_way_and_control_comes_back() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 4000u32));
+    stage.run(12.0, &centred());
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+    assert!(stage.camera.operate("rpan=-6"));
+    stage.run_until(&TAKEN_OVER, 3.0, &centred());
+    let before = stage.moves().len();
+    // The target is followed in the picture, and not by the camera.
+    stage.run(2.0, &aside());
+    assert!(stage.camera.operate("rpan=3"));
+    stage.run(3.5, &aside());
+    assert_eq!(stage.moves().len(), before);
+    assert_eq!(stage.rig.stats().get::<&str>("state").unwrap(), "taken-over");
+    assert_eq!(stage.times(&RESUMED), 0, "he moved it again");
+    stage.run_until(&RESUMED, 4.0, &aside());
+    stage.run(1.0, &aside());
+    assert!(stage.moves().len() > before);
+    assert_eq!((stage.times(&TAKEN_OVER), stage.times(&RESUMED)), (0, 0));
+}
+
+#[test]
+fn an_operator_who_steers_against_us_is_noticed_and_our_own_move_ended() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig);
+    stage.run(2.0, &centred());
+    let mut seconds = 0.0;
+    while !stage.heard.contains(&TAKEN_OVER) {
+        // His stick says left thirty times for each of our commands to the right.
+        stage.picture(&aside());
+        stage.camera.operate("continuouspantiltmove=-20,0");
+        seconds += FRAME.as_secs_f64();
+        assert!(seconds < 6.0, "not noticed");
+    }
+    stage.run(0.2, &aside());
+    assert_eq!(stage.moves().last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+}
+
+#[test]
+fn where_nobody_is_to_be_given_way_nobody_is() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 0u32));
+    stage.run(12.0, &centred());
+    stage.camera.operate("rpan=-6");
+    stage.run(5.0, &aside());
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+    assert!(!stage.moves().is_empty());
+}
+
+#[test]
+fn zooming_by_hand_is_no_override() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig);
+    stage.run(12.0, &centred());
+    stage.camera.operate("zoom=3000");
+    stage.run(8.0, &centred());
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+}
+
+/// The camera's delays, speeds and ends differ from all that is assumed, and nobody else is there.
+#[test]
+fn our_own_moves_are_nobody_elses() {
+    let slow = Kinematics { command_delay: Duration::from_millis(900), ..Kinematics::default() };
+    let lazy = Kinematics { acceleration_deg_s2: 20.0, ..Kinematics::default() };
+    let linear = Kinematics { speed_map: SpeedMap::Linear { max_deg_s: 200.0 }, ..Kinematics::default() };
+    for (name, kinematics) in
+        [("plain", Kinematics::default()), ("slow", slow), ("lazy", lazy), ("linear", linear)]
+    {
+        for mode in ["velocity", "absolute", "centre"] {
+            let settings = Settings { kinematics: kinematics.clone(), ..Settings::default() };
+            let mut stage = Stage::new(settings, |rig| rig.with_str("mode", mode));
+            let end = stage.camera.limits().pan_deg.1;
+            // To and fro, and on beyond the end of the range.
+            for second in 0..40 {
+                for _ in 0..25 {
+                    let phase = stage.now.as_secs_f64() * 0.5;
+                    let meta = stage.person_at((end + 3.0) * phase.sin());
+                    stage.picture(&meta);
+                }
+                assert_eq!(stage.times(&TAKEN_OVER), 0, "{name}, {mode}, second {second}");
+            }
+            assert!(!stage.moves().is_empty());
+        }
+    }
+}
+
+#[test]
+fn a_camera_that_comes_back_from_a_reboot_elsewhere_was_not_moved_by_anybody() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("timeout", 300u32));
+    stage.run(12.0, &centred());
+    stage.camera.set_fault(Fault::Reboot);
+    stage.run(8.0, &centred());
+    // It looks for its zero.
+    stage.camera.operate("rpan=15");
+    stage.run(1.0, &centred());
+    stage.camera.set_fault(Fault::None);
+    for pan in ["pan=-12", "pan=12", "pan=0"] {
+        stage.camera.operate(pan);
+        stage.run(1.0, &centred());
+    }
+    stage.run(10.0, &centred());
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+}
+
+#[test]
+fn it_goes_home_when_nobody_was_there_for_a_while() {
+    let presets = vec![("Gate".to_owned(), Pose { pan_deg: 9.0, tilt_deg: 2.0, zoom_step: 1.0 })];
+    for (home, command, pan) in [
+        ("-8,1", "camera=1&pan=-8.0000&tilt=1.0000&speed=100", -8.0),
+        ("start", "camera=1&pan=0.0000&tilt=0.0000&speed=100&zoom=1", 0.0),
+        ("Gate", "camera=1&gotoserverpresetno=2", 9.0),
+    ] {
+        let settings = Settings { presets: presets.clone(), ..Settings::default() };
+        let mut stage = Stage::new(settings, |rig| rig.with("home", home).with("home-timeout", 3000u32));
+        stage.run(2.0, &target(TargetState::Tracking, 0.3, 0.5));
+        stage.run(2.8, &nobody());
+        assert!(!stage.moves().contains(&command.to_owned()), "{home}: too early");
+        stage.run(20.0, &nobody());
+        let there: Vec<_> = stage.moves().into_iter().filter(|query| query == command).collect();
+        assert_eq!(there.len(), 1, "{home}: {:?}", stage.moves());
+        assert_eq!(stage.moves().last().unwrap(), command);
+        assert!((stage.camera.status().pan_deg - pan).abs() < 0.01, "{home}");
+        assert_eq!(stage.times(&TAKEN_OVER), 0, "{home}");
+        assert!(!stage.heard.iter().any(Heard::is_warning), "{:?}", stage.heard);
+        // And away again.
+        stage.run(2.0, &aside());
+        assert!(stage.moves().last().unwrap().contains("continuous"), "{home}");
+    }
+}
+
+#[test]
+fn without_a_home_it_stays_where_the_last_target_was() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("home-timeout", 0u32));
+    stage.run(1.0, &aside());
+    stage.run(1.0, &nobody());
+    let before = stage.moves().len();
+    stage.run(30.0, &nobody());
+    assert_eq!(stage.moves().len(), before);
+}
+
+#[test]
+fn at_the_start_it_goes_home_without_waiting() {
+    let mut stage =
+        Stage::new(Settings::default(), |rig| rig.with("home", "-8,1").with("home-at-start", true));
+    stage.run(0.5, &nobody());
+    assert_eq!(stage.moves(), ["camera=1&pan=-8.0000&tilt=1.0000&speed=100"]);
+}
+
+#[test]
+fn a_way_home_is_broken_off_for_a_target_and_for_a_pause() {
+    let slow = Settings {
+        kinematics: Kinematics { acceleration_deg_s2: 4.0, ..Kinematics::default() },
+        ..Settings::default()
+    };
+    let mut stage = Stage::new(slow, |rig| rig.with("home", "-15,0").with("home-at-start", true));
+    stage.run(1.0, &nobody());
+    assert!(stage.camera.status().moving);
+    stage.run(0.2, &aside());
+    assert!(stage.moves().last().unwrap().contains("continuouspantiltmove="), "{:?}", stage.moves());
+    stage.run(13.0, &nobody());
+    assert!(stage.camera.status().moving, "on the way again");
+    stage.rig.sink.set_state(gst::State::Paused).unwrap();
+    assert_eq!(stage.moves().last().unwrap(), "camera=1&move=stop");
+}
+
+#[test]
+fn a_home_that_is_none_is_said_once_and_nothing_else_suffers() {
+    let mut stage =
+        Stage::new(Settings::default(), |rig| rig.with("home", "Nowhere").with("home-timeout", 100u32));
+    stage.run(10.0, &nobody());
+    let warnings: Vec<_> = stage.heard.iter().filter(|heard| heard.is_warning()).collect();
+    let [Heard::Warning(text)] = warnings[..] else { panic!("{warnings:?}") };
+    assert!(text.contains("Nowhere") && text.contains("home"), "{text}");
+    stage.run(1.0, &aside());
+    assert!(!stage.moves().is_empty());
+}
+
+#[test]
+fn a_home_that_does_not_parse_is_refused_and_the_old_one_stays() {
+    let rig = Rig::ready("http://192.168.0.90").with("home", "10,5").with("home", "10,500");
+    assert_eq!(rig.sink.property::<Option<String>>("home").as_deref(), Some("10,5"));
+    assert!(matches!(&rig.heard()[..], [Heard::Warning(text)] if text.contains("180")));
+}
+
+#[test]
+fn a_camera_found_moving_is_stopped_whoever_left_it_so() {
+    for query in ["continuouspantiltmove=12,0", "continuouspantiltmove=0,8&continuouszoommove=20"] {
+        let camera = VirtualCamera::start(Settings { clock: Clock::Stepped, ..Settings::default() }).unwrap();
+        // The predecessor, before it crashed.
+        assert!(camera.operate(query));
+        camera.advance_to(Duration::from_millis(500));
+        let mut stage = Stage::before(camera, |rig| rig);
+        stage.run(6.0, &nobody());
+        assert!(!stage.camera.status().moving, "{query}");
+        assert_eq!(stage.moves().len(), 1, "{:?}", stage.moves());
+        assert_eq!(stage.times(&TAKEN_OVER), 0);
+    }
+}
+
+#[test]
+fn a_camera_found_at_rest_is_told_nothing() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig);
+    stage.run(15.0, &nobody());
+    assert_eq!(stage.moves(), [] as [&str; 0]);
+}
+
+#[test]
+fn with_a_control_queue_it_waits_for_its_turn() {
+    let settings = Settings { control_queue: Some(Duration::from_secs(10)), ..Settings::default() };
+    let mut stage = Stage::new(settings, |rig| rig);
+    stage.walk(60.0);
+    assert!(!stage.heard.contains(&Heard::Camera(CameraChange::Refused)), "{:?}", stage.heard);
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+    assert!(stage.moves().len() > 5, "it keeps its place: {:?}", stage.moves());
+
+    stage.camera.queue_operator(true);
+    stage.run_until(&TAKEN_OVER, 6.0, &aside());
+    let before = stage.moves().len();
+    stage.walk(20.0);
+    assert_eq!(stage.moves().len(), before);
+    stage.camera.queue_operator(false);
+    stage.run_until(&RESUMED, 11.0, &aside());
+    stage.walk(4.0);
+    assert!(stage.moves().len() > before);
+    assert!(!stage.heard.contains(&Heard::Camera(CameraChange::Refused)), "{:?}", stage.heard);
+
+    // It gives up its place: another is let in at once.
+    let Stage { camera, rig, .. } = stage;
+    drop(rig);
+    let mut stage = Stage::before(camera, |rig| rig);
+    let before = stage.moves().len();
+    stage.walk(4.0);
+    assert!(stage.moves().len() > before && stage.times(&TAKEN_OVER) == 0);
+}
+
+#[test]
+fn a_stop_that_the_network_swallows_is_repeated_when_it_is_back() {
+    let camera = common::camera(virtual_camera::Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    rig.set_going(&camera);
+    camera.set_fault(Fault::Refuse);
+    let nobody = nobody();
+    rig.push_until_message(&nobody, Heard::is_warning);
+    assert!(camera.status().moving);
+    camera.set_fault(Fault::None);
+    rig.push_until(&nobody, &camera, |status| !status.moving);
+}
+
+#[test]
+fn a_stop_outlives_the_element_that_could_not_send_it() {
+    let camera = common::camera(virtual_camera::Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    rig.set_going(&camera);
+    camera.set_fault(Fault::Refuse);
+    drop(rig);
+    assert!(camera.status().moving);
+    camera.set_fault(Fault::None);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
+
+#[test]
+fn under_load_there_is_one_request_and_nothing_is_queued() {
+    const SERVICE: Duration = Duration::from_millis(400);
+    let camera = VirtualCamera::start(Settings { service_time: SERVICE, ..Settings::default() }).unwrap();
+    let mut rig = Rig::playing(&camera.url());
+    let frame = Duration::from_secs(1) / 60;
+    let begin = std::time::Instant::now();
+    let mut pictures = 0u32;
+    while begin.elapsed() < Duration::from_secs(8) {
+        let side = if pictures.is_multiple_of(2) { 0.15 } else { 0.85 };
+        rig.push(&target(TargetState::Tracking, side, 0.5));
+        pictures += 1;
+        camera.wait_for(frame, |_| false);
+    }
+    let elapsed = begin.elapsed();
+    let status = camera.status();
+    drop(rig);
+    assert_eq!(camera.status().most_in_flight, 1);
+    // Never more than the camera has time for: nothing is left over for later.
+    assert!(u128::from(status.requests) <= elapsed.as_millis() / SERVICE.as_millis() + 1, "{status:?}");
+    assert!(moves(&camera).len() >= 3);
+}
