@@ -14,6 +14,7 @@ use crate::{
     experiment::{self, Experiment, Place},
     film,
     pipeline::{Pipeline, PipelineError, SINK, SOURCE},
+    realtime,
     record::{Bounds, Estimate, FrameRecord, Run},
     still,
     trackers::{Cue, Phase, Tracker},
@@ -30,6 +31,8 @@ pub(crate) enum RunError {
     Pipeline(#[from] PipelineError),
     #[error("pictures of {0}x{1} cannot be made")]
     Size(u32, u32),
+    #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
+    Raw,
     #[error("the person is never wholly in the first view")]
     Nobody,
 }
@@ -38,6 +41,7 @@ pub(crate) enum RunError {
 pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
     let driven = match &experiment.scene.place {
+        Place::World(world) if experiment.real_time => realtime::drive(experiment, world, &mut run),
         Place::World(world) => drive(experiment, world, &mut run),
         Place::Recording(recording) => still::drive(experiment, recording, &mut run),
     };
@@ -70,8 +74,9 @@ fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), Ru
 /// Camera, pipeline and tracker of one run.
 struct Stage<'a> {
     experiment: &'a Experiment,
-    camera: VirtualCamera,
+    /// Goes before the camera, which it stops at its end.
     pipeline: Pipeline,
+    camera: VirtualCamera,
     tracker: Tracker,
     info: gst_video::VideoInfo,
     /// Number of the last command that was counted.
@@ -98,7 +103,7 @@ impl<'a> Stage<'a> {
         } else {
             format!("fakesink name={SINK} sync=false async=false")
         };
-        let sink = experiment.film.as_ref().map_or(sink.clone(), |file| film::description(&sink, file));
+        let sink = film::beside(&sink, &experiment.film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
@@ -108,7 +113,7 @@ impl<'a> Stage<'a> {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;
-        Ok(Self { experiment, camera, pipeline, tracker, info, counted: 0 })
+        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0 })
     }
 
     /// Takes picture `number` and sends it through.
@@ -117,26 +122,16 @@ impl<'a> Stage<'a> {
         let exposure = experiment::exposure(number, period);
         let arrival = exposure + self.experiment.delays.video;
         self.camera.advance_to(arrival);
-        let (truth, others) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
-        let pose = self.camera.pose_at(exposure);
-        let phase = match number.cmp(&first) {
-            std::cmp::Ordering::Less => Phase::Before,
-            std::cmp::Ordering::Equal => Phase::FirstBox,
-            std::cmp::Ordering::Greater => Phase::After,
-        };
-        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), size })?;
+        let witnessed = self.experiment.witness(&self.camera, number, first);
+        let phase = Phase::of(number >= first, number > first);
+        let cue = Cue { phase, truth: witnessed.truth.clone(), size };
+        self.tracker.next(self.pipeline.bin(), cue)?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
         let record = FrameRecord {
-            time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
-            truth,
-            others,
             estimate: target.map(|target| estimate(&target, size)),
-            size,
-            pan_deg: pose.pan_deg,
-            tilt_deg: pose.tilt_deg,
-            zoom: pose.zoom_step,
-            commands: self.count_commands(),
+            commands: count_commands(&self.camera, &mut self.counted),
+            ..witnessed
         };
         Ok((record, picture))
     }
@@ -150,13 +145,13 @@ impl<'a> Stage<'a> {
         }
         Ok(buffer)
     }
+}
 
-    /// Commands that arrived since the last call; questions do not count.
-    fn count_commands(&mut self) -> u32 {
-        let commands = self.camera.commands_after(self.counted);
-        self.counted = commands.last().map_or(self.counted, |command| command.number);
-        commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
-    }
+/// Commands that came after number `counted`, which becomes the last one; questions do not count.
+pub(crate) fn count_commands(camera: &VirtualCamera, counted: &mut u64) -> u32 {
+    let commands = camera.commands_after(*counted);
+    *counted = commands.last().map_or(*counted, |command| command.number);
+    commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
 }
 
 fn clock_time(time: Duration) -> gst::ClockTime {
