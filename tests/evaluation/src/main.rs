@@ -24,7 +24,7 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
         eprintln!("evaluate: {reason}");
     }
     std::fs::create_dir_all(&args.out)?;
-    let runs = evaluation::run_all(&args.experiments(&trackers)?, args.jobs, std::io::stderr());
+    let runs = evaluation::run_all(&args.experiments(&trackers)?, args.jobs(), std::io::stderr());
     let report = report::write(&runs, &args.out)?;
     for note in &report.notes {
         eprintln!("evaluate: {note}");

@@ -335,6 +335,11 @@ impl VirtualCamera {
         format!("rtsp://{}", self.rtsp.address())
     }
 
+    /// How late it is for the camera, since its start.
+    pub fn now(&self) -> Duration {
+        self.camera.now()
+    }
+
     /// The camera at this moment.
     pub fn status(&self) -> Status {
         self.camera.status()
