@@ -118,15 +118,14 @@ impl Experiment {
     }
 
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
-    /// was never moved; `None` where there is none. Never the very first, during which the servo meets its camera: a target
-    /// in it would be seen before or after that, as threads go.
+    /// was never moved; `None` where there is none.
     pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
         let (period, home) = (camera.frame_period(), camera.home());
         let whole = |number: &u32| {
             let people = camera.ground_truth_from(&home, exposure(*number, period), self.size);
             self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
         };
-        self.pictures(period).skip(1).find(whole)
+        self.pictures(period).find(whole)
     }
 
     /// What can be said of picture `number` before anybody tracked in it; `first` is the first that counts.

@@ -3,10 +3,9 @@
 //!
 //! ## What is counted
 //! Counting begins with the *first box*: the first picture, with the camera still at home, in which the person's whole
-//! box lies inside the view (the second picture at the earliest: during the first the servo meets its camera). That is
-//! decided before anything runs, so that it is the same picture for every tracker, and in it every tracker is given the
-//! true box (`--first-box detected`: those with a detector are not). It ends with the person's walk. Pictures are counted
-//! by when they were taken, whatever the delays.
+//! box lies inside the view. That is decided before anything runs, so that it is the same picture for every tracker,
+//! and in it every tracker is given the true box (`--first-box detected`: those with a detector are not). It ends with
+//! the person's walk. Pictures are counted by when they were taken, whatever the delays.
 //!
 //! ## Recordings
 //! [`Scene::footage`] puts a turning camera into a recording of real people, in closed loop like the tests. Beside them it

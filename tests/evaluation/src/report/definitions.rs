@@ -5,9 +5,8 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
     (
         "First box",
         "Counting begins with the first picture in which the person's whole box is inside the view, while the camera still \
-         stands at home; with a camera the second picture at the earliest, as during the first the servo meets it. No \
-         tracker has any influence on it, so all are counted over the same time; each is given the true box of that picture, \
-         unless the first box is said to be detected. It ends with the end of the walk.",
+         stands at home. No tracker has any influence on it, so all are counted over the same time; each is given the true \
+         box of that picture, unless the first box is said to be detected. It ends with the end of the walk.",
     ),
     (
         "True positive, false positive",
