@@ -45,6 +45,9 @@ pub struct Args {
     /// Write a video of each run as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
+    /// Instead of running tests, write pictures of the room to look at: every subject, light and occlusion, from far and near
+    #[arg(long, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time", "record"])]
+    pub gallery: bool,
     /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
     /// pictures that the tracker has no time for are dropped and counted
     #[arg(long, conflicts_with_all = ["record", "still_recording"])]
@@ -164,6 +167,12 @@ impl Args {
             }
         }
         (there, left_out)
+    }
+
+    /// What pictures of the room are to be like.
+    pub fn gallery(&self) -> Option<Experiment> {
+        let scene = self.gallery.then(|| Scene::room(TestId(1), self.seed)).flatten()?;
+        Some(self.experiment(scene, TrackerName::Still))
     }
 
     fn experiment(&self, scene: Scene, tracker: TrackerName) -> Experiment {

@@ -19,6 +19,7 @@ mod codec;
 mod experiment;
 mod film;
 mod footage;
+pub mod gallery;
 mod lockstep;
 pub mod metrics;
 mod people;

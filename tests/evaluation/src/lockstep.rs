@@ -31,6 +31,8 @@ pub(crate) enum RunError {
     Pipeline(#[from] PipelineError),
     #[error("pictures of {0}x{1} cannot be made")]
     Size(u32, u32),
+    #[error("cannot turn the camera: {0}")]
+    Aim(std::io::Error),
     #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
     Raw,
     #[error("the person is never wholly in the first view")]
@@ -87,13 +89,7 @@ impl<'a> Stage<'a> {
     fn set(experiment: &'a Experiment, world: &World) -> Result<Self, RunError> {
         let camera = experiment.camera(world, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
-        let (width, height) = experiment.size;
-        let rate = gst::Fraction::approximate_f64(1.0 / camera.frame_period().as_secs_f64());
-        let info = gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, width, height)
-            .fps(rate.unwrap_or(gst::Fraction::new(25, 1)))
-            .par(gst::Fraction::new(1, 1))
-            .build()
-            .map_err(|_| RunError::Size(width, height))?;
+        let info = info(experiment.size, camera.frame_period())?;
         let sink = if tracker.steers() {
             format!(
                 "vapixptzsink name={SINK} location={} lockstep=true timeout=60000 {}",
@@ -154,7 +150,17 @@ pub(crate) fn count_commands(camera: &VirtualCamera, counted: &mut u64) -> u32 {
     commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
 }
 
-fn clock_time(time: Duration) -> gst::ClockTime {
+/// What pictures are before they are encoded.
+pub(crate) fn info((width, height): (u32, u32), period: Duration) -> Result<gst_video::VideoInfo, RunError> {
+    let rate = gst::Fraction::approximate_f64(1.0 / period.as_secs_f64());
+    gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, width, height)
+        .fps(rate.unwrap_or(gst::Fraction::new(25, 1)))
+        .par(gst::Fraction::new(1, 1))
+        .build()
+        .map_err(|_| RunError::Size(width, height))
+}
+
+pub(crate) fn clock_time(time: Duration) -> gst::ClockTime {
     gst::ClockTime::from_nseconds(time.as_nanos() as u64)
 }
 

@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use evaluation::{cli::Args, report};
+use evaluation::{cli::Args, gallery, report};
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -19,6 +19,11 @@ fn main() -> ExitCode {
 /// Whether every run came to its end.
 fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     evaluation::init()?;
+    if let Some(like) = args.gallery() {
+        let folder = args.out.join("gallery");
+        println!("{} pictures in {}", gallery::write(&like, &folder)?, folder.display());
+        return Ok(true);
+    }
     let (trackers, left_out) = args.trackers();
     for reason in left_out {
         eprintln!("evaluate: {reason}");

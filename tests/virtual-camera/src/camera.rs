@@ -15,7 +15,7 @@ use crate::{
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
-    kinematics::{Head, Limits, Pose},
+    kinematics::{Head, Limits, Optics, Pose},
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
@@ -398,6 +398,11 @@ impl VirtualCamera {
     /// Where it looks at first, and the preset `Home`.
     pub fn home(&self) -> Pose {
         self.camera.settings.home_pose()
+    }
+
+    /// What its lens does.
+    pub fn optics(&self) -> Optics {
+        lock(&self.camera.state).device.head.optics()
     }
 
     /// From one picture to the next.
