@@ -335,6 +335,8 @@ impl BaseSinkImpl for VapixPtzSink {
         self.push_news();
         let step = self.lockstep_time(buffer.pts());
         if let Some(time) = step {
+            // What is still under way, as the first questions to the camera are, belongs to the time before.
+            self.settle();
             self.with_worker(|worker| worker.inbox().hold_at(time));
         }
         match TargetMeta::of(buffer) {

@@ -11,9 +11,9 @@ use crate::{
     trackers::missing,
 };
 
-/// Runs the thesis' tests against the virtual camera and writes CSV, tables, plots and one page.
+/// Follows people with a moving camera, in the thesis' tests or in recordings, and writes CSV, tables, plots and one page.
 #[derive(Debug, Clone, Parser)]
-#[command(name = "evaluate", version)]
+#[command(name = "evaluate", version, after_help = EXAMPLES)]
 pub struct Args {
     /// Tests by number, `7` or `1-6`; all 72 unless given
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
@@ -21,7 +21,7 @@ pub struct Args {
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
     pub tracker: Vec<Trackers>,
-    /// What the pictures go through: mjpeg or mpeg4
+    /// What the pictures go through: mjpeg, mpeg4 or raw; a recording as it is only ever is raw
     #[arg(long, default_value = "mjpeg")]
     pub codec: Codec,
     /// Width and height of the pictures
@@ -45,13 +45,21 @@ pub struct Args {
     /// Write a video of each run as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
-    /// Instead of the tests, follow one person in a still camera's recording, cut out of it as a turning camera sees it
+    /// Instead of running tests, write pictures of the room to look at: every subject, light and occlusion, from far and near
+    #[arg(long, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time", "record"])]
+    pub gallery: bool,
+    /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
+    /// pictures that the tracker has no time for are dropped and counted
+    #[arg(long, conflicts_with_all = ["record", "still_recording"])]
+    pub real_time: bool,
+    /// Instead of the tests, follow one person in a still camera's recording, as seen by a camera that turns within it
     #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
     pub footage: Option<PathBuf>,
-    /// Instead of the tests, follow one person in a recording as it is, without a camera
+    /// Instead of the tests, follow one person in a recording as it is: no camera, no codec, no delays
     #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
     pub still_recording: Option<PathBuf>,
-    /// Who is where in the recording: MOTChallenge; for --still-recording also a box a line, by size or corners
+    /// Who is where in the recording: MOTChallenge (frame,id,left,top,width,height,...); for --still-recording also one box
+    /// a line, left,top,width,height or left,top,right,bottom
     #[arg(long, value_name = "FILE")]
     pub truth: Option<PathBuf>,
     /// Number of the person to follow in the recording, or auto: who is there longest
@@ -64,6 +72,15 @@ pub struct Args {
     #[arg(long, default_value = "target/evaluation")]
     pub out: PathBuf,
 }
+
+const EXAMPLES: &str = "\
+Examples:
+  evaluate                                           all 72 tests in a simulated room
+  evaluate --test 1-6 --tracker ptztrack,oracle --record
+  evaluate --footage walk.mp4 --truth walk.csv --tracker ptztrack,thesis,csrt
+                                                     a camera that turns within a recording, in closed loop
+  evaluate --still-recording walk.mp4 --truth walk.csv --tracker all
+                                                     the recording as it is: success and precision of the box";
 
 /// Tests from one number to another.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -152,6 +169,12 @@ impl Args {
         (there, left_out)
     }
 
+    /// What pictures of the room are to be like.
+    pub fn gallery(&self) -> Option<Experiment> {
+        let scene = self.gallery.then(|| Scene::room(TestId(1), self.seed)).flatten()?;
+        Some(self.experiment(scene, TrackerName::Still))
+    }
+
     fn experiment(&self, scene: Scene, tracker: TrackerName) -> Experiment {
         let delays = Delays {
             video: Duration::from_millis(self.video_delay),
@@ -163,9 +186,15 @@ impl Args {
             size: self.size,
             delays,
             first_box: self.first_box,
+            real_time: self.real_time,
             film: self.record.then(|| self.out.join(format!("{name}-{tracker}.mkv"))),
             ..Experiment::new(scene, tracker, self.seed)
         }
+    }
+
+    /// How many runs go on at once: in real time they would take the processor from each other.
+    pub fn jobs(&self) -> usize {
+        if self.real_time { 1 } else { self.jobs }
     }
 
     /// What is to be followed.
@@ -254,7 +283,7 @@ mod tests {
             ("--test 5-3", "1 to 72"),
             ("--size 640", "WIDTHxHEIGHT"),
             ("--tracker best", "ptztrack, thesis"),
-            ("--codec h264", "mjpeg, mpeg4"),
+            ("--codec h264", "mjpeg, mpeg4, raw"),
             ("--first-box drawn", "given, detected"),
             ("--footage x.avi", "--truth"),
             ("--person somebody", "auto"),

@@ -29,13 +29,14 @@ impl Codec {
                 "avenc_mpeg4 name=encoder gop-size=25 pass=quant quantizer={} ! avdec_mpeg4 max-threads=1",
                 2 + COMPRESSION / 10
             ),
+            Self::Raw => "identity".into(),
         }
     }
 
     /// Mends what the elements do wrong.
     pub(crate) fn attach(self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match self {
-            Self::Mjpeg => Ok(()),
+            Self::Mjpeg | Self::Raw => Ok(()),
             Self::Mpeg4 => keep_times(&pipeline.pad("encoder", "sink")?, &pipeline.pad("encoder", "src")?),
         }
     }
@@ -104,7 +105,7 @@ mod tests {
 
     #[test]
     fn every_picture_comes_out_at_its_time_before_the_next_goes_in() {
-        for codec in [Codec::Mjpeg, Codec::Mpeg4] {
+        for &codec in Codec::ALL {
             let out = through(codec);
             for (n, (time, brightness)) in out.iter().enumerate() {
                 assert_eq!(*time, Some(gst::ClockTime::from_mseconds(40 * n as u64)), "{codec}");

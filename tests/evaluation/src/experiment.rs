@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
 
 use crate::{
-    record::{Codec, Delays, FirstBox, Run, TestId, TrackerName},
+    record::{Codec, Delays, FirstBox, FrameRecord, Run, TestId, TrackerName},
     still::Recording,
 };
 
@@ -33,7 +33,7 @@ pub struct Scene {
     pub title: String,
     /// What there is to see.
     pub place: Place,
-    /// From the start of the world to the last picture that counts; a recording is seen to its end.
+    /// From the start of the world to the last picture that counts; a recording as it is has a number for that.
     pub duration: Duration,
     /// Who is to be followed; `None` where there is only one.
     pub person: Option<u32>,
@@ -79,6 +79,8 @@ pub struct Experiment {
     pub first_box: FirstBox,
     /// Whether it is one of a series over the delay.
     pub sweep: bool,
+    /// Whether the clock is looked at: the camera streams, and pictures that come too early for the tracker are dropped.
+    pub real_time: bool,
     /// Where to write a video of it, with everything drawn in (Matroska); nowhere unless given.
     pub film: Option<PathBuf>,
 }
@@ -95,6 +97,7 @@ impl Experiment {
             delays: Delays::default(),
             first_box: FirstBox::Given,
             sweep: false,
+            real_time: false,
             film: None,
         }
     }
@@ -123,6 +126,25 @@ impl Experiment {
             self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
         };
         self.pictures(period).find(whole)
+    }
+
+    /// What can be said of picture `number` before anybody tracked in it; `first` is the first that counts.
+    pub(crate) fn witness(&self, camera: &VirtualCamera, number: u32, first: u32) -> FrameRecord {
+        let period = camera.frame_period();
+        let exposure = exposure(number, period);
+        let (truth, others) = self.scene.split(camera.ground_truth(exposure, self.size));
+        let pose = camera.pose_at(exposure);
+        FrameRecord {
+            time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
+            truth,
+            others,
+            estimate: None,
+            size: self.size,
+            pan_deg: pose.pan_deg,
+            tilt_deg: pose.tilt_deg,
+            zoom: pose.zoom_step,
+            commands: 0,
+        }
     }
 
     /// What it will be recorded as.

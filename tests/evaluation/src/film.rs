@@ -1,6 +1,6 @@
 //! A video of a run to look at: what the tracker saw, what it said, and in white where the person really is.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use gst::prelude::*;
 use gst_video::prelude::*;
@@ -17,8 +17,12 @@ const CANVAS: &str = "canvas";
 const LINE: usize = 2;
 const WHITE: u8 = 235;
 
-/// Elements that film what passes on its way to `sink`.
-pub(crate) fn description(sink: &str, file: &Path) -> String {
+/// The elements `sink`, and those that film what passes on its way there where a `file` is given.
+pub(crate) fn beside(sink: &str, file: &Option<PathBuf>) -> String {
+    file.as_ref().map_or_else(|| sink.into(), |file| description(sink, file))
+}
+
+fn description(sink: &str, file: &Path) -> String {
     // Quotes, so that a path may hold blanks; what would end them is kept from doing so.
     let file = file.display().to_string().replace('\\', "\\\\").replace('"', "\\\"");
     format!(

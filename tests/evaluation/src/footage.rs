@@ -68,15 +68,15 @@ impl Scene {
         })
     }
 
-    /// The recording `file` as it is, and `person` of `truth` in it; without a number who stays longest.
+    /// The recording `file` as it is, and `person` of `truth` in it to their last box; without a number who stays longest.
     ///
     /// # Errors
     /// Where the ground truth cannot be used, or the person is not there.
     pub fn recording(file: &Path, truth: &Path, person: Option<u32>) -> Result<Self, SceneError> {
         let people = people::read(truth)?;
         let everybody = |picture| people[&picture].iter().map(|one| one.id).collect();
-        let (id, _) = choose(&stays(&people, everybody), person)?;
-        let place = Place::Recording(Recording { file: file.into(), people: Arc::new(people) });
+        let (id, (_, last)) = choose(&stays(&people, everybody), person)?;
+        let place = Place::Recording(Recording { file: file.into(), people: Arc::new(people), last });
         Ok(Self { test: None, title: title(file, id), place, duration: Duration::MAX, person: Some(id) })
     }
 }

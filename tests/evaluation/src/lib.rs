@@ -6,6 +6,11 @@
 //! box lies inside the view. That is decided before anything runs, so that it is the same picture for every tracker,
 //! and in it every tracker is given the true box (`--first-box detected`: those with a detector are not). It ends with
 //! the person's walk. Pictures are counted by when they were taken, whatever the delays.
+//!
+//! ## Recordings
+//! [`Scene::footage`] puts a turning camera into a recording of real people, in closed loop like the tests. Beside them it
+//! is counted how often somebody else is followed. [`Scene::recording`] shows a recording as it is to the tracker alone,
+//! from the first picture with the person in it to the last, and only what it says of the boxes is judged.
 
 mod album;
 mod batch;
@@ -14,10 +19,12 @@ mod codec;
 mod experiment;
 mod film;
 mod footage;
+pub mod gallery;
 mod lockstep;
 pub mod metrics;
 mod people;
 mod pipeline;
+mod realtime;
 pub mod record;
 pub mod report;
 mod still;

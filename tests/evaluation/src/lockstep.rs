@@ -14,6 +14,7 @@ use crate::{
     experiment::{self, Experiment, Place},
     film,
     pipeline::{Pipeline, PipelineError, SINK, SOURCE},
+    realtime,
     record::{Bounds, Estimate, FrameRecord, Run},
     still,
     trackers::{Cue, Phase, Tracker},
@@ -30,6 +31,10 @@ pub(crate) enum RunError {
     Pipeline(#[from] PipelineError),
     #[error("pictures of {0}x{1} cannot be made")]
     Size(u32, u32),
+    #[error("cannot turn the camera: {0}")]
+    Aim(std::io::Error),
+    #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
+    Raw,
     #[error("the person is never wholly in the first view")]
     Nobody,
 }
@@ -38,6 +43,7 @@ pub(crate) enum RunError {
 pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
     let driven = match &experiment.scene.place {
+        Place::World(world) if experiment.real_time => realtime::drive(experiment, world, &mut run),
         Place::World(world) => drive(experiment, world, &mut run),
         Place::Recording(recording) => still::drive(experiment, recording, &mut run),
     };
@@ -70,8 +76,9 @@ fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), Ru
 /// Camera, pipeline and tracker of one run.
 struct Stage<'a> {
     experiment: &'a Experiment,
-    camera: VirtualCamera,
+    /// Goes before the camera, which it stops at its end.
     pipeline: Pipeline,
+    camera: VirtualCamera,
     tracker: Tracker,
     info: gst_video::VideoInfo,
     /// Number of the last command that was counted.
@@ -82,13 +89,7 @@ impl<'a> Stage<'a> {
     fn set(experiment: &'a Experiment, world: &World) -> Result<Self, RunError> {
         let camera = experiment.camera(world, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
-        let (width, height) = experiment.size;
-        let rate = gst::Fraction::approximate_f64(1.0 / camera.frame_period().as_secs_f64());
-        let info = gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, width, height)
-            .fps(rate.unwrap_or(gst::Fraction::new(25, 1)))
-            .par(gst::Fraction::new(1, 1))
-            .build()
-            .map_err(|_| RunError::Size(width, height))?;
+        let info = info(experiment.size, camera.frame_period())?;
         let sink = if tracker.steers() {
             format!(
                 "vapixptzsink name={SINK} location={} lockstep=true timeout=60000 {}",
@@ -98,7 +99,7 @@ impl<'a> Stage<'a> {
         } else {
             format!("fakesink name={SINK} sync=false async=false")
         };
-        let sink = experiment.film.as_ref().map_or(sink.clone(), |file| film::description(&sink, file));
+        let sink = film::beside(&sink, &experiment.film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
@@ -108,7 +109,7 @@ impl<'a> Stage<'a> {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;
-        Ok(Self { experiment, camera, pipeline, tracker, info, counted: 0 })
+        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0 })
     }
 
     /// Takes picture `number` and sends it through.
@@ -117,26 +118,16 @@ impl<'a> Stage<'a> {
         let exposure = experiment::exposure(number, period);
         let arrival = exposure + self.experiment.delays.video;
         self.camera.advance_to(arrival);
-        let (truth, others) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
-        let pose = self.camera.pose_at(exposure);
-        let phase = match number.cmp(&first) {
-            std::cmp::Ordering::Less => Phase::Before,
-            std::cmp::Ordering::Equal => Phase::FirstBox,
-            std::cmp::Ordering::Greater => Phase::After,
-        };
-        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), size })?;
+        let witnessed = self.experiment.witness(&self.camera, number, first);
+        let phase = Phase::of(number >= first, number > first);
+        let cue = Cue { phase, truth: witnessed.truth.clone(), size };
+        self.tracker.next(self.pipeline.bin(), cue)?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
         let record = FrameRecord {
-            time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
-            truth,
-            others,
             estimate: target.map(|target| estimate(&target, size)),
-            size,
-            pan_deg: pose.pan_deg,
-            tilt_deg: pose.tilt_deg,
-            zoom: pose.zoom_step,
-            commands: self.count_commands(),
+            commands: count_commands(&self.camera, &mut self.counted),
+            ..witnessed
         };
         Ok((record, picture))
     }
@@ -150,16 +141,26 @@ impl<'a> Stage<'a> {
         }
         Ok(buffer)
     }
-
-    /// Commands that arrived since the last call; questions do not count.
-    fn count_commands(&mut self) -> u32 {
-        let commands = self.camera.commands_after(self.counted);
-        self.counted = commands.last().map_or(self.counted, |command| command.number);
-        commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
-    }
 }
 
-fn clock_time(time: Duration) -> gst::ClockTime {
+/// Commands that came after number `counted`, which becomes the last one; questions do not count.
+pub(crate) fn count_commands(camera: &VirtualCamera, counted: &mut u64) -> u32 {
+    let commands = camera.commands_after(*counted);
+    *counted = commands.last().map_or(*counted, |command| command.number);
+    commands.iter().filter(|command| !command.query.contains("query=")).count() as u32
+}
+
+/// What pictures are before they are encoded.
+pub(crate) fn info((width, height): (u32, u32), period: Duration) -> Result<gst_video::VideoInfo, RunError> {
+    let rate = gst::Fraction::approximate_f64(1.0 / period.as_secs_f64());
+    gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, width, height)
+        .fps(rate.unwrap_or(gst::Fraction::new(25, 1)))
+        .par(gst::Fraction::new(1, 1))
+        .build()
+        .map_err(|_| RunError::Size(width, height))
+}
+
+pub(crate) fn clock_time(time: Duration) -> gst::ClockTime {
     gst::ClockTime::from_nseconds(time.as_nanos() as u64)
 }
 

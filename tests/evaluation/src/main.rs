@@ -3,7 +3,7 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use evaluation::{cli::Args, report};
+use evaluation::{cli::Args, gallery, report};
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -19,12 +19,17 @@ fn main() -> ExitCode {
 /// Whether every run came to its end.
 fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     evaluation::init()?;
+    if let Some(like) = args.gallery() {
+        let folder = args.out.join("gallery");
+        println!("{} pictures in {}", gallery::write(&like, &folder)?, folder.display());
+        return Ok(true);
+    }
     let (trackers, left_out) = args.trackers();
     for reason in left_out {
         eprintln!("evaluate: {reason}");
     }
     std::fs::create_dir_all(&args.out)?;
-    let runs = evaluation::run_all(&args.experiments(&trackers)?, args.jobs, std::io::stderr());
+    let runs = evaluation::run_all(&args.experiments(&trackers)?, args.jobs(), std::io::stderr());
     let report = report::write(&runs, &args.out)?;
     for note in &report.notes {
         eprintln!("evaluate: {note}");

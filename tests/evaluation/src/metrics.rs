@@ -44,6 +44,8 @@ pub struct Metrics {
     pub box_precision: Option<f64>,
     /// Commands that reached the camera, a second.
     pub commands_per_s: Option<f64>,
+    /// Of the pictures that the network brought, the share that never reached the tracker; `None` in virtual time.
+    pub dropped: Option<f64>,
     /// Counted pictures, N_F.
     pub frames: usize,
     /// Pictures that contain the target, nF.
@@ -69,6 +71,7 @@ impl Metrics {
             success: success(frames),
             box_precision: box_precision(frames),
             commands_per_s: commands_per_s(frames, run.frame_rate),
+            dropped: run.dropped.and_then(|dropped| share(dropped as usize, dropped as usize + frames.len())),
             frames: frames.len(),
             frames_with_target: frames.iter().filter(|frame| contains_target(frame)).count(),
         }

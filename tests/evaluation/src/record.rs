@@ -91,6 +91,8 @@ named! {
         Mjpeg = "mjpeg",
         /// MPEG-4 part 2.
         Mpeg4 = "mpeg4",
+        /// Nothing: as the camera or the recording has them.
+        Raw = "raw",
     }
 }
 

@@ -1,6 +1,6 @@
 //! A recording as it is, without any camera: only the tracked box is judged.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Duration};
 
 use gst::prelude::*;
 use virtual_camera::{GroundTruth, People, Person, Picture};
@@ -8,9 +8,10 @@ use virtual_camera::{GroundTruth, People, Person, Picture};
 use crate::{
     album::Album,
     experiment::Experiment,
+    film,
     lockstep::{RunError, estimate},
-    pipeline::{Pipeline, PipelineError, SINK, SOURCE},
-    record::{FrameRecord, Run},
+    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE},
+    record::{Codec, Delays, FrameRecord, Run},
     trackers::{Cue, Phase, Tracker},
 };
 
@@ -27,23 +28,30 @@ pub struct Recording {
     pub file: PathBuf,
     /// By the number of the picture, from 0.
     pub people: Arc<People>,
+    /// Number of the last picture that counts.
+    pub last: u64,
 }
 
 /// Shows it to the tracker of `experiment`.
 pub(crate) fn drive(experiment: &Experiment, recording: &Recording, run: &mut Run) -> Result<(), RunError> {
-    let film = Film::open(recording)?;
-    let mut samples = film.samples().peekable();
-    let info = samples.peek().and_then(info).ok_or_else(|| PipelineError::Posted(film.fault()))?;
+    (run.codec, run.delays) = (Codec::Raw, Delays { video: Duration::ZERO, command: Duration::ZERO });
+    let projector = Projector::open(recording)?;
+    let mut samples = projector.samples();
+    let first = samples.next().unwrap_or_else(|| Err(projector.fault()))?;
+    let info = info(&first).ok_or_else(|| projector.fault())?;
     let mut screening = Screening::begin(experiment, info)?;
     (run.size, run.frame_rate) = (screening.size(), screening.frame_rate);
     let mut album = Album::default();
-    for (number, sample) in samples.enumerate() {
-        let people = recording.people.get(&(number as u64)).map_or(&[][..], Vec::as_slice);
-        let (record, picture) = screening.picture(number, &sample, people)?;
+    for (number, sample) in (0..=recording.last).zip(std::iter::once(Ok(first)).chain(samples)) {
+        let people = recording.people.get(&number).map_or(&[][..], Vec::as_slice);
+        let (record, picture) = screening.picture(number, &sample?, people)?;
         if screening.first.is_some() {
             album.look(run.frames.len(), &record, picture);
             run.frames.push(record);
         }
+    }
+    if experiment.film.is_some() {
+        screening.pipeline.end()?;
     }
     run.snapshots = album.develop(&screening.info)?;
     if run.frames.is_empty() { Err(RunError::Nobody) } else { Ok(()) }
@@ -57,19 +65,20 @@ struct Screening<'a> {
     info: gst_video::VideoInfo,
     frame_rate: f64,
     /// Number of the first picture that counts, once it has come: the first with the person in it.
-    first: Option<usize>,
+    first: Option<u64>,
 }
 
 impl<'a> Screening<'a> {
     fn begin(experiment: &'a Experiment, info: gst_video::VideoInfo) -> Result<Self, RunError> {
         let rate = f64::from(info.fps().numer()) / f64::from(info.fps().denom().max(1));
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, (info.width(), info.height()));
-        let description = format!(
-            "appsrc name={SOURCE} ! {} ! fakesink name={SINK} sync=false async=false",
-            tracker.description()
-        );
+        let sink = film::beside(&format!("fakesink name={SINK} sync=false async=false"), &experiment.film);
+        let description = format!("appsrc name={SOURCE} ! {} ! {sink}", tracker.description());
         let pipeline = Pipeline::new(&description, &info)?;
         tracker.attach(pipeline.bin())?;
+        if experiment.film.is_some() {
+            film::attach(pipeline.bin(), tracker.cue(), &info)?;
+        }
         pipeline.start()?;
         let frame_rate = if rate > 0.0 { rate } else { UNKNOWN_RATE };
         Ok(Self { experiment, tracker, pipeline, info, frame_rate, first: None })
@@ -81,7 +90,7 @@ impl<'a> Screening<'a> {
 
     fn picture(
         &mut self,
-        number: usize,
+        number: u64,
         sample: &gst::Sample,
         people: &[Person],
     ) -> Result<(FrameRecord, Picture), RunError> {
@@ -145,44 +154,55 @@ fn stamped(sample: &gst::Sample, time_s: f64) -> Result<gst::Buffer, RunError> {
 }
 
 /// A video file, picture by picture.
-struct Film {
+struct Projector {
     pipeline: gst::Pipeline,
     sink: gst_app::AppSink,
 }
 
-impl Film {
+impl Projector {
     fn open(recording: &Recording) -> Result<Self, PipelineError> {
         let pipeline = gst::parse::launch(
             "filesrc name=file ! decodebin ! videoconvert ! video/x-raw,format=I420 \
              ! appsink name=pictures sync=false max-buffers=2",
         )?
         .downcast::<gst::Pipeline>()
-        .map_err(|_| PipelineError::NoElement(SOURCE))?;
+        .map_err(|_| PipelineError::NoElement("pictures"))?;
         let sink = pipeline.by_name("pictures").and_downcast::<gst_app::AppSink>();
         let sink = sink.ok_or(PipelineError::NoElement("pictures"))?;
-        let file = pipeline.by_name("file").ok_or(PipelineError::NoElement("file"))?;
-        file.set_property("location", recording.file.display().to_string());
-        let film = Self { pipeline, sink };
-        let started = film.pipeline.set_state(gst::State::Playing);
-        started.map_err(|_| PipelineError::Start(film.fault()))?;
-        Ok(film)
+        pipeline.element("file")?.set_property("location", recording.file.display().to_string());
+        let projector = Self { pipeline, sink };
+        // A file that cannot be decoded is told of before the first picture.
+        projector.go_to(gst::State::Paused)?;
+        projector.go_to(gst::State::Playing)?;
+        Ok(projector)
     }
 
-    fn samples(&self) -> impl Iterator<Item = gst::Sample> + '_ {
-        std::iter::from_fn(|| self.sink.try_pull_sample(PATIENCE))
+    fn go_to(&self, state: gst::State) -> Result<(), PipelineError> {
+        let changed = self.pipeline.set_state(state).and_then(|_| self.pipeline.state(PATIENCE).0);
+        changed.map(|_| ()).map_err(|_| self.fault())
     }
 
-    /// Why there is no picture.
-    fn fault(&self) -> String {
-        let bus = self.pipeline.bus();
-        let message = bus.and_then(|bus| bus.pop_filtered(&[gst::MessageType::Error]));
-        message
-            .and_then(|message| crate::pipeline::fault(&message))
-            .unwrap_or_else(|| "no picture in it".into())
+    /// All pictures of the file, and at last why there are no more if that is not its end.
+    fn samples(&self) -> impl Iterator<Item = Result<gst::Sample, PipelineError>> + '_ {
+        std::iter::from_fn(|| match self.sink.try_pull_sample(PATIENCE) {
+            Some(sample) => Some(Ok(sample)),
+            None => self.posted().or_else(|| (!self.sink.is_eos()).then(|| self.fault())).map(Err),
+        })
+    }
+
+    fn fault(&self) -> PipelineError {
+        let nothing = || PipelineError::Posted("the recording gives no picture".into());
+        self.posted().unwrap_or_else(nothing)
+    }
+
+    /// The next fault that the bus tells of.
+    fn posted(&self) -> Option<PipelineError> {
+        let error = self.pipeline.bus()?.pop_filtered(&[gst::MessageType::Error])?;
+        crate::pipeline::fault(&error).map(PipelineError::Posted)
     }
 }
 
-impl Drop for Film {
+impl Drop for Projector {
     fn drop(&mut self) {
         // Nothing more can be done about a pipeline that will not stop.
         let _ = self.pipeline.set_state(gst::State::Null);

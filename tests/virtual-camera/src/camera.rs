@@ -15,7 +15,7 @@ use crate::{
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
-    kinematics::{Head, Limits, Pose},
+    kinematics::{Head, Limits, Optics, Pose},
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
@@ -355,6 +355,11 @@ impl VirtualCamera {
         format!("rtsp://{}", self.rtsp.address())
     }
 
+    /// How late it is for the camera, since its start.
+    pub fn now(&self) -> Duration {
+        self.camera.now()
+    }
+
     /// The camera at this moment.
     pub fn status(&self) -> Status {
         self.camera.status()
@@ -424,6 +429,11 @@ impl VirtualCamera {
     /// Where it looks at first, and the preset `Home`.
     pub fn home(&self) -> Pose {
         self.camera.settings.home_pose()
+    }
+
+    /// What its lens does.
+    pub fn optics(&self) -> Optics {
+        lock(&self.camera.state).device.head.optics()
     }
 
     /// From one picture to the next.

@@ -1,20 +1,25 @@
-//! What trackers are judged by on a recording from a camera that stands still (Wu, Lim and Yang, "Online object
-//! tracking: a benchmark", 2013).
+//! What trackers are judged by on a recording as it is, where no camera follows: the two measures of Y. Wu, J. Lim and
+//! M.-H. Yang, "Online object tracking: a benchmark", CVPR 2013, section 3. Where a camera follows, the same is computed
+//! in its pictures.
 
 use super::{contains_target, distance, mean, tracked};
 use crate::record::{Bounds, FrameRecord};
 
-/// How far apart the middles of two boxes may be, pixels.
+/// How far apart the middles of two boxes may be, pixels ("threshold = 20 pixels").
 const NEAR_PX: f64 = 20.0;
 
-/// Success: the area under the success plot, which is the mean overlap (intersection over union) of the two boxes over
-/// the frames that contain the target; zero where nothing is tracked.
+/// Success: the area under the curve of the success plot, which shows for each threshold t from 0 to 1 the share of the
+/// frames whose overlap S = |r_t ∩ r_a| / |r_t ∪ r_a| of tracked and true box is above it.
+///
+/// The integral of that share over t is the mean of S, so that is what is computed, without the paper's steps in t. It is
+/// over the frames that contain the target, with S = 0 where nothing is tracked.
 pub fn success(frames: &[FrameRecord]) -> Option<f64> {
     let overlaps: Vec<_> = frames.iter().filter(|frame| contains_target(frame)).map(overlap).collect();
     mean(&overlaps)
 }
 
-/// Precision at 20 pixels: share of the frames that contain the target in which the middles of the boxes are near.
+/// Precision: the share of the frames in which the middles of the tracked and the true box are within 20 pixels. It is
+/// over the same frames.
 pub fn box_precision(frames: &[FrameRecord]) -> Option<f64> {
     let near = |frame: &FrameRecord| f64::from(u8::from(is_near(frame)));
     let near: Vec<_> = frames.iter().filter(|frame| contains_target(frame)).map(near).collect();

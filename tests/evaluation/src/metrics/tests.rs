@@ -212,6 +212,10 @@ fn boxes_overlap() {
     assert_eq!(success(&frames), Some((1.0 / 3.0 + 1.0) / 4.0));
     assert_eq!(box_precision(&frames), Some(0.5));
     assert_eq!((success(&[]), box_precision(&[])), (None, None));
+    let apart = |x| box_precision(&[at(MIDDLE, says(Tracking, (x, 30.0)))]);
+    assert_eq!((apart(60.0), apart(60.5)), (Some(1.0), Some(0.0)), "20 pixels are near");
+    let hidden = [seen(0.0, at(MIDDLE, says(Occluded, MIDDLE)))];
+    assert_eq!((success(&hidden), box_precision(&hidden)), (None, None), "no frame contains the target");
 }
 
 fn run(frames: Vec<FrameRecord>) -> Run {

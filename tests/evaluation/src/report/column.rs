@@ -97,6 +97,10 @@ pub const BOX_PRECISION: Column = Column {
     value: |m| percent(m.box_precision),
 };
 
+/// Pictures that never reached the tracker; only in real time.
+pub const DROPPED: Column =
+    Column { key: "dropped_pct", heading: "dropped %", decimals: 1, value: |m| percent(m.dropped) };
+
 /// What the thesis gives too.
 pub const OF_THESIS: [Column; 7] = [P, DP, TF, MEAN_DGC, VAR_DGC, MEAN_DGP, VAR_DGP];
 
@@ -105,7 +109,7 @@ pub const OF_TESTS: [Column; 10] =
     [P, DP, TF, MEAN_DGC, VAR_DGC, MEAN_DGP, VAR_DGP, ACQUIRE, IDENTITY, COMMANDS];
 
 /// Everything.
-pub const ALL: [Column; 13] = [
+pub const ALL: [Column; 14] = [
     P,
     DP,
     TF,
@@ -119,4 +123,5 @@ pub const ALL: [Column; 13] = [
     SWITCHES,
     SUCCESS,
     BOX_PRECISION,
+    DROPPED,
 ];

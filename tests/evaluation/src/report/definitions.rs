@@ -42,10 +42,23 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
          second after the person came out. The share of the tests that have a full occlusion.",
     ),
     (
-        "Switches, success, precision at 20 px",
-        "For recordings. How often the person under the centroid became another one; the mean overlap of tracked and true \
-         box over the frames that contain the target, zero where nothing is tracked; the share of those frames in which the \
-         middles of the two boxes are at most 20 pixels apart.",
+        "Switches",
+        "How often the person under the tracked centroid became another one, of those that the ground truth knows. Where \
+         boxes overlap it is the one to be followed, or else the one from before, or else the nearest; nobody is no switch.",
+    ),
+    (
+        "Success, precision at 20 px",
+        "Wu, Lim and Yang, Online object tracking: a benchmark (2013). Success: area under the curve that shows for each \
+         threshold from 0 to 1 the share of frames whose overlap (intersection over union) of tracked and true box is above \
+         it, which is the mean overlap. Precision: the share of frames in which the middles of the two boxes are at most 20 \
+         pixels of the picture apart. Both over the frames that contain the target; where nothing is tracked, there is no \
+         overlap and nothing near.",
+    ),
+    (
+        "Recordings",
+        "In closed loop a camera turns within the recording, and the first view is the middle of it. As it is: raw, without \
+         delays or commands, at the recording's size; d_gc and TF then only tell of the recording. Counting ends with the \
+         person's last box; a person without a box in between is outside.",
     ),
     (
         "Means",

@@ -23,20 +23,25 @@ pub struct Setup {
     pub first_box: FirstBox,
     /// How late things are.
     pub delays: Delays,
+    /// By the clock, so that pictures may be dropped.
+    pub real_time: bool,
 }
 
 impl Setup {
     fn of(run: &Run) -> Self {
         let Run { sweep, seed, codec, size, first_box, delays, .. } = *run;
-        Self { sweep, seed, codec, size, first_box, delays }
+        Self { sweep, seed, codec, size, first_box, delays, real_time: run.dropped.is_some() }
     }
 
     /// Name of a folder.
     pub fn folder(&self) -> String {
-        let Self { seed, codec, size: (width, height), first_box, delays, sweep } = self;
+        let Self { seed, codec, size: (width, height), first_box, delays, sweep, real_time } = self;
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         let sweep = if *sweep { "sweep-" } else { "" };
-        format!("{sweep}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms")
+        let real_time = if *real_time { "realtime-" } else { "" };
+        format!(
+            "{sweep}{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
+        )
     }
 }
 
@@ -46,7 +51,8 @@ impl fmt::Display for Setup {
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         write!(
             f,
-            "seed {seed}, {codec}, {width}x{height}, first box {first_box}, delays: video {video} ms, command {command} ms"
+            "seed {seed}, {codec}, {width}x{height}, first box {first_box}, delays: video {video} ms, command {command} ms{}",
+            if self.real_time { ", in real time" } else { "" }
         )
     }
 }

@@ -28,8 +28,8 @@ pub fn html(content: &Content, plots: &Path) -> String {
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>ptztrack: evaluation</title>\n\
          <style>\n{STYLE}</style>\n<h1>Following a person with a moving camera</h1>\n\
          <p>ptztrack {version}. The thesis' tests (its chapter 5), rerun in closed loop against a virtual camera in a \
-         simulated room: pictures delayed, encoded and decoded, commands delayed, every tracker with the same servo. The same \
-         seed gives the same figures on any machine.</p>\n{}{sections}{}{}",
+         simulated room, and recordings of real people: pictures delayed, encoded and decoded, commands delayed, every \
+         tracker with the same servo. The same seed gives the same figures on any machine.</p>\n{}{sections}{}{}",
         failures(content),
         sweep(content, plots),
         definitions(),

@@ -14,9 +14,11 @@ pub const PRINTED: &str = "thesis, as printed";
 /// Trackers × figures, over all tests.
 pub fn overview(section: &Section) -> Table {
     let tests = section.printed().len();
+    let dropped = section.setup.real_time.then_some(&column::DROPPED);
+    let columns: Vec<_> = column::OF_TESTS.iter().chain(dropped).collect();
     let line = |name: String, runs: Vec<&Metrics>| {
         let number = runs.len().to_string();
-        let figures = column::OF_TESTS.iter().map(|column| column.show(column.mean(runs.iter().copied())));
+        let figures = columns.iter().map(|column| column.show(column.mean(runs.iter().copied())));
         [name, number].into_iter().chain(figures).collect()
     };
     let mut rows: Vec<_> = section
@@ -26,10 +28,7 @@ pub fn overview(section: &Section) -> Table {
     rows.push(line(PRINTED.into(), section.printed().iter().map(|row| &row.metrics).collect()));
     Table {
         caption: format!("Means over {tests} tests ({})", section.setup),
-        headings: headings(
-            &["tracker", "tests"],
-            column::OF_TESTS.iter().map(|column| column.heading.into()),
-        ),
+        headings: headings(&["tracker", "tests"], columns.iter().map(|column| column.heading.into())),
         rows,
     }
 }

@@ -120,6 +120,21 @@ fn has_every_run_and_figure() {
 }
 
 #[test]
+fn what_was_dropped_is_told_where_the_clock_was_looked_at() {
+    let folder = Folder::new("dropped");
+    let runs = [Run { dropped: Some(10), ..run(1, TrackerName::Ptztrack) }];
+    let summary = write(&runs, &folder.0).unwrap().summary;
+    assert!(
+        summary.contains("command 60 ms, in real time)") && summary.contains("| dropped % |"),
+        "{summary}"
+    );
+    let ours = summary.lines().find(|line| line.starts_with("| ptztrack")).unwrap();
+    // 10 beside the 40 that were seen.
+    assert!(ours.ends_with("|      20.0 |"), "{ours}");
+    assert!(folder.read("results.csv").contains(",20.000000,10,"));
+}
+
+#[test]
 fn the_thesis_stands_beside_the_tests_that_were_run() {
     let folder = Folder::new("thesis");
     write(&runs(), &folder.0).unwrap();

@@ -25,6 +25,17 @@ pub(crate) enum Phase {
     After,
 }
 
+impl Phase {
+    /// Of a picture that is `counted` or not; `begun` says whether one before it was.
+    pub fn of(counted: bool, begun: bool) -> Self {
+        match (counted, begun) {
+            (false, _) => Self::Before,
+            (true, false) => Self::FirstBox,
+            (true, true) => Self::After,
+        }
+    }
+}
+
 /// What is known of the picture that comes next. The bounds see the truth; everybody else sees it once, in the
 /// picture of the first box.
 #[derive(Debug, Clone)]

@@ -106,4 +106,3 @@ impl Walker {
         body::patches(pose, &self.build, &self.outfit, detail)
     }
 }
-

@@ -1,0 +1,115 @@
+//! Pictures of the room to look at: every subject, light and occlusion, from far and from near.
+
+use std::{
+    fs,
+    io::{Read, Write},
+    net::TcpStream,
+    path::Path,
+    sync::{Arc, Mutex},
+    time::Duration,
+};
+
+use gst::prelude::*;
+use virtual_camera::{Clock, GroundTruth, Pose, VirtualCamera};
+
+use crate::{
+    experiment::{self, Experiment, Place, Scene},
+    lockstep::{RunError, clock_time, info},
+    pipeline::{Elements, Pipeline, SINK, SOURCE, lock},
+    record::{TestId, TrackerName},
+};
+
+/// Horizontal fields of view, degrees.
+const VIEWS: [(&str, f64); 2] = [("wide", 55.0), ("near", 14.0)];
+/// The camera is given this long to turn and zoom; its head remembers no longer.
+const AIMING: Duration = Duration::from_secs(2);
+
+/// Writes PNG files into `folder`: tests with fixed speed and direction, as the codec of `like` leaves them.
+///
+/// # Errors
+/// In words, where a picture cannot be made or written.
+pub fn write(like: &Experiment, folder: &Path) -> Result<usize, Box<dyn std::error::Error>> {
+    fs::create_dir_all(folder)?;
+    let mut written = 0;
+    // The first quarter of the tests has all lights, occlusions and subjects.
+    for test in (1..=18).map(TestId) {
+        let Some(scene) = Scene::room(test, like.seed) else { continue };
+        let experiment = Experiment { scene, tracker: TrackerName::Still, ..like.clone() };
+        for (name, fov_deg) in VIEWS {
+            let png = shoot(&experiment, fov_deg)?;
+            fs::write(folder.join(format!("test-{test}-{name}.png")), png)?;
+            written += 1;
+        }
+    }
+    Ok(written)
+}
+
+/// One picture with the person in the middle of it, half hidden where they are ever hidden.
+fn shoot(experiment: &Experiment, fov_deg: f64) -> Result<Vec<u8>, RunError> {
+    let Place::World(world) = &experiment.scene.place else { return Err(RunError::Nobody) };
+    let camera = experiment.camera(world, Clock::Stepped)?;
+    let (exposure, person) = moment(experiment, &camera).ok_or(RunError::Nobody)?;
+    camera.advance_to(exposure.saturating_sub(AIMING));
+    aim(&camera, &person, fov_deg)?;
+    camera.advance_to(exposure + camera.frame_period());
+    let picture = camera.picture(exposure, experiment.size)?;
+    let (width, height) = experiment.size;
+    let info = info(experiment.size, camera.frame_period())?;
+    let mut buffer = picture.to_buffer(&info).ok_or(RunError::Size(width, height))?;
+    if let Some(buffer) = buffer.get_mut() {
+        buffer.set_pts(clock_time(exposure));
+    }
+    let codec = experiment.codec.description();
+    let description = format!(
+        "appsrc name={SOURCE} ! {codec} ! videoconvert ! pngenc ! fakesink name={SINK} sync=false async=false"
+    );
+    let pipeline = Pipeline::new(&description, &info)?;
+    experiment.codec.attach(pipeline.bin())?;
+    let png = Arc::new(Mutex::new(Vec::new()));
+    let out = png.clone();
+    pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
+        *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
+        gst::PadProbeReturn::Ok
+    });
+    pipeline.start()?;
+    pipeline.finish(buffer)?;
+    Ok(std::mem::take(&mut *lock(&png)))
+}
+
+/// Where a moment is looked for; who is hidden shows in small pictures too.
+const SMALL: (u32, u32) = (160, 120);
+
+/// The exposure at which the person is most nearly half hidden; in the middle of the way where nothing hides them.
+fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, GroundTruth)> {
+    let (period, home) = (camera.frame_period(), camera.home());
+    let seen = |number: u32| {
+        let exposure = experiment::exposure(number, period);
+        let from =
+            |pose: &Pose| experiment.scene.split(camera.ground_truth_from(pose, exposure, SMALL)).0;
+        let (pan_deg, tilt_deg) = from(&home)?.direction_deg?;
+        Some((exposure, from(&Pose { pan_deg, tilt_deg, ..home })?))
+    };
+    let walk: Vec<_> = experiment.pictures(period).filter_map(seen).collect();
+    let middle = walk.len() / 2;
+    let half_hidden = |(index, (_, person)): &(usize, (Duration, GroundTruth))| {
+        // Thousandths, and where all are the same the nearest to the middle of the way.
+        (((person.unhidden - 0.5).abs() * 1000.0) as u32, index.abs_diff(middle))
+    };
+    walk.into_iter().enumerate().min_by_key(half_hidden).map(|(_, moment)| moment)
+}
+
+/// Turns and zooms to where the person will be.
+fn aim(camera: &VirtualCamera, person: &GroundTruth, fov_deg: f64) -> Result<(), RunError> {
+    let (pan, tilt) = person.direction_deg.ok_or(RunError::Nobody)?;
+    let (optics, half) = (camera.optics(), |degrees: f64| (degrees / 2.0).to_radians().tan());
+    let zoom = optics.zoom_step(half(optics.wide_fov_deg) / half(fov_deg));
+    let query = format!("pan={pan:.2}&tilt={tilt:.2}&zoom={zoom:.0}");
+    get(camera, &query).map_err(RunError::Aim)
+}
+
+fn get(camera: &VirtualCamera, query: &str) -> std::io::Result<()> {
+    let mut connection = TcpStream::connect(camera.http_address())?;
+    write!(connection, "GET /axis-cgi/com/ptz.cgi?{query} HTTP/1.0\r\n\r\n")?;
+    connection.read_to_end(&mut Vec::new()).map(|_| ())
+}

@@ -1,0 +1,171 @@
+//! People in recordings that the test makes itself: followed within one, and in one as it is.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::{fmt::Write, fs, path::PathBuf};
+
+use evaluation::{
+    Experiment, Scene, SceneError,
+    metrics::Metrics,
+    record::{Codec, Run, TrackerName},
+    report,
+};
+use gst::prelude::*;
+
+const WIDTH: usize = 480;
+const HEIGHT: usize = 320;
+const PICTURES: usize = 50;
+/// Person 4 walks from left to right, person 7 above them the other way.
+const WALKS: [Walk; 2] =
+    [Walk { id: 4, left: 170.0, step: 5.0, top: 150 }, Walk { id: 7, left: 400.0, step: -6.0, top: 40 }];
+/// Width and height of a person, pixels.
+const BOX: (usize, usize) = (32, 72);
+
+/// A patterned box that moves sideways.
+struct Walk {
+    id: u32,
+    left: f64,
+    step: f64,
+    top: usize,
+}
+
+impl Walk {
+    fn left(&self, picture: usize) -> usize {
+        (self.left + self.step * picture as f64).round() as usize
+    }
+}
+
+/// Grey of squares of four pixels: anything, but always the same.
+fn pattern(x: usize, y: usize, kind: u32) -> u8 {
+    let square = (x as u32 / 4 * 7919) ^ (y as u32 / 4 * 104_729) ^ (kind * 15_485_863);
+    (square.wrapping_mul(2_654_435_761) >> 24) as u8
+}
+
+fn picture(number: usize) -> Vec<u8> {
+    let mut picture = vec![128; WIDTH * HEIGHT * 3 / 2];
+    for (at, grey) in picture.iter_mut().take(WIDTH * HEIGHT).enumerate() {
+        let (x, y) = (at % WIDTH, at / WIDTH);
+        *grey = 90 + pattern(x, y, 0) / 8;
+        for walk in &WALKS {
+            let (right, down) = (x.wrapping_sub(walk.left(number)), y.wrapping_sub(walk.top));
+            if right < BOX.0 && down < BOX.1 {
+                *grey = 16 + pattern(right, down, walk.id) / 5 * 4;
+            }
+        }
+    }
+    picture
+}
+
+/// The recording and its ground truth.
+fn recording(name: &str) -> (PathBuf, PathBuf) {
+    evaluation::init().unwrap();
+    let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR"));
+    let (file, truth) = (folder.join(format!("{name}.mkv")), folder.join(format!("{name}.csv")));
+    let pipeline = gst::parse::launch(&format!(
+        "appsrc name=source format=time caps=video/x-raw,format=I420,width={WIDTH},height={HEIGHT},framerate=25/1 \
+         ! jpegenc quality=90 ! matroskamux ! filesink name=file"
+    ))
+    .unwrap()
+    .downcast::<gst::Pipeline>()
+    .unwrap();
+    pipeline.by_name("file").unwrap().set_property("location", &file);
+    let source = pipeline.by_name("source").and_downcast::<gst_app::AppSrc>().unwrap();
+    pipeline.set_state(gst::State::Playing).unwrap();
+    let mut lines = String::new();
+    for number in 0..PICTURES {
+        let mut buffer = gst::Buffer::from_slice(picture(number));
+        let stamped = buffer.get_mut().unwrap();
+        stamped.set_pts(gst::ClockTime::from_mseconds(40 * number as u64));
+        stamped.set_duration(gst::ClockTime::from_mseconds(40));
+        source.push_buffer(buffer).unwrap();
+        for walk in &WALKS {
+            let (left, (width, height)) = (walk.left(number), BOX);
+            writeln!(lines, "{},{},{left},{},{width},{height},1,1,1", number + 1, walk.id, walk.top).unwrap();
+        }
+    }
+    source.end_of_stream().unwrap();
+    let ends = [gst::MessageType::Eos, gst::MessageType::Error];
+    let end = pipeline.bus().unwrap().timed_pop_filtered(gst::ClockTime::from_seconds(60), &ends);
+    pipeline.set_state(gst::State::Null).unwrap();
+    assert_eq!(end.unwrap().type_(), gst::MessageType::Eos);
+    fs::write(&truth, lines).unwrap();
+    (file, truth)
+}
+
+#[track_caller]
+fn run(scene: &Scene, tracker: TrackerName) -> Run {
+    let run = evaluation::run(&Experiment { size: (320, 240), ..Experiment::new(scene.clone(), tracker, 1) });
+    assert_eq!(run.error, None);
+    run
+}
+
+#[test]
+fn a_camera_follows_one_person_within_a_recording() {
+    let (file, truth) = recording("closed-loop");
+    let scene = Scene::footage(&file, &truth, None, (320, 240)).unwrap();
+    assert_eq!((scene.title.as_str(), scene.person), ("closed-loop, person 4", Some(4)));
+
+    let oracle = run(&scene, TrackerName::Oracle);
+    let metrics = Metrics::of(&oracle);
+    assert_eq!((metrics.precision, metrics.detection_precision), (Some(1.0), Some(1.0)));
+    assert_eq!((metrics.track_fragmentation, metrics.identity_switches), (Some(0.0), Some(0)));
+    assert_eq!(metrics.success, Some(1.0));
+    assert!(oracle.frames.last().unwrap().pan_deg > 5.0, "{:?}", oracle.frames.last());
+    assert!(oracle.frames.iter().all(|frame| frame.others.len() == 1 && frame.others[0].id == 7));
+
+    let still = Metrics::of(&run(&scene, TrackerName::Still));
+    assert!(still.track_fragmentation.unwrap() > 0.1, "{still:?}");
+
+    let ours = run(&scene, TrackerName::Ptztrack);
+    assert!(ours.frames.iter().any(|frame| frame.commands > 0));
+}
+
+#[test]
+fn in_a_recording_as_it_is_the_box_is_judged() {
+    let (file, truth) = recording("as-it-is");
+    let scene = Scene::recording(&file, &truth, Some(7)).unwrap();
+    let oracle = run(&scene, TrackerName::Oracle);
+    assert_eq!((oracle.size, oracle.frame_rate), ((WIDTH as u32, HEIGHT as u32), 25.0));
+    assert_eq!((oracle.codec, oracle.delays.total().as_millis()), (Codec::Raw, 0));
+    let metrics = Metrics::of(&oracle);
+    assert_eq!((metrics.frames, metrics.success, metrics.box_precision), (PICTURES, Some(1.0), Some(1.0)));
+
+    let ours = run(&scene, TrackerName::Ptztrack);
+    assert!(ours == run(&scene, TrackerName::Ptztrack), "twice is not the same");
+    let metrics = Metrics::of(&ours);
+    assert!(metrics.box_precision.unwrap() > 0.9 && metrics.success.unwrap() > 0.4, "{metrics:?}");
+    assert_eq!(metrics.identity_switches, Some(0));
+
+    let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("as-it-is");
+    report::write(&[ours, oracle], &out).unwrap();
+    let results = fs::read_to_string(out.join("results.csv")).unwrap();
+    let mut lines = results.lines();
+    assert!(lines.next().unwrap().contains(",identity_switches,success_pct,box_precision_20px_pct,"));
+    assert!(lines.next().unwrap().starts_with("\"as-it-is, person 7\",,ptztrack,1,raw,480,320,given,0,0,"));
+    assert!(lines.next().unwrap().contains(",0.000000,100.000000,100.000000,"), "{results}");
+    let page = fs::read_to_string(out.join("index.html")).unwrap();
+    assert!(page.contains("<th scope=\"row\">as-it-is, person 7</th>"));
+}
+
+#[test]
+fn it_ends_with_the_persons_last_box() {
+    let (file, truth) = recording("last-box");
+    let early: String = (1..=20).map(|frame| format!("{frame},4,200,150,32,72,1,1,1\n")).collect();
+    fs::write(&truth, early).unwrap();
+    let closed = Scene::footage(&file, &truth, None, (320, 240)).unwrap();
+    let as_it_is = Scene::recording(&file, &truth, None).unwrap();
+    assert_eq!([closed, as_it_is].map(|scene| run(&scene, TrackerName::Still).frames.len()), [20, 20]);
+}
+
+#[test]
+fn what_cannot_be_used_is_told_of_in_words() {
+    let (file, truth) = recording("refused");
+    let nobody = Scene::recording(&file, &truth, Some(5));
+    assert!(matches!(nobody, Err(SceneError::Person(5))), "{nobody:?}");
+    let no_truth = Scene::footage(&file, &file.with_extension("txt"), None, (320, 240)).unwrap_err();
+    assert!(no_truth.to_string().contains("refused.txt"), "{no_truth}");
+    let no_video = Scene::footage(&truth, &truth, None, (320, 240)).unwrap_err();
+    assert!(no_video.to_string().contains("refused.csv"), "{no_video}");
+    let scene = Scene::recording(&truth, &truth, None).unwrap();
+    let run = evaluation::run(&Experiment::new(scene, TrackerName::Oracle, 1));
+    assert!(run.frames.is_empty() && run.error.is_some(), "{:?}", run.error);
+}
