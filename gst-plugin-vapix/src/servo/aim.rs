@@ -156,6 +156,11 @@ impl Aim {
         }
     }
 
+    /// The target's own angular rate over the last moments.
+    pub fn pace(&self) -> PanTilt {
+        self.target_rate.mean()
+    }
+
     /// Off the middle, as the last picture has it.
     pub fn error(&self) -> PanTilt {
         self.error

@@ -124,6 +124,18 @@ fn a_standing_person_is_let_be_though_the_tracker_trembles() {
 }
 
 #[test]
+fn somebody_who_goes_to_and_fro_is_no_swing_of_the_loop() {
+    for (delay, zoom) in CASES {
+        for rhythm in [0.7, 1.0, 1.5, 2.0] {
+            let run = Setup { jitter: 0.003, ..Setup::new(delay, zoom) }
+                .run(60.0, pan(|t| 10.0 / zoom * (rhythm * t).sin()));
+            let said = run.reports.iter().filter(|report| matches!(report, Report::Swinging(_))).count();
+            assert_eq!(said, 0, "{delay} ms, {zoom}x, {rhythm} rad/s");
+        }
+    }
+}
+
+#[test]
 fn coarse_speed_steps_make_no_limit_cycle() {
     // Its slowest is 4.5 degrees per second, nearly a picture's width.
     for delay in [100, 300] {

@@ -260,7 +260,7 @@ mod tests {
             const STEP: Duration = Duration::from_millis(100);
             let mut rig = Rig::armed();
             let (mut at, mut late) = (PanTilt::default(), vec![PanTilt::default(); latency_steps]);
-            let wobble = |tick: u64| noise * if tick % 3 == 0 { 1.0 } else { -1.0 };
+            let wobble = |tick: u64| noise * if tick.is_multiple_of(3) { 1.0 } else { -1.0 };
             let mut ticks = 0u64;
             for (pan, tilt, steps) in moves.into_iter().chain([(0.0, 0.0, 60)]) {
                 rig.command(pan, tilt);
@@ -270,7 +270,7 @@ mod tests {
                     at = at + rate * STEP.as_secs_f64();
                     at = PanTilt::new(at.pan.clamp(-end, end), at.tilt.clamp(-70.0, 20.0));
                     ticks += 1;
-                    if ticks % 10 == 0 {
+                    if ticks.is_multiple_of(10) {
                         let told = |angle: f64| ((angle + wobble(ticks / 10)) / coarse).round() * coarse;
                         let told_pan = (told(at.pan) + 180.0).rem_euclid(360.0) - 180.0;
                         prop_assert_eq!(rig.tell_after(STEP, told_pan, told(at.tilt)), Verdict::Ours);

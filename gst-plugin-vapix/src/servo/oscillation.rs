@@ -26,10 +26,13 @@ impl OscillationGuard {
     /// After so long without a swing a little more is dared.
     const CALM: Duration = Duration::from_secs(30);
 
-    /// Takes the error of a picture; `tolerated_deg` is no swing. Returns whether the gain was lowered by this.
-    pub fn see(&mut self, error: PanTilt, tolerated_deg: f64, at: Duration) -> bool {
-        let swings =
-            [self.pan.see(error.pan, tolerated_deg, at), self.tilt.see(error.tilt, tolerated_deg, at)];
+    /// Takes the error of a picture, and the target's own rate, where the background tells that; `tolerated_deg` is no
+    /// swing. Returns whether the gain was lowered by this.
+    pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: f64, at: Duration) -> bool {
+        let swings = [
+            self.pan.see(error.pan, target.pan, tolerated_deg, at),
+            self.tilt.see(error.tilt, target.tilt, tolerated_deg, at),
+        ];
         if swings.contains(&true) {
             self.trust = (self.trust * Self::LOWER).max(Self::LOWEST);
             (self.pan, self.tilt, self.changed_at) = (Swing::default(), Swing::default(), at);
@@ -58,6 +61,8 @@ impl OscillationGuard {
 struct Swing {
     /// The farthest of the half wave under way, signed; 0 before the first.
     peak: f64,
+    /// The slowest and the fastest that the target went by itself meanwhile.
+    pace: (f64, f64),
     since: Duration,
     /// The size of the one before, and how many in a row were no smaller.
     last: f64,
@@ -77,7 +82,8 @@ impl Swing {
     /// So many half waves in a row are no accident.
     const ENOUGH: u32 = 4;
 
-    fn see(&mut self, error: f64, tolerated: f64, at: Duration) -> bool {
+    fn see(&mut self, error: f64, target: f64, tolerated: f64, at: Duration) -> bool {
+        self.pace = (self.pace.0.min(target), self.pace.1.max(target));
         if error.abs() <= tolerated {
             return false;
         }
@@ -86,10 +92,13 @@ impl Swing {
             return false;
         }
         let lasted = at.saturating_sub(self.since);
-        let swings = (Self::SHORTEST..=Self::LONGEST).contains(&lasted);
+        // A target that went to and fro itself leaves the middle as far as that.
+        let by_itself = (self.pace.1 - self.pace.0) * lasted.as_secs_f64() >= self.peak.abs();
+        let swings = (Self::SHORTEST..=Self::LONGEST).contains(&lasted) && !by_itself;
         let steady = self.peak.abs() >= Self::STEADY * self.last;
         self.steady = if swings && steady && self.peak != 0.0 { self.steady + 1 } else { 0 };
         (self.last, self.peak, self.since) = (self.peak.abs(), error, at);
+        self.pace = (target, target);
         self.steady >= Self::ENOUGH
     }
 }
@@ -101,12 +110,20 @@ mod tests {
 
     /// How often the gain is lowered by an error over 20 s.
     fn lowered(guard: &mut OscillationGuard, error: impl Fn(f64) -> f64) -> usize {
-        let at = |frame: u32| f64::from(frame) / 25.0;
-        (0..500)
-            .filter(|frame| {
-                guard.see(PanTilt::new(error(at(*frame)), 0.0), 1.0, Duration::from_secs_f64(at(*frame)))
-            })
-            .count()
+        lowered_before(guard, error, |_| 12.0)
+    }
+
+    /// The same before a target that goes at a rate by itself.
+    fn lowered_before(
+        guard: &mut OscillationGuard,
+        error: impl Fn(f64) -> f64,
+        target: impl Fn(f64) -> f64,
+    ) -> usize {
+        let mut see = |time: f64| {
+            let [error, target] = [error(time), target(time)].map(|pan| PanTilt::new(pan, 0.0));
+            guard.see(error, target, 1.0, Duration::from_secs_f64(time))
+        };
+        (0..500).filter(|frame| see(f64::from(*frame) / 25.0)).count()
     }
 
     #[test]
@@ -125,6 +142,9 @@ mod tests {
         assert_eq!(lowered(&mut guard, |t| 0.9 * (9.0 * t).sin()), 0);
         assert_eq!(lowered(&mut guard, |t| 9.0 * (35.0 * t).sin()), 0, "jumps");
         assert_eq!(lowered(&mut guard, |t| 5.0 + 3.0 * (4.0 * t).sin()), 0);
+        let (error, target) = (|t: f64| 3.0 * (2.0 * t).sin(), |t: f64| 10.0 * (2.0 * t).cos());
+        assert_eq!(lowered_before(&mut guard, error, target), 0);
+        assert!(lowered(&mut OscillationGuard::default(), error) > 0);
         assert_eq!(guard.trust(), 1.0);
     }
 
@@ -133,7 +153,7 @@ mod tests {
         let mut guard = OscillationGuard::default();
         lowered(&mut guard, |t| 5.0 * (4.0 * t).sin());
         for second in 20..600 {
-            assert!(!guard.see(PanTilt::default(), 1.0, Duration::from_secs(second)));
+            assert!(!guard.see(PanTilt::default(), PanTilt::default(), 1.0, Duration::from_secs(second)));
         }
         assert_eq!(guard.trust(), 1.0);
     }
@@ -143,7 +163,7 @@ mod tests {
         fn trust_stays_in_range(errors in prop::collection::vec(-90.0..90.0f64, 0..400)) {
             let mut guard = OscillationGuard::default();
             for (frame, error) in (0..).zip(errors) {
-                guard.see(PanTilt::new(error, -error), 0.5, Duration::from_millis(40 * frame));
+                guard.see(PanTilt::new(error, -error), PanTilt::default(), 0.5, Duration::from_millis(40 * frame));
                 prop_assert!((OscillationGuard::LOWEST..=1.0).contains(&guard.trust()));
             }
         }

@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use super::{
     Aim, Authority, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
-    LimitGuard, Link, Mode, Next, OscillationGuard, Query, Report, Scheduler, ServoSettings, Sight, SpeedMap,
-    Status, Steps, View, Visibility, ZoomDrive, magnified,
+    LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
+    SpeedMap, Status, Steps, View, Visibility, ZoomDrive, magnified,
 };
 use crate::vapix::Command;
 
@@ -151,7 +151,9 @@ impl Pilot {
         let view = self.view(&sight);
         self.aim.see(&sight, &view, &self.history, self.calibration.latency());
         let tolerated_deg = self.settings.dead_zone * view.horizontal_fov_deg;
-        if self.oscillation.see(self.aim.error(), tolerated_deg, sight.taken_at) {
+        // Told by the commands it would be no witness against them.
+        let by_itself = sight.ego_velocity.map_or(PanTilt::default(), |_| self.aim.pace());
+        if self.oscillation.see(self.aim.error(), by_itself, tolerated_deg, sight.taken_at) {
             self.reports.push(Report::Swinging(self.oscillation.trust()));
         }
         self.overtaken += u64::from(self.target.as_ref().is_some_and(|target| !target.considered));

@@ -8,22 +8,32 @@ use super::PanTilt;
 pub struct RateAverage {
     window: Duration,
     samples: VecDeque<(Duration, PanTilt)>,
+    /// How the rate was changing at each sample of the last moments.
+    trends: VecDeque<(Duration, PanTilt)>,
 }
 
 impl RateAverage {
+    /// The gait's sway turns to the other side within this time: half a wave of 1 Hz, the slowest, and a little.
+    const SWAY: Duration = Duration::from_millis(600);
+
     /// An empty average.
     pub fn new(window: Duration) -> Self {
-        Self { window, samples: VecDeque::new() }
+        Self { window, samples: VecDeque::new(), trends: VecDeque::new() }
     }
 
     /// Takes the rate at a time; times that go back begin anew.
     pub fn push(&mut self, at: Duration, rate: PanTilt) {
         if self.samples.back().is_some_and(|(last, _)| *last > at) {
-            self.samples.clear();
+            self.clear();
         }
         self.samples.push_back((at, rate));
         while self.samples.front().is_some_and(|(first, _)| at - *first > self.window) {
             self.samples.pop_front();
+        }
+        let trend = self.axes(|axis| axis.slope());
+        self.trends.push_back((at, trend));
+        while self.trends.front().is_some_and(|(first, _)| at - *first > Self::SWAY) {
+            self.trends.pop_front();
         }
     }
 
@@ -41,23 +51,43 @@ impl RateAverage {
     }
 
     /// The rate to expect so long after the newest sample, by the straight line through the samples as far as
-    /// it stands out of the noise. Never much beyond what was seen: nobody turns for ever.
+    /// it stands out of the noise and of the gait's sway. Never much beyond what was seen: nobody turns for ever.
     pub fn ahead(&self, lead: Duration) -> PanTilt {
-        self.axes(|axis| axis.ahead(lead.as_secs_f64()))
+        let (lead_s, trend) = (lead.as_secs_f64(), self.trend());
+        PanTilt::new(
+            self.axis(|rate| rate.pan).map_or(0.0, |pan| pan.ahead(trend.pan, lead_s)),
+            self.axis(|rate| rate.tilt).map_or(0.0, |tilt| tilt.ahead(trend.tilt, lead_s)),
+        )
+    }
+
+    /// How the rate changes, per second: what of that goes beyond the changes to the other side just before. Who
+    /// starts or turns keeps on; what sways comes back.
+    fn trend(&self) -> PanTilt {
+        let lasting = |part: fn(&PanTilt) -> f64| {
+            let trends = || self.trends.iter().map(|(_, trend)| part(trend));
+            let newest = trends().next_back().unwrap_or_default();
+            let back = trends().fold(0.0, |back: f64, trend| back.max(-trend * newest.signum()));
+            (newest.abs() - back).max(0.0).copysign(newest)
+        };
+        PanTilt::new(lasting(|trend| trend.pan), lasting(|trend| trend.tilt))
     }
 
     fn axes(&self, value: impl Fn(&Samples) -> f64) -> PanTilt {
-        let Some((newest, _)) = self.samples.back() else { return PanTilt::default() };
-        let samples = |part: fn(&PanTilt) -> f64| {
-            let at = |time: &Duration| -newest.saturating_sub(*time).as_secs_f64();
-            Samples::new(self.samples.iter().map(|(time, rate)| (at(time), part(rate))))
-        };
-        PanTilt::new(value(&samples(|rate| rate.pan)), value(&samples(|rate| rate.tilt)))
+        let value = |axis: Option<Samples>| axis.map_or(0.0, |axis| value(&axis));
+        PanTilt::new(value(self.axis(|rate| rate.pan)), value(self.axis(|rate| rate.tilt)))
+    }
+
+    /// The samples of one axis; `None` without any.
+    fn axis(&self, part: fn(&PanTilt) -> f64) -> Option<Samples> {
+        let (newest, _) = self.samples.back()?;
+        let at = |time: &Duration| -newest.saturating_sub(*time).as_secs_f64();
+        Some(Samples::new(self.samples.iter().map(|(time, rate)| (at(time), part(rate)))))
     }
 
     /// Forgets everything.
     pub fn clear(&mut self) {
         self.samples.clear();
+        self.trends.clear();
     }
 }
 
@@ -97,9 +127,8 @@ impl Samples {
         certain(self.mean(), self.variance() / self.0.len() as f64)
     }
 
-    /// The rate to expect `lead_s` after the newest.
-    fn ahead(&self, lead_s: f64) -> f64 {
-        let slope = self.slope();
+    /// The rate to expect `lead_s` after the newest, if it changes by `slope` per second.
+    fn ahead(&self, slope: f64, lead_s: f64) -> f64 {
         if slope == 0.0 {
             return self.certain_mean();
         }
@@ -185,6 +214,19 @@ mod tests {
         assert!((growing.ahead(ms(9000)).pan - 3.64).abs() < 1e-9);
         assert_eq!(average([5.0; 8]).ahead(ms(300)).pan, 5.0);
         assert_eq!(average([3.0, -4.0, 5.0, -3.0, 4.0, -3.0, 4.0]).ahead(ms(300)).pan, 0.0);
+    }
+
+    #[test]
+    fn what_sways_has_no_trend() {
+        for steps_hz in [1.0, 1.5, 2.0] {
+            let mut average = RateAverage::new(ms(400));
+            for frame in 0..75 {
+                let sway = (f64::from(frame) / 25.0 * std::f64::consts::TAU * steps_hz).sin();
+                average.push(ms(40 * u64::from(frame as u32)), PanTilt::new(12.0 + 2.0 * sway, 0.0));
+                let ahead = average.ahead(ms(300)).pan;
+                assert!(frame < 50 || (ahead - 12.0).abs() < 2.0, "{steps_hz} Hz: {ahead}");
+            }
+        }
     }
 
     proptest! {

@@ -27,8 +27,23 @@
 //! then gives the same run every time, at any speed. It is for simulations: a camera that does not answer
 //! holds the stream for up to `timeout`.
 //!
-//! Without a target for `home-timeout` the camera goes to `home`, where one is set.
+//! ## What it learns
+//! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
+//! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
+//! `field-of-view`, and `camera-speed` with `speed-curve` are only where that begins; `learn=false` keeps to them.
+//! A loop that swings about its target all the same is calmed by less gain, with a warning.
 //!
+//! ## Zoom and limits
+//! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
+//! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does, within what
+//! the camera can; an operator may go beyond them. `mode=centre`, in which the camera itself works out the angles,
+//! is not bound by those for pan and tilt.
+//!
+//! ## Home
+//! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the
+//! name of a preset, or `start`, where it looked when it was met; with `home-at-start` before the first target too.
+//!
+//! ## Operators
 //! An operator comes first. When the camera's position contradicts what it was told, or its control queue says
 //! that it is somebody else's turn, it is not steered until nobody has moved it for `override-timeout`, or until
 //! our turn. Only a turn that no command explains, of more than 1.5 degrees, counts; zooming by hand does not. A
@@ -47,6 +62,10 @@
 //! A camera that is spoken to over HTTPS with a certificate of its own making, and never faster than 30 degrees a second:
 //! ```sh
 //! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 insecure=true max-speed=30 mode=velocity
+//! ```
+//! One that goes back to its preset "Door" after 20 s without anybody, zooms, and never looks to the left of 60 degrees:
+//! ```sh
+//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 home=Door home-timeout=20000 auto-zoom=true target-height=0.5 pan-min=-60
 //! ```
 
 use glib::prelude::*;
