@@ -106,7 +106,7 @@ fn the_documented_pipelines_run() {
     let documentation = include_str!("../src/vapixptzsink/mod.rs");
     let lines: Vec<_> =
         documentation.lines().filter_map(|line| line.strip_prefix("//! gst-launch-1.0 ")).collect();
-    assert_eq!(lines.len(), 2);
+    assert_eq!(lines.len(), 3);
     for line in lines {
         let launch = line.replace("http://192.168.0.90", &camera.url());
         assert_ne!(launch, line);

@@ -231,8 +231,8 @@ fn at_its_limit_it_says_so_once_and_rests() {
     let beyond = target(TargetState::Tracking, 0.9, 0.5);
     let heard = rig.push_until_message(&beyond, |heard| *heard == Heard::Camera(CameraChange::AtLimit));
     assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
-    rig.push_until(&beyond, &camera, |status| !status.moving);
-    assert!((camera.status().pan_deg - camera.limits().pan_deg.1).abs() < 0.2);
+    let end = camera.limits().pan_deg.1;
+    rig.push_until(&beyond, &camera, |status| !status.moving && (status.pan_deg - end).abs() < 0.2);
     for _ in 0..50 {
         rig.push(&beyond);
     }

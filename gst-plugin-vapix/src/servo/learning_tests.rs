@@ -71,6 +71,23 @@ fn the_latency_is_found_within_20_s() {
     assert_right("early", 400, early);
 }
 
+/// At first it is off the middle, where every camera is turned fast.
+#[test]
+fn a_longer_latency_is_found_before_the_loop_swings() {
+    for (delay_ms, sees_ground) in [(300, true), (400, true), (300, false)] {
+        let mut setup = Setup { jitter: 0.003, sees_ground, ..Setup::new(delay_ms, 1.0) };
+        setup.settings.latency = Duration::from_millis(200);
+        let run = setup.run(10.0, |time| (PanTilt::new(18.0 + 3.0 * time, 0.0), 20.0));
+        let offset = run.mean_offset(3.0, 10.0);
+        assert!(offset < 0.02, "{delay_ms} ms, {sees_ground}: {offset}");
+        assert!(
+            run.farthest(-1.0, 0.0, 10.0) < 0.2,
+            "{delay_ms} ms, {sees_ground}: {}",
+            run.farthest(-1.0, 0.0, 10.0)
+        );
+    }
+}
+
 #[test]
 fn the_field_of_view_is_found_within_20_s() {
     assert_right("wide", 100, wide);

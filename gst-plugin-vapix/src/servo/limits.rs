@@ -35,6 +35,9 @@ impl LimitGuard {
     /// This near to its end an axis counts as there.
     const NEAR_DEG: f64 = 0.1;
 
+    /// Having been there, it has left by this; before, it only finds that it was not quite there.
+    const LEFT_DEG: f64 = 3.0;
+
     /// A range this wide is no end: the camera turns round and round.
     const ENDLESS_DEG: f64 = 359.0;
 
@@ -64,8 +67,9 @@ impl LimitGuard {
         let pan = Some(narrower(hard.pan_deg, soft.pan_deg))
             .filter(|range| range.max - range.min < Self::ENDLESS_DEG);
         let tilt = Some(narrower(hard.tilt_deg, soft.tilt_deg));
-        let (pan, pan_held) = held(rate.pan, position.pan, pan, lasting_s);
-        let (tilt, tilt_held) = held(rate.tilt, position.tilt, tilt, lasting_s);
+        let near_deg = if self.at_limit { Self::LEFT_DEG } else { Self::NEAR_DEG };
+        let (pan, pan_held) = held(rate.pan, position.pan, pan, lasting_s, near_deg);
+        let (tilt, tilt_held) = held(rate.tilt, position.tilt, tilt, lasting_s, near_deg);
         self.at_limit = pan_held || tilt_held;
         PanTilt::new(pan, tilt)
     }
@@ -82,13 +86,12 @@ pub fn narrower(hard: Option<Range>, soft: Range) -> Range {
     Range { min: hard.min.max(soft.min), max: hard.max.min(soft.max) }
 }
 
-/// The rate that is left of one that drives outwards near an end, and whether the end is reached.
-fn held(rate: f64, position: f64, limits: Option<Range>, lasting_s: f64) -> (f64, bool) {
+/// The rate that is left of one that drives outwards near an end, and whether the end is reached, by `near_deg`.
+fn held(rate: f64, position: f64, limits: Option<Range>, lasting_s: f64, near_deg: f64) -> (f64, bool) {
     let Some(limits) = limits else { return (rate, false) };
     let room = if rate > 0.0 { limits.max - position } else { position - limits.min };
-    let there = rate != 0.0 && room <= LimitGuard::NEAR_DEG;
-    let left = if there { 0.0 } else { rate.abs().min(room / lasting_s) };
-    (left.copysign(rate), there)
+    let left = if room <= LimitGuard::NEAR_DEG { 0.0 } else { rate.abs().min(room / lasting_s) };
+    (left.copysign(rate), rate != 0.0 && room <= near_deg)
 }
 
 #[cfg(test)]
@@ -135,6 +138,18 @@ mod tests {
         guard.told(ms(1000), Some(PanTilt::new(5.0, 0.0)));
         history.push(ms(800), PanTilt::new(10.0, 0.0));
         assert_eq!(guard.position(&history, ms(100), ms(1400)), Some(PanTilt::new(10.0, 0.0)));
+    }
+
+    #[test]
+    fn an_end_that_was_a_little_farther_is_the_same_end() {
+        let (hard, soft, mut guard) =
+            (limits(Some((-170.0, 170.0))), SoftLimits::default(), LimitGuard::default());
+        let mut at_limit = |rate: f64, pan: f64| {
+            guard.apply(PanTilt::new(rate, 0.0), Some(PanTilt::new(pan, 0.0)), (&hard, &soft), 0.5);
+            guard.at_limit()
+        };
+        assert!(!at_limit(10.0, 169.0) && at_limit(10.0, 169.95) && at_limit(10.0, 169.0));
+        assert!(!at_limit(-10.0, 169.0) && !at_limit(10.0, 169.0));
     }
 
     proptest! {

@@ -73,6 +73,11 @@ impl Pilot {
     /// A camera that does not tell its position is asked again this much later.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
 
+    /// To be a swing, an offset goes so many dead zones beyond the middle: gait and tracker go beyond one.
+    const SWING: f64 = 2.5;
+    /// And this part of the picture's width.
+    const SWING_LEAST: f64 = 0.04;
+
     /// Knows nothing of the camera yet.
     pub fn new(settings: ServoSettings) -> Self {
         Self {
@@ -150,7 +155,8 @@ impl Pilot {
         }
         let view = self.view(&sight);
         self.aim.see(&sight, &view, &self.history, self.calibration.latency());
-        let tolerated_deg = self.settings.dead_zone * view.horizontal_fov_deg;
+        let tolerated_deg =
+            (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
         // Told by the commands it would be no witness against them.
         let by_itself = sight.ego_velocity.map_or(PanTilt::default(), |_| self.aim.pace());
         if self.oscillation.see(self.aim.error(), by_itself, tolerated_deg, sight.taken_at) {

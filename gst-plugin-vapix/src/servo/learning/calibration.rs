@@ -1,9 +1,11 @@
 use std::time::Duration;
 
+use ptztrack_contract::Vector;
+
 use super::{FieldLearner, LatencyLearner, SpeedLearner};
 use crate::servo::{CommandHistory, PanTilt, Sight, SpeedMap, View};
 
-/// How the camera turned between two pictures, as the background shows it.
+/// How the camera turned between two pictures, as the background shows it, or the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Turn {
     /// The earlier picture's time.
@@ -18,13 +20,11 @@ impl Turn {
     /// Pictures further apart than this show no turn.
     const LONGEST: Duration = Duration::from_millis(500);
 
-    /// The turn that a picture shows, after the one before.
-    fn of(sight: &Sight, view: &View, before: Duration) -> Option<Self> {
-        let ego = sight.ego_velocity?;
+    /// The turn that a picture, after the one before, shows by what moves in it like this against the camera.
+    fn of(velocity: Vector, sight: &Sight, view: &View, before: Duration) -> Option<Self> {
         let lasted = sight.taken_at.checked_sub(before)?;
         let fits = !lasted.is_zero() && lasted <= Self::LONGEST;
-        // The background moves against the camera.
-        let rate = view.rate(sight.centroid, ego) * -1.0;
+        let rate = view.rate(sight.centroid, velocity) * -1.0;
         let sound = rate.pan.is_finite() && rate.tilt.is_finite();
         (fits && sound).then_some(Self { from: before, to: sight.taken_at, rate })
     }
@@ -91,9 +91,14 @@ impl Calibration {
     /// Takes a picture, seen with `view`, and what was commanded, counted by `map`.
     pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, map: &SpeedMap) {
         let before = self.before.replace(sight.taken_at);
-        let Some(turn) = before.and_then(|before| Turn::of(sight, view, before)) else { return };
+        // Where the background is not seen, the target tells at least when the camera begins to turn.
+        let shown = sight.ego_velocity.unwrap_or(sight.velocity);
+        let Some(turn) = before.and_then(|before| Turn::of(shown, sight, view, before)) else { return };
         let fov_deg = view.horizontal_fov_deg;
         self.latency.see(&turn, history, fov_deg);
+        if sight.ego_velocity.is_none() {
+            return;
+        }
         let latency = self.latency();
         self.speeds.see(&turn, latency, history, map, fov_deg);
         let factor = self.field_factor();

@@ -41,7 +41,7 @@ const AGREEMENT: f64 = 0.4;
 const RELUCTANCE: f64 = 0.1;
 
 /// Part of the way to the best candidate that is gone in a second.
-const PACE_PER_S: f64 = 1.0;
+const PACE_PER_S: f64 = 3.0;
 
 impl LatencyLearner {
     /// Knows what is assumed.
