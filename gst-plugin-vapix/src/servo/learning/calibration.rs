@@ -3,7 +3,7 @@ use std::time::Duration;
 use ptztrack_contract::Vector;
 
 use super::{FieldLearner, LatencyLearner, SpeedLearner};
-use crate::servo::{CommandHistory, PanTilt, Sight, SpeedMap, View};
+use crate::servo::{CommandHistory, PanTilt, Sight, SpeedMap, View, Visibility};
 
 /// How the camera turned between two pictures, as the background shows it, or the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +92,8 @@ impl Calibration {
     pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, map: &SpeedMap) {
         let before = self.before.replace(sight.taken_at);
         // Where the background is not seen, the target tells at least when the camera begins to turn.
-        let shown = sight.ego_velocity.unwrap_or(sight.velocity);
+        let seen = (sight.visibility == Visibility::Seen).then_some(sight.velocity);
+        let Some(shown) = sight.ego_velocity.or(seen) else { return };
         let Some(turn) = before.and_then(|before| Turn::of(shown, sight, view, before)) else { return };
         let fov_deg = view.horizontal_fov_deg;
         self.latency.see(&turn, history, fov_deg);
