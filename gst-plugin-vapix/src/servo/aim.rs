@@ -102,6 +102,9 @@ impl Aim {
             self.target_rate.clear();
             self.id = sight.id;
         }
+        if sight.visibility == Visibility::Predicted {
+            return self.foresee(sight, view);
+        }
         self.error = view.error(sight.centroid);
         self.taken_at = sight.taken_at;
         // The target's own motion is what is left of its motion in the picture without the camera's:
@@ -116,6 +119,17 @@ impl Aim {
             }
         };
         self.target_rate.push(sight.taken_at, rate);
+    }
+
+    /// Takes a picture that hides the target: it goes on as it did, but whether faster and faster nobody knows.
+    fn foresee(&mut self, sight: &Sight, view: &View) {
+        self.target_rate.coast(sight.taken_at, self.target_rate(Duration::ZERO));
+        // Who does not see the background cannot tell how the camera's turns move a hidden target in the
+        // picture: there the last sight and the commands since know better.
+        if sight.ego_velocity.is_some() {
+            self.error = view.error(sight.centroid);
+            self.taken_at = sight.taken_at;
+        }
     }
 
     /// Forgets the target.
@@ -151,7 +165,7 @@ impl Aim {
     /// The target's own angular rate so long after the picture.
     fn target_rate(&self, lead: Duration) -> PanTilt {
         match self.prediction {
-            Prediction::Average => self.target_rate.certain_mean(),
+            Prediction::Average => self.target_rate.mean(),
             Prediction::Lead => self.target_rate.ahead(lead),
         }
     }
@@ -245,5 +259,58 @@ pub(super) mod tests {
         }
         aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY);
         assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
+    }
+
+    #[test]
+    fn the_average_is_the_plain_mean() {
+        let history = CommandHistory::default();
+        let mut aim = Aim::new(Prediction::Average);
+        for (time, x) in [(0.2, 0.1), (0.4, -0.05), (0.6, 0.2)] {
+            let trembling = Sight { velocity: Vector { x, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
+            aim.see(&trembling, &VIEW, &history, LATENCY);
+        }
+        let rate = aim.target_rate(seconds(0.4)).pan;
+        assert!((rate - 6.616 * 0.25 / 0.3).abs() < 0.01, "{rate}");
+    }
+
+    /// Somebody who goes faster and faster, and is hidden at 0.4 s; and the mean rate and the last of what was seen.
+    fn hidden(ego_velocity: Option<Vector>) -> (Aim, f64, f64) {
+        let history = CommandHistory::default();
+        let mut aim = Aim::new(Prediction::Lead);
+        let at = |frame: u32| seconds(0.04 * f64::from(frame));
+        for frame in 1..=10 {
+            let velocity = Vector { x: 0.02 * f64::from(frame), y: 0.0 };
+            let seen = Sight { velocity, ego_velocity, ..sight(0.6, 0.5, at(frame)) };
+            aim.see(&seen, &VIEW, &history, LATENCY);
+        }
+        let (mean, last) = (aim.pace().pan, aim.target_rate(Duration::ZERO).pan);
+        assert!(aim.target_rate(LATENCY).pan > last);
+        for frame in 11..=25 {
+            let echo = Sight {
+                visibility: Visibility::Predicted,
+                velocity: Vector { x: 0.4, y: 0.0 },
+                ego_velocity,
+                ..sight(0.7, 0.5, at(frame))
+            };
+            aim.see(&echo, &VIEW, &history, LATENCY);
+        }
+        (aim, mean, last)
+    }
+
+    #[test]
+    fn who_is_hidden_goes_on_at_a_plain_rate() {
+        for ego in [None, Some(Vector::default())] {
+            let (aim, mean, last) = hidden(ego);
+            let rate = aim.target_rate(LATENCY).pan;
+            assert!((mean..last).contains(&rate), "{rate} after {mean} to {last}");
+            assert_eq!(aim.target_rate(Duration::from_secs(1)).pan, rate);
+        }
+    }
+
+    #[test]
+    fn a_prediction_is_believed_of_who_sees_the_background() {
+        let error = |x| VIEW.error(Point { x, y: 0.5 });
+        assert_eq!(hidden(None).0.error(), error(0.6));
+        assert_eq!(hidden(Some(Vector::default())).0.error(), error(0.7));
     }
 }

@@ -37,6 +37,12 @@ impl RateAverage {
         }
     }
 
+    /// Takes a rate at which it is only thought to go on, and whose changes so far are no sign of more.
+    pub fn coast(&mut self, at: Duration, rate: PanTilt) {
+        self.push(at, rate);
+        self.trends.clear();
+    }
+
     /// The mean; zero where nothing is known.
     pub fn mean(&self) -> PanTilt {
         let sum = self.samples.iter().fold(PanTilt::default(), |sum, (_, rate)| sum + *rate);

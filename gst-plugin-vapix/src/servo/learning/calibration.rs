@@ -91,9 +91,11 @@ impl Calibration {
     /// Takes a picture, seen with `view`, and what was commanded, counted by `map`.
     pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, map: &SpeedMap) {
         let before = self.before.replace(sight.taken_at);
+        if sight.visibility != Visibility::Seen {
+            return;
+        }
         // Where the background is not seen, the target tells at least when the camera begins to turn.
-        let seen = (sight.visibility == Visibility::Seen).then_some(sight.velocity);
-        let Some(shown) = sight.ego_velocity.or(seen) else { return };
+        let shown = sight.ego_velocity.unwrap_or(sight.velocity);
         let Some(turn) = before.and_then(|before| Turn::of(shown, sight, view, before)) else { return };
         let fov_deg = view.horizontal_fov_deg;
         self.latency.see(&turn, history, fov_deg);
