@@ -91,7 +91,8 @@ impl Tracker {
     /// What the servo is set to beside what is the same for all.
     pub fn servo(&self) -> &'static str {
         match self.name {
-            TrackerName::Thesis => "prediction=average",
+            // The thesis knows its camera from the start.
+            TrackerName::Thesis => "prediction=average learn=false",
             _ => "",
         }
     }
