@@ -71,7 +71,7 @@ impl Default for ServoSettings {
             gain: 2.0,
             dead_zone: 0.03,
             max_speed_deg_s: 100.0,
-            max_acceleration_deg_s2: 300.0,
+            max_acceleration_deg_s2: 600.0,
             max_rate_hz: 10.0,
             latency: Duration::from_millis(200),
             fov_deg: None,
