@@ -12,6 +12,8 @@ use crate::servo::{CommandHistory, SpeedMap};
 #[derive(Debug)]
 pub(super) struct SpeedLearner {
     regression: Regression<FEATURES>,
+    /// The latency by which the newest was measured.
+    latency: Option<Duration>,
 }
 
 const OFFSET: usize = 0;
@@ -45,6 +47,12 @@ const STRONG: f64 = 8.0;
 /// ... if it stands for about a second: before that it may be late.
 const STANDING_VARIANCE: f64 = 20.0;
 
+/// What was measured by a latency that proves so far off ...
+const ANOTHER_LATENCY: Duration = Duration::from_millis(50);
+
+/// ... is forgotten by this part of the prior's variance.
+const DOUBTED: f64 = 0.2;
+
 /// Rates that differ by more than this factor within the time that a picture may show teach nothing.
 const STEADY: f64 = 2.0;
 
@@ -57,9 +65,10 @@ impl SpeedLearner {
     pub fn new(told: bool) -> Self {
         let mut deviations = [if told { 0.1 } else { 0.25 }; FEATURES];
         deviations[OFFSET] = if told { 0.1 } else { 1.5 };
-        deviations[SLOPE] = if told { 0.1 } else { 1.0 };
+        // Linear for cubic is off by two: with less, that would be taken for an oddity at each step met so far.
+        deviations[SLOPE] = if told { 0.1 } else { 2.0 };
         deviations[ZOOM] = if told { 0.1 } else { 0.5 };
-        Self { regression: Regression::new(deviations) }
+        Self { regression: Regression::new(deviations), latency: None }
     }
 
     /// The map with what was learned.
@@ -81,6 +90,10 @@ impl SpeedLearner {
     ) {
         let (from, to) = (turn.from.saturating_sub(latency), turn.to.saturating_sub(latency));
         let commanded = history.rotation(from, to) / turn.seconds();
+        if self.latency.get_or_insert(latency).abs_diff(latency) > ANOTHER_LATENCY {
+            self.latency = Some(latency);
+            self.regression.forget(DOUBTED);
+        }
         let window = || history.rates_between(from.saturating_sub(SETTLING), to + EARLY);
         self.regression.forget(FORGOTTEN_PER_S * turn.seconds());
         for (seen, commanded, rates) in [
@@ -111,7 +124,11 @@ impl SpeedLearner {
             return;
         }
         let variance = VARIANCE + ratio.ln().powi(2) + doubt;
-        let features = features(map.ideal_step(commanded), fov_deg);
+        let mut features = features(map.ideal_step(commanded), fov_deg);
+        if stands {
+            // How much slower is not told: nothing of this step in particular, nor of the curve.
+            features[OFFSET + 1..].fill(0.0);
+        }
         let known = self.regression.predict(&features);
         self.regression.update(&features, known + (seen / commanded).ln(), variance);
     }
