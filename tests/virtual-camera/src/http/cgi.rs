@@ -38,6 +38,10 @@ pub(super) async fn queue(
     ConnectInfo(connection): ConnectInfo<Connection>,
     request: Request,
 ) -> Response {
+    // Made after a camera without the program, where the queue is off.
+    if site.camera.settings.control_queue.is_none() {
+        return StatusCode::NOT_FOUND.into_response();
+    }
     answer(&site, &connection, request, Camera::queue, |_, _, _| {}).await
 }
 
