@@ -171,9 +171,10 @@ impl<'a> Brush<'a> {
 impl Span {
     /// Brightness of its pixels, in 1/16384.
     fn light(&self, light: &mut [i16]) {
+        let share = self.share();
         for (light, ends) in light.chunks_mut(self.piece).zip(self.spots.windows(2)) {
             let (from, to) = (f64::from(ends[0].light) * 16384.0, f64::from(ends[1].light) * 16384.0);
-            let (mut value, step) = (from as i16, ((to - from) / self.piece as f64) as i16);
+            let (mut value, step) = (from as i16, ((to - from) * share) as i16);
             for light in light {
                 *light = value;
                 value = value.wrapping_add(step);
@@ -181,13 +182,18 @@ impl Span {
         }
     }
 
+    /// What part of a straight piece a pixel is: exact, as pieces are powers of two.
+    fn share(&self) -> f64 {
+        1.0 / self.piece as f64
+    }
+
     /// Its straight pieces on a tile so many metres wide and high.
     fn ways(&self, tile: (f64, f64)) -> impl Iterator<Item = Way> {
         const WHOLE: f64 = 4_294_967_296.0;
-        let scale = (WHOLE / tile.0, WHOLE / tile.1);
+        let (scale, share) = ((WHOLE / tile.0, WHOLE / tile.1), self.share());
         self.spots.windows(2).map(move |ends| {
             let [from, to] = [&ends[0], &ends[1]].map(|spot| [spot.u * scale.0, spot.v * scale.1]);
-            let step = [0, 1].map(|axis| (to[axis] - from[axis]) / self.piece as f64);
+            let step = [0, 1].map(|axis| (to[axis] - from[axis]) * share);
             // Whole tiles are left out.
             let part = |value: f64| value as i64 as u32;
             Way { start: from.map(part), step: step.map(part) }
