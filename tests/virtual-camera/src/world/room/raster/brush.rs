@@ -18,7 +18,7 @@ const PIECES: usize = 4;
 /// How far straight lines may lead astray, in pixels.
 const ASTRAY: f64 = 0.1;
 /// Light is computed at least so often, in metres.
-const LIGHT_STEP: f64 = 0.25;
+const LIGHT_STEP: f64 = 0.5;
 /// Where a pixel covers so many pixels of the grain, nothing of it is left to see.
 const COARSEST_GRAIN: f64 = 7.0;
 
