@@ -160,7 +160,7 @@ impl Experiment {
             first_box: self.first_box,
             sweep: self.sweep,
             frame_rate: 0.0,
-            dropped: None,
+            dropped: self.real_time.then_some(0),
             frames: Vec::new(),
             snapshots: Vec::new(),
             error: None,

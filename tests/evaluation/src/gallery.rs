@@ -85,8 +85,7 @@ fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, 
     let (period, home) = (camera.frame_period(), camera.home());
     let seen = |number: u32| {
         let exposure = experiment::exposure(number, period);
-        let from =
-            |pose: &Pose| experiment.scene.split(camera.ground_truth_from(pose, exposure, SMALL)).0;
+        let from = |pose: &Pose| experiment.scene.split(camera.ground_truth_from(pose, exposure, SMALL)).0;
         let (pan_deg, tilt_deg) = from(&home)?.direction_deg?;
         Some((exposure, from(&Pose { pan_deg, tilt_deg, ..home })?))
     };
