@@ -222,7 +222,7 @@ fn blend_fine<const FINE: usize>(window: &Window, colours: &[[u8; 4]], canvas: &
     let [luma, chroma @ ..] = &mut canvas.planes;
     for (index, rows) in colours.chunks(2 * FINE * stride).enumerate() {
         let (y, covered) = (2 * index, covered(rows, stride));
-        for x in ((covered.start / FINE & !1)..covered.end.div_ceil(FINE)).step_by(2) {
+        for x in (((covered.start / FINE) & !1)..covered.end.div_ceil(FINE)).step_by(2) {
             let mut block = Sum::default();
             for (x, down) in [(x, 0), (x + 1, 0), (x, 1), (x + 1, 1)] {
                 if x < window.width && y + down < window.height {
