@@ -1,4 +1,4 @@
-//! The command as it is called: what it refuses before anything is written.
+//! The command as it is called: what it refuses before anything is written, and that it gives the same everywhere.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::{
@@ -46,4 +46,24 @@ fn a_place_where_nothing_can_be_written_is_told_of_first() {
     }
     assert_eq!(fs::read_to_string(&file).unwrap(), "a file");
     fs::remove_file(&file).unwrap();
+}
+
+#[test]
+fn a_lesser_processor_gives_the_same_figures() {
+    let run = |name: &str, without: &str| {
+        let out = folder(name);
+        let mut command = Command::new(env!("CARGO_BIN_EXE_evaluate"));
+        command.args(["--test", "37", "--size", "160x120", "--seed", "4", "--out"]).arg(&out);
+        let output = command.env("OPENCV_CPU_DISABLE", without).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        let figures = fs::read_to_string(out.join("results.csv")).unwrap();
+        let frames = out.join("frames/seed4-mjpeg-160x120-given-video100ms-command60ms/test-37-ptztrack.csv");
+        let frames = fs::read_to_string(frames).unwrap();
+        fs::remove_dir_all(&out).unwrap();
+        (figures, frames)
+    };
+    // What OpenCV would choose by on most processors.
+    let lesser = run("lesser", "AVX2,FMA3,AVX,SSE4.2,SSE4.1");
+    assert!(lesser.1.lines().count() > 100, "{}", lesser.0);
+    assert!(run("full", "") == lesser);
 }
