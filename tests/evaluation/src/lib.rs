@@ -1,5 +1,5 @@
 //! The thesis' 72 closed-loop experiments (chapter 5), rerun by anyone: real elements in a real pipeline against the
-//! virtual camera, in virtual time, so that the same seed gives the same table on any machine.
+//! virtual camera, in virtual time, so that the same seed gives the same table on any x86-64 machine.
 //!
 //! ## What is counted
 //! Counting begins with the *first box*: the first picture, with the camera still at home, in which the person's whole

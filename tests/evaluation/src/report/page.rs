@@ -29,7 +29,7 @@ pub fn html(content: &Content, plots: &Path) -> String {
          <style>\n{STYLE}</style>\n<h1>Following a person with a moving camera</h1>\n\
          <p>ptztrack {version}. The thesis' tests (its chapter 5), rerun in closed loop against a virtual camera in a \
          simulated room, and recordings of real people: pictures delayed, encoded and decoded, commands delayed, every \
-         tracker with the same servo. The same seed gives the same figures on any machine.</p>\n{}{sections}{}{}",
+         tracker with the same servo. The same seed gives the same figures on any x86-64 machine with the same libraries.</p>\n{}{sections}{}{}",
         left_out(content) + &failures(content),
         sweep(content, plots),
         definitions(),
