@@ -1,17 +1,12 @@
 //! Pictures of a run's telling moments, chosen while it goes on.
 
-use std::{
-    collections::BTreeMap,
-    sync::{Arc, Mutex},
-};
-
-use gst::prelude::*;
+use std::collections::BTreeMap;
 
 use virtual_camera::Picture;
 
 use crate::{
     codec, metrics,
-    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE, lock},
+    pipeline::{LastBytes, Pipeline, PipelineError, SINK, SOURCE},
     record::{FrameRecord, Moment, Snapshot, TargetState},
 };
 
@@ -29,23 +24,36 @@ pub(crate) struct Album {
     pages: BTreeMap<Moment, Page>,
     /// d_gc of the worst one.
     worst: f64,
+    /// Whether the tracker ever was.
+    was_right: bool,
 }
 
 impl Album {
     /// Keeps `picture`, number `frame` of those that count, if it tells something.
     pub fn look(&mut self, frame: usize, record: &FrameRecord, picture: Picture) {
-        let first = match record.estimate.as_ref().map(|estimate| estimate.state) {
-            Some(TargetState::Tracking) => Some(Moment::Acquired),
-            Some(TargetState::Occluded) => Some(Moment::Occluded),
-            Some(TargetState::Lost) => Some(Moment::Lost),
-            Some(TargetState::Searching) | None => None,
+        let first = self.tells(record).filter(|moment| !self.pages.contains_key(moment));
+        self.was_right |= metrics::is_true_positive(record);
+        let is_worst = |distance: &f64| {
+            let counts = !metrics::is_out(record) && record.time_s >= APPROACH_S;
+            counts && first.is_none() && *distance > self.worst
         };
-        let first = first.filter(|moment| !self.pages.contains_key(moment));
-        let distance = metrics::d_gc(record)
-            .filter(|distance| first.is_none() && record.time_s >= APPROACH_S && *distance > self.worst);
+        let distance = metrics::d_gc(record).filter(is_worst);
         self.worst = distance.unwrap_or(self.worst);
         if let Some(moment) = first.or(distance.map(|_| Moment::Worst)) {
             self.pages.insert(moment, Page { frame, picture });
+        }
+    }
+
+    /// What the picture would be the first of.
+    fn tells(&self, record: &FrameRecord) -> Option<Moment> {
+        let is_wrong = metrics::contains_target(record) && !metrics::is_true_positive(record);
+        match record.estimate.as_ref().map(|estimate| estimate.state) {
+            Some(TargetState::Lost) => Some(Moment::Lost),
+            Some(TargetState::Occluded) => Some(Moment::Occluded),
+            // Some trackers never say that they lost it.
+            _ if self.was_right && is_wrong => Some(Moment::Lost),
+            Some(TargetState::Tracking) => Some(Moment::Acquired),
+            Some(TargetState::Searching) | None => None,
         }
     }
 
@@ -64,7 +72,7 @@ impl Album {
 /// Makes JPEGs.
 struct Encoder {
     pipeline: Pipeline,
-    jpeg: Arc<Mutex<Vec<u8>>>,
+    jpeg: LastBytes,
 }
 
 impl Encoder {
@@ -74,13 +82,7 @@ impl Encoder {
             codec::jpeg_encoder()
         );
         let pipeline = Pipeline::new(&description, info)?;
-        let jpeg = Arc::new(Mutex::new(Vec::new()));
-        let out = jpeg.clone();
-        pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
-            let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
-            *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
-            gst::PadProbeReturn::Ok
-        });
+        let jpeg = pipeline.last_bytes()?;
         pipeline.start()?;
         Ok(Self { pipeline, jpeg })
     }
@@ -96,7 +98,7 @@ impl Encoder {
             buffer.set_pts(gst::ClockTime::from_mseconds(number as u64));
         }
         self.pipeline.finish(buffer)?;
-        Ok(std::mem::take(&mut *lock(&self.jpeg)))
+        Ok(self.jpeg.take())
     }
 }
 
@@ -132,6 +134,53 @@ mod tests {
         }
     }
 
+    fn look(album: &mut Album, frame: usize, record: &FrameRecord) {
+        album.look(frame, record, Picture::grey(SIZE.0, SIZE.1, 20 * frame as u8));
+    }
+
+    fn developed(album: Album) -> (Vec<(Moment, usize)>, Vec<Snapshot>) {
+        let info = gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, SIZE.0, SIZE.1).build();
+        let snapshots = album.develop(&info.unwrap()).unwrap();
+        (snapshots.iter().map(|snapshot| (snapshot.moment, snapshot.frame)).collect(), snapshots)
+    }
+
+    /// As a tracker that stays behind while the person goes on.
+    fn wrong(mut record: FrameRecord) -> FrameRecord {
+        record.estimate.as_mut().unwrap().centroid = (32.0, 45.0);
+        record
+    }
+
+    #[test]
+    fn who_is_wrong_after_being_right_has_lost_it_unless_there_was_nothing_to_see() {
+        gst::init().unwrap();
+        use TargetState::{Occluded, Tracking};
+        let mut hidden = wrong(record(1.0, 30.0, Tracking));
+        hidden.truth.as_mut().unwrap().visible = 0.0;
+        let run = [
+            wrong(record(0.0, 30.0, Tracking)),
+            record(0.5, 30.0, Tracking),
+            hidden,
+            wrong(record(1.5, 30.0, Occluded)),
+            wrong(record(1.6, 30.0, Tracking)),
+        ];
+        let mut album = Album::default();
+        for (frame, record) in run.iter().enumerate() {
+            look(&mut album, frame, record);
+        }
+        let expected = [(Moment::Acquired, 0), (Moment::Occluded, 3), (Moment::Lost, 4)];
+        assert_eq!(developed(album).0, expected);
+    }
+
+    #[test]
+    fn the_worst_is_still_in_the_picture() {
+        gst::init().unwrap();
+        let mut album = Album::default();
+        for (frame, x) in [32.0, 50.0, 45.0, 70.0].into_iter().enumerate() {
+            look(&mut album, frame, &record(2.0 + frame as f64, x, TargetState::Tracking));
+        }
+        assert_eq!(developed(album).0, [(Moment::Acquired, 0), (Moment::Worst, 1)]);
+    }
+
     #[test]
     fn keeps_firsts_and_the_worst_after_the_approach() {
         gst::init().unwrap();
@@ -147,13 +196,9 @@ mod tests {
         ];
         let mut album = Album::default();
         for (frame, (time_s, x, state)) in run.into_iter().enumerate() {
-            let picture = Picture::grey(SIZE.0, SIZE.1, 20 * frame as u8);
-            album.look(frame, &record(time_s, x, state), picture);
+            look(&mut album, frame, &record(time_s, x, state));
         }
-        let info =
-            gst_video::VideoInfo::builder(gst_video::VideoFormat::I420, SIZE.0, SIZE.1).build().unwrap();
-        let snapshots = album.develop(&info).unwrap();
-        let moments: Vec<_> = snapshots.iter().map(|snapshot| (snapshot.moment, snapshot.frame)).collect();
+        let (moments, snapshots) = developed(album);
         let expected = [(Moment::Acquired, 0), (Moment::Occluded, 2), (Moment::Lost, 3), (Moment::Worst, 4)];
         assert_eq!(moments, expected);
         assert!(snapshots.iter().all(|snapshot| snapshot.jpeg.starts_with(&[0xff, 0xd8])));

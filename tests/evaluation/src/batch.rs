@@ -1,7 +1,9 @@
 //! Many runs, some at once, in an order that does not depend on which is faster.
 
 use std::{
+    any::Any,
     io::Write,
+    panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         Mutex,
         atomic::{AtomicUsize, Ordering},
@@ -31,7 +33,7 @@ fn run_all_with(
     };
     let perform = |(number, experiment): (usize, &Experiment)| {
         let begin = Instant::now();
-        let run = run(experiment);
+        let run = caught(experiment, &run);
         let mut progress = lock(&progress);
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         let (all, took_s) = (experiments.len(), begin.elapsed().as_secs_f64());
@@ -42,11 +44,25 @@ fn run_all_with(
     let work = || std::iter::from_fn(take).map(perform).collect::<Vec<_>>();
     let mut runs = std::thread::scope(|scope| {
         let workers: Vec<_> = (0..jobs.max(1)).map(|_| scope.spawn(work)).collect();
-        // A worker that panicked has told why; its runs are missing, and that shows.
-        workers.into_iter().filter_map(|worker| worker.join().ok()).flatten().collect::<Vec<(usize, Run)>>()
+        let told = workers.into_iter().filter_map(|worker| worker.join().ok());
+        told.flatten().collect::<Vec<(usize, Run)>>()
     });
     runs.sort_by_key(|(number, _)| *number);
     runs.into_iter().map(|(_, run)| run).collect()
+}
+
+/// A run that panics is one that failed: it shall not take the others with it.
+fn caught(experiment: &Experiment, run: impl Fn(&Experiment) -> Run) -> Run {
+    // What the closure could leave half done is all its own.
+    catch_unwind(AssertUnwindSafe(|| run(experiment))).unwrap_or_else(|panic| Run {
+        error: Some(format!("panicked: {}", words(&*panic))),
+        ..experiment.blank()
+    })
+}
+
+fn words(panic: &(dyn Any + Send)) -> &str {
+    let fixed = panic.downcast_ref::<&str>().copied();
+    fixed.or_else(|| panic.downcast_ref::<String>().map(String::as_str)).unwrap_or("without a word")
 }
 
 /// One line on one run.
@@ -79,11 +95,33 @@ mod tests {
         record::{TestId, TrackerName},
     };
 
+    fn experiments() -> Vec<Experiment> {
+        let scenes = TestId::all().filter_map(|test| Scene::room(test, 1));
+        scenes.map(|scene| Experiment::new(scene, TrackerName::Still, 1)).collect()
+    }
+
+    #[test]
+    fn a_run_that_panics_is_told_of_and_takes_no_other_with_it() {
+        let experiments = experiments();
+        let fake = |experiment: &Experiment| match experiment.scene.test {
+            Some(TestId(3)) => panic!("of its own"),
+            Some(TestId(test)) if test > 70 => panic!("of number {test}"),
+            _ => experiment.blank(),
+        };
+        for jobs in [1, 3] {
+            let runs = run_all_with(&experiments, jobs, std::io::sink(), fake);
+            assert_eq!(runs.len(), experiments.len());
+            let failed = runs.iter().filter_map(|run| Some((run.test?.0, run.error.as_deref()?)));
+            assert_eq!(
+                failed.collect::<Vec<_>>(),
+                [(3, "panicked: of its own"), (71, "panicked: of number 71"), (72, "panicked: of number 72")]
+            );
+        }
+    }
+
     #[test]
     fn runs_come_in_order_and_each_is_told_of() {
-        let experiments: Vec<_> = TestId::all()
-            .filter_map(|test| Some(Experiment::new(Scene::room(test, 1)?, TrackerName::Still, 1)))
-            .collect();
+        let experiments = experiments();
         let fake = |experiment: &Experiment| Run { error: Some("not run".into()), ..experiment.blank() };
         for jobs in [0, 1, 3] {
             let mut progress = Vec::new();

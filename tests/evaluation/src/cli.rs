@@ -24,8 +24,8 @@ pub struct Args {
     /// What the pictures go through: mjpeg, mpeg4 or raw; a recording as it is only ever is raw
     #[arg(long, default_value = "mjpeg")]
     pub codec: Codec,
-    /// Width and height of the pictures
-    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size)]
+    /// Width and height of the pictures; a recording as it is has its own
+    #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size, conflicts_with = "still_recording")]
     pub size: (u32, u32),
     /// Number of the world; 1 is the reference
     #[arg(long, default_value_t = 1)]
@@ -42,7 +42,7 @@ pub struct Args {
     /// Who draws the first box: given (the truth, to every tracker) or detected (by those that can)
     #[arg(long, default_value = "given")]
     pub first_box: FirstBox,
-    /// Write a video of each run as well, with everything drawn in: the truth in white
+    /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
     /// Instead of running tests, write pictures of the room to look at: every subject, light and occlusion, from far and near
@@ -53,17 +53,17 @@ pub struct Args {
     #[arg(long, conflicts_with_all = ["record", "still_recording"])]
     pub real_time: bool,
     /// Instead of the tests, follow one person in a still camera's recording, as seen by a camera that turns within it
-    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
+    #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
     pub footage: Option<PathBuf>,
     /// Instead of the tests, follow one person in a recording as it is: no camera, no codec, no delays
-    #[arg(long, value_name = "FILE", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
+    #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
     pub still_recording: Option<PathBuf>,
     /// Who is where in the recording: MOTChallenge (frame,id,left,top,width,height,...); for --still-recording also one box
     /// a line, left,top,width,height or left,top,right,bottom
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "recording")]
     pub truth: Option<PathBuf>,
     /// Number of the person to follow in the recording, or auto: who is there longest
-    #[arg(long, value_name = "ID|auto", default_value = "auto")]
+    #[arg(long, value_name = "ID|auto", default_value = "auto", requires = "recording")]
     pub person: Whom,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
@@ -180,14 +180,13 @@ impl Args {
             video: Duration::from_millis(self.video_delay),
             command: Duration::from_millis(self.command_delay),
         };
-        let name = scene.title.replace([' ', ',', '/'], "-");
         Experiment {
             codec: self.codec,
             size: self.size,
             delays,
             first_box: self.first_box,
             real_time: self.real_time,
-            film: self.record.then(|| self.out.join(format!("{name}-{tracker}.mkv"))),
+            films: self.record.then(|| self.out.join("films")),
             ..Experiment::new(scene, tracker, self.seed)
         }
     }
@@ -232,7 +231,7 @@ impl Args {
         let at = |delays: Delays| {
             let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), self.seed));
             let experiments = scenes.map(move |scene| self.experiment(scene, tracker));
-            experiments.map(move |experiment| Experiment { delays, sweep: true, film: None, ..experiment })
+            experiments.map(move |experiment| Experiment { delays, sweep: true, films: None, ..experiment })
         };
         delays.flat_map(at).collect()
     }
@@ -277,6 +276,17 @@ mod tests {
     }
 
     #[test]
+    fn what_is_only_there_by_default_conflicts_with_nothing() {
+        for line in [
+            "--still-recording x.avi --truth x.csv",
+            "--still-recording x.avi --truth x.csv --person 3",
+            "--footage x.avi --truth x.csv --size 320x240 --person auto",
+        ] {
+            assert!(parse(line).is_ok(), "{line}");
+        }
+    }
+
+    #[test]
     fn nonsense_is_refused_with_what_would_be_right() {
         for (line, hint) in [
             ("--test 73", "1 to 72"),
@@ -286,6 +296,10 @@ mod tests {
             ("--codec h264", "mjpeg, mpeg4, raw"),
             ("--first-box drawn", "given, detected"),
             ("--footage x.avi", "--truth"),
+            ("--truth x.csv", "--footage"),
+            ("--person 3", "--still-recording"),
+            ("--footage x.avi --still-recording x.avi --truth x.csv", "cannot be used with"),
+            ("--still-recording x.avi --truth x.csv --size 320x240", "cannot be used with"),
             ("--person somebody", "auto"),
         ] {
             let error = parse(line).unwrap_err().to_string();

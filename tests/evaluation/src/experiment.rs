@@ -81,8 +81,8 @@ pub struct Experiment {
     pub sweep: bool,
     /// Whether the clock is looked at: the camera streams, and pictures that come too early for the tracker are dropped.
     pub real_time: bool,
-    /// Where to write a video of it, with everything drawn in (Matroska); nowhere unless given.
-    pub film: Option<PathBuf>,
+    /// Folder of the videos, with everything drawn in (Matroska); none is made unless given.
+    pub films: Option<PathBuf>,
 }
 
 impl Experiment {
@@ -98,7 +98,7 @@ impl Experiment {
             first_box: FirstBox::Given,
             sweep: false,
             real_time: false,
-            film: None,
+            films: None,
         }
     }
 
@@ -160,7 +160,7 @@ impl Experiment {
             first_box: self.first_box,
             sweep: self.sweep,
             frame_rate: 0.0,
-            dropped: None,
+            dropped: self.real_time.then_some(0),
             frames: Vec::new(),
             snapshots: Vec::new(),
             error: None,

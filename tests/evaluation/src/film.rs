@@ -1,13 +1,18 @@
 //! A video of a run to look at: what the tracker saw, what it said, and in white where the person really is.
 
-use std::path::{Path, PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use gst::prelude::*;
 use gst_video::prelude::*;
 
 use crate::{
+    lockstep::RunError,
     pipeline::{Elements, PipelineError, lock},
-    record::Bounds,
+    record::{Bounds, Run},
+    report,
     trackers::CurrentCue,
 };
 
@@ -17,9 +22,18 @@ const CANVAS: &str = "canvas";
 const LINE: usize = 2;
 const WHITE: u8 = 235;
 
+/// The file for a film of `run` among the `films`, in a folder that is made here: every setup has its own.
+pub(crate) fn file(films: &Path, run: &Run) -> Result<PathBuf, RunError> {
+    let file = films.join(report::place(run) + ".mkv");
+    match file.parent().map_or(Ok(()), fs::create_dir_all) {
+        Ok(()) => Ok(file),
+        Err(source) => Err(RunError::Film { file, source }),
+    }
+}
+
 /// The elements `sink`, and those that film what passes on its way there where a `file` is given.
-pub(crate) fn beside(sink: &str, file: &Option<PathBuf>) -> String {
-    file.as_ref().map_or_else(|| sink.into(), |file| description(sink, file))
+pub(crate) fn beside(sink: &str, file: Option<&Path>) -> String {
+    file.map_or_else(|| sink.into(), |file| description(sink, file))
 }
 
 fn description(sink: &str, file: &Path) -> String {
@@ -77,6 +91,29 @@ fn outline(luma: &mut [u8], stride: usize, size: (usize, usize), bounds: &Bounds
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{
+        record::{Codec, FirstBox},
+        report::made_up,
+    };
+
+    #[test]
+    fn films_of_different_setups_do_not_overwrite_each_other() {
+        let films = std::env::temp_dir().join(format!("ptztrack-films-{}", std::process::id()));
+        let run = made_up::run(vec![]);
+        let setups = [
+            run.clone(),
+            Run { seed: 2, ..run.clone() },
+            Run { codec: Codec::Raw, ..run.clone() },
+            Run { first_box: FirstBox::Detected, ..run.clone() },
+            Run { title: "../Walk, person 3".into(), ..run },
+        ];
+        let files: Vec<_> = setups.iter().map(|run| file(&films, run).unwrap()).collect();
+        for (index, file) in files.iter().enumerate() {
+            assert!(file.parent().unwrap().is_dir() && !files[..index].contains(file), "{}", file.display());
+        }
+        assert!(files[4].ends_with("---walk--person-3-ptztrack.mkv"), "{}", files[4].display());
+        fs::remove_dir_all(&films).unwrap();
+    }
 
     #[test]
     fn the_box_is_drawn_as_far_as_it_is_inside() {

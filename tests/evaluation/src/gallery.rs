@@ -1,22 +1,20 @@
 //! Pictures of the room to look at: every subject, light and occlusion, from far and from near.
 
 use std::{
-    fs,
     io::{Read, Write},
     net::TcpStream,
     path::Path,
-    sync::{Arc, Mutex},
     time::Duration,
 };
 
-use gst::prelude::*;
 use virtual_camera::{Clock, GroundTruth, Pose, VirtualCamera};
 
 use crate::{
     experiment::{self, Experiment, Place, Scene},
     lockstep::{RunError, clock_time, info},
-    pipeline::{Elements, Pipeline, SINK, SOURCE, lock},
+    pipeline::{Pipeline, SINK, SOURCE},
     record::{TestId, TrackerName},
+    report,
 };
 
 /// Horizontal fields of view, degrees.
@@ -29,7 +27,6 @@ const AIMING: Duration = Duration::from_secs(2);
 /// # Errors
 /// In words, where a picture cannot be made or written.
 pub fn write(like: &Experiment, folder: &Path) -> Result<usize, Box<dyn std::error::Error>> {
-    fs::create_dir_all(folder)?;
     let mut written = 0;
     // The first quarter of the tests has all lights, occlusions and subjects.
     for test in (1..=18).map(TestId) {
@@ -37,7 +34,7 @@ pub fn write(like: &Experiment, folder: &Path) -> Result<usize, Box<dyn std::err
         let experiment = Experiment { scene, tracker: TrackerName::Still, ..like.clone() };
         for (name, fov_deg) in VIEWS {
             let png = shoot(&experiment, fov_deg)?;
-            fs::write(folder.join(format!("test-{test}-{name}.png")), png)?;
+            report::save(&folder.join(format!("test-{test}-{name}.png")), png)?;
             written += 1;
         }
     }
@@ -65,16 +62,10 @@ fn shoot(experiment: &Experiment, fov_deg: f64) -> Result<Vec<u8>, RunError> {
     );
     let pipeline = Pipeline::new(&description, &info)?;
     experiment.codec.attach(pipeline.bin())?;
-    let png = Arc::new(Mutex::new(Vec::new()));
-    let out = png.clone();
-    pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
-        let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
-        *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
-        gst::PadProbeReturn::Ok
-    });
+    let png = pipeline.last_bytes()?;
     pipeline.start()?;
     pipeline.finish(buffer)?;
-    Ok(std::mem::take(&mut *lock(&png)))
+    Ok(png.take())
 }
 
 /// Where a moment is looked for; who is hidden shows in small pictures too.

@@ -1,5 +1,5 @@
 //! The thesis' 72 closed-loop experiments (chapter 5), rerun by anyone: real elements in a real pipeline against the
-//! virtual camera, in virtual time, so that the same seed gives the same table on any machine.
+//! virtual camera, in virtual time, so that the same seed gives the same table on any x86-64 machine.
 //!
 //! ## What is counted
 //! Counting begins with the *first box*: the first picture, with the camera still at home, in which the person's whole
@@ -40,7 +40,8 @@ pub use trackers::missing;
 
 /// Makes GStreamer and our elements ready; again does nothing.
 ///
-/// OpenCV gets one thread: a run shall not depend on how many cores there are, and several go on at once.
+/// OpenCV gets one thread and only those instructions that every processor has: a run shall not depend on how many cores
+/// there are or on what they are, and several go on at once.
 ///
 /// # Errors
 /// Where GStreamer does not start.
@@ -49,6 +50,7 @@ pub fn init() -> Result<(), glib::Error> {
     let ready = READY.get_or_init(|| {
         gst::init()?;
         opencv::core::set_num_threads(1)
+            .and_then(|()| opencv::core::set_use_optimized(false))
             .map_err(|error| glib::Error::new(gst::LibraryError::Init, &error.message))?;
         let register =
             || gstptztrack::plugin_register_static().and_then(|()| gstvapix::plugin_register_static());

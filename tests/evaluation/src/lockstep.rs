@@ -4,7 +4,10 @@
 //! as the video delay; the camera's time is that of its arrival. The pipeline finishes it, with every command that it
 //! leads to sent over HTTP and answered, before the camera's time goes on.
 
-use std::time::Duration;
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use ptztrack_contract::{TargetMeta, TargetState};
 use virtual_camera::{Clock, Picture, VirtualCamera, World};
@@ -35,6 +38,8 @@ pub(crate) enum RunError {
     Aim(std::io::Error),
     #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
     Raw,
+    #[error("cannot film into {}: {source}", file.display())]
+    Film { file: PathBuf, source: std::io::Error },
     #[error("the person is never wholly in the first view")]
     Nobody,
 }
@@ -54,7 +59,8 @@ pub fn run(experiment: &Experiment) -> Run {
 }
 
 fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), RunError> {
-    let mut stage = Stage::set(experiment, world)?;
+    let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
+    let mut stage = Stage::set(experiment, world, film.as_deref())?;
     let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
     let period = stage.camera.frame_period();
     run.frame_rate = 1.0 / period.as_secs_f64();
@@ -66,7 +72,7 @@ fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), Ru
             run.frames.push(record);
         }
     }
-    if experiment.film.is_some() {
+    if film.is_some() {
         stage.pipeline.end()?;
     }
     run.snapshots = album.develop(&stage.info)?;
@@ -86,7 +92,7 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn set(experiment: &'a Experiment, world: &World) -> Result<Self, RunError> {
+    fn set(experiment: &'a Experiment, world: &World, film: Option<&Path>) -> Result<Self, RunError> {
         let camera = experiment.camera(world, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
@@ -99,13 +105,13 @@ impl<'a> Stage<'a> {
         } else {
             format!("fakesink name={SINK} sync=false async=false")
         };
-        let sink = film::beside(&sink, &experiment.film);
+        let sink = film::beside(&sink, film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
         experiment.codec.attach(pipeline.bin())?;
         tracker.attach(pipeline.bin())?;
-        if experiment.film.is_some() {
+        if film.is_some() {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;

@@ -1,6 +1,10 @@
 //! `evaluate`: runs tests and writes down what came out.
 
-use std::process::ExitCode;
+use std::{
+    fmt,
+    io::{self, Write},
+    process::ExitCode,
+};
 
 use clap::Parser;
 use evaluation::{cli::Args, gallery, report};
@@ -10,7 +14,8 @@ fn main() -> ExitCode {
         Ok(true) => ExitCode::SUCCESS,
         Ok(false) => ExitCode::FAILURE,
         Err(error) => {
-            eprintln!("evaluate: {error}");
+            // Where not even that can be said, the exit code still tells.
+            let _ = tell(io::stderr(), format_args!("evaluate: {error}"));
             ExitCode::FAILURE
         }
     }
@@ -21,19 +26,45 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     evaluation::init()?;
     if let Some(like) = args.gallery() {
         let folder = args.out.join("gallery");
-        println!("{} pictures in {}", gallery::write(&like, &folder)?, folder.display());
+        report::make_room(&folder)?;
+        let written = gallery::write(&like, &folder)?;
+        tell(io::stdout(), format_args!("{written} pictures in {}", folder.display()))?;
         return Ok(true);
     }
     let (trackers, left_out) = args.trackers();
-    for reason in left_out {
-        eprintln!("evaluate: {reason}");
+    let experiments = args.experiments(&trackers)?;
+    if experiments.is_empty() {
+        return Err(format!("nothing to run: {}", left_out.join("; ")).into());
     }
-    std::fs::create_dir_all(&args.out)?;
-    let runs = evaluation::run_all(&args.experiments(&trackers)?, args.jobs(), std::io::stderr());
-    let report = report::write(&runs, &args.out)?;
+    report::make_room(&args.out)?;
+    let runs = evaluation::run_all(&experiments, args.jobs(), io::stderr());
+    let report = report::write(&runs, &left_out, &args.out)?;
     for note in &report.notes {
-        eprintln!("evaluate: {note}");
+        tell(io::stderr(), format_args!("evaluate: {note}"))?;
     }
-    println!("{}\nall of it: {}", report.summary, args.out.join("index.html").display());
-    Ok(!runs.is_empty() && runs.iter().all(|run| run.error.is_none()))
+    let page = args.out.join("index.html");
+    tell(io::stdout(), format_args!("{}\nall of it: {}", report.summary, page.display()))?;
+    Ok(runs.len() == experiments.len() && runs.iter().all(|run| run.error.is_none()))
+}
+
+/// Writes a line. That nobody reads any more, as behind `| head`, is no fault.
+fn tell(mut out: impl Write, line: fmt::Arguments) -> io::Result<()> {
+    match writeln!(out, "{line}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+        told => told,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_closed_pipe_is_no_fault() {
+        let (reader, writer) = io::pipe().unwrap();
+        drop(reader);
+        assert!(tell(writer, format_args!("unheard")).is_ok());
+        let full: &mut [u8] = &mut [0; 3];
+        assert!(tell(full, format_args!("more than that")).is_err());
+    }
 }

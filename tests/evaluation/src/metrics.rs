@@ -15,6 +15,9 @@ pub use identity::{identity_kept, identity_switches, is_hidden};
 /// A picture contains the target when at least this part of the person is inside it and hidden by nothing.
 pub const CONTAINS: f64 = 0.1;
 
+/// Less of the person than this part is nothing to be seen: a finger beside a screen ends no occlusion.
+pub const SPECK: f64 = 0.01;
+
 /// What one run is judged by. Shares are 0..1, distances in the unit of their equation.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Metrics {
@@ -79,10 +82,10 @@ impl Metrics {
 }
 
 /// TP: the tracker says that it tracks, and the mean of its features lies inside the true box of the person, of whom
-/// something is visible.
+/// more than a [`SPECK`] is visible.
 pub fn is_true_positive(frame: &FrameRecord) -> bool {
     let Some((truth, estimate)) = frame.truth.as_ref().zip(tracked(frame)) else { return false };
-    truth.visible > 0.0 && is_inside(&truth.bounds, estimate)
+    truth.visible >= SPECK && is_inside(&truth.bounds, estimate)
 }
 
 /// FP: the tracker says that it tracks, and it is wrong. One that says it is searching, or that the target is
@@ -152,10 +155,12 @@ pub fn time_to_acquire_s(frames: &[FrameRecord]) -> Option<f64> {
     Some(first.time_s - frames.first()?.time_s)
 }
 
-/// Commands that reached the camera over the counted time, each picture standing for one period.
+/// Commands that reached the camera over the counted time, which goes on for one period after the last picture. Pictures
+/// that were dropped took their time too.
 pub fn commands_per_s(frames: &[FrameRecord], frame_rate: f64) -> Option<f64> {
+    let elapsed_s = frames.last()?.time_s - frames.first()?.time_s + 1.0 / frame_rate;
     let commands: u32 = frames.iter().map(|frame| frame.commands).sum();
-    (!frames.is_empty()).then(|| f64::from(commands) * frame_rate / frames.len() as f64)
+    Some(f64::from(commands) / elapsed_s)
 }
 
 /// Arithmetic mean.

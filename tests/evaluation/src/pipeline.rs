@@ -57,6 +57,17 @@ struct Arrival {
     target: Option<TargetMeta>,
 }
 
+/// What reached the sink last, where it is a file in itself: an encoded picture.
+#[derive(Clone, Default)]
+pub(crate) struct LastBytes(Arc<Mutex<Vec<u8>>>);
+
+impl LastBytes {
+    /// Each can be had once.
+    pub fn take(&self) -> Vec<u8> {
+        std::mem::take(&mut *lock(&self.0))
+    }
+}
+
 /// Elements by name, with an error that says which is missing.
 pub(crate) trait Elements {
     fn element(&self, name: &'static str) -> Result<gst::Element, PipelineError>;
@@ -117,6 +128,18 @@ impl Pipeline {
         let started = self.bin.set_state(gst::State::Playing);
         started.map_err(|error| PipelineError::Start(self.posted().unwrap_or_else(|| error.to_string())))?;
         self.wait(|event| matches!(event, Event::Hungry))
+    }
+
+    /// What reaches the sink from now on; to be called before [`Self::start`].
+    pub fn last_bytes(&self) -> Result<LastBytes, PipelineError> {
+        let bytes = LastBytes::default();
+        let LastBytes(out) = bytes.clone();
+        self.bin.pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+            let map = info.buffer().and_then(|buffer| buffer.map_readable().ok());
+            *lock(&out) = map.map(|map| map.to_vec()).unwrap_or_default();
+            gst::PadProbeReturn::Ok
+        });
+        Ok(bytes)
     }
 
     /// Sends a picture through and waits until all elements have done with it; gives the target meta that it had at

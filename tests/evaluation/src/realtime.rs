@@ -47,7 +47,7 @@ pub(crate) fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Re
     if let Some(info) = journal.info {
         run.snapshots = journal.album.develop(&info)?;
     }
-    watched?;
+    journal.fault.map_or(watched, Err)?;
     if run.frames.is_empty() { Err(RunError::Nobody) } else { Ok(()) }
 }
 
@@ -67,6 +67,8 @@ struct Journal {
     frames: Vec<FrameRecord>,
     album: Album,
     info: Option<gst_video::VideoInfo>,
+    /// Why the tracker could not be told of a picture.
+    fault: Option<PipelineError>,
 }
 
 /// Follows the pictures on their way.
@@ -114,6 +116,10 @@ impl Watch {
         let counted = number >= self.first;
         let phase = Phase::of(counted, std::mem::replace(&mut journal.begun, counted));
         journal.tracked += u64::from(counted);
+        if phase == Phase::FirstBox {
+            // What the camera was told before belongs to no picture that counts.
+            count_commands(&self.camera, &mut journal.counted);
+        }
         drop(journal);
         let exposure = experiment::exposure(number, self.camera.frame_period());
         let (truth, _) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
@@ -169,10 +175,11 @@ impl Stream {
         on_buffer(&self.pipeline.pad(DECODER, "sink")?, move |_, buffer| watch.arrives(buffer.pts()));
         let (watch, pipeline) = (self.watch.clone(), self.pipeline.downgrade());
         on_buffer(&self.pipeline.pad(QUEUE, "src")?, move |_, buffer| {
-            let told =
-                pipeline.upgrade().map_or(Ok(()), |pipeline| watch.goes_to_tracker(&pipeline, buffer.pts()));
-            if let Err(error) = told {
-                gst::error!(gst::CAT_DEFAULT, "the tracker was told nothing: {error}");
+            let Some(pipeline) = pipeline.upgrade() else { return };
+            if let Err(error) = watch.goes_to_tracker(&pipeline, buffer.pts()) {
+                lock(&watch.journal).fault.get_or_insert(error);
+                // Nothing that comes now is worth waiting for. A stopped pipeline needs no waking.
+                let _ = pipeline.post_message(gst::message::Eos::new());
             }
         });
         let watch = self.watch.clone();
@@ -183,15 +190,20 @@ impl Stream {
         Ok(())
     }
 
-    /// Waits until it is `end` for the camera; an error ends it before.
+    /// Waits until it is `end` for the camera; a fault ends it before.
     fn watch_until(&self, end: Duration) -> Result<(), PipelineError> {
         let left = end.saturating_sub(self.watch.camera.now());
-        let left = gst::ClockTime::from_nseconds(left.as_nanos() as u64);
         let bus = self.pipeline.bus().ok_or(PipelineError::NoElement("bus"))?;
-        match bus.timed_pop_filtered(left, &[gst::MessageType::Error, gst::MessageType::Eos]) {
-            None => Ok(()),
-            Some(message) => Err(PipelineError::Posted(fault(&message).unwrap_or("the stream ended".into()))),
-        }
+        unbroken(&bus, gst::ClockTime::from_nseconds(left.as_nanos() as u64))
+    }
+}
+
+/// Waits for `left`; an error, a warning or the end of the stream ends it before. Being late (QoS) is none of them.
+fn unbroken(bus: &gst::Bus, left: gst::ClockTime) -> Result<(), PipelineError> {
+    use gst::MessageType::{Eos, Error, Warning};
+    match bus.timed_pop_filtered(left, &[Error, Warning, Eos]) {
+        None => Ok(()),
+        Some(message) => Err(PipelineError::Posted(fault(&message).unwrap_or("the stream ended".into()))),
     }
 }
 
@@ -235,4 +247,26 @@ fn on_buffer(pad: &gst::Pad, look: impl Fn(&gst::Pad, &gst::BufferRef) + Send + 
         }
         gst::PadProbeReturn::Ok
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_warning_breaks_the_run_and_being_late_does_not() {
+        gst::init().unwrap();
+        let bus = gst::Bus::new();
+        let late = || bus.post(gst::message::Qos::builder(true).build()).unwrap();
+        late();
+        assert!(unbroken(&bus, gst::ClockTime::from_mseconds(1)).is_ok());
+        let broken = || unbroken(&bus, gst::ClockTime::from_seconds(10)).unwrap_err().to_string();
+        late();
+        let warning = gst::message::Warning::builder(gst::StreamError::Decode, "half a picture").build();
+        bus.post(warning).unwrap();
+        let told = broken();
+        assert!(told.ends_with(": half a picture"), "{told}");
+        bus.post(gst::message::Eos::new()).unwrap();
+        assert_eq!(broken(), "the stream ended");
+    }
 }

@@ -173,9 +173,10 @@ named! {
         Acquired = "acquired",
         /// It says for the first time that the target is hidden.
         Occluded = "occluded",
-        /// It loses the target for the first time.
+        /// For the first time it says that it lost the target; or it is not right about a target that is to be seen, without
+        /// calling it occluded, after a true positive: some trackers never say so.
         Lost = "lost",
-        /// The target was never farther from the middle while it was in the picture.
+        /// The target was never farther from the middle while its own middle was in the picture.
         Worst = "worst",
     }
 }
@@ -187,7 +188,8 @@ pub struct Snapshot {
     pub moment: Moment,
     /// Index of its record in [`Run::frames`].
     pub frame: usize,
-    /// As the camera sent it, nothing drawn in.
+    /// Encoded anew as a JPEG, nothing drawn in: in virtual time from the picture before it went through the codec, else from
+    /// the decoded one. So it is not what the tracker saw to the last bit.
     pub jpeg: Vec<u8>,
 }
 

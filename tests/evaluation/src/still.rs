@@ -1,6 +1,10 @@
 //! A recording as it is, without any camera: only the tracked box is judged.
 
-use std::{path::PathBuf, sync::Arc, time::Duration};
+use std::{
+    path::{Path, PathBuf},
+    sync::Arc,
+    time::Duration,
+};
 
 use gst::prelude::*;
 use virtual_camera::{GroundTruth, People, Person, Picture};
@@ -39,8 +43,10 @@ pub(crate) fn drive(experiment: &Experiment, recording: &Recording, run: &mut Ru
     let mut samples = projector.samples();
     let first = samples.next().unwrap_or_else(|| Err(projector.fault()))?;
     let info = info(&first).ok_or_else(|| projector.fault())?;
-    let mut screening = Screening::begin(experiment, info)?;
-    (run.size, run.frame_rate) = (screening.size(), screening.frame_rate);
+    run.size = (info.width(), info.height());
+    let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
+    let mut screening = Screening::begin(experiment, info, film.as_deref())?;
+    run.frame_rate = screening.frame_rate;
     let mut album = Album::default();
     for (number, sample) in (0..=recording.last).zip(std::iter::once(Ok(first)).chain(samples)) {
         let people = recording.people.get(&number).map_or(&[][..], Vec::as_slice);
@@ -50,7 +56,7 @@ pub(crate) fn drive(experiment: &Experiment, recording: &Recording, run: &mut Ru
             run.frames.push(record);
         }
     }
-    if experiment.film.is_some() {
+    if film.is_some() {
         screening.pipeline.end()?;
     }
     run.snapshots = album.develop(&screening.info)?;
@@ -69,14 +75,18 @@ struct Screening<'a> {
 }
 
 impl<'a> Screening<'a> {
-    fn begin(experiment: &'a Experiment, info: gst_video::VideoInfo) -> Result<Self, RunError> {
+    fn begin(
+        experiment: &'a Experiment,
+        info: gst_video::VideoInfo,
+        film: Option<&Path>,
+    ) -> Result<Self, RunError> {
         let rate = f64::from(info.fps().numer()) / f64::from(info.fps().denom().max(1));
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, (info.width(), info.height()));
-        let sink = film::beside(&format!("fakesink name={SINK} sync=false async=false"), &experiment.film);
+        let sink = film::beside(&format!("fakesink name={SINK} sync=false async=false"), film);
         let description = format!("appsrc name={SOURCE} ! {} ! {sink}", tracker.description());
         let pipeline = Pipeline::new(&description, &info)?;
         tracker.attach(pipeline.bin())?;
-        if experiment.film.is_some() {
+        if film.is_some() {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;

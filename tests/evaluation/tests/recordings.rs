@@ -136,7 +136,7 @@ fn in_a_recording_as_it_is_the_box_is_judged() {
     assert_eq!(metrics.identity_switches, Some(0));
 
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("as-it-is");
-    report::write(&[ours, oracle], &out).unwrap();
+    report::write(&[ours, oracle], &[], &out).unwrap();
     let results = fs::read_to_string(out.join("results.csv")).unwrap();
     let mut lines = results.lines();
     assert!(lines.next().unwrap().contains(",identity_switches,success_pct,box_precision_20px_pct,"));

@@ -1,6 +1,6 @@
 //! Whether it is still the same person.
 
-use super::{distance, is_inside, is_true_positive, tracked};
+use super::{SPECK, distance, is_inside, is_true_positive, tracked};
 use crate::record::{FrameRecord, GroundTruth};
 
 /// The second that is looked at begins so long after the end of a full occlusion.
@@ -23,9 +23,9 @@ fn kept_from(frames: &[FrameRecord], begin_s: f64) -> Option<bool> {
     (!looked_at.is_empty()).then_some(2 * right >= looked_at.len())
 }
 
-/// Whether the person is wholly behind something, wherever the camera looks.
+/// Whether the person is behind something, wholly but for a [`SPECK`], wherever the camera looks.
 pub fn is_hidden(frame: &FrameRecord) -> bool {
-    frame.truth.as_ref().is_some_and(|truth| truth.unhidden <= 0.0)
+    frame.truth.as_ref().is_some_and(|truth| truth.unhidden < SPECK)
 }
 
 /// How often the person on whom the tracked point lies became another one. Where boxes overlap, the point is on the

@@ -158,11 +158,13 @@ fn time_to_acquire_ends_with_the_first_frame_that_is_right() {
 
 #[test]
 fn commands_are_counted_over_whole_periods() {
-    let mut frames = vec![at(MIDDLE, None); 50];
+    let mut frames = timed(vec![at(MIDDLE, None); 20]);
     frames[0].commands = 3;
-    frames[49].commands = 4;
-    assert_eq!(commands_per_s(&frames, 25.0), Some(3.5));
-    assert_eq!(commands_per_s(&[], 25.0), None);
+    frames[19].commands = 4;
+    assert_eq!(commands_per_s(&frames, 10.0), Some(3.5));
+    frames.drain(5..15);
+    assert_eq!(commands_per_s(&frames, 10.0), Some(3.5), "those in between were dropped");
+    assert_eq!(commands_per_s(&[], 10.0), None);
 }
 
 /// Hidden from frame 10 to 19, so that the second looked at is frames 30 to 39; right in `right` of them.
@@ -180,6 +182,13 @@ fn identity_is_kept_when_right_in_half_of_the_second_after_a_second() {
     assert_eq!(identity_kept(&comes_out(4)), Some(false));
     assert_eq!(identity_kept(&comes_out(5)[..28]), None, "ended before it could be seen");
     assert_eq!(identity_kept(&comes_out(5)[20..]), None, "nobody was hidden");
+    // A finger beside the screen ends no occlusion: what is said a second after it is not what counts.
+    let mut finger = comes_out(10);
+    finger[11] = FrameRecord { time_s: finger[11].time_s, ..seen(0.005, at(MIDDLE, says(Occluded, MIDDLE))) };
+    for frame in &mut finger[20..30] {
+        frame.estimate = says(Tracking, (0.0, 0.0));
+    }
+    assert_eq!(identity_kept(&finger), Some(true));
     let twice = timed(comes_out(10).into_iter().chain(comes_out(0)));
     assert_eq!(identity_kept(&twice), Some(false), "every time counts");
 }

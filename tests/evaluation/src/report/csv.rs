@@ -13,15 +13,25 @@ use crate::{
 /// Digits after the point; as many as the thesis gives.
 const DECIMALS: usize = 6;
 
-const SETUP: [&str; 8] =
-    ["seed", "codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms", "sweep"];
+const SETUP: [&str; 9] = [
+    "seed",
+    "codec",
+    "width",
+    "height",
+    "first_box",
+    "video_delay_ms",
+    "command_delay_ms",
+    "sweep",
+    "real_time",
+];
+/// What every line on a run begins with.
+const RUN: [&str; 3] = ["title", "test", "tracker"];
 
 /// One line a run.
 pub fn results(judged: &[Judged]) -> String {
     let figures = column::ALL.iter().map(|column| column.key);
     let mut csv = line(
-        ["title", "test", "tracker"]
-            .into_iter()
+        RUN.into_iter()
             .chain(SETUP)
             .chain(["frames", "frames_with_target"])
             .chain(figures)
@@ -39,6 +49,11 @@ pub fn results(judged: &[Judged]) -> String {
         csv += &line(cells);
     }
     csv
+}
+
+/// Whether a text is what [`results`] once wrote.
+pub fn is_results(text: &str) -> bool {
+    text.starts_with(&RUN.join(","))
 }
 
 /// One line a tracker and condition, and the thesis' own means of the same tests.
@@ -130,7 +145,7 @@ fn estimate(frame: &FrameRecord) -> [String; 9] {
     [state, x, y, left, top, width, height, estimate.id.to_string(), estimate.features.to_string()]
 }
 
-fn setup(setup: &Setup) -> [String; 8] {
+fn setup(setup: &Setup) -> [String; 9] {
     let (video, command) = (setup.delays.video.as_millis(), setup.delays.command.as_millis());
     [
         setup.seed.to_string(),
@@ -141,6 +156,7 @@ fn setup(setup: &Setup) -> [String; 8] {
         video.to_string(),
         command.to_string(),
         setup.sweep.to_string(),
+        setup.real_time.to_string(),
     ]
 }
 

@@ -11,7 +11,7 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
     (
         "True positive, false positive",
         "TP: the tracker says that it tracks, and its centroid (mean of its features; middle of the box where it has none) \
-         lies inside the true box of a person of whom something is visible. FP: it says that it tracks, and that is not so. \
+         lies inside the true box of a person of whom at least 1 % is visible; the box goes round what is hidden too. FP: it says that it tracks, and that is not so. \
          A tracker that says it is searching, or that the target is occluded or lost, is neither right nor wrong.",
     ),
     ("P", "TP / (TP + FP) (thesis 5.1). None for a tracker that never tracks."),
@@ -61,6 +61,21 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
          person's last box; a person without a box in between is outside.",
     ),
     (
+        "Servo",
+        "The same for all, with its defaults; it is not told of the delays. Only for the thesis it predicts by the average \
+         of a second.",
+    ),
+    (
+        "In real time",
+        "Pictures that were dropped are missing from all counts. A picture is held to be the newest that the camera had when \
+         it came.",
+    ),
+    (
+        "Read together",
+        "P, DP and distances only count pictures with the person in them (or tracked): who loses the person early and says \
+         so can have good ones. TF tells of the rest.",
+    ),
+    (
         "Means",
         "Every test counts the same. A test without a figure (no precision where nothing was ever tracked, no d_gp either) \
          is left out of that figure's mean.",
@@ -68,7 +83,7 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
     (
         "Bounds",
         "oracle knows the truth of the delayed picture, so what it loses is lost by servo and delay. still never moves the \
-         camera.",
+         camera; it is told the truth as well, so only its TF and d_gc say something.",
     ),
     (
         "The thesis' rows",

@@ -80,11 +80,11 @@ impl<'a> Judged<'a> {
     pub fn printed(&self) -> Option<&'static Row> {
         thesis::row_of(self.run.test?)
     }
+}
 
-    /// Name of a file.
-    pub fn file(&self) -> String {
-        format!("{}-{}", slug(&self.run.title), self.run.tracker)
-    }
+/// Name of a file of one run alone, without its ending: the setup is a folder.
+pub fn place(run: &Run) -> String {
+    format!("{}/{}-{}", Setup::of(run).folder(), slug(&run.title), run.tracker)
 }
 
 /// A title as part of a file name.
@@ -115,6 +115,11 @@ impl<'a> Section<'a> {
     /// The runs of one tracker.
     pub fn of(&self, tracker: TrackerName) -> impl Iterator<Item = &'a Judged<'a>> + use<'a> {
         self.runs.iter().filter(move |judged| judged.run.tracker == tracker)
+    }
+
+    /// Those of them that came to their end: only they are comparable.
+    pub fn whole(&self, tracker: TrackerName) -> impl Iterator<Item = &'a Judged<'a>> + use<'a> {
+        self.of(tracker).filter(|one| one.run.error.is_none())
     }
 
     /// What was shown, each once.

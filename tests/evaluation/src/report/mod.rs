@@ -17,6 +17,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub(crate) use judged::place;
 use judged::{Judged, Section};
 use plot::Plot;
 use table::Table;
@@ -39,6 +40,9 @@ pub(crate) mod made_up;
 #[cfg(test)]
 mod tests;
 
+/// By it a folder is known to hold a report.
+const RESULTS: &str = "results.csv";
+
 /// The tests of the thesis' figures 5.10 to 5.13, and the first with a full occlusion.
 const SHOWN: [TestId; 5] = [TestId(1), TestId(7), TestId(13), TestId(19), TestId(37)];
 
@@ -59,34 +63,70 @@ pub struct ReportError {
     source: io::Error,
 }
 
-/// Writes everything about `runs` into the folder `out`, which is made where it is missing.
+/// Makes the folder `out` where it is missing, and tries to write into it: better now than after hours of work.
+///
+/// # Errors
+/// Where nothing can be written there.
+pub fn make_room(out: &Path) -> Result<(), ReportError> {
+    let probe = out.join(format!(".probe-{}", std::process::id()));
+    fs::create_dir_all(out)
+        .and_then(|()| fs::write(&probe, ""))
+        .and_then(|()| fs::remove_file(&probe))
+        .map_err(|source| ReportError { path: out.into(), source })
+}
+
+/// Writes everything about `runs` into the folder `out`, which is made where it is missing; `left_out` says which trackers
+/// were not run and why. What an earlier report left there is gone.
 ///
 /// # Errors
 /// Where a file cannot be written. A missing gnuplot is no error but a note.
-pub fn write(runs: &[Run], out: &Path) -> Result<Report, ReportError> {
+pub fn write(runs: &[Run], left_out: &[String], out: &Path) -> Result<Report, ReportError> {
     let judged = Judged::all(runs);
-    let content = Content::of(&judged);
-    save(&out.join("results.csv"), &csv::results(&judged))?;
-    save(&out.join("conditions.csv"), &csv::by_condition(&content.sections))?;
+    let content = Content::of(&judged, left_out);
+    clear(out)?;
+    save(&out.join(RESULTS), csv::results(&judged))?;
+    save(&out.join("conditions.csv"), csv::by_condition(&content.sections))?;
     for one in &judged {
-        let file = format!("frames/{}/{}.csv", one.setup.folder(), one.file());
-        save(&out.join(file), &csv::frames(&one.run.frames))?;
+        save(&out.join(format!("frames/{}.csv", place(one.run))), csv::frames(&one.run.frames))?;
     }
     let plots = out.join("plots");
     fs::create_dir_all(&plots).map_err(|source| ReportError { path: plots.clone(), source })?;
-    let mut notes: Vec<_> = content.failures().map(|(what, why)| format!("{what} failed: {why}")).collect();
+    let failures = content.failures().map(|(what, why)| format!("{what} failed: {why}"));
+    let mut notes: Vec<_> = left_out.iter().cloned().chain(failures).collect();
     notes.extend(content.draw(&plots));
     let summary = content.summary();
-    save(&out.join("summary.md"), &summary)?;
-    save(&out.join("tests.md"), &content.test_by_test())?;
-    save(&out.join("index.html"), &page::html(&content, &plots))?;
+    save(&out.join("summary.md"), with_notes(&summary, &notes))?;
+    save(&out.join("tests.md"), content.test_by_test())?;
+    save(&out.join("index.html"), page::html(&content, &plots))?;
     Ok(Report { summary, notes })
 }
 
-fn save(path: &Path, text: &str) -> Result<(), ReportError> {
+/// Removes the folders of an earlier report: nothing of it shall stand beside the new tables. Where there is none, folders of
+/// these names are somebody else's.
+fn clear(out: &Path) -> Result<(), ReportError> {
+    if !fs::read_to_string(out.join(RESULTS)).is_ok_and(|text| csv::is_results(&text)) {
+        return Ok(());
+    }
+    for path in ["frames", "plots"].map(|folder| out.join(folder)) {
+        match fs::remove_dir_all(&path) {
+            Err(source) if source.kind() != io::ErrorKind::NotFound => {
+                return Err(ReportError { path, source });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn with_notes(summary: &str, notes: &[String]) -> String {
+    let list: String = notes.iter().map(|note| format!("- {note}\n")).collect();
+    if list.is_empty() { summary.into() } else { format!("{summary}\nNotes\n\n{list}") }
+}
+
+pub(crate) fn save(path: &Path, content: impl AsRef<[u8]>) -> Result<(), ReportError> {
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)
-        .and_then(|()| fs::write(path, text))
+        .and_then(|()| fs::write(path, content))
         .map_err(|source| ReportError { path: path.into(), source })
 }
 
@@ -96,12 +136,14 @@ struct Content<'a> {
     sections: Vec<Section<'a>>,
     /// Runs that differ in delay, in order of delay.
     sweep: Vec<Section<'a>>,
+    /// Why trackers were not run.
+    left_out: &'a [String],
 }
 
 impl<'a> Content<'a> {
-    fn of(judged: &'a [Judged<'a>]) -> Self {
+    fn of(judged: &'a [Judged<'a>], left_out: &'a [String]) -> Self {
         let (sweep, sections) = Section::all(judged).into_iter().partition(|section| section.setup.sweep);
-        Self { sections, sweep }
+        Self { sections, sweep, left_out }
     }
 
     /// What is looked at closely: the thesis' figures, or else the first there is.
@@ -129,7 +171,7 @@ impl<'a> Content<'a> {
         });
         let plots = over_time.chain(self.plots_against_delay());
         let failed: Vec<_> = plots.filter_map(|plot| plot.draw(folder).err()).collect();
-        failed.first().map(|error| format!("no plots: {error}; install gnuplot (Debian: gnuplot-nox)"))
+        failed.first().map(|error| format!("plots are missing ({} of them): {error}", failed.len()))
     }
 
     fn failures(&self) -> impl Iterator<Item = (String, &'a str)> {

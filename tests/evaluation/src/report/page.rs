@@ -29,8 +29,8 @@ pub fn html(content: &Content, plots: &Path) -> String {
          <style>\n{STYLE}</style>\n<h1>Following a person with a moving camera</h1>\n\
          <p>ptztrack {version}. The thesis' tests (its chapter 5), rerun in closed loop against a virtual camera in a \
          simulated room, and recordings of real people: pictures delayed, encoded and decoded, commands delayed, every \
-         tracker with the same servo. The same seed gives the same figures on any machine.</p>\n{}{sections}{}{}",
-        failures(content),
+         tracker with the same servo. The same seed gives the same figures on any x86-64 machine with the same libraries.</p>\n{}{sections}{}{}",
+        left_out(content) + &failures(content),
         sweep(content, plots),
         definitions(),
     )
@@ -85,13 +85,25 @@ fn definitions() -> String {
     )
 }
 
+fn left_out(content: &Content) -> String {
+    let list = content.left_out.iter().map(|reason| format!("<li>{}</li>\n", escape(reason)));
+    let list: String = list.collect();
+    titled(
+        "h2",
+        "Trackers that were left out",
+        if list.is_empty() { list } else { format!("<ul>\n{list}</ul>\n") },
+    )
+}
+
 fn failures(content: &Content) -> String {
     let line = |(what, why): (String, &str)| format!("<li>{}: {}</li>\n", escape(&what), escape(why));
     let list: String = content.failures().map(line).collect();
     if list.is_empty() {
         list
     } else {
-        format!("<h2>Runs that failed</h2>\n<p>Counted up to there.</p>\n<ul>\n{list}</ul>\n")
+        format!(
+            "<h2>Runs that failed</h2>\n<p>Counted up to there, and left out of all means.</p>\n<ul>\n{list}</ul>\n"
+        )
     }
 }
 

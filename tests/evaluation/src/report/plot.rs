@@ -1,7 +1,6 @@
 //! Plots, drawn by gnuplot where it is installed.
 
 use std::{
-    fs,
     io::{self, Write},
     path::Path,
     process::{Command, Stdio},
@@ -69,7 +68,7 @@ impl Plot {
             .iter()
             .map(|name| {
                 let points = sweep.iter().map(|section| {
-                    let mean = column.mean(section.of(*name).map(|one| &one.metrics));
+                    let mean = column.mean(section.whole(*name).map(|one| &one.metrics));
                     (section.setup.delays.total().as_secs_f64() * 1e3, mean)
                 });
                 datablock("delay", *name, points)
@@ -92,21 +91,28 @@ impl Plot {
     /// # Errors
     /// Where gnuplot is missing or fails.
     pub fn draw(&self, folder: &Path) -> io::Result<()> {
-        // One of an earlier run would otherwise be taken for this one's.
-        match fs::remove_file(folder.join(&self.file)) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => return Err(error),
-            _ => {}
-        }
-        let mut gnuplot = Command::new("gnuplot")
+        let gnuplot = Command::new("gnuplot")
             .current_dir(folder)
             .stdin(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()?;
-        if let Some(mut input) = gnuplot.stdin.take() {
-            input.write_all(self.script.as_bytes())?;
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn();
+        let mut gnuplot = gnuplot.map_err(|error| match error.kind() {
+            io::ErrorKind::NotFound => {
+                io::Error::other("there is no gnuplot; install it (Debian: gnuplot-nox)")
+            }
+            _ => error,
+        })?;
+        // Where it stops reading, what it says of that is worth more than the broken pipe.
+        let written =
+            gnuplot.stdin.take().map_or(Ok(()), |mut input| input.write_all(self.script.as_bytes()));
+        let output = gnuplot.wait_with_output()?;
+        if output.status.success() {
+            return written;
         }
-        let status = gnuplot.wait()?;
-        if status.success() { Ok(()) } else { Err(io::Error::other(format!("gnuplot failed ({status})"))) }
+        let said = String::from_utf8_lossy(&output.stderr);
+        let why = said.lines().map(str::trim).rfind(|line| !line.is_empty()).unwrap_or("without a word");
+        Err(io::Error::other(format!("gnuplot failed ({}): {why}", output.status)))
     }
 }
 
@@ -192,5 +198,21 @@ pub fn colour(tracker: TrackerName) -> &'static str {
         TrackerName::MedianFlow => "#56b4e9",
         TrackerName::Oracle => "#000000",
         TrackerName::Still => "#999999",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gnuplot_tells_itself_why_it_failed() {
+        let plot =
+            Plot { file: "none.png".into(), caption: String::new(), script: "plot nonsense(\n".into() };
+        let told = plot.draw(&std::env::temp_dir()).unwrap_err().to_string();
+        let there = Command::new("gnuplot").arg("--version").output().is_ok();
+        assert_eq!(told.contains("install"), !there, "{told}");
+        assert_eq!(told.contains("): "), there, "{told}");
+        assert!(!told.ends_with("without a word"), "{told}");
     }
 }

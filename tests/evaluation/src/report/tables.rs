@@ -11,7 +11,7 @@ use crate::{metrics::Metrics, record::TrackerName};
 /// What the thesis' own figures are called beside those of its profile, rerun.
 pub const PRINTED: &str = "thesis, as printed";
 
-/// Trackers × figures, over all tests.
+/// Trackers × figures, over all tests that came to their end.
 pub fn overview(section: &Section) -> Table {
     let tests = section.printed().len();
     let dropped = section.setup.real_time.then_some(&column::DROPPED);
@@ -92,7 +92,7 @@ pub fn against_delay(sweep: &[Section], column: &Column) -> Table {
     let trackers = swept(sweep);
     let line = |section: &Section| {
         let delays = section.setup.delays;
-        let mean = |name: &TrackerName| column.mean(section.of(*name).map(|one| &one.metrics));
+        let mean = |name: &TrackerName| column.mean(section.whole(*name).map(|one| &one.metrics));
         let cells = trackers.iter().map(|name| column.show(mean(name)));
         std::iter::once(delays.total().as_millis().to_string()).chain(cells).collect()
     };
@@ -122,7 +122,7 @@ pub fn in_condition<'a>(
     condition: &Condition,
 ) -> impl Iterator<Item = &'a Metrics> {
     let included = |one: &&Judged| one.printed().is_some_and(|row| (condition.includes)(&row.conditions));
-    section.of(tracker).filter(included).map(|one| &one.metrics)
+    section.whole(tracker).filter(included).map(|one| &one.metrics)
 }
 
 /// The thesis' figures in tests of a condition.
@@ -131,7 +131,7 @@ pub fn printed_in<'a>(rows: &'a [&Row], condition: &Condition) -> impl Iterator<
 }
 
 fn tests_of<'a>(section: &Section<'a>, tracker: TrackerName) -> impl Iterator<Item = &'a Judged<'a>> {
-    section.of(tracker).filter(|one| one.run.test.is_some())
+    section.whole(tracker).filter(|one| one.run.test.is_some())
 }
 
 fn headings(first: &[&str], rest: impl IntoIterator<Item = String>) -> Vec<String> {

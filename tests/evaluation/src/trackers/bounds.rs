@@ -6,6 +6,7 @@ use ptztrack_contract::{Point, TargetMeta, TargetState, Vector};
 
 use super::{Cue, CurrentCue, Phase, attach_targets, normalised, rate};
 use crate::{
+    metrics::SPECK,
     pipeline::{Elements, PipelineError, lock},
     record::GroundTruth,
 };
@@ -24,7 +25,7 @@ type Last = Option<(TargetMeta, Option<gst::ClockTime>)>;
 fn tell(cue: &Cue, time: Option<gst::ClockTime>, last: &mut Last) -> TargetMeta {
     let truth = cue.truth.as_ref().filter(|_| cue.phase != Phase::Before);
     let target = match truth {
-        Some(truth) if truth.visible > 0.0 => see(truth, cue.size, time, last),
+        Some(truth) if truth.visible >= SPECK => see(truth, cue.size, time, last),
         Some(_) | None => match last.take() {
             Some((before, _)) => TargetMeta { state: TargetState::Occluded, ..before },
             None => TargetMeta::default(),

@@ -56,7 +56,7 @@ pub struct RoomSettings {
     pub occlusion: Occlusion,
     /// Of walking: 1.4 m/s, or once up to 2.2 and once down to 0.8 m/s.
     pub speed: Change,
-    /// Of walking: across the room, or half of the way and back.
+    /// Of walking: across the room, or almost across and back, so that the turn is half-way.
     pub direction: Change,
     /// Who walks.
     pub subject: Subject,
@@ -101,6 +101,13 @@ impl RoomSettings {
         let (occlusion, lighting, subject) =
             (self.occlusion as u32, self.lighting as u32, self.subject as u32);
         1 + 36 * direction + 18 * speed + 6 * occlusion + 3 * lighting + subject
+    }
+
+    /// The number of the way that is walked: tests that differ by light and occlusion alone share one, so that
+    /// nothing else differs between them (thesis 5.1).
+    pub(super) fn way(&self) -> u64 {
+        let plain = Self { lighting: Lighting::Optimal, occlusion: Occlusion::None, ..self.clone() };
+        u64::from(plain.number())
     }
 
     /// From the start of the world, empty for two seconds, to the end of the person's way.

@@ -5,7 +5,7 @@ use std::ops::Range;
 use super::{
     cover::cover,
     surface::Surface,
-    texture::{SPAN, Texture},
+    texture::{SPAN, Texture, Way},
 };
 use crate::{
     geometry::{Matrix, Pinhole},
@@ -18,7 +18,7 @@ const PIECES: usize = 4;
 /// How far straight lines may lead astray, in pixels.
 const ASTRAY: f64 = 0.1;
 /// Light is computed at least so often, in metres.
-const LIGHT_STEP: f64 = 0.25;
+const LIGHT_STEP: f64 = 0.5;
 /// Where a pixel covers so many pixels of the grain, nothing of it is left to see.
 const COARSEST_GRAIN: f64 = 7.0;
 
@@ -59,7 +59,7 @@ impl<'a> Brush<'a> {
         let material = &*self.surface.material;
         let (mut values, mut rough, mut light) = ([0; SPAN], [0; SPAN], [0; SPAN]);
         self.paint(polygon, size, [plane], |span, [line]| {
-            let count = line.len();
+            let count = padded(line.len());
             sample(&material.luma, material.tile, span, &mut values[..count]);
             let grain = material.detail.as_ref();
             if let Some(grain) = grain.filter(|grain| span.footprint * grain.per_metre < COARSEST_GRAIN) {
@@ -77,9 +77,10 @@ impl<'a> Brush<'a> {
         let material = &*self.surface.material;
         let (mut values, mut light) = ([0; SPAN], [0; SPAN]);
         self.paint(polygon, size, planes, |span, lines| {
-            span.light(&mut light[..lines[0].len()]);
+            let count = padded(lines[0].len());
+            span.light(&mut light[..count]);
             for (index, line) in lines.into_iter().enumerate() {
-                let values = &mut values[..line.len()];
+                let values = &mut values[..count];
                 match material.plain[index] {
                     Some(value) => values.fill(i16::from(value) << 7),
                     None => sample(&material.chroma[index], material.tile, span, values),
@@ -168,59 +169,47 @@ impl<'a> Brush<'a> {
 }
 
 impl Span {
-    /// A quantity between the spots, `scale` being what it is multiplied by.
-    fn along<T: Copy + Wrapping>(&self, quantity: impl Fn(&Spot) -> f64, scale: f64, values: &mut [T]) {
-        for (values, ends) in values.chunks_mut(self.piece).zip(self.spots.windows(2)) {
-            let (from, to) = (quantity(&ends[0]) * scale, quantity(&ends[1]) * scale);
-            let (mut value, step) = (T::of(from), T::of((to - from) / self.piece as f64));
-            for place in values {
-                *place = value;
-                value = value.plus(step);
+    /// Brightness of its pixels, in 1/16384.
+    fn light(&self, light: &mut [i16]) {
+        let share = self.share();
+        for (light, ends) in light.chunks_mut(self.piece).zip(self.spots.windows(2)) {
+            let (from, to) = (f64::from(ends[0].light) * 16384.0, f64::from(ends[1].light) * 16384.0);
+            let (mut value, step) = (from as i16, ((to - from) * share) as i16);
+            for light in light {
+                *light = value;
+                value = value.wrapping_add(step);
             }
         }
     }
 
-    /// Brightness of its pixels, in 1/16384.
-    fn light(&self, light: &mut [i16]) {
-        self.along(|spot| f64::from(spot.light), 16384.0, light);
+    /// What part of a straight piece a pixel is: exact, as pieces are powers of two.
+    fn share(&self) -> f64 {
+        1.0 / self.piece as f64
+    }
+
+    /// Its straight pieces on a tile so many metres wide and high.
+    fn ways(&self, tile: (f64, f64)) -> impl Iterator<Item = Way> {
+        const WHOLE: f64 = 4_294_967_296.0;
+        let (scale, share) = ((WHOLE / tile.0, WHOLE / tile.1), self.share());
+        self.spots.windows(2).map(move |ends| {
+            let [from, to] = [&ends[0], &ends[1]].map(|spot| [spot.u * scale.0, spot.v * scale.1]);
+            let step = [0, 1].map(|axis| (to[axis] - from[axis]) * share);
+            // Whole tiles are left out.
+            let part = |value: f64| value as i64 as u32;
+            Way { start: from.map(part), step: step.map(part) }
+        })
     }
 }
 
-/// A whole number that begins again where it ends.
-trait Wrapping {
-    fn of(value: f64) -> Self;
-    fn plus(self, other: Self) -> Self;
-}
-
-impl Wrapping for u32 {
-    fn of(value: f64) -> Self {
-        value as i64 as u32
-    }
-
-    fn plus(self, other: Self) -> Self {
-        self.wrapping_add(other)
-    }
-}
-
-impl Wrapping for i16 {
-    fn of(value: f64) -> Self {
-        value as i16
-    }
-
-    fn plus(self, other: Self) -> Self {
-        self.wrapping_add(other)
-    }
+/// As many pixels as straight pieces are multiples of: what is reckoned in loops of that length needs no remainder.
+fn padded(count: usize) -> usize {
+    count.next_multiple_of(SPAN / PIECES)
 }
 
 /// What pixels of a span show of a texture whose tile is `tile` metres wide and high, in 1/128.
 fn sample(texture: &Texture, tile: (f64, f64), span: &Span, values: &mut [i16]) {
-    const WHOLE: f64 = 4_294_967_296.0;
-    let (mut u, mut v) = ([0u32; SPAN], [0u32; SPAN]);
-    let (u, v) = (&mut u[..values.len()], &mut v[..values.len()]);
-    span.along(|spot| spot.u, WHOLE / tile.0, u);
-    span.along(|spot| spot.v, WHOLE / tile.1, v);
     let per_metre = texture.side() / (tile.0 * tile.1).sqrt();
-    texture.fitting(span.footprint * per_metre).sample([u, v], values);
+    texture.fitting(span.footprint * per_metre).sample(span.ways(tile), span.piece, values);
 }
 
 /// Pixels of so much brightness in 1/128 under a light in 1/16384.

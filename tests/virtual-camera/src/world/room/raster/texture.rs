@@ -20,6 +20,14 @@ pub(in super::super) struct Level {
     cells: Vec<u32>,
 }
 
+/// A straight way over a tile, u and v: its first place, and how far it is from pixel to pixel.
+///
+/// Places count in 1/2^32 of the tile and so repeat by themselves.
+pub(in super::super) struct Way {
+    pub start: [u32; 2],
+    pub step: [u32; 2],
+}
+
 /// Footprints at which the next step begins: 2^(1/4), 2^(3/4) and so on.
 const STEPS: [f64; 12] = [1.189, 1.682, 2.378, 3.364, 4.757, 6.727, 9.514, 13.45, 19.03, 26.91, 38.05, 53.82];
 
@@ -90,32 +98,62 @@ impl Level {
         Self { shift, cells: (0..side * side).map(cell).collect() }
     }
 
-    /// Brightness at places: the mean of the four pixels around each, in 1/128.
+    /// Brightness along straight ways of `piece` pixels each: the mean of the four pixels around each place, in 1/128.
     ///
-    /// Places count in 1/2^32 of the tile and so repeat by themselves. Loading is pixel by pixel; the arithmetic is in a
-    /// loop that the compiler makes eight pixels wide.
-    pub fn sample(&self, [u, v]: [&[u32]; 2], values: &mut [i16]) {
+    /// Loading is pixel by pixel; all arithmetic is in loops that the compiler makes several pixels wide, each over
+    /// numbers of one width as far as possible.
+    pub fn sample(&self, ways: impl Iterator<Item = Way>, piece: usize, values: &mut [i16]) {
+        let count = values.len().min(SPAN);
+        let (mut cells, mut shares) = ([0u32; SPAN], [[0i16; SPAN]; 2]);
+        let [right, down] = &mut shares;
+        let places = cells[..count].chunks_mut(piece);
+        let shares = right[..count].chunks_mut(piece).zip(down[..count].chunks_mut(piece));
+        for ((way, cells), (right, down)) in ways.zip(places).zip(shares) {
+            self.places(&way, cells, [right, down]);
+        }
+        let all = &self.cells[..1 << (2 * self.shift)];
+        for cell in &mut cells[..count] {
+            *cell = all[*cell as usize];
+        }
+        let mut corners = [[0i16; SPAN]; 4];
+        unpack(&cells[..count], &mut corners);
+        blend(&corners, [right, down], &mut values[..count]);
+    }
+
+    /// The cell of each place on a way, and how far right and down it lies in there: in 1/128 and in 1/32768.
+    fn places(&self, way: &Way, cells: &mut [u32], [right, down]: [&mut [i16]; 2]) {
         let shift = self.shift;
-        let cells = &self.cells[..1 << (2 * shift)];
         // Values stand for the middles of pixels.
         let middle = (1u32 << 31) >> shift;
-        let mut corners = [0u32; SPAN];
-        let count = values.len().min(SPAN);
-        for ((corners, &u), &v) in corners[..count].iter_mut().zip(u).zip(v) {
-            let (u, v) = (u.wrapping_sub(middle), v.wrapping_sub(middle));
-            let at = (v >> (32 - shift)) << shift | u >> (32 - shift);
-            *corners = cells[at as usize];
+        let (mut u, mut v) = (way.start[0].wrapping_sub(middle), way.start[1].wrapping_sub(middle));
+        for ((cell, right), down) in cells.iter_mut().zip(right).zip(down) {
+            *cell = (v >> (32 - shift)) << shift | u >> (32 - shift);
+            *right = (u << shift >> 25) as i16;
+            *down = (v << shift >> 17) as i16;
+            (u, v) = (u.wrapping_add(way.step[0]), v.wrapping_add(way.step[1]));
         }
-        for (((value, &corners), &u), &v) in values.iter_mut().zip(&corners[..count]).zip(u).zip(v) {
-            let right = (u.wrapping_sub(middle) << shift >> 25) as i16;
-            let down = (v.wrapping_sub(middle) << shift >> 17) as i16;
-            let (a, b) = ((corners & 255) as i16, (corners >> 8 & 255) as i16);
-            let (c, d) = ((corners >> 16 & 255) as i16, (corners >> 24) as i16);
-            let above = (a << 7).wrapping_add((b - a).wrapping_mul(right));
-            let below = (c << 7).wrapping_add((d - c).wrapping_mul(right));
-            let between = ((i32::from(below.wrapping_sub(above)) * i32::from(down)) >> 16) as i16;
-            *value = above.wrapping_add(between << 1);
-        }
+    }
+}
+
+/// Cells' four pixels: itself, right, below, below right.
+fn unpack(cells: &[u32], [a, b, c, d]: &mut [[i16; SPAN]; 4]) {
+    for ((((&cell, a), b), c), d) in cells.iter().zip(a).zip(b).zip(c).zip(d) {
+        *a = (cell & 255) as i16;
+        *b = (cell >> 8 & 255) as i16;
+        *c = (cell >> 16 & 255) as i16;
+        *d = (cell >> 24) as i16;
+    }
+}
+
+/// What lies between four pixels, in 1/128.
+fn blend([a, b, c, d]: &[[i16; SPAN]; 4], [right, down]: [&[i16; SPAN]; 2], values: &mut [i16]) {
+    let pixels = a.iter().zip(b).zip(c.iter().zip(d));
+    let shares = right.iter().zip(down);
+    for ((value, ((&a, &b), (&c, &d))), (&right, &down)) in values.iter_mut().zip(pixels).zip(shares) {
+        let above = (a << 7).wrapping_add((b - a).wrapping_mul(right));
+        let below = (c << 7).wrapping_add((d - c).wrapping_mul(right));
+        let between = ((i32::from(below.wrapping_sub(above)) * i32::from(down)) >> 16) as i16;
+        *value = above.wrapping_add(between << 1);
     }
 }
 
@@ -155,7 +193,8 @@ mod tests {
     fn at(level: &Level, u: f64, v: f64) -> i16 {
         let place = |pixels: f64| (pixels * f64::from(1u32 << 31)) as u64 as u32;
         let mut values = [0; 3];
-        level.sample([&[place(u); 3], &[place(v); 3]], &mut values);
+        let way = Way { start: [place(u), place(v)], step: [0; 2] };
+        level.sample(std::iter::once(way), 3, &mut values);
         values[1]
     }
 
@@ -176,7 +215,8 @@ mod tests {
         let contrast = |footprint| {
             let level = texture.fitting(footprint);
             let mut values = [0; 2];
-            level.sample([&[1 << 29, 3 << 29], &[1 << 29; 2]], &mut values);
+            let way = Way { start: [1 << 29; 2], step: [2 << 29, 0] };
+            level.sample(std::iter::once(way), 2, &mut values);
             (values[1] - values[0]) >> 7
         };
         assert_eq!([0.1, 1.0, 1.4, 2.0, 99.0].map(contrast), [80, 80, 0, 0, 0]);

@@ -46,7 +46,7 @@ impl Walker {
         let mut person = root.fork(PERSON).fork(settings.subject as u64);
         let build = Build::of(settings.subject, &mut person);
         let outfit = Outfit::of(settings.subject, &mut person);
-        let phase = root.fork(STEP).fork(u64::from(settings.number())).unit();
+        let phase = root.fork(STEP).fork(settings.way()).unit();
         let gait = Gait::new(Walk::new(settings), build.clone(), phase);
         Self { build, outfit, gait, repeats: settings.repeats }
     }

@@ -23,7 +23,7 @@ const NEARNESS: f64 = 0.76;
 
 /// What must stand in the way of `walker`, if anything.
 pub(super) fn obstacle(walker: &Walker, settings: &RoomSettings) -> Option<(Obstacle, Solid)> {
-    let mut chance = Seeded::new(settings.seed).fork(0x0b57).fork(u64::from(settings.number()));
+    let mut chance = Seeded::new(settings.seed).fork(0x0b57).fork(settings.way());
     let begins = walker.walk().entry() + chance.range(AFTER_ENTRY.0, AFTER_ENTRY.1);
     match settings.occlusion {
         Occlusion::None => None,

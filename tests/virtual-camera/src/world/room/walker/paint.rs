@@ -1,5 +1,7 @@
 //! Painting skins into a picture, nearest first, several samples a pixel.
 
+use std::ops::Range;
+
 use super::{
     super::{
         light::Light,
@@ -171,14 +173,14 @@ struct Texture<'a> {
 }
 
 impl Texture<'_> {
-    fn texel(&self, column: i32, row: i32) -> [u8; 4] {
-        let mask = self.side - 1;
-        self.texels[(row as usize & mask) * self.side + (column as usize & mask)]
+    /// A row's texels.
+    fn row(&self, row: i32) -> &[[u8; 4]] {
+        &self.texels[(row as usize & (self.side - 1)) * self.side..][..self.side]
     }
 
     /// The nearest texel; places in 65536ths of texels, shade in 256ths.
     fn far(&self, u: i32, v: i32, shade: i32) -> [u8; 4] {
-        let [y, u, v, _] = self.texel(u >> 16, v >> 16).map(i32::from);
+        let [y, u, v, _] = self.row(v >> 16)[(u >> 16) as usize & (self.side - 1)].map(i32::from);
         lit([y, u, v], shade)
     }
 
@@ -186,8 +188,9 @@ impl Texture<'_> {
     fn close(&self, u: i32, v: i32, shade: i32) -> [u8; 4] {
         let (column, row) = (u >> 16, v >> 16);
         let (across, down) = (u >> 8 & 255, v >> 8 & 255);
-        let four =
-            [(0, 0), (1, 0), (0, 1), (1, 1)].map(|(right, below)| self.texel(column + right, row + below));
+        let columns = [column, column + 1].map(|column| column as usize & (self.side - 1));
+        let [above, below] = [row, row + 1].map(|row| columns.map(|column| self.row(row)[column]));
+        let four = [above[0], above[1], below[0], below[1]];
         let mixed = [0, 1, 2].map(|part| {
             let [a, b, c, d] = four.map(|texel| i32::from(texel[part]));
             let (above, below) = (a * 256 + (b - a) * across, c * 256 + (d - c) * across);
@@ -199,23 +202,32 @@ impl Texture<'_> {
     }
 }
 
-/// Y, U, V and 255 for "covered". Black stays black, grey stays grey.
+/// Y, U, V and 1 for "covered". Black stays black, grey stays grey.
 fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
     let scaled = |value: i32, zero: i32| (zero + (((value - zero) * shade + 128) >> 8)).clamp(0, 255) as u8;
-    [scaled(y, 16), scaled(u, 128), scaled(v, 128), 255]
+    [scaled(y, 16), scaled(u, 128), scaled(v, 128), 1]
 }
 
 /// Averages the samples of every pixel over what the picture shows behind them.
 fn blend(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
-    let (fine, stride) = (window.fineness, window.samples().0);
+    match window.fineness {
+        1 => blend_fine::<1>(window, colours, canvas),
+        _ => blend_fine::<2>(window, colours, canvas),
+    }
+}
+
+/// The same for so many samples along a pixel's side, known beforehand: sums need no loops.
+fn blend_fine<const FINE: usize>(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
+    let stride = window.samples().0;
     let [luma, chroma @ ..] = &mut canvas.planes;
-    for y in (0..window.height).step_by(2) {
-        for x in (0..window.width).step_by(2) {
+    for (index, rows) in colours.chunks(2 * FINE * stride).enumerate() {
+        let (y, covered) = (2 * index, covered(rows, stride));
+        for x in (((covered.start / FINE) & !1)..covered.end.div_ceil(FINE)).step_by(2) {
             let mut block = Sum::default();
-            for (x, y) in [(x, y), (x + 1, y), (x, y + 1), (x + 1, y + 1)] {
-                if x < window.width && y < window.height {
-                    let sum = Sum::of(colours, y * fine * stride + x * fine, stride, fine);
-                    sum.over(&mut luma.data[(window.top + y) * luma.width + window.left + x], 0);
+            for (x, down) in [(x, 0), (x + 1, 0), (x, 1), (x + 1, 1)] {
+                if x < window.width && y + down < window.height {
+                    let sum = Sum::of::<FINE>(rows, down * FINE * stride + x * FINE, stride);
+                    sum.over(&mut luma.data[(window.top + y + down) * luma.width + window.left + x], 0);
                     block.add(sum);
                 }
             }
@@ -227,6 +239,17 @@ fn blend(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
     }
 }
 
+/// From the first to the last column of some rows in which there is any skin.
+fn covered(rows: &[[u8; 4]], stride: usize) -> Range<usize> {
+    let none = |colour: &&[u8; 4]| colour[3] == 0;
+    let (mut start, mut end) = (stride, 0);
+    for row in rows.chunks_exact(stride) {
+        start = start.min(row.iter().take_while(none).count());
+        end = end.max(stride - row.iter().rev().take_while(none).count());
+    }
+    start..end
+}
+
 /// Y, U, V and coverage of some samples together; what is not covered is black.
 #[derive(Default, Clone, Copy)]
 struct Sum {
@@ -235,19 +258,19 @@ struct Sum {
 }
 
 impl Sum {
-    /// A square of samples.
-    fn of(colours: &[[u8; 4]], first: usize, stride: usize, side: usize) -> Self {
+    /// A square of samples, a power of two along its side.
+    fn of<const SIDE: usize>(colours: &[[u8; 4]], first: usize, stride: usize) -> Self {
         // Two parts at a time, each with 16 bits to grow.
         let (mut even, mut odd) = (0u32, 0u32);
-        for row in 0..side {
-            for &colour in &colours[first + row * stride..][..side] {
+        for row in 0..SIDE {
+            for &colour in &colours[first + row * stride..][..SIDE] {
                 let parts = u32::from_le_bytes(colour);
                 even += parts & 0x00ff_00ff;
                 odd += parts >> 8 & 0x00ff_00ff;
             }
         }
         let parts = [even & 0xffff, odd & 0xffff, even >> 16, odd >> 16];
-        Self { parts, samples: (side * side) as u32 }
+        Self { parts, samples: (SIDE * SIDE) as u32 }
     }
 
     fn add(&mut self, other: Self) {
@@ -257,10 +280,12 @@ impl Sum {
 
     /// One of its parts over a pixel of the picture.
     fn over(&self, pixel: &mut u8, part: usize) {
-        let covered = self.parts[3] / 255;
+        let covered = self.parts[3];
         if covered > 0 {
             let behind = u32::from(*pixel) * (self.samples - covered);
-            *pixel = ((self.parts[part] + behind + self.samples / 2) / self.samples) as u8;
+            // Samples are as many as a power of two: of one, two or four pixels.
+            let half = self.samples / 2;
+            *pixel = ((self.parts[part] + behind + half) >> self.samples.trailing_zeros()) as u8;
         }
     }
 }

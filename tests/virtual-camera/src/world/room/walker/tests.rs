@@ -3,7 +3,7 @@ use crate::{
     geometry::Pinhole,
     kinematics::Pose,
     world::room::{
-        settings::{Change, Occlusion, Subject},
+        settings::{Change, Lighting, Occlusion, Subject},
         view::{CAMERA, Vector, dot, subtract},
     },
 };
@@ -40,6 +40,19 @@ fn frames(walker: &Walker) -> impl Iterator<Item = f64> {
 
 fn lamps() -> Light {
     Light { lamps: vec![[-3.0, 3.2, 4.0], [3.0, 3.2, 4.0]], windows: Vec::new() }
+}
+
+#[test]
+fn light_and_occlusion_change_nothing_else() {
+    for plain in (1..=72).filter_map(|number| RoomSettings::test(number, 3)) {
+        let twin = RoomSettings { lighting: Lighting::Optimal, occlusion: Occlusion::None, ..plain.clone() };
+        let (plain, twin) = (Walker::new(&plain), Walker::new(&twin));
+        for time in [0.0, 3.3, 6.1, 9.7] {
+            assert_eq!(plain.walk().at(time), twin.walk().at(time));
+            assert_eq!(plain.pose_at(time).place, twin.pose_at(time).place);
+        }
+    }
+    assert_ne!(walker(1, 3).walk().at(4.0), walker(2, 3).walk().at(4.0), "each subject has a way of their own");
 }
 
 #[test]

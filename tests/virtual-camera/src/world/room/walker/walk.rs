@@ -56,7 +56,7 @@ pub(crate) struct Walk {
 
 impl Walk {
     pub fn new(settings: &RoomSettings) -> Self {
-        let mut chance = Seeded::new(settings.seed).fork(0x3a1c).fork(u64::from(settings.number()));
+        let mut chance = Seeded::new(settings.seed).fork(0x3a1c).fork(settings.way());
         let side = chance.pick(&[-1.0, 1.0]);
         let (from_z, to_z) = (chance.range(5.1, 6.1), chance.range(5.1, 6.1));
         let from_x = -side * from_z * chance.range(50f64, 52.0).to_radians().tan();
