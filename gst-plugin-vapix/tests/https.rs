@@ -1,34 +1,16 @@
 //! HTTPS, and the redirect to it: what the virtual camera does not speak, a scripted one answers.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
+mod certificates;
+
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::{SocketAddr, TcpListener};
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
+use certificates::{certificate, server_config};
 use gstvapix::vapix::{Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust};
-use rustls::pki_types::pem::PemObject;
-use rustls::pki_types::{CertificateDer, PrivateKeyDer};
-use rustls::{ServerConfig, ServerConnection, StreamOwned};
-
-fn certificate(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/certificates").join(name)
-}
-
-fn server_config() -> Arc<ServerConfig> {
-    let provider = Arc::new(rustls::crypto::ring::default_provider());
-    let chain = vec![CertificateDer::from_pem_file(certificate("camera.pem")).unwrap()];
-    let key = PrivateKeyDer::from_pem_file(certificate("camera.key.pem")).unwrap();
-    let config = ServerConfig::builder_with_provider(provider)
-        .with_safe_default_protocol_versions()
-        .unwrap()
-        .with_no_client_auth()
-        .with_single_cert(chain, key)
-        .unwrap();
-    Arc::new(config)
-}
+use rustls::{ServerConnection, StreamOwned};
 
 /// Answers every request on a connection with the same bytes; the request lines and credentials go to `seen`.
 fn serve(stream: impl Read + Write, answer: &str, seen: &std::sync::mpsc::Sender<String>) {
@@ -52,7 +34,7 @@ fn scripted(tls: bool, answer: String) -> (SocketAddr, Receiver<String>) {
     let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
     let address = listener.local_addr().unwrap();
     let (sender, seen) = channel();
-    let config = tls.then(server_config);
+    let config = tls.then(|| server_config("camera"));
     std::thread::spawn(move || {
         for stream in listener.incoming().map_while(Result::ok) {
             match &config {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use common::{Heard, Rig, camera, target};
 use ptztrack_contract::TargetState;
-use surviving::front::{certificate, tls_front};
+use surviving::front::{certificates::certificate, tls_front};
 use surviving::{cases, survive, unknown_host, wrong_password};
 use virtual_camera::{Auth, Fault};
 

@@ -16,7 +16,7 @@ use crate::{
     album::Album,
     experiment::{self, Experiment, Place},
     film,
-    pipeline::{Pipeline, PipelineError, SINK, SOURCE},
+    pipeline::{Pipeline, PipelineError, SOURCE},
     realtime,
     record::{Bounds, Estimate, FrameRecord, Run},
     still,
@@ -96,16 +96,7 @@ impl<'a> Stage<'a> {
         let camera = experiment.camera(world, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
-        let sink = if tracker.steers() {
-            format!(
-                "vapixptzsink name={SINK} location={} lockstep=true timeout=60000 {}",
-                camera.url(),
-                tracker.servo()
-            )
-        } else {
-            format!("fakesink name={SINK} sync=false async=false")
-        };
-        let sink = film::beside(&sink, film);
+        let sink = film::beside(&tracker.sink(&camera.url(), "lockstep=true timeout=60000"), film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;

@@ -18,7 +18,7 @@ use virtual_camera::{Clock, Picture, VirtualCamera, World};
 use crate::{
     album::Album,
     experiment::{self, Experiment},
-    lockstep::{RunError, count_commands, estimate},
+    lockstep::{RunError, clock_time, count_commands, estimate},
     pipeline::{Elements, PipelineError, SINK, fault, lock},
     record::{Codec, FrameRecord, Run},
     trackers::{Cue, Phase, Tracker},
@@ -194,7 +194,7 @@ impl Stream {
     fn watch_until(&self, end: Duration) -> Result<(), PipelineError> {
         let left = end.saturating_sub(self.watch.camera.now());
         let bus = self.pipeline.bus().ok_or(PipelineError::NoElement("bus"))?;
-        unbroken(&bus, gst::ClockTime::from_nseconds(left.as_nanos() as u64))
+        unbroken(&bus, clock_time(left))
     }
 }
 
@@ -229,12 +229,7 @@ fn description(watch: &Watch) -> String {
             camera.url()
         ),
     };
-    let sink = if watch.tracker.steers() {
-        format!("vapixptzsink name={SINK} location={} {}", camera.url(), watch.tracker.servo())
-    } else {
-        format!("fakesink name={SINK} sync=false async=false")
-    };
-    let tracker = watch.tracker.description();
+    let (tracker, sink) = (watch.tracker.description(), watch.tracker.sink(&camera.url(), ""));
     format!(
         "{stream} ! queue name={QUEUE} leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0 ! {tracker} ! {sink}"
     )

@@ -107,11 +107,8 @@ impl<'a> Screening<'a> {
         let size = self.size();
         let people = people.iter().map(|person| truth(person, size)).collect();
         let (truth, others) = self.experiment.scene.split(people);
-        let phase = match (self.first, &truth) {
-            (None, None) => Phase::Before,
-            (None, Some(_)) => Phase::FirstBox,
-            (Some(_), _) => Phase::After,
-        };
+        let begun = self.first.is_some();
+        let phase = Phase::of(begun || truth.is_some(), begun);
         if phase == Phase::FirstBox {
             self.first = Some(number);
         }

@@ -6,7 +6,7 @@ use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 
 use crate::{
-    pipeline::{PipelineError, lock},
+    pipeline::{PipelineError, SINK, lock},
     record::{Bounds, FirstBox, GroundTruth, TrackerName},
 };
 
@@ -88,18 +88,19 @@ impl Tracker {
         }
     }
 
-    /// What the servo is set to beside what is the same for all.
-    pub fn servo(&self) -> &'static str {
+    /// The element that moves the camera at `location`, with `settings` that are the same for all; one that moves nothing
+    /// where the tracker is not to.
+    pub fn sink(&self, location: &str, settings: &str) -> String {
         match self.name {
+            TrackerName::Still => format!("fakesink name={SINK} sync=false async=false"),
             // The thesis knows its camera from the start.
-            TrackerName::Thesis => "prediction=average learn=false",
-            _ => "",
+            TrackerName::Thesis => {
+                format!(
+                    "vapixptzsink name={SINK} location={location} {settings} prediction=average learn=false"
+                )
+            }
+            _ => format!("vapixptzsink name={SINK} location={location} {settings}"),
         }
-    }
-
-    /// Whether it moves the camera.
-    pub fn steers(&self) -> bool {
-        self.name != TrackerName::Still
     }
 
     /// Puts up its probes.

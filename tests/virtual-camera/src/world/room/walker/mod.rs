@@ -28,7 +28,7 @@ use super::{
 };
 use crate::{picture::Plane, seeded::Seeded};
 
-/// Streams of chance: who somebody is depends on the seed and the subject alone, how they step off on the test too.
+/// Streams of chance: who somebody is depends on the seed and the subject alone, how they step off on the way too.
 const PERSON: u64 = 0xb0d7;
 const STEP: u64 = 0x57e9;
 
