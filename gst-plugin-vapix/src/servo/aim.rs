@@ -96,8 +96,15 @@ impl Aim {
     }
 
     /// Takes a picture of the target, seen with `view`. `latency`: a command sent that long before
-    /// the picture's timestamp shows in it.
-    pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, latency: Duration) {
+    /// the picture's timestamp shows in it, by as much as `doubt` sooner or later.
+    pub fn see(
+        &mut self,
+        sight: &Sight,
+        view: &View,
+        history: &CommandHistory,
+        latency: Duration,
+        doubt: Duration,
+    ) {
         if sight.id != self.id {
             self.target_rate.clear();
             self.id = sight.id;
@@ -114,11 +121,23 @@ impl Aim {
                 view.rate(sight.centroid, Vector { x: sight.velocity.x - ego.x, y: sight.velocity.y - ego.y })
             }
             None => {
-                let commanded = history.rate_at(sight.taken_at.saturating_sub(latency));
-                view.rate(sight.centroid, sight.velocity) + commanded
+                let sent = sight.taken_at.saturating_sub(latency);
+                let commanded = history.rates_between(sent.saturating_sub(doubt), sent + doubt);
+                self.likeliest(view.rate(sight.centroid, sight.velocity), commanded)
             }
         };
         self.target_rate.push(sight.taken_at, rate);
+    }
+
+    /// The target's own rate where it is seen to turn like this against a camera that turns at one of these rates: of what
+    /// is possible, what is nearest to how it went so far. Else a camera's start that shows later than it is
+    /// thought to would be taken for a start of the target's.
+    fn likeliest(&self, seen: PanTilt, camera: impl Iterator<Item = PanTilt>) -> PanTilt {
+        let possible: Vec<PanTilt> = camera.map(|rate| seen + rate).collect();
+        let bound = |nearer: fn(f64, f64) -> f64| {
+            possible.iter().copied().reduce(|bound, rate| bound.each(rate, nearer)).unwrap_or(seen)
+        };
+        self.pace().each(bound(f64::min), f64::max).each(bound(f64::max), f64::min)
     }
 
     /// Takes a picture that hides the target: it goes on as it did, but whether faster and faster nobody knows.
@@ -212,7 +231,7 @@ pub(super) mod tests {
         let mut aim = Aim::new(Prediction::Lead);
         for time in [0.92, 0.96, 1.0] {
             let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
-            aim.see(&walking, &VIEW, &history, LATENCY);
+            aim.see(&walking, &VIEW, &history, LATENCY, Duration::ZERO);
         }
         let rate = aim.target_rate(Duration::ZERO).pan;
         assert!((rate - 6.616).abs() < 0.01, "{rate}");
@@ -231,7 +250,7 @@ pub(super) mod tests {
             ego_velocity: Some(Vector { x: -0.15, y: 0.0 }),
             ..sight(0.6, 0.5, seconds(1.0))
         };
-        aim.see(&still, &VIEW, &history, LATENCY);
+        aim.see(&still, &VIEW, &history, LATENCY, Duration::ZERO);
         assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
         let offset = VIEW.error(still.centroid).pan;
         let error = aim.error_at_effect(seconds(1.1), &history, LATENCY).pan;
@@ -244,7 +263,7 @@ pub(super) mod tests {
         history.push(seconds(0.5), PanTilt::new(6.0, 0.0));
         let mut aim = Aim::new(Prediction::Average);
         for time in [0.92, 0.96, 1.0] {
-            aim.see(&sight(0.5, 0.5, seconds(time)), &VIEW, &history, LATENCY);
+            aim.see(&sight(0.5, 0.5, seconds(time)), &VIEW, &history, LATENCY, Duration::ZERO);
         }
         assert_eq!(aim.target_rate(Duration::ZERO).pan, 6.0);
     }
@@ -255,9 +274,9 @@ pub(super) mod tests {
         let mut aim = Aim::new(Prediction::Average);
         for time in [0.92, 0.96, 1.0] {
             let walking = Sight { velocity: Vector { x: 0.1, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
-            aim.see(&walking, &VIEW, &history, LATENCY);
+            aim.see(&walking, &VIEW, &history, LATENCY, Duration::ZERO);
         }
-        aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY);
+        aim.see(&Sight { id: 2, ..sight(0.5, 0.5, seconds(1.1)) }, &VIEW, &history, LATENCY, Duration::ZERO);
         assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
     }
 
@@ -267,7 +286,7 @@ pub(super) mod tests {
         let mut aim = Aim::new(Prediction::Average);
         for (time, x) in [(0.2, 0.1), (0.4, -0.05), (0.6, 0.2)] {
             let trembling = Sight { velocity: Vector { x, y: 0.0 }, ..sight(0.5, 0.5, seconds(time)) };
-            aim.see(&trembling, &VIEW, &history, LATENCY);
+            aim.see(&trembling, &VIEW, &history, LATENCY, Duration::ZERO);
         }
         let rate = aim.target_rate(seconds(0.4)).pan;
         assert!((rate - 6.616 * 0.25 / 0.3).abs() < 0.01, "{rate}");
@@ -281,7 +300,7 @@ pub(super) mod tests {
         for frame in 1..=10 {
             let velocity = Vector { x: 0.02 * f64::from(frame), y: 0.0 };
             let seen = Sight { velocity, ego_velocity, ..sight(0.6, 0.5, at(frame)) };
-            aim.see(&seen, &VIEW, &history, LATENCY);
+            aim.see(&seen, &VIEW, &history, LATENCY, Duration::ZERO);
         }
         let (mean, last) = (aim.pace().pan, aim.target_rate(Duration::ZERO).pan);
         assert!(aim.target_rate(LATENCY).pan > last);
@@ -292,7 +311,7 @@ pub(super) mod tests {
                 ego_velocity,
                 ..sight(0.7, 0.5, at(frame))
             };
-            aim.see(&echo, &VIEW, &history, LATENCY);
+            aim.see(&echo, &VIEW, &history, LATENCY, Duration::ZERO);
         }
         (aim, mean, last)
     }
@@ -312,5 +331,33 @@ pub(super) mod tests {
         let error = |x| VIEW.error(Point { x, y: 0.5 });
         assert_eq!(hidden(None).0.error(), error(0.6));
         assert_eq!(hidden(Some(Vector::default())).0.error(), error(0.7));
+    }
+
+    /// A camera that was told to turn at 50 degrees a second, and turns later or sooner than it is thought to.
+    fn pace_seen(late_ms: i64, doubt_ms: u64, own_deg_s: f64) -> f64 {
+        let mut history = CommandHistory::default();
+        history.push(seconds(1.0), PanTilt::new(50.0, 0.0));
+        let begins = 1.2 + late_ms as f64 / 1000.0;
+        let mut aim = Aim::new(Prediction::Lead);
+        for picture in 0..=32 {
+            let time = 0.8 + f64::from(picture) * 0.02;
+            let seen_deg_s = own_deg_s - if time >= begins { 50.0 } else { 0.0 };
+            let per_deg = VIEW.rate(Point { x: 0.5, y: 0.5 }, Vector { x: 1.0, y: 0.0 }).pan;
+            let velocity = Vector { x: seen_deg_s / per_deg, y: 0.0 };
+            let seen = Sight { velocity, ..sight(0.5, 0.5, seconds(time)) };
+            aim.see(&seen, &VIEW, &history, LATENCY, Duration::from_millis(doubt_ms));
+        }
+        aim.pace().pan
+    }
+
+    #[test]
+    fn a_camera_that_turns_at_another_time_than_thought_is_no_start_of_the_targets() {
+        for late_ms in [-140, -60, 0, 60, 140] {
+            for own_deg_s in [-8.0, 0.0, 12.0] {
+                let pace = pace_seen(late_ms, 150, own_deg_s);
+                assert!((pace - own_deg_s).abs() < 1e-3, "{late_ms} ms, {own_deg_s}: {pace}");
+            }
+        }
+        assert!(pace_seen(100, 0, 0.0) > 5.0, "without doubt it is taken for one");
     }
 }

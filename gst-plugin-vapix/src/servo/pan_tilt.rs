@@ -15,6 +15,11 @@ impl PanTilt {
         Self { pan, tilt }
     }
 
+    /// What `f` makes of both pans, and of both tilts.
+    pub fn each(self, other: Self, f: impl Fn(f64, f64) -> f64) -> Self {
+        Self::new(f(self.pan, other.pan), f(self.tilt, other.tilt))
+    }
+
     /// The larger of both sizes.
     pub fn largest(&self) -> f64 {
         self.pan.abs().max(self.tilt.abs())

@@ -154,7 +154,8 @@ impl Pilot {
             self.zoom.see(&sight, &self.lens(), self.calibration.latency());
         }
         let view = self.view(&sight);
-        self.aim.see(&sight, &view, &self.history, self.calibration.latency());
+        let doubt = if self.settings.learn { self.calibration.latency_doubt() } else { Duration::ZERO };
+        self.aim.see(&sight, &view, &self.history, self.calibration.latency(), doubt);
         let tolerated_deg =
             (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
         // Told by the commands it would be no witness against them.

@@ -78,6 +78,11 @@ impl Calibration {
         self.latency.latency()
     }
 
+    /// By how much that may be wrong.
+    pub fn latency_doubt(&self) -> Duration {
+        self.latency.doubt()
+    }
+
     /// What the tangent of half the assumed field of view is to be multiplied by.
     pub fn field_factor(&self) -> f64 {
         self.field.factor()

@@ -11,6 +11,7 @@ use crate::servo::{CommandHistory, PanTilt};
 pub(super) struct LatencyLearner {
     assumed: Duration,
     learned: Duration,
+    doubt: Duration,
     recent: VecDeque<Turn>,
     /// Per candidate delay: squares of the commanded change, and its products with the change seen.
     commanded: [f64; CANDIDATES],
@@ -40,6 +41,9 @@ const AGREEMENT: f64 = 0.4;
 /// Agreement that a second away from what was assumed costs.
 const RELUCTANCE: f64 = 0.1;
 
+/// What is only assumed may be wrong by this; what was seen often enough, by a step.
+const DOUBT: Duration = Duration::from_millis(150);
+
 /// Part of the way to the best candidate that is gone in a second.
 const PACE_PER_S: f64 = 3.0;
 
@@ -49,6 +53,7 @@ impl LatencyLearner {
         Self {
             assumed,
             learned: assumed,
+            doubt: DOUBT,
             recent: VecDeque::new(),
             commanded: [0.0; CANDIDATES],
             product: [0.0; CANDIDATES],
@@ -64,6 +69,11 @@ impl LatencyLearner {
     /// The delay from sending a command to the timestamp of the first picture that shows it.
     pub fn latency(&self) -> Duration {
         self.learned
+    }
+
+    /// By how much that may be wrong.
+    pub fn doubt(&self) -> Duration {
+        self.doubt
     }
 
     /// Takes a turn that was seen; the picture is `fov_deg` wide.
@@ -103,8 +113,9 @@ impl LatencyLearner {
     fn approach(&mut self, seconds: f64) {
         let Some(best) = self.best().filter(|_| self.seen > ENOUGH) else { return };
         let learned = self.learned.as_secs_f64();
-        let way = (best - learned) * (PACE_PER_S * seconds).min(1.0);
-        self.learned = Duration::from_secs_f64((learned + way).max(0.0));
+        let part = (PACE_PER_S * seconds).min(1.0);
+        self.learned = Duration::from_secs_f64((learned + (best - learned) * part).max(0.0));
+        self.doubt = STEP + self.doubt.saturating_sub(STEP).mul_f64(1.0 - part);
     }
 
     /// The delay of the best agreement in seconds, between the candidates by a parabola.
