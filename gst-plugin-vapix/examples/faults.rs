@@ -19,7 +19,7 @@ use surviving::{Case, Outcome, cases, name_not_yet_known, survive, unknown_name,
 use virtual_camera::Fault;
 
 /// As the element has it by default.
-const TIMEOUT: Duration = Duration::from_secs(2);
+const TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// How long faults last. They end at different moments of the pauses between attempts.
 const LAST: [Duration; 3] =
@@ -46,7 +46,7 @@ fn main() {
     println!(
         "as the fault begins and one `connected` as it is over. A request that hangs is waited for as long as"
     );
-    println!("`timeout` says, 2 s by default: with a longer one it takes that long to be back.\n");
+    println!("`timeout` says, 1.5 s by default: with a longer one it takes that long to be back.\n");
     println!("| Fault | What the user sees | Requests per second meanwhile | Back in control after |");
     println!("|---|---|---|---|");
     for case in cases() {
