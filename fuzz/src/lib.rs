@@ -3,14 +3,14 @@
 #![allow(missing_docs)]
 
 use gstvapix::vapix::{
-    Attributes, Credentials, Limits, Parameters, Position, QueuePlace, Secret, answer_to_challenge,
-    parse_move_speed,
+    Attributes, Credentials, Limits, Parameters, Position, Presets, QueuePlace, Secret, answer_to_challenge,
+    answer_to_cookie, parse_move_speed,
 };
 
 /// A target: takes anything, says whether it was understood, and never panics.
 pub type Target = fn(&[u8]) -> bool;
 
-pub const TARGETS: [(&str, Target); 7] = [
+pub const TARGETS: [(&str, Target); 9] = [
     ("challenge", challenge),
     ("position", position),
     ("limits", limits),
@@ -18,6 +18,8 @@ pub const TARGETS: [(&str, Target); 7] = [
     ("move_speed", move_speed),
     ("parameters", parameters),
     ("queue", queue),
+    ("presets", presets),
+    ("cookies", cookies),
 ];
 
 /// As the client reads a body.
@@ -68,5 +70,18 @@ pub fn parameters(bytes: &[u8]) -> bool {
 pub fn queue(bytes: &[u8]) -> bool {
     let Ok(place) = QueuePlace::parse(&text(bytes)) else { return false };
     assert!((5..=3600).contains(&place.poll_every.as_secs()), "{place:?}");
+    true
+}
+
+pub fn presets(bytes: &[u8]) -> bool {
+    let Ok(presets) = Presets::parse(&text(bytes)) else { return false };
+    assert!(presets.0.iter().all(|(_, name)| presets.number(name).is_some()), "{presets:?}");
+    true
+}
+
+/// One that comes back to us in a header must stay one.
+pub fn cookies(bytes: &[u8]) -> bool {
+    let Some(cookie) = answer_to_cookie(text(bytes).trim_end()) else { return false };
+    assert!(cookie.find('=').is_some_and(|end| end > 0) && !cookie.contains(';'), "{cookie}");
     true
 }

@@ -357,26 +357,3 @@ fn a_stop_outlives_the_element_that_could_not_send_it() {
     camera.set_fault(Fault::None);
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
 }
-
-#[test]
-fn under_load_there_is_one_request_and_nothing_is_queued() {
-    const SERVICE: Duration = Duration::from_millis(400);
-    let camera = VirtualCamera::start(Settings { service_time: SERVICE, ..Settings::default() }).unwrap();
-    let mut rig = Rig::playing(&camera.url());
-    let frame = Duration::from_secs(1) / 60;
-    let begin = std::time::Instant::now();
-    let mut pictures = 0u32;
-    while begin.elapsed() < Duration::from_secs(8) {
-        let side = if pictures.is_multiple_of(2) { 0.15 } else { 0.85 };
-        rig.push(&target(TargetState::Tracking, side, 0.5));
-        pictures += 1;
-        camera.wait_for(frame, |_| false);
-    }
-    let elapsed = begin.elapsed();
-    let status = camera.status();
-    drop(rig);
-    assert_eq!(camera.status().most_in_flight, 1);
-    // Never more than the camera has time for: nothing is left over for later.
-    assert!(u128::from(status.requests) <= elapsed.as_millis() / SERVICE.as_millis() + 1, "{status:?}");
-    assert!(moves(&camera).len() >= 3);
-}

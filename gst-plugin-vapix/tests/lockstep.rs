@@ -88,3 +88,42 @@ fn a_camera_that_is_gone_holds_no_stream_for_ever() {
     assert!(rig.stats().get::<Option<String>>("last-error").unwrap().is_some());
     rig.sink.set_state(gst::State::Null).unwrap();
 }
+
+/// An hour ahead and back again, by timestamps or by a seek: what is timed goes on from where it stood.
+#[test]
+fn a_stream_whose_time_jumps_is_steered_by_on() {
+    const HOUR: u64 = 3_600_000;
+    let camera = camera(Auth::None);
+    let mut rig = rig(&camera);
+    let mut last = 0;
+    // Long enough on each side not to be taken for a camera that swings about its target.
+    for (begin, x, turn) in [
+        (0, 0.9, "move="),
+        (HOUR, 0.1, "move=-"),
+        (2000, 0.9, "move="),
+        (0, 0.1, "move=-"),
+        (HOUR, 0.9, "move="),
+    ] {
+        let before = moves(&camera).len();
+        for picture in 0..60 {
+            last = begin + 40 * picture;
+            push_at(&mut rig, last, Some(&target(TargetState::Tracking, x, 0.5)));
+            let sent = moves(&camera);
+            assert!(sent.len() - before <= 1 + picture as usize / 3 + 1, "as often as ever: {sent:?}");
+            let turned = sent.last().is_some_and(|query| turns(query, turn));
+            assert!(picture < 25 || turned, "from {begin} on {picture} pictures: {sent:?}");
+        }
+    }
+    // Nobody is seen any more, and the time of the pictures that show it is another still.
+    for picture in 0..26 {
+        push_at(&mut rig, last / 2 + 40 * picture, None);
+    }
+    assert_eq!(moves(&camera).last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+    assert!(!rig.heard().iter().any(common::Heard::is_warning));
+}
+
+/// By this sign, and at all.
+fn turns(query: &str, turn: &str) -> bool {
+    let pan = query.split_once(turn).and_then(|(_, speeds)| speeds.split(',').next()?.parse::<u8>().ok());
+    pan.is_some_and(|pan| pan > 0)
+}

@@ -4,12 +4,16 @@
 mod common;
 mod surviving;
 
+use std::net::Ipv4Addr;
 use std::time::Duration;
 
-use common::{Heard, Rig, camera, target};
+use common::{Heard, PATIENCE, Rig, camera, target};
+use gst::prelude::*;
 use ptztrack_contract::TargetState;
-use surviving::front::{certificates::certificate, tls_front};
-use surviving::{cases, survive, unknown_host, wrong_password};
+use surviving::front::{certificates::certificate, pass_on_from, tls_front};
+use surviving::names::Lookup;
+use surviving::scene::{Jump, Scene, Trouble};
+use surviving::{cases, survive, wrong_password};
 use virtual_camera::{Auth, Fault};
 
 /// Shorter than by default, to see several attempts fail.
@@ -43,6 +47,8 @@ survives! {
     black_hole: "black hole: no packet comes back";
     no_answer: "connected, and never an answer";
     late_answers: "answers after 5 s";
+    name_unknown: "the camera's name is unknown for a while";
+    name_server_silent: "the name server does not answer";
     reboot: "camera reboots: refuses, then other realm and nonce";
     redirect_301: "301 to another host";
     redirect_302: "302 to another host";
@@ -60,11 +66,50 @@ survives! {
     closed_keep_alive: "keep-alive closed without a word";
     clock_jump: "clock of the camera jumps by an hour: stale nonce";
     line_feeds: "lines that end in LF";
+    pipeline_clock: "the pipeline's clock jumps by an hour, and back";
+    timestamps: "timestamps jump by an hour, and back";
+    clock_and_timestamps: "clock and timestamps jump by an hour, and back";
+    segment: "the stream's segment jumps by an hour, and back";
 }
 
 #[test]
-fn unknown_name() {
-    unknown_host(TIMEOUT);
+fn a_name_that_nobody_has_can_be_corrected() {
+    surviving::unknown_name(TIMEOUT);
+}
+
+#[test]
+fn a_name_that_is_known_later_is_found_without_a_hand() {
+    surviving::name_not_yet_known(TIMEOUT);
+}
+
+/// Neither the address is kept nor the connection, which nobody has closed.
+#[test]
+fn a_camera_that_has_another_address_since_is_found_again() {
+    let mut scene = Scene::new("another address", Lookup::LOOPBACK, TIMEOUT);
+    scene.rig.set_going(&scene.camera);
+    scene.rig.heard();
+    let moved = camera(Auth::Digest { qop: true });
+    let elsewhere = Ipv4Addr::new(127, 0, 0, 2);
+    pass_on_from((elsewhere, scene.camera.http_address().port()), moved.http_address());
+    scene.camera.set_fault(Fault::BlackHole);
+    let here = target(TargetState::Tracking, 0.9, 0.4);
+    scene.rig.push_until_message(&here, Heard::is_warning);
+    scene.name.set(Lookup::Address(elsewhere));
+    scene.rig.set_going(&moved);
+    scene.rig.push_until(&target(TargetState::Lost, 0.5, 0.5), &moved, |status| !status.moving);
+    assert!(!scene.rig.heard().iter().any(Heard::is_warning));
+}
+
+/// Neither with pictures, which the other tests have, nor without.
+#[test]
+fn a_jump_of_time_leaves_no_camera_turning() {
+    for jump in Jump::ALL {
+        let mut scene = Scene::new("jump", Lookup::LOOPBACK, PATIENT);
+        scene.rig.set_going(&scene.camera);
+        scene.begin(&Trouble::Jump(jump));
+        assert!(scene.camera.wait_for(PATIENCE, |status| !status.moving), "{jump:?}");
+        assert!(!scene.rig.heard().iter().any(Heard::is_warning));
+    }
 }
 
 /// The camera's own HTTPS, which its redirect leads to, and nothing but that.
@@ -127,4 +172,28 @@ fn another_certificate_is_not_believed_and_gets_nothing() {
 #[test]
 fn a_wrong_password_locks_nobody_out() {
     wrong_password();
+}
+
+#[test]
+fn at_rest_a_silent_camera_is_left_without_complaint() {
+    let camera = camera(Auth::None);
+    camera.set_fault(Fault::Hang);
+    let rig = Rig::ready(&camera.url()).with("timeout", 60_000u32).play();
+    assert!(camera.wait_for(PATIENCE, |status| status.requests > 0));
+    rig.sink.set_state(gst::State::Paused).unwrap();
+    rig.sink.set_state(gst::State::Null).unwrap();
+    assert_eq!(rig.heard(), []);
+}
+
+#[test]
+fn a_dead_network_ends_with_a_warning_within_bounds() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("timeout", 60_000u32).play();
+    rig.set_going(&camera);
+    camera.set_fault(Fault::Hang);
+    rig.sink.set_state(gst::State::Null).unwrap();
+    let heard = rig.heard();
+    let gave_up =
+        |heard: &Heard| matches!(heard, Heard::Warning(text) if text.contains("may still be moving"));
+    assert_eq!(heard.iter().filter(|heard| gave_up(heard)).count(), 1, "{heard:?}");
 }

@@ -385,3 +385,31 @@ proptest! {
         prop_assert!(!moved || !rig.sent.is_empty());
     }
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    /// Timestamps jump with the stream's segment or the pipeline's clock: what they say is not to be trusted.
+    #[test]
+    fn pictures_of_any_time_are_steered_by(
+        jumps in prop::collection::vec((0u64..5000, any::<bool>()), 1..40),
+        zooms in any::<bool>(),
+    ) {
+        let target_height = zooms.then_some(0.5);
+        let mut rig = Rig::new(ServoSettings { target_height, ..ServoSettings::default() });
+        for (late, right) in jumps {
+            rig.now += ms(40);
+            let x = if right { 0.9 } else { 0.1 };
+            rig.pilot.see(sight(x, 0.5, rig.now.saturating_sub(ms(late))), rig.now);
+            rig.after(ms(0));
+        }
+        // Two seconds of pictures that are what they seem.
+        for _ in 0..50 {
+            rig.see(0.9, 0.5);
+            let sent = rig.after(ms(40));
+            prop_assert!(sent.len() <= 2);
+        }
+        prop_assert!(rig.pilot.status(rig.now).rate.pan > 0.0);
+        prop_assert!(rig.after(ms(1100)).last().is_some_and(Command::is_stop));
+    }
+}

@@ -1,5 +1,15 @@
 use reqwest::header::{COOKIE, HeaderMap, HeaderValue, SET_COOKIE};
 
+/// What a camera is reminded of that has set a cookie with this header; `None`: of nothing.
+pub fn answer_to_cookie(header: &str) -> Option<String> {
+    let header = HeaderValue::from_str(header).ok()?;
+    let mut cookies = Cookies::default();
+    cookies.take(&HeaderMap::from_iter([(SET_COOKIE, header)]));
+    let mut request = HeaderMap::new();
+    cookies.put(&mut request);
+    Some(request.get(COOKIE)?.to_str().ok()?.to_owned())
+}
+
 /// Remembers what the camera asks to be reminded of: with a control queue that is who we are.
 ///
 /// For one camera only, until the end; and few, so that no camera can fill the memory.
@@ -42,6 +52,7 @@ impl Cookies {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use proptest::prelude::*;
 
     fn take(cookies: &mut Cookies, text: &str) {
         let mut headers = HeaderMap::new();
@@ -76,5 +87,17 @@ mod tests {
             take(&mut cookies, &format!("c{number}=1"));
         }
         assert_eq!(cookies.0.len(), Cookies::MOST);
+    }
+
+    proptest! {
+        /// A camera makes no header of its own, and no longer one than is kept.
+        #[test]
+        fn any_text_is_kept_or_not(header in "([a-z]{1,8}|=|;|path=/|, |\"|é|.){0,24}") {
+            if let Some(cookie) = answer_to_cookie(&header) {
+                let (name, value) = cookie.split_once('=').unwrap();
+                prop_assert!(!name.is_empty() && header.contains(name) && header.contains(value));
+                prop_assert!(!cookie.contains(';') && cookie.len() <= Cookies::LONGEST_BYTES + 1);
+            }
+        }
     }
 }

@@ -24,6 +24,7 @@ pub use attributes::{Attributes, StepMeaning};
 pub use auth::{Credentials, answer_to_challenge};
 pub use client::{Client, ClientSettings};
 pub use command::Command;
+pub use cookies::answer_to_cookie;
 pub use error::Error;
 pub use location::Location;
 pub use presets::Presets;

@@ -14,6 +14,8 @@ pub struct Clock {
 #[derive(Debug)]
 struct State {
     reading: Duration,
+    /// The stream's own time, where it was last held.
+    stream: Duration,
     /// Since when it has been running from that reading; `None` while it is held.
     running_since: Option<Instant>,
 }
@@ -21,12 +23,16 @@ struct State {
 impl Clock {
     /// Runs from zero.
     pub fn running() -> Self {
-        Self { state: Mutex::new(State { reading: Duration::ZERO, running_since: Some(Instant::now()) }) }
+        Self::at_zero(Some(Instant::now()))
     }
 
     /// Stands at zero.
     pub fn held() -> Self {
-        Self { state: Mutex::new(State { reading: Duration::ZERO, running_since: None }) }
+        Self::at_zero(None)
+    }
+
+    fn at_zero(running_since: Option<Instant>) -> Self {
+        Self { state: Mutex::new(State { reading: Duration::ZERO, stream: Duration::ZERO, running_since }) }
     }
 
     /// What it shows.
@@ -34,14 +40,20 @@ impl Clock {
         self.with(|state| state.now())
     }
 
-    /// Lets it stand at a time; at its own where that is later.
+    /// Lets it stand at the stream's time. Where that goes back, as after a seek, nothing has elapsed: it goes
+    /// on from there, and does not wait until the stream is where it was.
     pub fn hold_at(&self, time: Duration) {
-        self.with(|state| *state = State { reading: state.now().max(time), running_since: None });
+        self.with(|state| {
+            let elapsed = time.saturating_sub(state.stream);
+            *state = State { reading: state.now() + elapsed, stream: time, running_since: None };
+        });
     }
 
     /// Lets it run on from where it stands.
     pub fn run(&self) {
-        self.with(|state| *state = State { reading: state.now(), running_since: Some(Instant::now()) });
+        self.with(|state| {
+            *state = State { reading: state.now(), running_since: Some(Instant::now()), ..*state };
+        });
     }
 
     /// Sleeps until a time; for ever where there is none, or nobody knows when it comes. Whoever changes
@@ -82,6 +94,15 @@ mod tests {
         assert_eq!(clock.now(), SECOND);
         clock.hold_at(SECOND / 2);
         assert_eq!(clock.now(), SECOND);
+    }
+
+    #[test]
+    fn a_stream_that_goes_back_is_followed_from_there() {
+        let clock = Clock::held();
+        for (stream, shown) in [(3600, 3600), (0, 3600), (2, 3602), (1, 3602), (3600, 7201)] {
+            clock.hold_at(stream * SECOND);
+            assert_eq!(clock.now(), shown * SECOND);
+        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ impl Default for Settings {
             camera: 1,
             user: None,
             password: None,
-            timeout_ms: 2000,
+            timeout_ms: 1500,
             insecure: false,
             ca_file: None,
             mode: Mode::default(),

@@ -31,9 +31,30 @@ pub fn target(state: TargetState, x: f64, y: f64) -> TargetMeta {
     TargetMeta { state, id: 1, centroid: Point { x, y }, confidence: 1.0, ..TargetMeta::default() }
 }
 
+/// Timestamps as a live source gives them.
+pub struct Stamps {
+    begin: Instant,
+    /// By how much they are ahead of the time since the beginning.
+    pub ahead: Duration,
+}
+
+impl Default for Stamps {
+    fn default() -> Self {
+        Self { begin: Instant::now(), ahead: Duration::ZERO }
+    }
+}
+
+impl Stamps {
+    fn next(&self) -> gst::ClockTime {
+        gst::ClockTime::try_from(self.begin.elapsed() + self.ahead).unwrap()
+    }
+}
+
 pub struct Rig {
     pub sink: gst::Element,
     pub bus: gst::Bus,
+    /// Where pictures have timestamps.
+    pub stamps: Option<Stamps>,
     harness: Option<gst_check::Harness>,
 }
 
@@ -44,7 +65,7 @@ impl Rig {
         let sink = gst::ElementFactory::make("vapixptzsink").property("location", location).build().unwrap();
         let bus = gst::Bus::new();
         sink.set_bus(Some(&bus));
-        Self { sink, bus, harness: None }
+        Self { sink, bus, stamps: None, harness: None }
     }
 
     /// The same, playing.
@@ -78,7 +99,9 @@ impl Rig {
     #[track_caller]
     pub fn push(&mut self, meta: &TargetMeta) {
         let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
-        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        let content = buffer.get_mut().unwrap();
+        content.set_pts(self.stamps.as_ref().map(Stamps::next));
+        meta.attach(content).unwrap();
         assert_eq!(self.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
     }
 
@@ -180,6 +203,10 @@ impl Heard {
 
     pub fn is_warning(&self) -> bool {
         matches!(self, Self::Warning(_))
+    }
+
+    pub fn into_warning(self) -> Option<String> {
+        if let Self::Warning(text) = self { Some(text) } else { None }
     }
 }
 

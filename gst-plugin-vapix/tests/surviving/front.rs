@@ -1,7 +1,7 @@
-//! TLS in front of a virtual camera, which speaks none.
+//! What stands in front of a virtual camera: TLS, which it does not speak, and other addresses.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream, ToSocketAddrs};
 
 use rustls::{ServerConnection, StreamOwned};
 
@@ -22,6 +22,16 @@ pub fn tls_front(camera: SocketAddr, name: &str) -> String {
         }
     });
     format!("https://{address}")
+}
+
+/// From here on the camera can be spoken to at `address`, too.
+pub fn pass_on_from(address: impl ToSocketAddrs, camera: SocketAddr) {
+    let listener = TcpListener::bind(address).unwrap();
+    std::thread::spawn(move || {
+        for client in listener.incoming().map_while(Result::ok) {
+            std::thread::spawn(move || pass_on(client, camera));
+        }
+    });
 }
 
 /// One request after the other, each over a connection of its own to the camera.

@@ -1,0 +1,49 @@
+//! Who the sink is to the camera.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::time::Duration;
+
+use common::{Heard, Rig, camera, target};
+use ptztrack_contract::TargetState;
+use virtual_camera::{Auth, Settings, VirtualCamera};
+
+#[test]
+fn every_kind_of_authentication() {
+    for auth in [Auth::Basic, Auth::Digest { qop: true }, Auth::Digest { qop: false }, Auth::Both] {
+        let camera = camera(auth);
+        let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+        rig.set_going(&camera);
+        rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
+        assert_eq!(camera.status().refused, 1, "{auth:?}: one challenge serves all requests");
+    }
+}
+
+#[test]
+fn a_nonce_that_expires_is_no_fault() {
+    let settings = Settings {
+        auth: Auth::Digest { qop: true },
+        nonce_lifetime: Duration::from_millis(50),
+        ..Settings::default()
+    };
+    let camera = VirtualCamera::start(settings).unwrap();
+    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    rig.set_going(&camera);
+    rig.push_until(&target(TargetState::Tracking, 0.05, 0.5), &camera, |status| {
+        status.pan_rate_deg_s < 0.0 && status.refused > 2
+    });
+    let heard = rig.heard();
+    assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
+}
+
+#[test]
+fn a_camera_that_wants_credentials_gets_none() {
+    let camera = camera(Auth::Basic);
+    let mut rig = Rig::playing(&camera.url());
+    let here = target(TargetState::Tracking, 0.9, 0.5);
+    let heard = rig.push_until_message(&here, Heard::is_warning);
+    let Some(Heard::Warning(text)) = heard.last() else { panic!("{heard:?}") };
+    assert!(text.contains("`user` and `password`"), "{text}");
+    assert_eq!(camera.status().refused, 1);
+}
