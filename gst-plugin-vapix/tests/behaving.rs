@@ -5,88 +5,42 @@ mod common;
 
 use std::time::Duration;
 
+use common::stage::{FRAME, Stage};
 use common::{Heard, PATIENCE, Rig, moves, target};
 use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, CameraChange, TargetMeta, TargetState};
+use ptztrack_contract::{CameraChange, TargetMeta, TargetState};
 use virtual_camera::{Clock, Fault, Kinematics, Pose, Settings, SpeedMap, VirtualCamera};
 
-const FRAME: Duration = Duration::from_millis(40);
 const TAKEN_OVER: Heard = Heard::Camera(CameraChange::TakenOver);
 const RESUMED: Heard = Heard::Camera(CameraChange::Resumed);
 
-/// A camera and a sink whose time goes on together, picture by picture.
-struct Stage {
-    camera: VirtualCamera,
-    rig: Rig,
-    now: Duration,
-    heard: Vec<Heard>,
+/// A person walks to and fro.
+fn walk(stage: &mut Stage, seconds: f64) {
+    for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
+        let meta = person_at(stage, 10.0 * stage.now.as_secs_f64().sin());
+        stage.picture(Some(&meta));
+    }
 }
 
-impl Stage {
-    fn new(settings: Settings, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let camera = VirtualCamera::start(Settings { clock: Clock::Stepped, ..settings }).unwrap();
-        Self::before(camera, set)
+/// Runs until this is heard; returns how long it took, in seconds.
+#[track_caller]
+fn run_until(stage: &mut Stage, wanted: &Heard, most: f64, meta: &TargetMeta) -> f64 {
+    let begin = stage.now;
+    while !stage.heard.contains(wanted) {
+        stage.picture(Some(meta));
+        let seconds = (stage.now - begin).as_secs_f64();
+        assert!(seconds <= most, "{wanted:?} not after {most} s: {:?}", stage.heard);
     }
+    stage.heard.retain(|heard| heard != wanted);
+    (stage.now - begin).as_secs_f64()
+}
 
-    fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let rig = set(Rig::ready(&camera.url()).with("lockstep", true)).play();
-        let now = camera.status().time;
-        Self { camera, rig, now, heard: Vec::new() }
-    }
-
-    fn picture(&mut self, meta: &TargetMeta) {
-        self.now += FRAME;
-        self.camera.advance_to(self.now);
-        let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
-        let content = buffer.get_mut().unwrap();
-        content.set_pts(gst::ClockTime::try_from(self.now).unwrap());
-        meta.attach(content).unwrap();
-        assert_eq!(self.rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
-        self.heard.extend(self.rig.heard());
-    }
-
-    fn run(&mut self, seconds: f64, meta: &TargetMeta) {
-        for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
-            self.picture(meta);
-        }
-    }
-
-    /// A person walks to and fro.
-    fn walk(&mut self, seconds: f64) {
-        for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
-            let meta = self.person_at(10.0 * self.now.as_secs_f64().sin());
-            self.picture(&meta);
-        }
-    }
-
-    /// Runs until this is heard; returns how long it took, in seconds.
-    #[track_caller]
-    fn run_until(&mut self, wanted: &Heard, most: f64, meta: &TargetMeta) -> f64 {
-        let begin = self.now;
-        while !self.heard.contains(wanted) {
-            self.picture(meta);
-            let seconds = (self.now - begin).as_secs_f64();
-            assert!(seconds <= most, "{wanted:?} not after {most} s: {:?}", self.heard);
-        }
-        self.heard.retain(|heard| heard != wanted);
-        (self.now - begin).as_secs_f64()
-    }
-
-    fn moves(&self) -> Vec<String> {
-        moves(&self.camera)
-    }
-
-    fn times(&self, wanted: &Heard) -> usize {
-        self.heard.iter().filter(|heard| *heard == wanted).count()
-    }
-
-    /// Where a person at this pan is in the picture.
-    fn person_at(&self, pan_deg: f64) -> TargetMeta {
-        let status = self.camera.status();
-        let wide = (status.horizontal_fov_deg / 2.0).to_radians().tan();
-        let x = 0.5 + (pan_deg - status.pan_deg).to_radians().tan() / (2.0 * wide);
-        target(TargetState::Tracking, x.clamp(0.0, 1.0), 0.5)
-    }
+/// Where a person at this pan is in the picture.
+fn person_at(stage: &Stage, pan_deg: f64) -> TargetMeta {
+    let status = stage.camera.status();
+    let wide = (status.horizontal_fov_deg / 2.0).to_radians().tan();
+    let x = 0.5 + (pan_deg - status.pan_deg).to_radians().tan() / (2.0 * wide);
+    target(TargetState::Tracking, x.clamp(0.0, 1.0), 0.5)
 }
 
 fn centred() -> TargetMeta {
@@ -107,7 +61,7 @@ fn an_operator_is_given_way_and_control_comes_back() {
     stage.run(12.0, &centred());
     assert_eq!(stage.times(&TAKEN_OVER), 0);
     assert!(stage.camera.operate("rpan=-6"));
-    stage.run_until(&TAKEN_OVER, 3.0, &centred());
+    run_until(&mut stage, &TAKEN_OVER, 3.0, &centred());
     let before = stage.moves().len();
     // The target is followed in the picture, and not by the camera.
     stage.run(2.0, &aside());
@@ -116,7 +70,7 @@ fn an_operator_is_given_way_and_control_comes_back() {
     assert_eq!(stage.moves().len(), before);
     assert_eq!(stage.rig.stats().get::<&str>("state").unwrap(), "taken-over");
     assert_eq!(stage.times(&RESUMED), 0, "he moved it again");
-    stage.run_until(&RESUMED, 4.0, &aside());
+    run_until(&mut stage, &RESUMED, 4.0, &aside());
     stage.run(1.0, &aside());
     assert!(stage.moves().len() > before);
     assert_eq!((stage.times(&TAKEN_OVER), stage.times(&RESUMED)), (0, 0));
@@ -129,7 +83,7 @@ fn an_operator_who_steers_against_us_is_noticed_and_our_own_move_ended() {
     let mut seconds = 0.0;
     while !stage.heard.contains(&TAKEN_OVER) {
         // His stick says left thirty times for each of our commands to the right.
-        stage.picture(&aside());
+        stage.picture(Some(&aside()));
         stage.camera.operate("continuouspantiltmove=-20,0");
         seconds += FRAME.as_secs_f64();
         assert!(seconds < 6.0, "not noticed");
@@ -174,8 +128,8 @@ fn our_own_moves_are_nobody_elses() {
             for second in 0..40 {
                 for _ in 0..25 {
                     let phase = stage.now.as_secs_f64() * 0.5;
-                    let meta = stage.person_at((end + 3.0) * phase.sin());
-                    stage.picture(&meta);
+                    let meta = person_at(&stage, (end + 3.0) * phase.sin());
+                    stage.picture(Some(&meta));
                 }
                 assert_eq!(stage.times(&TAKEN_OVER), 0, "{name}, {mode}, second {second}");
             }
@@ -308,19 +262,19 @@ fn a_camera_found_at_rest_is_told_nothing() {
 fn with_a_control_queue_it_waits_for_its_turn() {
     let settings = Settings { control_queue: Some(Duration::from_secs(10)), ..Settings::default() };
     let mut stage = Stage::new(settings, |rig| rig);
-    stage.walk(60.0);
+    walk(&mut stage, 60.0);
     assert!(!stage.heard.contains(&Heard::Camera(CameraChange::Refused)), "{:?}", stage.heard);
     assert_eq!(stage.times(&TAKEN_OVER), 0);
     assert!(stage.moves().len() > 5, "it keeps its place: {:?}", stage.moves());
 
     stage.camera.queue_operator(true);
-    stage.run_until(&TAKEN_OVER, 6.0, &aside());
+    run_until(&mut stage, &TAKEN_OVER, 6.0, &aside());
     let before = stage.moves().len();
-    stage.walk(20.0);
+    walk(&mut stage, 20.0);
     assert_eq!(stage.moves().len(), before);
     stage.camera.queue_operator(false);
-    stage.run_until(&RESUMED, 11.0, &aside());
-    stage.walk(4.0);
+    run_until(&mut stage, &RESUMED, 11.0, &aside());
+    walk(&mut stage, 4.0);
     assert!(stage.moves().len() > before);
     assert!(!stage.heard.contains(&Heard::Camera(CameraChange::Refused)), "{:?}", stage.heard);
 
@@ -329,7 +283,7 @@ fn with_a_control_queue_it_waits_for_its_turn() {
     drop(rig);
     let mut stage = Stage::before(camera, |rig| rig);
     let before = stage.moves().len();
-    stage.walk(4.0);
+    walk(&mut stage, 4.0);
     assert!(stage.moves().len() > before && stage.times(&TAKEN_OVER) == 0);
 }
 

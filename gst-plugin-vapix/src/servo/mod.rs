@@ -35,6 +35,7 @@ mod simulation;
 mod speed;
 mod steps;
 mod talk;
+mod ways;
 mod zoom;
 mod zoom_drive;
 #[cfg(test)]
@@ -62,6 +63,7 @@ pub use settings::{Mode, ServoSettings};
 pub use speed::{SpeedCurve, SpeedMap};
 pub use steps::Steps;
 pub use talk::{Answer, Job, Next, Query, Report, Status};
+pub use ways::{Refusal, Ways};
 pub use zoom::ZoomController;
 pub use zoom_drive::{ZoomDrive, ZoomGoal};
 pub use zoom_track::ZoomTrack;

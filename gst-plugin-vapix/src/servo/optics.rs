@@ -35,6 +35,17 @@ impl View {
         }
     }
 
+    /// Where in the picture the middle will have been taken from, once the camera has turned by so much: the inverse of
+    /// [`Self::error`].
+    pub fn point(&self, turn: PanTilt) -> Point {
+        let (pan, elevation) = (turn.pan.to_radians(), (self.tilt_deg + turn.tilt).to_radians());
+        let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
+        let (sin, cos) = self.tilt_deg.to_radians().sin_cos();
+        let (ahead, up) = (far * cos + high * sin, high * cos - far * sin);
+        let width = 2.0 * self.half_width();
+        Point { x: 0.5 + right / ahead / width, y: 0.5 - up / ahead * self.aspect / width }
+    }
+
     /// Degrees per second of a point that moves through the picture with `velocity` (frames per second).
     pub fn rate(&self, point: Point, velocity: Vector) -> PanTilt {
         // Short enough to be the derivative, long enough for the difference to be exact.
@@ -193,6 +204,13 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn the_point_of_an_error_is_where_it_was(x in 0.0..1.0f64, y in 0.0..1.0f64, tilt in -60.0..60.0f64) {
+            let view = View { tilt_deg: tilt, ..LEVEL };
+            let point = view.point(view.error(Point { x, y }));
+            prop_assert!((point.x - x).abs() < 1e-9 && (point.y - y).abs() < 1e-9, "{point:?}");
+        }
+
         /// Turned by the error, the camera sees the point in the middle.
         #[test]
         fn the_error_points_at_the_target(x in 0.0..1.0f64, y in 0.0..1.0f64, tilt in -89.0..89.0f64) {

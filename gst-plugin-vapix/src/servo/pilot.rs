@@ -8,7 +8,7 @@ use std::time::Duration;
 use super::{
     Aim, Authority, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
     LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
-    SpeedMap, Status, Steps, View, Visibility, ZoomDrive, magnified,
+    SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
 use crate::vapix::Command;
 
@@ -22,6 +22,9 @@ pub struct Pilot {
     scheduler: Scheduler,
     steps: Steps,
     authority: Authority,
+    ways: Ways,
+    /// How the camera is moved as far as anybody was told.
+    mode_told: Mode,
     homing: Homing,
     aim: Aim,
     history: CommandHistory,
@@ -89,6 +92,8 @@ impl Pilot {
             scheduler: Scheduler::default(),
             steps: Steps::default(),
             authority: Authority::default(),
+            ways: Ways::default(),
+            mode_told: settings.mode,
             homing: Homing::new(settings.home.clone(), settings.home_timeout, settings.home_at_start),
             history: CommandHistory::default(),
             controller: Controller::default(),
@@ -116,6 +121,10 @@ impl Pilot {
         let before = mem::replace(&mut self.settings, settings);
         let now = &self.settings;
         self.homing.configure(now.home.as_ref(), now.home_timeout);
+        if now.mode != before.mode {
+            self.ways.forget_refusals();
+            self.mode_told = now.mode;
+        }
         if !now.learn {
             self.calibration = Calibration::new(now.latency);
         }
@@ -305,6 +314,7 @@ impl Pilot {
             position: self.camera.position,
             rate: self.history.rate_at(now),
             fov_deg: self.known_fov_deg(),
+            mode: Some(self.mode(now)),
         }
     }
 
@@ -330,10 +340,15 @@ impl Pilot {
         }
         target.considered = true;
         let sight = target.sight;
-        match self.settings.mode {
+        match self.mode(now) {
             Mode::Velocity => self.velocity(&sight, now),
-            Mode::Absolute | Mode::Centre => self.step(&sight, now),
+            mode => self.step(mode, &sight, now),
         }
+    }
+
+    /// How to move the camera: as is set, if it takes that.
+    fn mode(&self, now: Duration) -> Mode {
+        self.ways.choose(self.settings.mode, self.camera.pan_tilt().is_some(), now)
     }
 
     /// Without a target.

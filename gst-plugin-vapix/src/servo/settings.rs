@@ -14,10 +14,21 @@ pub enum Mode {
     Centre,
 }
 
+impl Mode {
+    /// As the property has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Absolute => "absolute",
+            Self::Centre => "centre",
+        }
+    }
+}
+
 /// Everything that can be set about the servo.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ServoSettings {
-    /// How the camera is moved.
+    /// How the camera is to be moved, if it takes the words for that.
     pub mode: Mode,
     /// Degrees per second for a degree of error, 1/s.
     pub gain: f64,

@@ -266,16 +266,17 @@ impl Simulation {
         let time_s = self.now.as_secs_f64();
         let (direction, height_deg) = target(time_s);
         let view = self.view();
-        let place = project(direction, self.pose, &view);
-        let above = project(direction + PanTilt::new(0.0, height_deg / 2.0), self.pose, &view);
-        let below = project(direction - PanTilt::new(0.0, height_deg / 2.0), self.pose, &view);
+        let point = |direction: PanTilt| view.point(direction - self.pose);
+        let place = point(direction);
+        let above = point(direction + PanTilt::new(0.0, height_deg / 2.0));
+        let below = point(direction - PanTilt::new(0.0, height_deg / 2.0));
         let noisy = Point { x: place.x + self.jitter(), y: place.y + self.jitter() };
         let (mut ego, mut velocity) = (Vector::default(), Vector::default());
         if let Some((at, pose, last_view, last_direction, last_noisy)) = self.last_shot {
             let dt = (self.now - at).as_secs_f64();
             let per_s = |to: Point, from: Point| Vector { x: (to.x - from.x) / dt, y: (to.y - from.y) / dt };
-            let before = project(last_direction, pose, &last_view);
-            ego = per_s(project(last_direction, self.pose, &view), before);
+            let before = last_view.point(last_direction - pose);
+            ego = per_s(view.point(last_direction - self.pose), before);
             velocity =
                 if self.setup.noisy_velocity { per_s(noisy, last_noisy) } else { per_s(place, before) };
         }
@@ -370,14 +371,4 @@ fn box_about(middle: Point, height: f64) -> Rect {
     let (left, right) = inside(middle.x - height / 8.0, height / 4.0);
     let (top, bottom) = inside(middle.y - height / 2.0, height);
     Rect { x: left, y: top, width: right - left, height: bottom - top }
-}
-
-/// Where a direction is in the picture of a camera that looks to `pose`; the inverse of [`View::error`].
-fn project(direction: PanTilt, pose: PanTilt, view: &View) -> Point {
-    let (pan, elevation) = ((direction.pan - pose.pan).to_radians(), direction.tilt.to_radians());
-    let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
-    let (sin, cos) = view.tilt_deg.to_radians().sin_cos();
-    let (ahead, up) = (far * cos + high * sin, high * cos - far * sin);
-    let width = 2.0 * (view.horizontal_fov_deg / 2.0).to_radians().tan();
-    Point { x: 0.5 + right / ahead / width, y: 0.5 - up / ahead * view.aspect / width }
 }

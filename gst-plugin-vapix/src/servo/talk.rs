@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use super::{Holder, LinkChange, PanTilt};
+use super::{Holder, LinkChange, Mode, PanTilt};
 use crate::vapix::{
     Attributes, Command, Error, Limits, Parameters, Position, Presets, QueuePlace, QueueRequest,
 };
@@ -104,6 +104,8 @@ pub enum Report {
     NoSuchPreset(String),
     /// The camera will not go home.
     HomeRefused(Error),
+    /// It is moved otherwise than before, or than is set, as it does not take the words for that.
+    Mode(Mode),
 }
 
 /// The camera as it is known.
@@ -121,4 +123,6 @@ pub struct Status {
     pub rate: PanTilt,
     /// Horizontal field of view in degrees, where it is set or told.
     pub fov_deg: Option<f64>,
+    /// How it is moved, where it is.
+    pub mode: Option<Mode>,
 }

@@ -96,7 +96,7 @@ fn without_auto_zoom_nothing_zooms() {
 
 #[test]
 fn soft_limits_are_not_left() {
-    for mode in [Mode::Velocity, Mode::Absolute] {
+    for mode in [Mode::Velocity, Mode::Absolute, Mode::Centre] {
         let mut setup = zooming(300, 1.0);
         setup.settings.mode = mode;
         setup.settings.limits.pan_deg = Range { min: -5.0, max: 20.0 };

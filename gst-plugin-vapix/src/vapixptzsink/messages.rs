@@ -58,6 +58,11 @@ impl VapixPtzSink {
                 gst::ResourceError::Settings,
                 ("the camera does not go home: {err}; it stays where it is. Correct `home`")
             ),
+            Event::Report(Report::Mode(mode)) => gst::element_imp_info!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera is moved by mode `{}` now, the best of those that it takes; `mode` stays as it is set", mode.name())
+            ),
             Event::Status(status) => *lock(&self.news) = Some(status),
             Event::GaveUp => gst::element_imp_warning!(
                 self,

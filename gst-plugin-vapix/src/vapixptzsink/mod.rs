@@ -36,8 +36,13 @@
 //! ## Zoom and limits
 //! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
 //! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does, within what
-//! the camera can; an operator may go beyond them. `mode=centre`, in which the camera itself works out the angles,
-//! is not bound by those for pan and tilt.
+//! the camera can; an operator may go beyond them. In `mode=centre` the place
+//! in the picture is chosen within them, as well as field of view and position are known.
+//!
+//! ## Modes
+//! `mode` is what is wished. A camera whose parameters say that it does not take the words of that mode, or that refuses them
+//! while it answers everything else, is moved by the best mode of those it does take: an info message says so, `stats` has it
+//! as `mode`, the property stays as it is. A refused mode is tried again every minute, and when `mode` changes.
 //!
 //! ## Home
 //! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the

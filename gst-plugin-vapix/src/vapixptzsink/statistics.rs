@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::servo::Status;
+use crate::servo::{Mode, Status};
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
@@ -56,6 +56,7 @@ impl Statistics {
             .field("round-trip-average", nanoseconds(self.round_trip_average))
             .field("pan-rate", status.rate.pan)
             .field("tilt-rate", status.rate.tilt)
+            .field_if_some("mode", status.mode.map(Mode::name))
             .field_if_some("pan", status.position.pan_deg)
             .field_if_some("tilt", status.position.tilt_deg)
             .field_if_some("zoom", status.position.zoom_steps)

@@ -1,6 +1,8 @@
 //! A sink under test before a virtual camera.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 
+pub mod stage;
+
 use std::sync::Once;
 use std::time::{Duration, Instant};
 
@@ -184,6 +186,7 @@ impl Drop for Rig {
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heard {
     Camera(CameraChange),
+    Info(String),
     Warning(String),
     Error(String),
 }
@@ -195,6 +198,7 @@ impl Heard {
                 let camera = CameraMessage::from_structure(element.structure()?).ok()?;
                 Some(Self::Camera(camera.change))
             }
+            gst::MessageView::Info(info) => Some(Self::Info(info.error().message().to_owned())),
             gst::MessageView::Warning(warning) => Some(Self::Warning(warning.error().message().to_owned())),
             gst::MessageView::Error(error) => Some(Self::Error(error.error().message().to_owned())),
             _ => None,

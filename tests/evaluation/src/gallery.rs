@@ -1,11 +1,6 @@
 //! Pictures of the room to look at: every subject, light and occlusion, from far and from near.
 
-use std::{
-    io::{Read, Write},
-    net::TcpStream,
-    path::Path,
-    time::Duration,
-};
+use std::{path::Path, time::Duration};
 
 use virtual_camera::{Clock, GroundTruth, Pose, VirtualCamera};
 
@@ -95,11 +90,5 @@ fn aim(camera: &VirtualCamera, person: &GroundTruth, fov_deg: f64) -> Result<(),
     let (optics, half) = (camera.optics(), |degrees: f64| (degrees / 2.0).to_radians().tan());
     let zoom = optics.zoom_step(half(optics.wide_fov_deg) / half(fov_deg));
     let query = format!("pan={pan:.2}&tilt={tilt:.2}&zoom={zoom:.0}");
-    get(camera, &query).map_err(RunError::Aim)
-}
-
-fn get(camera: &VirtualCamera, query: &str) -> std::io::Result<()> {
-    let mut connection = TcpStream::connect(camera.http_address())?;
-    write!(connection, "GET /axis-cgi/com/ptz.cgi?{query} HTTP/1.0\r\n\r\n")?;
-    connection.read_to_end(&mut Vec::new()).map(|_| ())
+    if camera.operate(&query) { Ok(()) } else { Err(RunError::Aim(query)) }
 }

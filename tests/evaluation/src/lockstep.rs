@@ -34,8 +34,8 @@ pub(crate) enum RunError {
     Pipeline(#[from] PipelineError),
     #[error("pictures of {0}x{1} cannot be made")]
     Size(u32, u32),
-    #[error("cannot turn the camera: {0}")]
-    Aim(std::io::Error),
+    #[error("the camera does not take `{0}`")]
+    Aim(String),
     #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
     Raw,
     #[error("cannot film into {}: {source}", file.display())]

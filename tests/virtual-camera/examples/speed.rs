@@ -3,12 +3,7 @@
 //! The camera turns all the while, so that every picture is another one, and blurred. Counted is processor time, of
 //! all threads together, so that it matters little what else the machine does.
 
-use std::{
-    error::Error,
-    io::{Read, Write},
-    net::TcpStream,
-    time::Duration,
-};
+use std::{error::Error, time::Duration};
 
 use gst::prelude::*;
 use virtual_camera::{Auth, Clock, Picture, RoomSettings, Settings, VirtualCamera, World};
@@ -37,7 +32,10 @@ fn speed(encoder: &str, size: (u32, u32)) -> Result<f64, Box<dyn Error>> {
     let settings =
         Settings { auth: Auth::None, world: World::Room(room), clock: Clock::Stepped, ..Settings::default() };
     let camera = VirtualCamera::start(Settings { service_time: Duration::ZERO, ..settings })?;
-    turn(&camera)?;
+    // A slow turn to the right.
+    if !camera.operate("continuouspantiltmove=5,0") {
+        return Err("the camera does not turn".into());
+    }
     let (pipeline, source, info) = encoding(encoder, size)?;
     let period = camera.frame_period();
     let pictures = (Duration::from_secs(PAINTED_S.into()).as_nanos() / period.as_nanos()) as u32;
@@ -64,15 +62,6 @@ fn processor_time() -> Result<Duration, Box<dyn Error>> {
         total += Duration::from_nanos(line.split(' ').next().ok_or("no account")?.parse()?);
     }
     Ok(total)
-}
-
-/// Starts a slow turn to the right.
-fn turn(camera: &VirtualCamera) -> Result<(), Box<dyn Error>> {
-    let mut connection = TcpStream::connect(camera.http_address())?;
-    let line = "GET /axis-cgi/com/ptz.cgi?continuouspantiltmove=5,0 HTTP/1.0\r\n\r\n";
-    connection.write_all(line.as_bytes())?;
-    connection.read_to_end(&mut Vec::new())?;
-    Ok(())
 }
 
 fn encoding(

@@ -4,8 +4,8 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Auth, FootageSettings, Kinematics, Pose, PtzApi, RoomSettings, Settings, SpeedMap, SyntheticSettings,
-    Video, World,
+    Auth, FootageSettings, Kinematics, Moves, Pose, PtzApi, RoomSettings, Settings, SpeedMap,
+    SyntheticSettings, Video, World,
 };
 
 /// A virtual Axis pan-tilt-zoom camera on loopback.
@@ -97,6 +97,9 @@ pub struct Options {
     /// Speak ptz.cgi as newer firmware does: query=attributes, proportionalspeed=
     #[arg(long)]
     extended_api: bool,
+    /// By which words it can be moved: continuous, absolute, centre
+    #[arg(long, value_enum, value_delimiter = ',', default_values = ["continuous", "absolute", "centre"])]
+    moves: Vec<MoveName>,
 
     /// Have a control queue, in which clients must ask at least every so many seconds
     #[arg(long, value_name = "SECONDS", value_parser = clap::value_parser!(u32).range(5..=3600))]
@@ -147,6 +150,16 @@ enum SpeedMapName {
     Cubic,
 }
 
+#[derive(Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum MoveName {
+    /// At a speed: continuouspantiltmove, continuouszoommove
+    Continuous,
+    /// To a position: pan, tilt, zoom
+    Absolute,
+    /// To a place in the picture: center, areazoom
+    Centre,
+}
+
 impl TryFrom<Options> for Settings {
     type Error = String;
 
@@ -165,6 +178,12 @@ impl TryFrom<Options> for Settings {
                 AuthName::Both => Auth::Both,
             },
             ptz_api: if options.extended_api { PtzApi::Extended } else { PtzApi::Classic },
+            moves: Moves {
+                continuous: options.moves.contains(&MoveName::Continuous),
+                absolute: options.moves.contains(&MoveName::Absolute),
+                centre: options.moves.contains(&MoveName::Centre),
+                told: true,
+            },
             service_time: milliseconds(options.service_time),
             control_queue: options.control_queue.map(|seconds| Duration::from_secs(seconds.into())),
             kinematics: options.kinematics(),
@@ -310,12 +329,13 @@ mod tests {
 
     #[test]
     fn options_become_settings() {
-        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250 --ground-truth gt.txt";
+        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250 --moves absolute,centre --ground-truth gt.txt";
         let settings = Settings::try_from(Options::parse_from(line.split(' '))).unwrap();
         assert_eq!(settings.auth, Auth::Digest { qop: false });
         assert_eq!(settings.video.size, Some((320, 240)));
         assert_eq!(settings.video.delay, Duration::from_millis(250));
         assert_eq!(settings.home.unwrap().pan_deg, -5.0);
+        assert_eq!(settings.moves, Moves { continuous: false, ..Moves::default() });
         let World::Footage(footage) = settings.world else { panic!("no footage") };
         assert_eq!((footage.start, footage.looped), (Duration::from_millis(12_500), true));
         assert_eq!(footage.ground_truth, Some("gt.txt".into()));

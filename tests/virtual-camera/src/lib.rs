@@ -40,7 +40,7 @@ pub use kinematics::{
     Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
 };
 pub use picture::{Picture, Plane};
-pub use settings::{Auth, Clock, FootageSettings, PtzApi, Settings, Video, World};
+pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Mask};
 pub use world::{

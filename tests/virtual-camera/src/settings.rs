@@ -32,6 +32,40 @@ pub enum PtzApi {
     Extended,
 }
 
+/// By which words of ptz.cgi the camera can be moved. Presets and `move=` are taken in any case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Moves {
+    /// `continuouspantiltmove`, `continuouszoommove`.
+    pub continuous: bool,
+    /// `pan`, `tilt`, `zoom`, and by how much to change them.
+    pub absolute: bool,
+    /// `center`, `areazoom`.
+    pub centre: bool,
+    /// Whether its parameters (`PTZ.Support`) say so; else they claim all of them.
+    pub told: bool,
+}
+
+impl Default for Moves {
+    fn default() -> Self {
+        Self { continuous: true, absolute: true, centre: true, told: true }
+    }
+}
+
+impl Moves {
+    /// Not one.
+    pub const NONE: Self = Self { continuous: false, absolute: false, centre: false, told: true };
+
+    /// Whether it takes this word.
+    pub(crate) fn take(&self, word: &str) -> bool {
+        match word {
+            "continuouspantiltmove" | "continuouszoommove" => self.continuous,
+            "pan" | "tilt" | "zoom" | "rpan" | "rtilt" | "rzoom" => self.absolute,
+            "center" | "areazoom" => self.centre,
+            _ => true,
+        }
+    }
+}
+
 /// How the camera's time passes. HTTP and RTSP themselves are as quick as the machine in any case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Clock {
@@ -141,6 +175,8 @@ pub struct Settings {
     pub serial: String,
     /// Which parts of ptz.cgi there are.
     pub ptz_api: PtzApi,
+    /// By which of its words it can be moved.
+    pub moves: Moves,
     /// Time that ptz.cgi and param.cgi take for a request. They take one at a time, in order of arrival. With a stepped
     /// clock they take none: nobody would step on before the answer has come.
     pub service_time: Duration,
@@ -172,6 +208,7 @@ impl Default for Settings {
             nonce_lifetime: Duration::from_secs(300),
             serial: "ACCC8E012345".into(),
             ptz_api: PtzApi::Classic,
+            moves: Moves::default(),
             service_time: Duration::from_millis(10),
             world: World::Synthetic(SyntheticSettings::default()),
             kinematics: Kinematics::default(),

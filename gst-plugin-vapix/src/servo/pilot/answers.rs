@@ -4,7 +4,7 @@ use std::mem;
 use std::time::Duration;
 
 use super::Pilot;
-use crate::servo::{Answer, Finding, Job, PanTilt, Query, Report, Scheduler, Steps};
+use crate::servo::{Answer, Finding, Job, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps};
 use crate::vapix::{Command, Error, Position};
 
 impl Pilot {
@@ -32,7 +32,35 @@ impl Pilot {
             self.reports.push(Report::HomeRefused(err.clone()));
             return;
         }
+        if matches!(err, Error::Camera(_)) && self.refused_a_mode(command, err, now) {
+            return;
+        }
         self.failed(err, true, now);
+    }
+
+    /// Whether a refusal is, or may be, only of the words of a mode.
+    fn refused_a_mode(&mut self, command: &Command, err: &Error, now: Duration) -> bool {
+        match self.ways.refused(command, err, now) {
+            Refusal::Other => false,
+            Refusal::Doubtful => {
+                let tells_position = self.camera.pan_tilt().is_some();
+                let witness = if tells_position { Query::Position } else { Query::Parameters };
+                self.introduction.retain(|pending| *pending != witness);
+                self.introduction.push_front(witness);
+                true
+            }
+            Refusal::OfMode(_) if self.ways.lacks(self.mode(now), now) => {
+                // There is none left: it is not for the words.
+                self.ways.forget_refusals();
+                false
+            }
+            Refusal::OfMode(mode) => {
+                if mode == Mode::Velocity {
+                    self.stop = Command::Stop;
+                }
+                true
+            }
+        }
     }
 
     /// What the camera does from here on is unknown.
@@ -79,12 +107,22 @@ impl Pilot {
             self.homing.settled();
         } else if !command.is_stop() {
             self.homing.strayed();
+            self.tell_mode(now);
         }
+        self.ways.accepted(command);
         self.succeeded(true);
         match (was_moving, self.scheduler.may_move()) {
             (false, true) => self.reports.push(Report::Moving),
             (true, false) => self.reports.push(Report::Stopped),
             _ => {}
+        }
+    }
+
+    /// The camera accepted a move towards the target.
+    fn tell_mode(&mut self, now: Duration) {
+        let mode = self.mode(now);
+        if mem::replace(&mut self.mode_told, mode) != mode {
+            self.reports.push(Report::Mode(mode));
         }
     }
 
@@ -108,6 +146,7 @@ impl Pilot {
             Answer::Limits(limits) => self.camera.limits = limits,
             Answer::Parameters(parameters) => {
                 self.camera.parameters = parameters;
+                self.ways.told(&parameters);
                 self.authority.queue.told(parameters.control_queue);
             }
             Answer::Presets(presets) => {
@@ -130,6 +169,10 @@ impl Pilot {
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
+        if let Some(refusal) = self.ways.failed().filter(|_| err.is_refusal() && !err.is_final()) {
+            self.introduction.retain(|pending| *pending != query);
+            return self.failed(&refusal, true, now);
+        }
         if query != Query::Position {
             // Optional; a camera that is gone will be missed by the next position.
             if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
@@ -141,6 +184,7 @@ impl Pilot {
         } else if self.link.connected()
             && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
         {
+            self.introduction.retain(|pending| *pending != query);
             self.positioned(None, now, now);
             if !self.steps.under_way() {
                 self.next_poll = now + Self::POLL_REFUSED;
@@ -168,7 +212,11 @@ impl Pilot {
         match self.authority.positioned(place, (asked, now), &self.history, give_way) {
             Finding::Nothing => {}
             Finding::Orphan { zooms } => {
-                self.stop = if zooms { Command::REST } else { Command::Halt };
+                self.stop = match zooms {
+                    _ if self.ways.lacks(Mode::Velocity, now) => Command::Stop,
+                    true => Command::REST,
+                    false => Command::Halt,
+                };
                 self.scheduler.found_moving();
                 self.reports.push(Report::Orphan);
             }
@@ -196,6 +244,7 @@ impl Pilot {
     }
 
     fn succeeded(&mut self, of_command: bool) {
+        self.ways.obeyed();
         let idle = self.target.is_none() && !self.scheduler.may_move();
         self.reports.extend(self.link.succeeded(of_command, idle).map(Report::Link));
     }
@@ -208,6 +257,7 @@ impl Pilot {
     fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {
         if !err.is_refusal() {
             self.authority.forget();
+            self.ways.forget_refusals();
         }
         self.reports.extend(self.link.failed(err, of_command, now).map(Report::Link));
     }

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use ptztrack_contract::Point;
+
 use super::{Pilot, Wish};
 use crate::servo::{ControlLaw, Mode, PanTilt, Report, Sight, View, ZoomGoal, narrower};
 use crate::vapix::Command;
@@ -63,7 +65,7 @@ impl Pilot {
     }
 
     /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
-    pub(super) fn step(&mut self, sight: &Sight, now: Duration) -> Wish {
+    pub(super) fn step(&mut self, mode: Mode, sight: &Sight, now: Duration) -> Wish {
         if self.scheduler.may_move() && !self.steps.under_way() {
             // By speed, before the mode was changed; or who knows, as a step went unanswered.
             return Wish::Rest;
@@ -76,34 +78,23 @@ impl Pilot {
         let jump = self
             .zoom_goal()
             .and_then(|goal| self.zoom.jump(&goal, &self.camera.lens()?, now, self.calibration.latency()));
-        if error.largest() <= self.settings.dead_zone * view.horizontal_fov_deg && jump.is_none() {
+        let dead_zone_deg = self.settings.dead_zone * view.horizontal_fov_deg;
+        if error.largest() <= dead_zone_deg && jump.is_none() {
             return Wish::AsIs;
         }
-        match self.settings.mode {
-            Mode::Centre => Wish::Move(self.centre(sight, jump.map(|jump| jump.factor), now)),
-            _ => self.camera.pan_tilt().map_or(Wish::AsIs, |position| {
-                let turn = self.limited(error, Some(position), 1.0);
-                let still = turn == PanTilt::default() && jump.is_none();
-                let command = absolute(position + turn, jump.map(|jump| jump.step));
-                if still { Wish::AsIs } else { Wish::Move(command) }
-            }),
+        let position = self.camera.pan_tilt();
+        let turn = self.limited(error, position, 1.0);
+        // An axis that is at its end is no reason to correct the other by next to nothing.
+        let worth = |error: f64, turn: f64| error.abs() > dead_zone_deg && turn != 0.0;
+        if !worth(error.pan, turn.pan) && !worth(error.tilt, turn.tilt) && jump.is_none() {
+            return Wish::AsIs;
         }
-    }
-
-    /// The pixel where the target will be when the camera begins to move.
-    fn centre(&self, sight: &Sight, magnify: Option<f64>, now: Duration) -> Command {
-        let ahead_s = (now.saturating_sub(sight.taken_at) + self.calibration.latency()).as_secs_f64();
-        let pixel = |place: f64, velocity: f64, size: u32| {
-            let last = f64::from(size.saturating_sub(1));
-            // Saturates; inside the picture by the clamp.
-            ((place + velocity * ahead_s) * f64::from(size)).round().clamp(0.0, last) as u32
-        };
-        Command::Centre {
-            x: pixel(sight.centroid.x, sight.velocity.x, sight.size.0),
-            y: pixel(sight.centroid.y, sight.velocity.y, sight.size.1),
-            width: sight.size.0,
-            height: sight.size.1,
-            zoom_percent: magnify.map(|factor| (factor * 100.0).round() as u32),
+        match mode {
+            // What is wrong with the field of view made the angle of the place, and makes a place of it again.
+            Mode::Centre => Wish::Move(centre(view.point(turn), sight.size, jump.map(|jump| jump.factor))),
+            _ => position.map_or(Wish::AsIs, |position| {
+                Wish::Move(absolute(position + turn, jump.map(|jump| jump.step)))
+            }),
         }
     }
 
@@ -113,6 +104,22 @@ impl Pilot {
             self.reports.push(Report::AtLimit);
         }
         self.at_limit = at_limit;
+    }
+}
+
+/// The command to bring a place in the picture of that size to its middle.
+fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Command {
+    let pixel = |place: f64, size: u32| {
+        let last = f64::from(size.saturating_sub(1));
+        // Saturates; inside the picture by the clamp.
+        (place * f64::from(size)).round().clamp(0.0, last) as u32
+    };
+    Command::Centre {
+        x: pixel(place.x, width),
+        y: pixel(place.y, height),
+        width,
+        height,
+        zoom_percent: magnify.map(|factor| (factor * 100.0).round() as u32),
     }
 }
 

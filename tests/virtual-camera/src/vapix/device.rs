@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     kinematics::{Head, Limits, Motion, Pose, ZOOM_RANGE},
-    settings::{PtzApi, Settings},
+    settings::{Moves, PtzApi, Settings},
 };
 
 /// Everything that requests change.
@@ -20,6 +20,7 @@ pub(crate) struct Device {
     /// The control queue, if it has one.
     pub queue: Option<Queue>,
     api: PtzApi,
+    moves: Moves,
     limits: Limits,
     /// Their numbers count from 1.
     presets: Vec<(String, Pose)>,
@@ -36,6 +37,7 @@ impl Device {
             params: Params::new(settings, &head, limits, view_size),
             head,
             api: settings.ptz_api,
+            moves: settings.moves,
             limits,
             presets: std::iter::once(home).chain(settings.presets.iter().cloned()).collect(),
             queue: settings.control_queue.map(Queue::new),
@@ -55,6 +57,9 @@ impl Device {
 
     fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<Answer, String> {
         let known = |arg: &&(String, String)| self.api == PtzApi::Extended || arg.0 != "proportionalspeed";
+        if let Some((name, _)) = args.iter().find(|(name, _)| !self.moves.take(name)) {
+            return Err(format!("{name}: not supported"));
+        }
         let args = args.iter().filter(known).cloned().collect();
         let request = Request::parse(&args, self.view_size)?;
         let preset = request.preset.as_ref().map(|preset| self.preset(preset)).transpose()?;
@@ -68,7 +73,7 @@ impl Device {
         let text = match request.question {
             None => return Ok(Answer::Accepted),
             Some(Question::Driver) => "Sony_camblock\r\n".into(),
-            Some(Question::Help) => help::commands(),
+            Some(Question::Help) => help::commands(&self.moves),
             Some(Question::About(subject)) => self.tell(&subject)?,
         };
         Ok(Answer::Text(text))
@@ -253,6 +258,29 @@ mod tests {
         let text = text(ask(&mut device(PtzApi::Classic), "query=limits&camera=1", 0));
         assert!(text.starts_with("MinPan=-20.5\r\nMaxPan=20.5\r\nMinTilt=-9.25\r\nMaxTilt=9.25\r\nMinZoom=1\r\nMaxZoom=9999\r\n"), "{text}");
         assert!(text.contains("MinFieldAngle=33\r\nMaxFieldAngle=552\r\n"), "{text}");
+    }
+
+    #[test]
+    fn words_that_it_has_not_are_refused_and_not_told_of() {
+        let moves = Moves { absolute: true, ..Moves::NONE };
+        let mut device = device(PtzApi::Classic);
+        device.moves = moves;
+        for (query, taken) in [
+            ("continuouspantiltmove=5,0", false),
+            ("continuouszoommove=5", false),
+            ("center=5,5", false),
+            ("areazoom=5,5,200", false),
+            ("pan=5&tilt=1&speed=50", true),
+            ("move=stop", true),
+        ] {
+            assert_eq!(ask(&mut device, query, 1) == Answer::Accepted, taken, "{query}");
+        }
+        let list = text(ask(&mut device, "info=1", 1));
+        assert!(
+            list.contains("pan=[") && !list.contains("center=") && !list.contains("continuouspan"),
+            "{list}"
+        );
+        assert!(!list.contains("imagewidth") && list.contains("continuousfocus"), "{list}");
     }
 
     #[test]

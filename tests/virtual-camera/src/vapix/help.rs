@@ -1,5 +1,7 @@
 //! The text of `ptz.cgi?info=1`.
 
+use crate::settings::Moves;
+
 /// Commands with their arguments, as the camera lists them.
 const COMMANDS: &[&str] = &[
     "{camera=[n]}",
@@ -40,6 +42,15 @@ const COMMANDS: &[&str] = &[
 ];
 
 /// The list, with the colon on its own line as recorded from real cameras.
-pub(super) fn commands() -> String {
-    format!("Available commands\r\n:\r\n{}\r\n", COMMANDS.join("\r\n"))
+pub(super) fn commands(moves: &Moves) -> String {
+    let mut taken = true;
+    let listed = COMMANDS.iter().filter(|line| {
+        // What is indented belongs to the line above.
+        if !line.starts_with(' ') {
+            taken = line.split_once('=').is_none_or(|(word, _)| moves.take(word));
+        }
+        taken
+    });
+    let lines: Vec<&str> = listed.copied().collect();
+    format!("Available commands\r\n:\r\n{}\r\n", lines.join("\r\n"))
 }

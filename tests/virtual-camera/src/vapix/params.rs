@@ -3,7 +3,7 @@
 use super::{Answer, Args, device::field_angles};
 use crate::{
     kinematics::{Head, Limits, ProportionalSpeed, ZOOM_RANGE},
-    settings::{Auth, Settings},
+    settings::{Auth, Moves, Settings},
 };
 
 /// The parameter tree, in the order in which it is listed.
@@ -88,15 +88,17 @@ impl Params {
             ],
         );
         self.add_limits(head, limits);
-        const ABILITIES: [(&str, bool); 35] = [
+        let Moves { continuous, absolute, centre, .. } =
+            if settings.moves.told { settings.moves } else { Moves::default() };
+        let abilities = [
             ("AbsoluteBrightness", false),
             ("AbsoluteFocus", true),
             ("AbsoluteIris", true),
-            ("AbsolutePan", true),
-            ("AbsoluteTilt", true),
-            ("AbsoluteZoom", true),
+            ("AbsolutePan", absolute),
+            ("AbsoluteTilt", absolute),
+            ("AbsoluteZoom", absolute),
             ("ActionNotification", true),
-            ("AreaZoom", true),
+            ("AreaZoom", centre),
             ("AutoFocus", true),
             ("AutoIrCutFilter", true),
             ("AutoIris", true),
@@ -105,9 +107,9 @@ impl Params {
             ("ContinuousBrightness", false),
             ("ContinuousFocus", true),
             ("ContinuousIris", true),
-            ("ContinuousPan", true),
-            ("ContinuousTilt", true),
-            ("ContinuousZoom", true),
+            ("ContinuousPan", continuous),
+            ("ContinuousTilt", continuous),
+            ("ContinuousZoom", continuous),
             ("DevicePreset", false),
             ("DigitalZoom", false),
             ("GenericHTTP", false),
@@ -119,14 +121,13 @@ impl Params {
             ("RelativeBrightness", false),
             ("RelativeFocus", true),
             ("RelativeIris", true),
-            ("RelativePan", true),
-            ("RelativeTilt", true),
-            ("RelativeZoom", true),
+            ("RelativePan", absolute),
+            ("RelativeTilt", absolute),
+            ("RelativeZoom", absolute),
             ("ServerPreset", true),
             ("SpeedCtl", true),
         ];
-        let abilities = ABILITIES.map(|(name, able)| (name, able.to_string()));
-        self.add("PTZ.Support.S1", &abilities);
+        self.add("PTZ.Support.S1", &abilities.map(|(name, able): (_, bool)| (name, able.to_string())));
         self.add_words(
             "PTZ.UserAdv.U1",
             &[

@@ -1,0 +1,168 @@
+//! A camera and a sink whose time goes on together, picture by picture.
+
+use std::time::Duration;
+
+use ptztrack_contract::{BufferMeta, Rect, TargetMeta, TargetState, Vector};
+use virtual_camera::{Bounds, Clock, Settings, VirtualCamera};
+
+use super::{Heard, Rig, moves, target};
+
+/// From one picture to the next.
+pub const FRAME: Duration = Duration::from_millis(40);
+
+/// Width and height of the pictures.
+const SIZE: (u32, u32) = (320, 240);
+
+/// A stepped camera and a sink in lockstep with it; or both by the clock.
+pub struct Stage {
+    pub camera: VirtualCamera,
+    pub rig: Rig,
+    pub now: Duration,
+    /// What was on the bus so far.
+    pub heard: Vec<Heard>,
+    stepped: bool,
+}
+
+/// Where a person is in one picture, in parts of it.
+#[derive(Debug, Clone, Copy)]
+pub struct Shown {
+    /// When the picture was pushed.
+    pub at: Duration,
+    /// Off the middle, to the right and down.
+    pub offset: (f64, f64),
+    pub height: f64,
+}
+
+impl Shown {
+    pub fn distance(&self) -> f64 {
+        self.offset.0.hypot(self.offset.1)
+    }
+
+    /// Whether no part of the person is beyond the picture's edge.
+    pub fn is_whole(&self) -> bool {
+        self.offset.0.abs() < 0.5 && self.offset.1.abs() + self.height / 2.0 < 0.5
+    }
+}
+
+/// Mean distance from the middle, in parts of the picture.
+pub fn mean_distance(shown: &[Shown]) -> f64 {
+    shown.iter().map(Shown::distance).sum::<f64>() / shown.len() as f64
+}
+
+impl Stage {
+    pub fn new(settings: Settings, set: impl FnOnce(Rig) -> Rig) -> Self {
+        Self::before(VirtualCamera::start(Settings { clock: Clock::Stepped, ..settings }).unwrap(), set)
+    }
+
+    pub fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
+        let rig = set(Rig::ready(&camera.url()).with("lockstep", true)).play();
+        let now = camera.status().time;
+        Self { camera, rig, now, heard: Vec::new(), stepped: true }
+    }
+
+    /// Time passes as everybody's, and pictures come when they come.
+    pub fn by_the_clock(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
+        let rig = set(Rig::ready(&camera.url())).play();
+        let now = camera.status().time;
+        Self { camera, rig, now, heard: Vec::new(), stepped: false }
+    }
+
+    /// Lets time pass until the next picture.
+    fn step(&mut self) {
+        self.now += FRAME;
+        if self.stepped {
+            self.camera.advance_to(self.now);
+        } else {
+            std::thread::sleep(self.now.saturating_sub(self.camera.now()));
+            self.now = self.camera.now();
+        }
+    }
+
+    /// The next picture comes, with these words of a tracker.
+    pub fn picture(&mut self, meta: Option<&TargetMeta>) {
+        self.step();
+        self.push(meta);
+    }
+
+    fn push(&mut self, meta: Option<&TargetMeta>) {
+        let mut buffer = gst::Buffer::with_size((SIZE.0 * SIZE.1) as usize).unwrap();
+        let content = buffer.get_mut().unwrap();
+        if self.stepped {
+            content.set_pts(gst::ClockTime::try_from(self.now).unwrap());
+        }
+        if let Some(meta) = meta {
+            meta.attach(content).unwrap();
+        }
+        assert_eq!(self.rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+        self.heard.extend(self.rig.heard());
+    }
+
+    /// The same words for some time.
+    pub fn run(&mut self, seconds: f64, meta: &TargetMeta) {
+        for _ in 0..frames(seconds) {
+            self.picture(Some(meta));
+        }
+    }
+
+    /// Pushes what a perfect tracker says of the world's person for some time; returns what was to be seen.
+    pub fn follow(&mut self, seconds: f64) -> Vec<Shown> {
+        let step = |_| {
+            self.step();
+            let meta = self.tracked(self.now.saturating_sub(self.camera.video_delay()));
+            self.push(meta.as_ref());
+            let meta = meta?;
+            let offset = (meta.centroid.x - 0.5, meta.centroid.y - 0.5);
+            Some(Shown { at: self.now, offset, height: meta.bounds.height })
+        };
+        (0..frames(seconds)).filter_map(step).collect()
+    }
+
+    /// What a tracker says of a picture, and the one before; `None` where nobody is in it.
+    fn tracked(&self, exposure: Duration) -> Option<TargetMeta> {
+        let before = exposure.checked_sub(FRAME)?;
+        let bounds = self.bounds(exposure, exposure)?;
+        let per_s = |from: Bounds, to: Bounds| {
+            let (from, to) = (middle(&from), middle(&to));
+            Vector { x: (to.0 - from.0) / FRAME.as_secs_f64(), y: (to.1 - from.1) / FRAME.as_secs_f64() }
+        };
+        let (from, turned) = (self.bounds(before, before)?, self.bounds(before, exposure)?);
+        let (x, y) = middle(&bounds);
+        let (width, height) = (f64::from(SIZE.0), f64::from(SIZE.1));
+        Some(TargetMeta {
+            bounds: Rect {
+                x: bounds.left / width,
+                y: bounds.top / height,
+                width: bounds.width / width,
+                height: bounds.height / height,
+            },
+            velocity: per_s(from, bounds),
+            // Of the place where the person was: what the camera alone did.
+            ego_velocity: Some(per_s(from, turned)),
+            ..target(TargetState::Tracking, x, y)
+        })
+    }
+
+    /// The person of a moment as seen from where the camera looked at another, in pixels.
+    fn bounds(&self, at: Duration, looking: Duration) -> Option<Bounds> {
+        let pose = self.camera.pose_at(looking);
+        self.camera.ground_truth_from(&pose, at, SIZE).first().map(|person| person.bounds)
+    }
+
+    /// The moves that the camera received.
+    pub fn moves(&self) -> Vec<String> {
+        moves(&self.camera)
+    }
+
+    pub fn times(&self, wanted: &Heard) -> usize {
+        self.heard.iter().filter(|heard| *heard == wanted).count()
+    }
+}
+
+fn frames(seconds: f64) -> u32 {
+    (seconds / FRAME.as_secs_f64()).round() as u32
+}
+
+fn middle(bounds: &Bounds) -> (f64, f64) {
+    let (x, y) = bounds.centre();
+    (x / f64::from(SIZE.0), y / f64::from(SIZE.1))
+}
