@@ -6,7 +6,7 @@ mod common;
 use std::time::Duration;
 
 use common::stage::{FRAME, Stage};
-use common::{Heard, PATIENCE, Rig, moves, target};
+use common::{Heard, PATIENCE, Rig, target};
 use gst::prelude::*;
 use ptztrack_contract::{CameraChange, TargetMeta, TargetState};
 use virtual_camera::{Clock, Fault, Kinematics, Pose, Settings, SpeedMap, VirtualCamera};
