@@ -1,6 +1,8 @@
 //! A sink under test before a virtual camera.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 
+pub mod walking;
+
 use std::sync::Once;
 use std::time::{Duration, Instant};
 

@@ -34,6 +34,9 @@ const ENOUGH: f64 = 0.1;
 /// ... and beyond which older ones fade.
 const PLENTY: f64 = 1.5;
 
+/// Seconds after which they count for a third, in any case.
+const MEMORY_S: f64 = 6.0;
+
 /// Agreement (0 to 1) below which what is seen has nothing to do with the commands.
 const AGREEMENT: f64 = 0.4;
 
@@ -87,12 +90,13 @@ impl LatencyLearner {
             *square += dot(commanded, commanded);
             *product += dot(commanded, change);
         }
-        self.fade();
+        self.fade(turn.seconds());
         self.approach(turn.seconds());
     }
 
-    fn fade(&mut self) {
-        let keep = (PLENTY / self.seen).min(1.0);
+    fn fade(&mut self, seconds: f64) {
+        // Wild swings, while nothing was known yet, would else outweigh a calm walk for long.
+        let keep = (PLENTY / self.seen).min((-seconds / MEMORY_S).exp());
         self.seen *= keep;
         for sum in self.commanded.iter_mut().chain(&mut self.product) {
             *sum *= keep;
