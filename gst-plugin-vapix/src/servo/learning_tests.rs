@@ -181,7 +181,7 @@ fn a_camera_that_does_not_tell_its_position_is_learned_by_the_picture() {
         });
         let real = setup.map;
         let run = setup.run(20.0, way);
-        let belief = run.belief.clone().unwrap();
+        let belief = run.belief.unwrap();
         assert!((belief.fov_deg - 1.3 * WIDE_FOV_DEG).abs() < 0.1, "{walk}: {}", belief.fov_deg);
         let wider = (1.3 * WIDE_FOV_DEG / 2.0).to_radians().tan() / (WIDE_FOV_DEG / 2.0).to_radians().tan();
         let parts: Vec<_> =
