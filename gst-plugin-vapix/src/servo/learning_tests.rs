@@ -107,12 +107,6 @@ fn linear(setup: &mut Setup) {
     setup.settings.speed_curve = SpeedCurve::Linear;
 }
 
-/// The camera is linear.
-fn cubic(setup: &mut Setup) {
-    setup.map = SpeedMap::new(200.0, SpeedCurve::Linear);
-    setup.settings.camera_speed_deg_s = 200.0;
-}
-
 fn wide(setup: &mut Setup) {
     setup.settings.fov_deg = Some(1.3 * WIDE_FOV_DEG);
 }
@@ -163,12 +157,6 @@ fn the_field_of_view_is_found_within_20_s() {
 fn the_speed_map_is_found_within_20_s() {
     assert_right("linear", 100, &WALKS, TENTH, linear);
     assert_right("linear", 300, &WALKS, TENTH, linear);
-}
-
-/// At 200 degrees per second, a walk lies between two of its steps all the time: those are told apart less well.
-#[test]
-fn a_linear_camera_taken_for_a_cubic_one_is_found_out() {
-    assert_right("cubic", 100, &WALKS, 0.7..1.3, cubic);
 }
 
 /// The speeds then fit the field of view that was set: in the picture they are right.

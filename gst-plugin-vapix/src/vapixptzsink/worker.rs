@@ -74,7 +74,8 @@ impl Worker {
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let inbox = Arc::new(Inbox::new(clock));
         let pilot = Pilot::new(servo);
-        let statistics = Statistics { belief: Some(pilot.belief()), ..Statistics::default() };
+        let (status, belief) = (pilot.status(Duration::ZERO), Some(pilot.belief()));
+        let statistics = Statistics { status, belief, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let desk = Desk {
             pilot,

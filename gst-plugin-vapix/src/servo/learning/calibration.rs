@@ -110,7 +110,8 @@ impl Calibration {
             return;
         }
         let latency = self.latency();
-        self.speeds.see(&turn, latency, history, Maps { assumed, believed }, fov_deg);
+        let wrong = self.speeds.see(&turn, latency, history, Maps { assumed, believed }, fov_deg);
+        self.latency.doubt(wrong);
         let factor = self.field_factor();
         self.field.see(&turn, latency);
         self.speeds.rescale((self.field_factor() / factor).ln());

@@ -34,8 +34,8 @@ const ENOUGH: f64 = 0.1;
 /// ... and beyond which older ones fade.
 const PLENTY: f64 = 1.5;
 
-/// Seconds after which they count for a third, in any case.
-const MEMORY_S: f64 = 6.0;
+/// Seconds after which they count for a third, in any case: a long swing by a wrong latency is no calm walk.
+const MEMORY_S: f64 = 12.0;
 
 /// Agreement (0 to 1) below which what is seen has nothing to do with the commands.
 const AGREEMENT: f64 = 0.4;
@@ -90,16 +90,20 @@ impl LatencyLearner {
             *square += dot(commanded, commanded);
             *product += dot(commanded, change);
         }
-        self.fade(turn.seconds());
+        self.keep((PLENTY / self.seen).min((-turn.seconds() / MEMORY_S).exp()));
         self.approach(turn.seconds());
     }
 
-    fn fade(&mut self, seconds: f64) {
-        // Wild swings, while nothing was known yet, would else outweigh a calm walk for long.
-        let keep = (PLENTY / self.seen).min((-seconds / MEMORY_S).exp());
-        self.seen *= keep;
+    /// The speeds that were compared proved wrong by so much (a logarithm): what that taught counts for less. Wild
+    /// swings, while nothing was known yet, would else outweigh a calm walk for long.
+    pub fn doubt(&mut self, wrong: f64) {
+        self.keep((-wrong.abs()).exp());
+    }
+
+    fn keep(&mut self, part: f64) {
+        self.seen *= part;
         for sum in self.commanded.iter_mut().chain(&mut self.product) {
-            *sum *= keep;
+            *sum *= part;
         }
     }
 

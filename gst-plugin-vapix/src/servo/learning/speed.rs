@@ -15,6 +15,8 @@ pub(super) struct SpeedLearner {
     regression: Regression<FEATURES>,
     /// The turns of the last moments.
     recent: VecDeque<Turn>,
+    /// By how much, as a logarithm, what was known was corrected since that was asked.
+    proved_wrong: f64,
     /// The latency by which the newest was measured.
     latency: Option<Duration>,
 }
@@ -120,7 +122,12 @@ impl SpeedLearner {
         // Linear for cubic is off by two: with less, that would be taken for an oddity at each step met so far.
         deviations[SLOPE] = if told { 0.1 } else { 2.0 };
         deviations[ZOOM] = if told { 0.1 } else { 0.5 };
-        Self { regression: Regression::new(deviations), recent: VecDeque::new(), latency: None }
+        Self {
+            regression: Regression::new(deviations),
+            recent: VecDeque::new(),
+            proved_wrong: 0.0,
+            latency: None,
+        }
     }
 
     /// The map with what was learned.
@@ -144,7 +151,7 @@ impl SpeedLearner {
         history: &CommandHistory,
         maps: Maps,
         fov_deg: f64,
-    ) {
+    ) -> f64 {
         if self.latency.get_or_insert(latency).abs_diff(latency) > ANOTHER_LATENCY {
             self.latency = Some(latency);
             self.regression.forget(DOUBTED);
@@ -156,6 +163,7 @@ impl SpeedLearner {
             self.see_travel(&seen);
             self.see_rate(turn, &seen);
         }
+        std::mem::take(&mut self.proved_wrong)
     }
 
     fn remember(&mut self, turn: &Turn) {
@@ -236,7 +244,9 @@ impl SpeedLearner {
 
     /// Takes it that the camera is so much faster (a logarithm) than is known by now.
     fn learn(&mut self, features: &[f64; FEATURES], faster: f64, variance: f64) {
-        self.regression.update(features, self.regression.predict(features) + faster, variance);
+        let known = self.regression.predict(features);
+        self.regression.update(features, known + faster, variance);
+        self.proved_wrong += (self.regression.predict(features) - known).abs();
     }
 
     /// Degrees have become another measure, by a factor of this logarithm.
