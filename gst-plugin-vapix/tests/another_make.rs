@@ -6,42 +6,30 @@ mod common;
 use std::time::Duration;
 
 use common::Heard;
-use common::stage::{Shown, Stage, mean_distance};
+use common::stage::{Shown, Stage, mean_distance, pacing};
 use ptztrack_contract::CameraChange;
 use virtual_camera::{
-    Auth, Fault, Kinematics, Limits, Pose, ProportionalRule, ProportionalSpeed, PtzApi, Settings, SpeedMap,
-    SyntheticSettings, VirtualCamera, Waypoint, World,
+    Auth, Fault, Kinematics, Limits, ProportionalRule, ProportionalSpeed, PtzApi, Settings, SpeedMap,
+    VirtualCamera,
 };
 
 /// Digest without `qop`, no attributes, lines that end in LF, speed steps in proportion, ends of pan and tilt; before
-/// somebody who stands for a while and then paces to and fro, `stretch_s` for 30 degrees and 1 s of rest in between.
+/// somebody who paces.
 fn settings(stands_s: u64, stretch_s: u64, wide_fov_deg: f64) -> Settings {
-    let turn = |turn: u64| {
-        let from = stands_s + (stretch_s + 1) * turn;
-        [(from, turn), (from + stretch_s, turn + 1)]
+    let kinematics = Kinematics {
+        speed_map: SpeedMap::Linear { max_deg_s: 100.0 },
+        proportional_speed: ProportionalSpeed {
+            enabled: false,
+            max_fields_s: 2.0,
+            rule: ProportionalRule::Cap,
+        },
+        limits: Some(Limits { pan_deg: (-170.0, 170.0), tilt_deg: (-20.0, 90.0) }),
+        ..Kinematics::default()
     };
-    let point = |(seconds, side): (u64, u64)| Waypoint {
-        time: Duration::from_secs(seconds),
-        pan_deg: if side.is_multiple_of(2) { -15.0 } else { 15.0 },
-        tilt_deg: -2.0,
-    };
-    let path = [(0, 0)].into_iter().chain((0..10).flat_map(turn)).map(point).collect();
     Settings {
         auth: Auth::Digest { qop: false },
         ptz_api: PtzApi::Classic,
-        world: World::Synthetic(SyntheticSettings { path, wide_fov_deg, stays: true, ..Default::default() }),
-        home: Some(Pose { pan_deg: -15.0, tilt_deg: -2.0, zoom_step: 1.0 }),
-        kinematics: Kinematics {
-            speed_map: SpeedMap::Linear { max_deg_s: 100.0 },
-            proportional_speed: ProportionalSpeed {
-                enabled: false,
-                max_fields_s: 2.0,
-                rule: ProportionalRule::Cap,
-            },
-            limits: Some(Limits { pan_deg: (-170.0, 170.0), tilt_deg: (-20.0, 90.0) }),
-            ..Kinematics::default()
-        },
-        ..Settings::default()
+        ..pacing(stands_s, stretch_s, wide_fov_deg, kinematics)
     }
 }
 

@@ -96,14 +96,14 @@ impl Aim {
     }
 
     /// Takes a picture of the target, seen with `view`. `latency`: a command sent that long before
-    /// the picture's timestamp shows in it, by as much as `doubt` sooner or later.
+    /// the picture's timestamp shows in it, by as much as `uncertainty` sooner or later.
     pub fn see(
         &mut self,
         sight: &Sight,
         view: &View,
         history: &CommandHistory,
         latency: Duration,
-        doubt: Duration,
+        uncertainty: Duration,
     ) {
         if sight.id != self.id {
             self.target_rate.clear();
@@ -122,7 +122,7 @@ impl Aim {
             }
             None => {
                 let sent = sight.taken_at.saturating_sub(latency);
-                let commanded = history.rates_between(sent.saturating_sub(doubt), sent + doubt);
+                let commanded = history.rates_between(sent.saturating_sub(uncertainty), sent + uncertainty);
                 self.likeliest(view.rate(sight.centroid, sight.velocity), commanded)
             }
         };
@@ -334,7 +334,7 @@ pub(super) mod tests {
     }
 
     /// A camera that was told to turn at 50 degrees a second, and turns later or sooner than it is thought to.
-    fn pace_seen(late_ms: i64, doubt_ms: u64, own_deg_s: f64) -> f64 {
+    fn pace_seen(late_ms: i64, uncertainty_ms: u64, own_deg_s: f64) -> f64 {
         let mut history = CommandHistory::default();
         history.push(seconds(1.0), PanTilt::new(50.0, 0.0));
         let begins = 1.2 + late_ms as f64 / 1000.0;
@@ -345,7 +345,7 @@ pub(super) mod tests {
             let per_deg = VIEW.rate(Point { x: 0.5, y: 0.5 }, Vector { x: 1.0, y: 0.0 }).pan;
             let velocity = Vector { x: seen_deg_s / per_deg, y: 0.0 };
             let seen = Sight { velocity, ..sight(0.5, 0.5, seconds(time)) };
-            aim.see(&seen, &VIEW, &history, LATENCY, Duration::from_millis(doubt_ms));
+            aim.see(&seen, &VIEW, &history, LATENCY, Duration::from_millis(uncertainty_ms));
         }
         aim.pace().pan
     }
@@ -358,6 +358,6 @@ pub(super) mod tests {
                 assert!((pace - own_deg_s).abs() < 1e-3, "{late_ms} ms, {own_deg_s}: {pace}");
             }
         }
-        assert!(pace_seen(100, 0, 0.0) > 5.0, "without doubt it is taken for one");
+        assert!(pace_seen(100, 0, 0.0) > 5.0, "where the latency is certain it is taken for one");
     }
 }

@@ -62,7 +62,7 @@ pub use scheduler::Scheduler;
 pub use settings::{Mode, ServoSettings};
 pub use speed::{SpeedCurve, SpeedMap};
 pub use steps::Steps;
-pub use talk::{Answer, Job, Next, Query, Report, Status};
+pub use talk::{Answer, Belief, Job, Next, Query, Report, Status};
 pub use ways::{Refusal, Ways};
 pub use zoom::ZoomController;
 pub use zoom_drive::{ZoomDrive, ZoomGoal};

@@ -6,7 +6,7 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
+    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
     LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
     SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
@@ -156,15 +156,17 @@ impl Pilot {
         self.homing.not_alone();
         let zooms = self.zoom.moves(sight.taken_at, self.calibration.latency(), now);
         if self.settings.learn && self.authority.is_ours(now) && !zooms {
-            self.calibration.see(&sight, &self.view(&sight), &self.history, &self.map);
+            let maps = [&self.assumed_speeds(), &self.map];
+            self.calibration.see(&sight, &self.view(&sight), &self.history, maps);
             self.revise();
         }
         if self.settings.target_height.is_some() {
             self.zoom.see(&sight, &self.lens(), self.calibration.latency());
         }
         let view = self.view(&sight);
-        let doubt = if self.settings.learn { self.calibration.latency_doubt() } else { Duration::ZERO };
-        self.aim.see(&sight, &view, &self.history, self.calibration.latency(), doubt);
+        let uncertainty =
+            if self.settings.learn { self.calibration.latency_uncertainty() } else { Duration::ZERO };
+        self.aim.see(&sight, &view, &self.history, self.calibration.latency(), uncertainty);
         let tolerated_deg =
             (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
         // Told by the commands it would be no witness against them.
@@ -299,10 +301,8 @@ impl Pilot {
     }
 
     /// The camera as it was learned.
-    #[cfg(test)]
-    pub fn belief(&self) -> super::simulation::Belief {
-        let latency = self.calibration.latency();
-        super::simulation::Belief { latency, fov_deg: self.fov_deg(None), map: self.map }
+    pub fn belief(&self) -> Belief {
+        Belief { latency: self.calibration.latency(), fov_deg: self.fov_deg(None), map: self.map }
     }
 
     /// The camera as it is known.
@@ -383,7 +383,8 @@ impl Pilot {
     }
 
     fn known_fov_deg(&self) -> Option<f64> {
-        let known = self.settings.fov_deg.is_some() || self.camera.tells_fov();
+        let learned = self.calibration.field_factor() != 1.0;
+        let known = self.settings.fov_deg.is_some() || self.camera.tells_fov() || learned;
         // To a tenth of a degree: those who are told need not hear of every picture's.
         known.then(|| (self.fov_deg(None) * 10.0).round() / 10.0)
     }
@@ -392,11 +393,15 @@ impl Pilot {
         self.calibration.assume_speeds(self.camera.told_speeds().is_some());
     }
 
+    /// The speed map before anything is learned.
+    fn assumed_speeds(&self) -> SpeedMap {
+        self.camera.told_speeds().unwrap_or_else(|| self.settings.speed_map())
+    }
+
     /// Brings the speed map up to what is known by now.
     fn revise(&mut self) {
         let fov_deg = self.fov_deg(None);
-        let assumed = self.camera.told_speeds().unwrap_or_else(|| self.settings.speed_map());
-        let map = self.calibration.correct(&assumed, fov_deg);
+        let map = self.calibration.correct(&self.assumed_speeds(), fov_deg);
         self.map = map.capped(self.camera.proportional_cap_deg_s(fov_deg));
         self.history.revise(&self.map);
     }

@@ -58,6 +58,16 @@ impl CommandHistory {
         iter::once(first).chain(self.0.iter().filter(within).map(|entry| entry.rate))
     }
 
+    /// The speed steps in force between two times, last first, with how long each was, in seconds; what was
+    /// not commanded in steps is left out.
+    pub fn steps_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = ((i8, i8), f64)> {
+        let ends = iter::once(to).chain(self.0.iter().rev().map(move |entry| entry.since.min(to)));
+        self.0.iter().rev().zip(ends).filter_map(move |(entry, end)| {
+            let lasted = end.saturating_sub(entry.since.max(from)).as_secs_f64();
+            entry.steps.filter(|_| lasted > 0.0).map(|steps| (steps, lasted))
+        })
+    }
+
     /// The rotation commanded between two times, degrees.
     pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
         let mut rotation = PanTilt::default();

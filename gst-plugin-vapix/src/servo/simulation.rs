@@ -6,7 +6,7 @@ use std::time::Duration;
 use ptztrack_contract::{Point, Rect, Vector};
 
 use super::{
-    Answer, Job, Lens, Next, PanTilt, Pilot, Query, ServoSettings, Sight, SpeedCurve, SpeedMap, View,
+    Answer, Belief, Job, Lens, Next, PanTilt, Pilot, Query, ServoSettings, Sight, SpeedCurve, SpeedMap, View,
     Visibility, magnified,
 };
 use crate::vapix::{Command, Error, Limits, Position, Range};
@@ -35,6 +35,14 @@ pub struct Setup {
     pub noisy_velocity: bool,
     /// Whether the tracker sees the background's motion.
     pub sees_ground: bool,
+    /// Half the width of the noise in the background's motion, pictures per second.
+    pub ground_jitter: f64,
+    /// Whether the camera tells where it looks.
+    pub tells_position: bool,
+    /// Whether the target is seen though it has left the picture.
+    pub sees_beyond: bool,
+    /// Where the noise begins.
+    pub seed: u64,
     pub visible: fn(f64) -> Visibility,
     /// Commands that this camera does not know.
     pub refuses: fn(&Command) -> bool,
@@ -59,6 +67,10 @@ impl Setup {
             jitter: 0.0,
             noisy_velocity: false,
             sees_ground: true,
+            ground_jitter: 0.0,
+            tells_position: true,
+            sees_beyond: true,
+            seed: 1,
             visible: |_| Visibility::Seen,
             refuses: |_| false,
         }
@@ -121,14 +133,6 @@ impl Run {
     }
 }
 
-/// A camera as the servo knows it.
-#[derive(Debug, Clone)]
-pub struct Belief {
-    pub latency: Duration,
-    pub fov_deg: f64,
-    pub map: SpeedMap,
-}
-
 struct Shot {
     frame: Frame,
     place: Point,
@@ -174,7 +178,7 @@ impl Simulation {
             in_flight: None,
             shots: VecDeque::new(),
             last_shot: None,
-            noise: 1,
+            noise: setup.seed,
             setup,
         }
     }
@@ -270,7 +274,8 @@ impl Simulation {
         let place = point(direction);
         let above = point(direction + PanTilt::new(0.0, height_deg / 2.0));
         let below = point(direction - PanTilt::new(0.0, height_deg / 2.0));
-        let noisy = Point { x: place.x + self.jitter(), y: place.y + self.jitter() };
+        let jitter = self.setup.jitter;
+        let noisy = Point { x: place.x + self.noise(jitter), y: place.y + self.noise(jitter) };
         let (mut ego, mut velocity) = (Vector::default(), Vector::default());
         if let Some((at, pose, last_view, last_direction, last_noisy)) = self.last_shot {
             let dt = (self.now - at).as_secs_f64();
@@ -280,6 +285,8 @@ impl Simulation {
             velocity =
                 if self.setup.noisy_velocity { per_s(noisy, last_noisy) } else { per_s(place, before) };
         }
+        let shaken = self.setup.ground_jitter;
+        ego = Vector { x: ego.x + self.noise(shaken), y: ego.y + self.noise(shaken) };
         self.last_shot = Some((self.now, self.pose, view, direction, noisy));
         let frame = Frame {
             time_s: time_s - Self::START_S,
@@ -288,7 +295,7 @@ impl Simulation {
             pose: self.pose,
             rate: self.rate,
         };
-        let height = (frame.height + self.jitter()).max(0.0);
+        let height = (frame.height + self.noise(jitter)).max(0.0);
         let bounds = box_about(noisy, height);
         self.shots.push_back(Shot { frame, place: noisy, ego, velocity, bounds, at: self.now });
     }
@@ -298,8 +305,10 @@ impl Simulation {
             return;
         }
         run.frames.push(shot.frame);
+        let inside = shot.frame.offset.x.abs().max(shot.frame.offset.y.abs()) < 0.5;
+        let sees = inside || self.setup.sees_beyond;
         let sight = Sight {
-            visibility: (self.setup.visible)(shot.frame.time_s),
+            visibility: if sees { (self.setup.visible)(shot.frame.time_s) } else { Visibility::Gone },
             id: 1,
             centroid: shot.place,
             bounds: shot.bounds,
@@ -339,7 +348,7 @@ impl Simulation {
                 return Err(Error::Camera("unknown".to_owned()));
             }
             Job::Command(_) => Answer::Accepted,
-            Job::Query(Query::Position) => Answer::Position(Position {
+            Job::Query(Query::Position) if self.setup.tells_position => Answer::Position(Position {
                 pan_deg: Some((self.pose.pan + 180.0).rem_euclid(360.0) - 180.0),
                 tilt_deg: Some(self.pose.tilt),
                 zoom_steps: Some(self.setup.zoom_step.round()),
@@ -357,11 +366,11 @@ impl Simulation {
         })
     }
 
-    fn jitter(&mut self) -> f64 {
+    fn noise(&mut self, half_width: f64) -> f64 {
         // Knuth's linear congruence: the same noise every time.
         self.noise =
             self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        ((self.noise >> 33) as f64 / f64::from(1u32 << 31) * 2.0 - 1.0) * self.setup.jitter
+        ((self.noise >> 33) as f64 / f64::from(1u32 << 31) * 2.0 - 1.0) * half_width
     }
 }
 

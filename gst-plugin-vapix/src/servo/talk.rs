@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use super::{Holder, LinkChange, Mode, PanTilt};
+use super::{Holder, LinkChange, Mode, PanTilt, SpeedMap};
 use crate::vapix::{
     Attributes, Command, Error, Limits, Parameters, Position, Presets, QueuePlace, QueueRequest,
 };
@@ -121,8 +121,19 @@ pub struct Status {
     pub position: Position,
     /// What it was last told, degrees per second.
     pub rate: PanTilt,
-    /// Horizontal field of view in degrees, where it is set or told.
+    /// Horizontal field of view in degrees, where it is set, told or learned.
     pub fov_deg: Option<f64>,
     /// How it is moved, where it is.
     pub mode: Option<Mode>,
+}
+
+/// The camera as it was learned, or is taken for where there was nothing to learn by.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Belief {
+    /// From sending a command to the timestamp of the first picture that shows it.
+    pub latency: Duration,
+    /// Horizontal field of view in degrees.
+    pub fov_deg: f64,
+    /// Degrees per second of the speed steps.
+    pub map: SpeedMap,
 }

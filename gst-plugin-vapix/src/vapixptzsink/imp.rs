@@ -223,7 +223,7 @@ impl ObjectImpl for VapixPtzSink {
         // The macro has no notion of a structure.
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
-                .blurb("State, commands sent, failed and coalesced, round-trip times in nanoseconds, position and field of view in degrees, last error")
+                .blurb("State, commands sent, failed and coalesced, round-trip times in nanoseconds, position and field of view in degrees, latency in nanoseconds and speeds of the steps 1 to 100 in degrees per second as they are known by now, last error")
                 .read_only()
                 .build();
             VapixPtzSink::derived_properties().iter().cloned().chain([stats]).collect()

@@ -31,6 +31,7 @@
 //! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
 //! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
 //! `field-of-view`, and `camera-speed` with `speed-curve` are only where that begins; `learn=false` keeps to them.
+//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the steps 1 to 100).
 //! A loop that swings about its target all the same is calmed by less gain, with a warning.
 //!
 //! ## Zoom and limits

@@ -2,12 +2,14 @@
 
 use std::time::Duration;
 
-use crate::servo::{Mode, Status};
+use crate::servo::{Belief, Mode, Status};
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
 pub struct Statistics {
     pub status: Status,
+    /// What the camera is taken for by now.
+    pub belief: Option<Belief>,
     pub sent: u64,
     pub failed: u64,
     /// Pictures of the target that were overtaken by newer ones before they could be steered by.
@@ -61,9 +63,16 @@ impl Statistics {
             .field_if_some("tilt", status.position.tilt_deg)
             .field_if_some("zoom", status.position.zoom_steps)
             .field_if_some("field-of-view", status.fov_deg)
+            .field_if_some("latency", self.belief.map(|belief| nanoseconds(belief.latency)))
+            .field_if_some("speeds", self.belief.map(|belief| speeds(&belief)))
             .field_if_some("last-error", self.last_error.as_deref())
             .build()
     }
+}
+
+/// Degrees per second of the speed steps 1 to 100.
+fn speeds(belief: &Belief) -> gst::Array {
+    gst::Array::new((1..=100).map(|step| belief.map.deg_s(step)))
 }
 
 fn nanoseconds(duration: Duration) -> u64 {

@@ -73,9 +73,12 @@ impl Worker {
         let client = Client::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let inbox = Arc::new(Inbox::new(clock));
-        let statistics = Arc::new(Mutex::new(Statistics::default()));
+        let pilot = Pilot::new(servo);
+        let (status, belief) = (pilot.status(Duration::ZERO), Some(pilot.belief()));
+        let statistics = Statistics { status, belief, ..Statistics::default() };
+        let statistics = Arc::new(Mutex::new(statistics));
         let desk = Desk {
-            pilot: Pilot::new(servo),
+            pilot,
             inbox: inbox.clone(),
             statistics: statistics.clone(),
             observer: observer.clone(),
@@ -311,6 +314,7 @@ impl<O: Fn(Event)> Desk<O> {
         {
             let mut statistics = lock(&self.statistics);
             statistics.status = status;
+            statistics.belief = Some(self.pilot.belief());
             statistics.halted = self.pilot.halted();
             statistics.coalesced = self.pilot.overtaken() + self.inbox.overtaken();
         }

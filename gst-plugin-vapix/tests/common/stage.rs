@@ -3,7 +3,9 @@
 use std::time::Duration;
 
 use ptztrack_contract::{BufferMeta, Rect, TargetMeta, TargetState, Vector};
-use virtual_camera::{Bounds, Clock, Settings, VirtualCamera};
+use virtual_camera::{
+    Bounds, Clock, Kinematics, Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World,
+};
 
 use super::{Heard, Rig, moves, target};
 
@@ -12,6 +14,27 @@ pub const FRAME: Duration = Duration::from_millis(40);
 
 /// Width and height of the pictures.
 const SIZE: (u32, u32) = (320, 240);
+
+/// Somebody who stands for a while and then paces to and fro, `stretch_s` for 30 degrees and 1 s of rest in between; the
+/// camera, `wide_fov_deg` wide, looks at where they begin.
+pub fn pacing(stands_s: u64, stretch_s: u64, wide_fov_deg: f64, kinematics: Kinematics) -> Settings {
+    let turn = |turn: u64| {
+        let from = stands_s + (stretch_s + 1) * turn;
+        [(from, turn), (from + stretch_s, turn + 1)]
+    };
+    let point = |(seconds, side): (u64, u64)| Waypoint {
+        time: Duration::from_secs(seconds),
+        pan_deg: if side.is_multiple_of(2) { -15.0 } else { 15.0 },
+        tilt_deg: -2.0,
+    };
+    let path = [(0, 0)].into_iter().chain((0..10).flat_map(turn)).map(point).collect();
+    Settings {
+        world: World::Synthetic(SyntheticSettings { path, wide_fov_deg, stays: true, ..Default::default() }),
+        home: Some(Pose { pan_deg: -15.0, tilt_deg: -2.0, zoom_step: 1.0 }),
+        kinematics,
+        ..Settings::default()
+    }
+}
 
 /// A stepped camera and a sink in lockstep with it; or both by the clock.
 pub struct Stage {

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use ptztrack_contract::Vector;
 
-use super::{FieldLearner, LatencyLearner, SpeedLearner};
+use super::{FieldLearner, LatencyLearner, Maps, SpeedLearner};
 use crate::servo::{CommandHistory, PanTilt, Sight, SpeedMap, View, Visibility};
 
 /// How the camera turned between two pictures, as the background shows it, or the target.
@@ -79,8 +79,8 @@ impl Calibration {
     }
 
     /// By how much that may be wrong.
-    pub fn latency_doubt(&self) -> Duration {
-        self.latency.doubt()
+    pub fn latency_uncertainty(&self) -> Duration {
+        self.latency.uncertainty()
     }
 
     /// What the tangent of half the assumed field of view is to be multiplied by.
@@ -93,8 +93,15 @@ impl Calibration {
         self.speeds.correct(assumed, fov_deg)
     }
 
-    /// Takes a picture, seen with `view`, and what was commanded, counted by `map`.
-    pub fn see(&mut self, sight: &Sight, view: &View, history: &CommandHistory, map: &SpeedMap) {
+    /// Takes a picture, seen with `view`, and what was commanded, counted by the map that is `believed` by now; `assumed`
+    /// was the one before anything was learned.
+    pub fn see(
+        &mut self,
+        sight: &Sight,
+        view: &View,
+        history: &CommandHistory,
+        [assumed, believed]: [&SpeedMap; 2],
+    ) {
         let before = self.before.replace(sight.taken_at);
         if sight.visibility != Visibility::Seen {
             return;
@@ -108,7 +115,8 @@ impl Calibration {
             return;
         }
         let latency = self.latency();
-        self.speeds.see(&turn, latency, history, map, fov_deg);
+        let wrong = self.speeds.see(&turn, latency, history, Maps { assumed, believed }, fov_deg);
+        self.latency.doubt(wrong);
         let factor = self.field_factor();
         self.field.see(&turn, latency);
         self.speeds.rescale((self.field_factor() / factor).ln());
@@ -122,5 +130,53 @@ impl Calibration {
     /// The camera has zoomed: what lies on both sides of that is not comparable.
     pub fn zoomed(&mut self) {
         self.field.interrupted();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::SpeedCurve;
+    use crate::servo::aim::tests::sight;
+    use proptest::prelude::*;
+
+    const VIEW: View = View { horizontal_fov_deg: 60.0, aspect: 4.0 / 3.0, tilt_deg: 0.0 };
+
+    fn garbage() -> impl Strategy<Value = f64> {
+        prop_oneof![-3.0..3.0f64, any::<f64>(), Just(f64::NAN), Just(f64::INFINITY), Just(0.0)]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(48))]
+
+        /// Whatever is seen, told and commanded.
+        #[test]
+        fn no_evidence_leads_out_of_bounds(
+            pictures in prop::collection::vec((garbage(), garbage(), -100i8..=100, any::<bool>(), 1u64..700), 1..200),
+            linear: bool,
+        ) {
+            let curve = if linear { SpeedCurve::Linear } else { SpeedCurve::Cubic };
+            let assumed = SpeedMap::new(450.0, curve);
+            let mut calibration = Calibration::new(Duration::from_millis(200));
+            let (mut history, mut map, mut now) = (CommandHistory::default(), assumed, Duration::ZERO);
+            for (x, y, step, tells, wait) in pictures {
+                now += Duration::from_millis(if wait < 500 { 40 } else { wait });
+                history.push_steps(now, (step, -step), &map);
+                if tells {
+                    calibration.positioned(now, PanTilt::new(x * 90.0, y * 90.0));
+                }
+                let ego_velocity = Some(Vector { x, y }).filter(|_| wait % 7 > 0);
+                let seen = Sight { ego_velocity, velocity: Vector { x: y, y: x }, ..sight(0.4, 0.6, now) };
+                calibration.see(&seen, &VIEW, &history, [&assumed, &map]);
+                map = calibration.correct(&assumed, 60.0);
+                history.revise(&map);
+                prop_assert!(calibration.latency() <= Duration::from_millis(1600), "{:?}", calibration.latency());
+                prop_assert!((0.33..=3.01).contains(&calibration.field_factor()));
+                for step in [1, 10, 50, 100] {
+                    let (known, at_most) = (map.deg_s(step), 251.0 * assumed.deg_s(100));
+                    prop_assert!(known >= assumed.deg_s(step) / 251.0 && known <= at_most, "{step}: {known}");
+                }
+            }
+        }
     }
 }

@@ -105,10 +105,12 @@ impl FieldLearner {
     fn find(&mut self, moved: PanTilt, seen: PanTilt, doubt_deg: f64) {
         let (square, along) = (dot(moved, moved), dot(moved, seen));
         let vagueness = (Self::NOISE_DEG + doubt_deg) / square.sqrt() + 0.02;
-        if along <= 0.0 || vagueness > Self::VAGUE {
+        let factor = square / along;
+        // What is no number compares with nothing.
+        if !(factor > 0.0 && factor.is_finite() && vagueness <= Self::VAGUE) {
             return;
         }
-        self.found.push_back(((square / along).ln(), vagueness.powi(-2)));
+        self.found.push_back((factor.ln(), vagueness.powi(-2)));
         if self.found.len() > Self::FINDINGS {
             self.found.pop_front();
         }

@@ -11,7 +11,7 @@ use crate::servo::{CommandHistory, PanTilt};
 pub(super) struct LatencyLearner {
     assumed: Duration,
     learned: Duration,
-    doubt: Duration,
+    uncertainty: Duration,
     recent: VecDeque<Turn>,
     /// Per candidate delay: squares of the commanded change, and its products with the change seen.
     commanded: [f64; CANDIDATES],
@@ -35,6 +35,9 @@ const ENOUGH: f64 = 0.1;
 /// ... and beyond which older ones fade.
 const PLENTY: f64 = 1.5;
 
+/// Seconds after which they count for a third, in any case: a long swing by a wrong latency is no calm walk.
+const MEMORY_S: f64 = 12.0;
+
 /// Agreement (0 to 1) below which what is seen has nothing to do with the commands.
 const AGREEMENT: f64 = 0.4;
 
@@ -42,7 +45,7 @@ const AGREEMENT: f64 = 0.4;
 const RELUCTANCE: f64 = 0.1;
 
 /// What is only assumed may be wrong by this; what was seen often enough, by a step.
-const DOUBT: Duration = Duration::from_millis(150);
+const UNCERTAINTY: Duration = Duration::from_millis(150);
 
 /// Part of the way to the best candidate that is gone in a second.
 const PACE_PER_S: f64 = 3.0;
@@ -53,7 +56,7 @@ impl LatencyLearner {
         Self {
             assumed,
             learned: assumed,
-            doubt: DOUBT,
+            uncertainty: UNCERTAINTY,
             recent: VecDeque::new(),
             commanded: [0.0; CANDIDATES],
             product: [0.0; CANDIDATES],
@@ -72,8 +75,8 @@ impl LatencyLearner {
     }
 
     /// By how much that may be wrong.
-    pub fn doubt(&self) -> Duration {
-        self.doubt
+    pub fn uncertainty(&self) -> Duration {
+        self.uncertainty
     }
 
     /// Takes a turn that was seen; the picture is `fov_deg` wide.
@@ -97,15 +100,20 @@ impl LatencyLearner {
             *square += dot(commanded, commanded);
             *product += dot(commanded, change);
         }
-        self.fade();
+        self.keep((PLENTY / self.seen).min((-turn.seconds() / MEMORY_S).exp()));
         self.approach(turn.seconds());
     }
 
-    fn fade(&mut self) {
-        let keep = (PLENTY / self.seen).min(1.0);
-        self.seen *= keep;
+    /// The speeds that were compared proved wrong by so much (a logarithm): what that taught counts for less. Wild
+    /// swings, while nothing was known yet, would else outweigh a calm walk for long.
+    pub fn doubt(&mut self, wrong: f64) {
+        self.keep((-wrong.abs()).exp());
+    }
+
+    fn keep(&mut self, part: f64) {
+        self.seen *= part;
         for sum in self.commanded.iter_mut().chain(&mut self.product) {
-            *sum *= keep;
+            *sum *= part;
         }
     }
 
@@ -115,7 +123,7 @@ impl LatencyLearner {
         let learned = self.learned.as_secs_f64();
         let part = (PACE_PER_S * seconds).min(1.0);
         self.learned = Duration::from_secs_f64((learned + (best - learned) * part).max(0.0));
-        self.doubt = STEP + self.doubt.saturating_sub(STEP).mul_f64(1.0 - part);
+        self.uncertainty = STEP + self.uncertainty.saturating_sub(STEP).mul_f64(1.0 - part);
     }
 
     /// The delay of the best agreement in seconds, between the candidates by a parabola.

@@ -20,4 +20,4 @@ pub use calibration::{Calibration, Turn};
 use field::FieldLearner;
 use latency::LatencyLearner;
 use regression::Regression;
-use speed::SpeedLearner;
+use speed::{Maps, SpeedLearner};

@@ -25,6 +25,11 @@ impl<const N: usize> Regression<N> {
         dot(&self.weights, features)
     }
 
+    /// How far that may be off: its standard deviation.
+    pub fn deviation(&self, features: &[f64; N]) -> f64 {
+        dot(&self.covariance.map(|row| dot(&row, features)), features).max(0.0).sqrt()
+    }
+
     /// Takes a measurement with a variance.
     pub fn update(&mut self, features: &[f64; N], measured: f64, variance: f64) {
         let spread = self.covariance.map(|row| dot(&row, features));

@@ -1,7 +1,8 @@
+use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::{Regression, Turn};
-use crate::servo::{CommandHistory, SpeedMap};
+use crate::servo::{CommandHistory, PanTilt, SpeedMap};
 
 /// Learns how fast the speed steps really are, as a factor on the map that was assumed.
 ///
@@ -12,6 +13,10 @@ use crate::servo::{CommandHistory, SpeedMap};
 #[derive(Debug)]
 pub(super) struct SpeedLearner {
     regression: Regression<FEATURES>,
+    /// The turns of the last moments.
+    recent: VecDeque<Turn>,
+    /// By how much, as a logarithm, what was known was corrected since that was asked.
+    proved_wrong: f64,
     /// The latency by which the newest was measured.
     latency: Option<Duration>,
 }
@@ -29,8 +34,9 @@ const MIDDLE_STEP: f64 = 20.0;
 /// The field of view at which the slope over it does nothing, degrees.
 const MIDDLE_FOV_DEG: f64 = 55.0;
 
-/// No speed is taken to be further than this factor from the assumed one.
-const LARGEST_FACTOR: f64 = 50.0;
+/// No speed is taken to be further than this factor from the assumed one: enough for a camera whose steps are in
+/// proportion where those of the same greatest speed were to grow by the cube.
+const LARGEST_FACTOR: f64 = 250.0;
 
 /// Part of the prior's variance that is forgotten in a second.
 const FORGOTTEN_PER_S: f64 = 2e-4;
@@ -53,12 +59,60 @@ const ANOTHER_LATENCY: Duration = Duration::from_millis(50);
 /// ... is forgotten by this part of the prior's variance.
 const DOUBTED: f64 = 0.2;
 
+/// Standard deviations by which a step may be faster than it seems: a slower one than was assumed is believed in so late.
+const CAUTION: f64 = 0.75;
+
+/// What the camera travels to and fro is counted over so long.
+const TRAVEL: Duration = Duration::from_secs(1);
+
+/// Logarithm of the factor from which on that tells: a delay and slow starts make up for less.
+const GROSS: f64 = std::f64::consts::LN_2;
+
+/// Variance of that logarithm: one picture's second is nearly the one before's.
+const TRAVEL_VARIANCE: f64 = 6.0;
+
 /// Rates that differ by more than this factor within the time that a picture may show teach nothing.
 const STEADY: f64 = 2.0;
 
 /// The camera needs some time to reach a speed; and the latency is not known to the millisecond.
 const SETTLING: Duration = Duration::from_millis(240);
 const EARLY: Duration = Duration::from_millis(80);
+
+/// What the camera's speeds are taken for.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Maps<'a> {
+    /// Before anything was learned.
+    pub assumed: &'a SpeedMap,
+    /// By now, with what bounds them.
+    pub believed: &'a SpeedMap,
+}
+
+#[derive(Clone, Copy)]
+struct Axis {
+    rate: fn(PanTilt) -> f64,
+    step: fn((i8, i8)) -> i8,
+}
+
+impl Axis {
+    const PAN: Self = Self { rate: |rate| rate.pan, step: |steps| steps.0 };
+    const TILT: Self = Self { rate: |rate| rate.tilt, step: |steps| steps.1 };
+}
+
+/// What a turn about one axis is to be compared with.
+#[derive(Clone, Copy)]
+struct Seen<'a> {
+    axis: Axis,
+    latency: Duration,
+    history: &'a CommandHistory,
+    maps: Maps<'a>,
+    fov_deg: f64,
+}
+
+/// A way commanded, and the features of its steps, each by its part of the way.
+struct Way {
+    degrees: f64,
+    features: [f64; FEATURES],
+}
 
 impl SpeedLearner {
     /// Knows nothing but the assumed map. `told`: that is the camera's own, and needs little correction.
@@ -68,69 +122,131 @@ impl SpeedLearner {
         // Linear for cubic is off by two: with less, that would be taken for an oddity at each step met so far.
         deviations[SLOPE] = if told { 0.1 } else { 2.0 };
         deviations[ZOOM] = if told { 0.1 } else { 0.5 };
-        Self { regression: Regression::new(deviations), latency: None }
+        Self {
+            regression: Regression::new(deviations),
+            recent: VecDeque::new(),
+            proved_wrong: 0.0,
+            latency: None,
+        }
     }
 
     /// The map with what was learned.
     pub fn correct(&self, assumed: &SpeedMap, fov_deg: f64) -> SpeedMap {
         assumed.times(|step| {
-            let logarithm = self.regression.predict(&features(step, fov_deg));
-            logarithm.clamp(-LARGEST_FACTOR.ln(), LARGEST_FACTOR.ln()).exp()
+            let features = features(step, fov_deg);
+            let logarithm = self.regression.predict(&features);
+            // Slower only as far as that is sure: a step that was never tried may fling the camera round.
+            let cautious =
+                (logarithm + CAUTION * self.regression.deviation(&features)).min(0.0).max(logarithm);
+            cautious.clamp(-LARGEST_FACTOR.ln(), LARGEST_FACTOR.ln()).exp()
         })
     }
 
-    /// Takes a turn that was seen. `map`: as it is believed now; `fov_deg`: that the turn was measured with.
+    /// Takes a turn that was seen. `assumed`: the map before anything was learned; `map`: as it is believed now;
+    /// `fov_deg`: that the turn was measured with.
     pub fn see(
         &mut self,
         turn: &Turn,
         latency: Duration,
         history: &CommandHistory,
-        map: &SpeedMap,
+        maps: Maps,
         fov_deg: f64,
-    ) {
-        let (from, to) = (turn.from.saturating_sub(latency), turn.to.saturating_sub(latency));
-        let commanded = history.rotation(from, to) / turn.seconds();
+    ) -> f64 {
         if self.latency.get_or_insert(latency).abs_diff(latency) > ANOTHER_LATENCY {
             self.latency = Some(latency);
             self.regression.forget(DOUBTED);
         }
-        let window = || history.rates_between(from.saturating_sub(SETTLING), to + EARLY);
         self.regression.forget(FORGOTTEN_PER_S * turn.seconds());
-        for (seen, commanded, rates) in [
-            (turn.rate.pan, commanded.pan, extremes(window().map(|rate| rate.pan))),
-            (turn.rate.tilt, commanded.tilt, extremes(window().map(|rate| rate.tilt))),
-        ] {
-            self.see_axis(seen, commanded, rates, map, fov_deg);
+        self.remember(turn);
+        for axis in [Axis::PAN, Axis::TILT] {
+            let seen = Seen { axis, latency, history, maps, fov_deg };
+            self.see_travel(&seen);
+            self.see_rate(turn, &seen);
+        }
+        std::mem::take(&mut self.proved_wrong)
+    }
+
+    fn remember(&mut self, turn: &Turn) {
+        if self.recent.back().is_some_and(|last| last.to != turn.from) {
+            self.recent.clear();
+        }
+        self.recent.push_back(*turn);
+        while self.recent.front().is_some_and(|first| first.to + TRAVEL <= turn.to) {
+            self.recent.pop_front();
         }
     }
 
-    fn see_axis(&mut self, seen: f64, commanded: f64, (low, high): (f64, f64), map: &SpeedMap, fov_deg: f64) {
-        let spread = high / low;
-        let noise = NOISE_FIELDS_S * fov_deg;
-        let ratio = if low > 0.0 { spread } else { 1.0 / spread };
+    /// Compares how fast the camera turned with how fast it should have, where it turned evenly.
+    fn see_rate(&mut self, turn: &Turn, about: &Seen) {
+        let Seen { axis, latency, history, maps, fov_deg } = *about;
+        let (from, to) = (turn.from.saturating_sub(latency), turn.to.saturating_sub(latency));
+        let rates = history.rates_between(from.saturating_sub(SETTLING), to + EARLY).map(axis.rate);
+        let (low, high) = extremes(rates);
+        let ratio = if low > 0.0 { high / low } else { low / high };
+        if low * high <= 0.0 || ratio > STEADY {
+            return;
+        }
         // What is bounded by proportional speed tells nothing of the map.
-        if low * high <= 0.0 || ratio > STEADY || map.is_capped(commanded) {
+        let believed = (axis.rate)(history.rotation(from, to)) / turn.seconds();
+        let Some(way) = self.way(about, from, to).filter(|_| !maps.believed.is_capped(believed)) else {
             return;
-        }
-        let stands = seen.abs() <= 2.0 * noise;
-        let (seen, doubt) = match stands {
-            // Far slower than it is taken for, or only late.
-            true if commanded.abs() > STRONG * noise => (noise.copysign(commanded), STANDING_VARIANCE),
-            true => return,
-            false => (seen, (noise / seen).powi(2)),
         };
-        // A camera that moves to the other side obeys somebody or something else.
-        if seen * commanded <= 0.0 {
+        let (seen, commanded) = ((axis.rate)(turn.rate) * low.signum(), way.degrees / turn.seconds());
+        let noise = NOISE_FIELDS_S * fov_deg;
+        let mut features = way.features;
+        if seen.abs() > 2.0 * noise {
+            // A camera that moves to the other side obeys somebody or something else.
+            if seen > 0.0 {
+                let variance = VARIANCE + ratio.ln().powi(2) + (noise / seen).powi(2);
+                self.learn(&features, (seen / commanded).ln(), variance);
+            }
+        } else if commanded > STRONG * noise {
+            // Far slower than it is taken for, or only late. How much slower is not told: nothing of this step
+            // in particular.
+            features[FIRST_KNOT..].fill(0.0);
+            self.learn(&features, (noise / commanded).ln(), STANDING_VARIANCE);
+        }
+    }
+
+    /// Compares how far the camera went to and fro in the last moments with how far it should have. That tells
+    /// nothing exact, but when all is so wrong that the camera swings, and never turns evenly, nothing else does.
+    fn see_travel(&mut self, about: &Seen) {
+        let (Some(first), Some(last)) = (self.recent.front(), self.recent.back()) else { return };
+        if first.from + TRAVEL > last.to {
             return;
         }
-        let variance = VARIANCE + ratio.ln().powi(2) + doubt;
-        let mut features = features(map.ideal_step(commanded), fov_deg);
-        if stands {
-            // How much slower is not told: nothing of this step in particular, nor of the curve.
-            features[OFFSET + 1..].fill(0.0);
+        let (from, to) = (first.from.saturating_sub(about.latency), last.to.saturating_sub(about.latency));
+        let seen: f64 =
+            self.recent.iter().map(|turn| (about.axis.rate)(turn.rate).abs() * turn.seconds()).sum();
+        let least = STRONG * NOISE_FIELDS_S * about.fov_deg * TRAVEL.as_secs_f64();
+        let Some(way) = self.way(about, from, to).filter(|_| seen > least) else { return };
+        let factor = (seen / way.degrees).ln();
+        if factor.abs() > GROSS {
+            self.learn(&way.features, factor, TRAVEL_VARIANCE);
         }
-        let known = self.regression.predict(&features);
-        self.regression.update(&features, known + (seen / commanded).ln(), variance);
+    }
+
+    /// The way commanded between two times, to and fro; `None` of none.
+    fn way(&self, about: &Seen, from: Duration, to: Duration) -> Option<Way> {
+        let mut way = Way { degrees: 0.0, features: [0.0; FEATURES] };
+        for (steps, seconds) in about.history.steps_between(from, to) {
+            let step = (about.axis.step)(steps).saturating_abs();
+            let features = features(f64::from(step), about.fov_deg);
+            let degrees = about.maps.assumed.deg_s(step) * self.regression.predict(&features).exp() * seconds;
+            way.degrees += degrees;
+            for (sum, feature) in way.features.iter_mut().zip(features) {
+                *sum += degrees * feature;
+            }
+        }
+        way.features = way.features.map(|sum| sum / way.degrees);
+        (way.degrees > 0.0 && way.degrees.is_finite()).then_some(way)
+    }
+
+    /// Takes it that the camera is so much faster (a logarithm) than is known by now.
+    fn learn(&mut self, features: &[f64; FEATURES], faster: f64, variance: f64) {
+        let known = self.regression.predict(features);
+        self.regression.update(features, known + faster, variance);
+        self.proved_wrong += (self.regression.predict(features) - known).abs();
     }
 
     /// Degrees have become another measure, by a factor of this logarithm.
