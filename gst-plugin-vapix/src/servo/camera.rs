@@ -1,4 +1,6 @@
-use super::{Lens, PanTilt, SpeedMap};
+use std::fmt;
+
+use super::{Lens, PanTilt, SpeedMap, is_endless};
 use crate::vapix::{Attributes, Limits, Parameters, Position, Range};
 
 /// Field of view of a camera that does not tell: a common dome's, zoomed out.
@@ -92,10 +94,55 @@ impl CameraModel {
     }
 }
 
+/// What it told, in one line.
+impl fmt::Display for CameraModel {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let limits = self.limits();
+        let range = |range: Option<Range>, unit: &str| {
+            range.map_or("not told".to_owned(), |range| format!("{} to {}{unit}", range.min, range.max))
+        };
+        let endless = if limits.pan_deg.is_some_and(is_endless) { ", endless" } else { "" };
+        write!(f, "pan {}{endless}; tilt {}; ", range(limits.pan_deg, "°"), range(limits.tilt_deg, "°"))?;
+        write!(f, "zoom {}; ", range(limits.zoom_steps, ""))?;
+        write!(f, "field of view {}; ", range(limits.field_angle_deg, "°"))?;
+        match self.told_speeds() {
+            Some(map) => write!(f, "speeds to {:.0}°/s; ", map.deg_s(100))?,
+            None => f.write_str("speeds not told; ")?,
+        }
+        let proportional = match self.parameters.proportional_speed {
+            Some(true) if self.takes_free_moves() => "proportional, left out",
+            Some(true) => "proportional to the field of view",
+            Some(false) => "not proportional",
+            None => "not told whether proportional",
+        };
+        let queue = if self.parameters.control_queue == Some(true) { "a" } else { "no" };
+        write!(f, "{proportional}; {queue} control queue")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::vapix::StepMeaning;
+
+    #[test]
+    fn it_is_told_in_one_line() {
+        let nothing = "pan not told; tilt not told; zoom not told; field of view not told; speeds not told; \
+                       not told whether proportional; no control queue";
+        assert_eq!(CameraModel::default().to_string(), nothing);
+        let limits = Limits {
+            pan_deg: Some(Range { min: -180.0, max: 180.0 }),
+            tilt_deg: Some(Range { min: -20.0, max: 90.0 }),
+            zoom_steps: Some(OPTICAL_STEPS),
+            field_angle_deg: Some(Range { min: 3.2, max: 55.2 }),
+        };
+        let parameters =
+            Parameters { proportional_speed: Some(true), control_queue: Some(true), ..Parameters::default() };
+        let camera = CameraModel { limits, parameters, ..CameraModel::default() };
+        let text = "pan -180 to 180°, endless; tilt -20 to 90°; zoom 1 to 9999; field of view 3.2 to 55.2°; \
+                    speeds not told; proportional to the field of view; a control queue";
+        assert_eq!(camera.to_string(), text);
+    }
 
     #[test]
     fn field_of_view_follows_the_zoom() {

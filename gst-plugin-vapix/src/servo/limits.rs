@@ -38,9 +38,6 @@ impl LimitGuard {
     /// Having been there, it has left by this; before, it only finds that it was not quite there.
     const LEFT_DEG: f64 = 3.0;
 
-    /// A range this wide is no end: the camera turns round and round.
-    const ENDLESS_DEG: f64 = 359.0;
-
     /// The camera told where it looks, or would not.
     pub fn told(&mut self, at: Duration, position: Option<PanTilt>) {
         self.told = position.map(|position| (at, position));
@@ -64,8 +61,7 @@ impl LimitGuard {
             self.at_limit = false;
             return rate;
         };
-        let pan = Some(narrower(hard.pan_deg, soft.pan_deg))
-            .filter(|range| range.max - range.min < Self::ENDLESS_DEG);
+        let pan = Some(narrower(hard.pan_deg, soft.pan_deg)).filter(|range| !is_endless(*range));
         let tilt = Some(narrower(hard.tilt_deg, soft.tilt_deg));
         let near_deg = if self.at_limit { Self::LEFT_DEG } else { Self::NEAR_DEG };
         let (pan, pan_held) = held(rate.pan, position.pan, pan, lasting_s, near_deg);
@@ -78,6 +74,11 @@ impl LimitGuard {
     pub fn at_limit(&self) -> bool {
         self.at_limit
     }
+}
+
+/// Whether a range of pan is so wide that it is no end: the camera turns round and round.
+pub fn is_endless(pan_deg: Range) -> bool {
+    pan_deg.max - pan_deg.min >= 359.0
 }
 
 /// What both allow.

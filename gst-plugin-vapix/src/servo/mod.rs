@@ -49,7 +49,7 @@ pub use control_queue::ControlQueue;
 pub use controller::{ControlLaw, Controller, Offset};
 pub use home::{Home, Homing};
 pub use learning::{Calibration, Turn};
-pub use limits::{LimitGuard, SoftLimits, narrower};
+pub use limits::{LimitGuard, SoftLimits, is_endless, narrower};
 pub use link::{Link, LinkChange};
 pub use operator::{OperatorWatch, Verdict};
 pub use optics::{Lens, View, magnified};

@@ -312,6 +312,7 @@ impl Pilot {
             moving: self.scheduler.may_move(),
             taken_over: self.authority.holder(now).is_some(),
             position: self.camera.position,
+            limits: self.camera.limits(),
             rate: self.history.rate_at(now),
             fov_deg: self.known_fov_deg(),
             mode: Some(self.mode(now)),

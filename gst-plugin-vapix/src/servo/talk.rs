@@ -86,6 +86,8 @@ pub enum Next {
 pub enum Report {
     /// The connection came, went, or is refused.
     Link(LinkChange),
+    /// The camera was asked what it is: this is what it told.
+    Met(String),
     /// The camera was at rest and has accepted a move.
     Moving,
     /// The camera has accepted a stop, or arrived.
@@ -123,6 +125,8 @@ pub struct Status {
     pub rate: PanTilt,
     /// Horizontal field of view in degrees, where it is set, told or learned.
     pub fov_deg: Option<f64>,
+    /// How far it can look and zoom, by its own word.
+    pub limits: Limits,
     /// How it is moved, where it is.
     pub mode: Option<Mode>,
 }

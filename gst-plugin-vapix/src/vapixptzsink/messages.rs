@@ -20,6 +20,7 @@ impl VapixPtzSink {
                 gst::debug!(CAT, imp = self, "{job} failed after {round_trip:?}: {err}");
             }
             Event::Report(Report::Link(change)) => self.link_changed(&change),
+            Event::Report(Report::Met(camera)) => gst::info!(CAT, imp = self, "the camera: {camera}"),
             Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
             Event::Report(Report::Stopped) => self.post(CameraChange::Stopped, "the camera has stopped"),
             Event::Report(Report::AtLimit) => {

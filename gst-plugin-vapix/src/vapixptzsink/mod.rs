@@ -31,7 +31,8 @@
 //! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
 //! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
 //! `field-of-view`, and `camera-speed` with `speed-curve` are only where that begins; `learn=false` keeps to them.
-//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the steps 1 to 100).
+//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the steps 1 to 100),
+//! and the camera's own limits, `pan-min` to `zoom-max` and `endless-pan`. What the camera told of itself is one line of INFO.
 //! A loop that swings about its target all the same is calmed by less gain, with a warning.
 //!
 //! ## Zoom and limits

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::servo::{Belief, Mode, Status};
+use crate::servo::{Belief, Mode, Status, is_endless};
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
@@ -49,6 +49,7 @@ impl Statistics {
 
     fn with_state(&self, state: &str) -> gst::Structure {
         let status = &self.status;
+        let limits = &status.limits;
         gst::Structure::builder("application/x-vapixptzsink-stats")
             .field("state", state)
             .field("commands-sent", self.sent)
@@ -62,6 +63,13 @@ impl Statistics {
             .field_if_some("pan", status.position.pan_deg)
             .field_if_some("tilt", status.position.tilt_deg)
             .field_if_some("zoom", status.position.zoom_steps)
+            .field_if_some("pan-min", limits.pan_deg.map(|pan| pan.min))
+            .field_if_some("pan-max", limits.pan_deg.map(|pan| pan.max))
+            .field_if_some("tilt-min", limits.tilt_deg.map(|tilt| tilt.min))
+            .field_if_some("tilt-max", limits.tilt_deg.map(|tilt| tilt.max))
+            .field_if_some("zoom-min", limits.zoom_steps.map(|zoom| zoom.min))
+            .field_if_some("zoom-max", limits.zoom_steps.map(|zoom| zoom.max))
+            .field_if_some("endless-pan", limits.pan_deg.map(is_endless))
             .field_if_some("field-of-view", status.fov_deg)
             .field_if_some("latency", self.belief.map(|belief| nanoseconds(belief.latency)))
             .field_if_some("speeds", self.belief.map(|belief| speeds(&belief)))

@@ -127,7 +127,6 @@ impl Pilot {
     }
 
     fn told(&mut self, query: Query, answer: Answer, sent: Duration, now: Duration) {
-        self.introduction.retain(|pending| *pending != query);
         match answer {
             Answer::Position(position) => {
                 let before = mem::replace(&mut self.camera.position, position);
@@ -164,13 +163,14 @@ impl Pilot {
             Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
             Answer::Accepted => {}
         }
+        self.asked(query);
         self.revise();
         self.succeeded(false);
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
         if let Some(refusal) = self.ways.failed().filter(|_| err.is_refusal() && !err.is_final()) {
-            self.introduction.retain(|pending| *pending != query);
+            self.asked(query);
             return self.failed(&refusal, true, now);
         }
         if query != Query::Position {
@@ -184,7 +184,7 @@ impl Pilot {
         } else if self.link.connected()
             && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
         {
-            self.introduction.retain(|pending| *pending != query);
+            self.asked(query);
             self.positioned(None, now, now);
             if !self.steps.under_way() {
                 self.next_poll = now + Self::POLL_REFUSED;
@@ -198,7 +198,16 @@ impl Pilot {
         match query {
             Query::Queue(_) => self.authority.queue.failed(now),
             Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
-            _ => self.introduction.retain(|pending| *pending != query),
+            _ => self.asked(query),
+        }
+    }
+
+    /// This need not be asked again; after the last question it is known whom we met.
+    fn asked(&mut self, query: Query) {
+        let meeting = !self.introduction.is_empty();
+        self.introduction.retain(|pending| *pending != query);
+        if meeting && self.introduction.is_empty() {
+            self.reports.push(Report::Met(self.camera.to_string()));
         }
     }
 
