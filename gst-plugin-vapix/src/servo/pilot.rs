@@ -210,7 +210,10 @@ impl Pilot {
         let (command, due) = match self.wish(now) {
             Wish::Rest => (self.stop, self.scheduler.stop_due(now, interval, retry_at)),
             Wish::Move(_) if self.meeting() => (self.stop, None),
-            Wish::Move(command) => (command, Some(self.scheduler.move_due(&command, interval, retry_at))),
+            Wish::Move(command) => {
+                let not_before = retry_at.max(self.ways.not_before(&command));
+                (command, Some(self.scheduler.move_due(&command, interval, not_before)))
+            }
             Wish::AsIs => (self.stop, None),
         };
         if due.is_some_and(|due| due <= now) {

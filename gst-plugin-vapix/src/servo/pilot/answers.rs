@@ -49,11 +49,8 @@ impl Pilot {
                 self.introduction.push_front(witness);
                 true
             }
-            Refusal::OfMode(_) if self.ways.lacks(self.mode(now), now) => {
-                // There is none left: it is not for the words.
-                self.ways.forget_refusals();
-                false
-            }
+            // There is none left to turn to: the wanted one is tried on, with the pauses of a fault.
+            Refusal::OfMode(_) if self.ways.lacks(self.mode(now), now) => false,
             Refusal::OfMode(mode) => {
                 if mode == Mode::Velocity {
                     self.stop = Command::Stop;
