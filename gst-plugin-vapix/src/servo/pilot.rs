@@ -6,7 +6,7 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
+    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing, Job, Lens,
     LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
     SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
@@ -208,6 +208,7 @@ impl Pilot {
         let interval = Duration::from_secs_f64(1.0 / self.settings.max_rate_hz);
         let retry_at = self.link.retry_at();
         let (command, due) = match self.wish(now) {
+            Wish::Rest if self.authority.queue.is_deaf() => (self.stop, None),
             Wish::Rest => (self.stop, self.scheduler.stop_due(now, interval, retry_at)),
             Wish::Move(_) if self.meeting() => (self.stop, None),
             Wish::Move(command) => {
@@ -235,7 +236,7 @@ impl Pilot {
             None if self.homing.wants_presets() => (Query::Presets, Duration::ZERO),
             None => (Query::Position, self.next_poll),
         };
-        match self.authority.queue.next() {
+        match self.authority.queue.next(self.is_at_rest()) {
             Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),
             _ => (query, at),
         }
@@ -273,8 +274,12 @@ impl Pilot {
         self.overtaken
     }
 
-    /// Whether there is something to move the camera for.
+    /// Whether there is something to do that a stop need not hurry for.
     pub fn has_errand(&self, now: Duration) -> bool {
+        if self.authority.queue.is_deaf() {
+            // A stop would not be heard; the answer under way may make it so.
+            return true;
+        }
         let going_home = self.steps.under_way() && self.homing.is_settled() || self.homing.due(now).is_some();
         self.authority.holder(now).is_none() && (self.has_target(now) || going_home)
     }
@@ -328,12 +333,9 @@ impl Pilot {
     }
 
     fn wish(&mut self, now: Duration) -> Wish {
-        match self.authority.holder(now) {
+        if self.authority.holder(now).is_some() {
             // What moves it is his; what we last said must not outlive our hold on it.
-            Some(Holder::Operator) => return Wish::Rest,
-            // It would be refused.
-            Some(Holder::Queue) => return Wish::AsIs,
-            None => {}
+            return Wish::Rest;
         }
         if !self.has_target(now) {
             self.lose();

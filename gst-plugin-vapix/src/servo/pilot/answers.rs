@@ -24,7 +24,8 @@ impl Pilot {
         } else {
             self.scheduler.failed(command, false, now);
         }
-        if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
+        let queue = &mut self.authority.queue;
+        if matches!(err, Error::Camera(_)) && (queue.refused_command() || queue.refused(now)) {
             return;
         }
         if self.homing.leads(command) && err.is_refusal() && !err.is_final() {
