@@ -106,6 +106,11 @@ impl Authority {
         self.queue.forget();
     }
 
+    /// The camera was asked where it looks, and did not say.
+    pub fn undecided(&mut self) {
+        self.watch.undecided();
+    }
+
     /// Whether the camera is to be asked at once where it looks.
     pub fn asks(&self) -> bool {
         self.watch.suspects()

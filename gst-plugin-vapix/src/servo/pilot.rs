@@ -46,6 +46,8 @@ pub struct Pilot {
     /// The words that end the last move, whatever the mode is by now.
     stop: Command,
     at_limit: bool,
+    /// Since when there is a target and it is not known whether the camera is ours to follow it.
+    unsteered_since: Option<Duration>,
     overtaken: u64,
     reports: Vec<Report>,
 }
@@ -75,6 +77,9 @@ impl Pilot {
     const POLL_RESTING: Duration = Duration::from_secs(5);
     /// A camera that does not tell its position is asked again this much later.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
+
+    /// For so long the camera may go on as it was last told, while it is found out whether it is ours.
+    const UNSTEERED: Duration = Duration::from_secs(1);
 
     /// To be a swing, an offset goes so many dead zones beyond the middle: gait and tracker go beyond one.
     const SWING: f64 = 2.5;
@@ -107,6 +112,7 @@ impl Pilot {
             speed_steps: (0, 0),
             stop: Command::Halt,
             at_limit: false,
+            unsteered_since: None,
             overtaken: 0,
             reports: Vec::new(),
             settings,
@@ -191,6 +197,7 @@ impl Pilot {
 
     fn lose(&mut self) {
         self.target = None;
+        self.unsteered_since = None;
         self.aim.clear();
         self.controller.rest();
         self.oscillation.clear();
@@ -226,7 +233,10 @@ impl Pilot {
             return Next::Do(Job::Query(query));
         }
         let operator_until = self.authority.operator_until(now);
-        Next::Wait([due, Some(query_due), self.stale_at(), operator_until].into_iter().flatten().min())
+        let unsteered_until = self.unsteered_since.map(|since| since + Self::UNSTEERED);
+        let unsteered_until = unsteered_until.filter(|until| now < *until);
+        let reasons = [due, Some(query_due), self.stale_at(), operator_until, unsteered_until];
+        Next::Wait(reasons.into_iter().flatten().min())
     }
 
     /// What to ask next, and when.
@@ -342,8 +352,10 @@ impl Pilot {
         }
         let Some(target) = &mut self.target else { return self.wait(now) };
         if !self.authority.is_ours(now) {
-            return Wish::AsIs;
+            let since = *self.unsteered_since.get_or_insert(now);
+            return if now < since + Self::UNSTEERED { Wish::AsIs } else { Wish::Rest };
         }
+        self.unsteered_since = None;
         target.considered = true;
         let sight = target.sight;
         match self.mode(now) {

@@ -137,6 +137,8 @@ impl Pilot {
                     if self.authority.is_ours(now) {
                         self.calibration.positioned((sent + now) / 2, position);
                     }
+                } else {
+                    self.authority.undecided();
                 }
                 self.positioned(Some(position), (sent + now) / 2, now);
             }
@@ -167,6 +169,9 @@ impl Pilot {
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
+        if query == Query::Position {
+            self.authority.undecided();
+        }
         if let Some(refusal) = self.ways.failed().filter(|_| err.is_refusal() && !err.is_final()) {
             self.asked(query);
             return self.failed(&refusal, true, now);
