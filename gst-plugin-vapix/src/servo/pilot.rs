@@ -259,6 +259,8 @@ impl Pilot {
         match command {
             _ if command.is_stop() => {}
             Command::Velocity { zoom: Some(_), .. } => self.stop = Command::REST,
+            // A zoom goes on until it is told otherwise.
+            Command::Velocity { .. } if self.stop == Command::REST => {}
             Command::Velocity { .. } => self.stop = Command::Halt,
             Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
                 self.stop = Command::Stop;

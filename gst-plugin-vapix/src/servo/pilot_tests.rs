@@ -1,5 +1,7 @@
 #[path = "pilot/others_tests.rs"]
 mod others;
+#[path = "pilot/words_tests.rs"]
+mod words;
 
 use super::*;
 use crate::servo::Answer;

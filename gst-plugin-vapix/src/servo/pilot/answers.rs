@@ -65,6 +65,11 @@ impl Pilot {
     pub(super) fn unanswered(&mut self, command: &Command, now: Duration) {
         self.scheduler.failed(command, true, now);
         self.authority.excuse(now + Scheduler::DOUBT);
+        if let Command::Velocity { zoom: Some(zoom), .. } = command
+            && *zoom != 0
+        {
+            self.zoom.commanded(now, *zoom);
+        }
     }
 
     fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
@@ -77,7 +82,12 @@ impl Pilot {
         match command {
             Command::Velocity { pan, tilt, zoom } => {
                 self.history.push_steps(sent, (*pan, *tilt), &self.map);
-                self.zoom.commanded(sent, zoom.unwrap_or(0));
+                if let Some(zoom) = zoom {
+                    self.zoom.commanded(sent, *zoom);
+                }
+                if *zoom == Some(0) && self.stop == Command::REST {
+                    self.stop = Command::Halt;
+                }
             }
             _ => self.history.push(sent, PanTilt::default()),
         }
@@ -223,12 +233,10 @@ impl Pilot {
         let give_way = self.settings.override_timeout;
         match self.authority.positioned(place, (asked, now), &self.history, give_way) {
             Finding::Nothing => {}
-            Finding::Orphan { zooms } => {
-                self.stop = match zooms {
-                    _ if self.ways.lacks(Mode::Velocity, now) => Command::Stop,
-                    true => Command::REST,
-                    false => Command::Halt,
-                };
+            Finding::Orphan => {
+                // That its zoom was not seen to move is no proof that it does not.
+                let lacks_speed = self.ways.lacks(Mode::Velocity, now);
+                self.stop = if lacks_speed { Command::Stop } else { Command::REST };
                 self.scheduler.found_moving();
                 self.reports.push(Report::Orphan);
             }
