@@ -173,6 +173,9 @@ impl Pilot {
         let uncertainty =
             if self.settings.learn { self.calibration.latency_uncertainty() } else { Duration::ZERO };
         self.aim.see(&sight, &view, &self.history, self.calibration.latency(), uncertainty);
+        if self.target.as_ref().is_some_and(|target| target.sight.id != sight.id) {
+            self.oscillation.clear();
+        }
         let tolerated_deg =
             (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
         // Told by the commands it would be no witness against them.

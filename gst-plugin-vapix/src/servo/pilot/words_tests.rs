@@ -1,4 +1,4 @@
-//! By which words the camera is brought to rest.
+//! By which words the camera is brought to rest, and what is said of a swing.
 
 use super::*;
 
@@ -54,4 +54,25 @@ fn a_camera_found_turning_is_told_to_end_its_zoom_too() {
         });
     }
     assert_eq!(rig.sent, [Command::REST]);
+}
+
+/// How often a swing is reported of targets that go to and fro; each is another after so many half waves.
+fn swings(half_waves: u64) -> usize {
+    let mut rig = Rig::new(ServoSettings::default());
+    for half_wave in 0..24u64 {
+        for _ in 0..10 {
+            rig.now += ms(40);
+            let x = if half_wave % 2 == 0 { 0.9 } else { 0.1 };
+            let id = half_wave / half_waves;
+            rig.pilot.see(Sight { id, ..sight(x, 0.5, rig.now) }, rig.now);
+            rig.after(ms(0));
+        }
+    }
+    rig.reports().iter().filter(|report| matches!(report, Report::Swinging(_))).count()
+}
+
+#[test]
+fn what_several_targets_do_is_no_swing() {
+    assert!(swings(24) > 0);
+    assert_eq!(swings(3), 0);
 }
