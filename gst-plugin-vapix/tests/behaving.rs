@@ -14,6 +14,8 @@ use virtual_camera::{Clock, Fault, Kinematics, Pose, Settings, SpeedMap, Virtual
 const TAKEN_OVER: Heard = Heard::Camera(CameraChange::TakenOver);
 const RESUMED: Heard = Heard::Camera(CameraChange::Resumed);
 
+const HALT: &str = "camera=1&continuouspantiltmove=0,0";
+
 /// A person walks to and fro.
 fn walk(stage: &mut Stage, seconds: f64) {
     for _ in 0..(seconds / FRAME.as_secs_f64()).round() as u32 {
@@ -271,7 +273,9 @@ fn with_a_control_queue_it_waits_for_its_turn() {
     run_until(&mut stage, &TAKEN_OVER, 6.0, &aside());
     let before = stage.moves().len();
     walk(&mut stage, 20.0);
-    assert_eq!(stage.moves().len(), before);
+    // It asks every 5 s where it stands, and each time tries its stop, which is refused.
+    let stops = &stage.moves()[before - 1..];
+    assert!((3..=6).contains(&stops.len()) && stops.iter().all(|query| query == HALT), "{stops:?}");
     stage.camera.queue_operator(false);
     run_until(&mut stage, &RESUMED, 11.0, &aside());
     walk(&mut stage, 4.0);
@@ -285,6 +289,30 @@ fn with_a_control_queue_it_waits_for_its_turn() {
     let before = stage.moves().len();
     walk(&mut stage, 4.0);
     assert!(stage.moves().len() > before && stage.times(&TAKEN_OVER) == 0);
+}
+
+#[test]
+fn who_loses_its_turn_while_the_camera_turns_stops_it() {
+    for queue_lets_stop in [true, false] {
+        let control_queue = Some(Duration::from_secs(10));
+        let kinematics = Kinematics { limits: None, ..Kinematics::default() };
+        let mut stage = Stage::new(
+            Settings { control_queue, queue_lets_stop, kinematics, ..Settings::default() },
+            |rig| rig.with("max-speed", 1.0),
+        );
+        stage.run(4.0, &aside());
+        stage.camera.queue_operator(true);
+        run_until(&mut stage, &TAKEN_OVER, 6.0, &aside());
+        stage.run(1.0, &aside());
+        assert_eq!(stage.camera.status().moving, !queue_lets_stop, "a camera may refuse a stop out of turn");
+        stage.run(1.0, &nobody());
+        stage.camera.queue_operator(false);
+        run_until(&mut stage, &RESUMED, 11.0, &nobody());
+        stage.run(1.0, &nobody());
+        assert!(!stage.camera.status().moving, "in its turn the stop is made up for");
+        assert_eq!(stage.moves().last().unwrap(), HALT);
+        assert!(!stage.heard.iter().any(|heard| matches!(heard, Heard::Info(_) | Heard::Warning(_))));
+    }
 }
 
 #[test]

@@ -51,19 +51,26 @@ fn a_step_in_the_targets_speed_is_met_without_overshoot() {
     assert!(farthest(&walking, 1.0) < 0.5, "{}", farthest(&walking, 1.0));
 }
 
-/// Somebody 1.75 m tall who stands 4 m away, walks off to 15 m at 1.2 m/s and stands there: the distance at a time.
-fn distance_m(time: Duration) -> f64 {
-    4.0 + 1.2 * (time.as_secs_f64() - 8.0).clamp(0.0, 11.0 / 1.2)
+/// Somebody 1.75 m tall who stands 4 m away, walks off to 15 m at 1.2 m/s and somewhat aside, and stands there: how far
+/// away they are at a time, in metres, and to which pan.
+fn departing(time: Duration) -> (f64, f64) {
+    let walked = 1.2 * (time.as_secs_f64() - 8.0).clamp(0.0, 11.0 / 1.2);
+    let (far, aside) = (4.0 + walked, 0.2 * walked);
+    (far.hypot(aside), aside.atan2(far).to_degrees())
 }
 
-/// What a tracker says of them; they walk along the middle of the camera's view.
-fn departing(stage: &Stage, exposure: Duration) -> TargetMeta {
+/// What a tracker says of them, where their middle is in the picture.
+fn departing_seen(stage: &Stage, exposure: Duration) -> Option<TargetMeta> {
     let pose = stage.camera.pose_at(exposure);
-    let fov_deg = stage.camera.optics().fov_deg(pose.zoom_step);
-    let tall = 2.0 * (fov_deg / 2.0).to_radians().tan() * 240.0 / 320.0;
-    let height = (1.75 / distance_m(exposure) / tall).min(1.0);
-    let bounds = Rect { x: 0.5 - height / 8.0, y: 0.5 - height / 2.0, width: height / 4.0, height };
-    TargetMeta { bounds, ..target(TargetState::Tracking, 0.5, 0.5) }
+    let (distance_m, pan_deg) = departing(exposure);
+    let wide = (stage.camera.optics().fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
+    let (right, down) = ((pan_deg - pose.pan_deg).to_radians().tan(), pose.tilt_deg.to_radians().tan());
+    let tall = wide * 240.0 / 320.0;
+    let (x, y) = (0.5 + right / (2.0 * wide), 0.5 + down / (2.0 * tall));
+    let height = (1.75 / distance_m / (2.0 * tall)).min(1.0);
+    let bounds = Rect { x: x - height / 8.0, y: y - height / 2.0, width: height / 4.0, height };
+    let visible = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
+    visible.then(|| TargetMeta { bounds, ..target(TargetState::Tracking, x, y) })
 }
 
 #[test]
@@ -75,18 +82,21 @@ fn somebody_who_walks_away_stays_as_tall_by_auto_zoom() {
         let mut stage = Stage::new(settings, |rig| {
             rig.with_str("mode", mode).with("auto-zoom", true).with("target-height", TARGET_HEIGHT)
         });
-        let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+        let (mut least, mut most, mut farthest) = (f64::INFINITY, 0.0f64, 0.0f64);
         while stage.now < Duration::from_secs(30) {
             let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
             stage.camera.advance_to(stage.now + FRAME);
-            let meta = departing(&stage, exposure);
+            let meta = departing_seen(&stage, exposure);
+            let meta = meta.unwrap_or_else(|| panic!("{mode}: lost after {:?}", stage.now));
             stage.picture(Some(&meta));
             if stage.now > Duration::from_secs(6) {
                 (least, most) = (least.min(meta.bounds.height), most.max(meta.bounds.height));
+                farthest = farthest.max((meta.centroid.x - 0.5).abs());
             }
         }
         let parts = (least / TARGET_HEIGHT, most / TARGET_HEIGHT);
         assert!(parts.0 > 0.8 && parts.1 < 1.2, "{mode}: {parts:?}");
+        assert!((0.02..0.45).contains(&farthest), "{mode}: {farthest}");
         assert!(!stage.heard.iter().any(Heard::is_warning), "{mode}: {:?}", stage.heard);
     }
 }

@@ -38,10 +38,7 @@ pub enum Finding {
     /// Nothing.
     Nothing,
     /// The camera moves since before we came.
-    Orphan {
-        /// It zooms too.
-        zooms: bool,
-    },
+    Orphan,
     /// An operator moves it.
     Operator,
 }
@@ -63,8 +60,8 @@ impl Authority {
         give_way: Duration,
     ) -> Finding {
         let verdict = self.watch.position(position, asked, answered, commands);
-        if let Some(orphan) = self.orphan(position, zoom_steps, answered) {
-            return orphan;
+        if self.is_orphan(position, zoom_steps, answered) {
+            return Finding::Orphan;
         }
         if verdict != Verdict::Foreign || give_way.is_zero() {
             return Finding::Nothing;
@@ -73,21 +70,22 @@ impl Authority {
         Finding::Operator
     }
 
-    fn orphan(&mut self, position: PanTilt, zoom_steps: Option<f64>, now: Duration) -> Option<Finding> {
+    fn is_orphan(&mut self, position: PanTilt, zoom_steps: Option<f64>, now: Duration) -> bool {
         if !self.met {
             self.met = true;
             self.found = Some(Found { position, zoom_steps, at: now });
-            return None;
+            return false;
         }
-        let found = self.found.as_ref().filter(|found| now <= found.at + Self::FIRST_LOOK)?;
+        let Some(found) = self.found.as_ref().filter(|found| now <= found.at + Self::FIRST_LOOK) else {
+            return false;
+        };
         let zoomed = found.zoom_steps.zip(zoom_steps).map_or(0.0, |(before, now)| (now - before).abs());
         let zooms = zoomed > Self::DRIFT_ZOOM_STEPS;
         let moves = (position - found.position).largest() > Self::DRIFT_DEG;
-        if !moves && !zooms {
-            return None;
+        if moves || zooms {
+            self.found = None;
         }
-        self.found = None;
-        Some(Finding::Orphan { zooms })
+        moves || zooms
     }
 
     /// We moved the camera, or may have, in a way that nobody can foresee.
@@ -104,6 +102,11 @@ impl Authority {
     pub fn forget(&mut self) {
         self.watch.forget();
         self.queue.forget();
+    }
+
+    /// The camera was asked where it looks, and did not say.
+    pub fn undecided(&mut self) {
+        self.watch.undecided();
     }
 
     /// Whether the camera is to be asked at once where it looks.
@@ -198,14 +201,14 @@ mod tests {
         let mut authority = Authority::default();
         assert_eq!(tell(&mut authority, 0.0, s(1)), Finding::Nothing);
         assert!(authority.looks(s(1)));
-        assert_eq!(tell(&mut authority, 0.5, s(2)), Finding::Orphan { zooms: false });
+        assert_eq!(tell(&mut authority, 0.5, s(2)), Finding::Orphan);
         assert_eq!(tell(&mut authority, 1.0, s(3)), Finding::Nothing);
         assert!(!authority.looks(s(3)));
         let mut authority = Authority::default();
         tell(&mut authority, 0.0, s(1));
         let zoomed = (PanTilt::default(), Some(100.0));
         let finding = authority.positioned(zoomed, (s(2), s(2)), &CommandHistory::default(), GIVE_WAY);
-        assert_eq!(finding, Finding::Orphan { zooms: true });
+        assert_eq!(finding, Finding::Orphan);
     }
 
     #[test]

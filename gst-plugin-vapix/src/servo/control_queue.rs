@@ -12,6 +12,8 @@ pub struct ControlQueue {
     doubted: bool,
     /// The camera said that it is not our turn.
     held: bool,
+    /// A command was refused out of our turn: so would be the next, until it is said again where we stand.
+    deaf: bool,
 }
 
 #[derive(Debug, Default, Clone, Copy, PartialEq, Eq)]
@@ -56,17 +58,29 @@ impl ControlQueue {
         true
     }
 
+    /// A command was refused with words; returns whether that is no wonder, as it is not our turn.
+    pub fn refused_command(&mut self) -> bool {
+        self.deaf = !self.lets_us();
+        self.deaf
+    }
+
+    /// Whether commands are pointless until the next answer, a stop too.
+    pub fn is_deaf(&self) -> bool {
+        self.deaf
+    }
+
     /// The camera did as it was told.
     pub fn obeyed(&mut self) {
         self.doubted = false;
     }
 
-    /// What to ask, and when.
-    pub fn next(&self) -> Option<(QueueRequest, Duration)> {
+    /// What to ask, and when. The place is not given up before the camera is at rest: to stop it may take our turn.
+    pub fn next(&self, at_rest: bool) -> Option<(QueueRequest, Duration)> {
+        let leaving = self.leaving && at_rest;
         match self.state {
             State::Unknown | State::Absent => None,
-            State::Waiting | State::InControl if self.leaving => Some((QueueRequest::Drop, Duration::ZERO)),
-            _ if self.leaving => None,
+            State::Waiting | State::InControl if leaving => Some((QueueRequest::Drop, Duration::ZERO)),
+            _ if leaving => None,
             State::Presumed | State::Outside => Some((QueueRequest::Request, self.ask_at)),
             State::Waiting | State::InControl => Some((QueueRequest::Query, self.ask_at)),
         }
@@ -82,6 +96,7 @@ impl ControlQueue {
             (_, Some(_)) => State::Waiting,
         };
         self.held = !matches!(self.state, State::InControl | State::Absent) && request != QueueRequest::Drop;
+        self.deaf = false;
         // Twice as often as it wants, so that one lost question does not cost the place.
         self.ask_at = now + place.map_or(Self::PAUSE, |place| place.poll_every) / 2;
     }
@@ -90,12 +105,13 @@ impl ControlQueue {
     pub fn failed(&mut self, now: Duration) {
         self.state = if self.state == State::Presumed { State::Absent } else { State::Outside };
         self.ask_at = now + Self::PAUSE;
+        self.deaf = false;
     }
 
     /// The connection was lost, and may be with it our place.
     pub fn forget(&mut self) {
         if self.exists() {
-            *self = Self { state: State::Outside, ask_at: Duration::ZERO, held: false, ..*self };
+            *self = Self { state: State::Outside, ask_at: Duration::ZERO, held: false, deaf: false, ..*self };
         }
     }
 
@@ -139,10 +155,10 @@ mod tests {
     #[test]
     fn a_camera_without_a_queue_is_asked_nothing() {
         let mut queue = ControlQueue::default();
-        assert!(queue.lets_us() && queue.next().is_none());
+        assert!(queue.lets_us() && queue.next(true).is_none());
         queue.told(Some(false));
         assert!(!queue.refused(s(1)));
-        assert!(queue.lets_us() && queue.next().is_none());
+        assert!(queue.lets_us() && queue.next(true).is_none());
     }
 
     #[test]
@@ -150,32 +166,32 @@ mod tests {
         let mut queue = ControlQueue::default();
         queue.told(Some(true));
         assert!(!queue.lets_us() && !queue.is_held(), "that is not known yet");
-        assert_eq!(queue.next(), Some((QueueRequest::Request, s(0))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(0))));
         queue.answered(QueueRequest::Request, place(2), s(1));
         assert!(!queue.lets_us() && queue.is_in() && queue.is_held());
-        assert_eq!(queue.next(), Some((QueueRequest::Query, s(11))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Query, s(11))));
         queue.answered(QueueRequest::Query, place(1), s(11));
         assert!(queue.lets_us() && !queue.is_held());
         queue.answered(QueueRequest::Query, place(0), s(21));
         assert!(!queue.lets_us());
-        assert_eq!(queue.next(), Some((QueueRequest::Request, s(31))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(31))));
     }
 
     #[test]
     fn a_refusal_makes_it_look_once() {
         let mut queue = ControlQueue::default();
         assert!(queue.refused(s(3)));
-        assert_eq!(queue.next(), Some((QueueRequest::Request, s(3))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(3))));
         assert!(!queue.refused(s(3)), "there is something else amiss");
         queue.failed(s(3));
-        assert!(queue.lets_us() && queue.next().is_none() && !queue.refused(s(4)));
+        assert!(queue.lets_us() && queue.next(true).is_none() && !queue.refused(s(4)));
         let mut queue = ControlQueue::default();
         queue.refused(s(3));
         queue.answered(QueueRequest::Request, place(1), s(3));
         assert!(queue.lets_us() && queue.exists());
         queue.obeyed();
         assert!(queue.refused(s(4)), "somebody pushed in");
-        assert_eq!(queue.next(), Some((QueueRequest::Query, s(4))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Query, s(4))));
         queue.answered(QueueRequest::Query, place(1), s(4));
         assert!(!queue.refused(s(5)), "it is our turn, so there is something else amiss");
     }
@@ -184,12 +200,30 @@ mod tests {
     fn at_the_end_the_place_is_given_up() {
         let mut queue = ControlQueue::default();
         queue.leave();
-        assert_eq!(queue.next(), None);
+        assert_eq!(queue.next(true), None);
         queue.told(Some(true));
         queue.answered(QueueRequest::Request, place(1), s(0));
-        assert_eq!(queue.next(), Some((QueueRequest::Drop, s(0))));
+        assert_eq!(queue.next(false), Some((QueueRequest::Query, s(10))), "a stop may take our turn");
+        assert_eq!(queue.next(true), Some((QueueRequest::Drop, s(0))));
         queue.answered(QueueRequest::Drop, None, s(0));
-        assert!(queue.next().is_none() && !queue.is_in());
+        assert!(queue.next(true).is_none() && !queue.is_in());
+    }
+
+    #[test]
+    fn out_of_turn_a_refused_command_is_pointless_until_the_next_answer() {
+        let mut queue = ControlQueue::default();
+        assert!(!queue.refused_command() && !queue.is_deaf());
+        queue.told(Some(true));
+        queue.answered(QueueRequest::Request, place(2), s(0));
+        assert!(!queue.is_deaf(), "it is worth a try");
+        assert!(queue.refused_command() && queue.is_deaf());
+        queue.answered(QueueRequest::Query, place(2), s(10));
+        assert!(!queue.is_deaf());
+        queue.refused_command();
+        queue.failed(s(20));
+        assert!(!queue.is_deaf() && queue.refused_command());
+        queue.answered(QueueRequest::Request, place(1), s(25));
+        assert!(!queue.refused_command() && !queue.is_deaf(), "that is for another reason");
     }
 
     #[test]
@@ -200,6 +234,6 @@ mod tests {
         queue.told(Some(true));
         queue.answered(QueueRequest::Request, place(1), s(0));
         queue.forget();
-        assert_eq!(queue.next(), Some((QueueRequest::Request, s(0))));
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(0))));
     }
 }

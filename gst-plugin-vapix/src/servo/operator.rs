@@ -90,6 +90,11 @@ impl OperatorWatch {
         *self = Self { excused_until: self.excused_until, ..Self::default() };
     }
 
+    /// The position that was to decide did not come: whoever moved it will be noticed again.
+    pub fn undecided(&mut self) {
+        self.suspects = false;
+    }
+
     /// Whether the next position decides.
     pub fn suspects(&self) -> bool {
         self.suspects
@@ -199,6 +204,16 @@ mod tests {
             assert_eq!(rig.tell(60.0, -20.0), Verdict::Suspicious);
             assert_eq!(rig.tell_after(ms(100), 0.0, 0.0), Verdict::Ours);
         }
+    }
+
+    #[test]
+    fn an_operator_is_noticed_later_where_the_deciding_answer_failed() {
+        let mut rig = Rig::armed();
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Suspicious);
+        rig.watch.undecided();
+        assert!(!rig.watch.suspects());
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Suspicious);
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Foreign);
     }
 
     #[test]

@@ -38,12 +38,40 @@ impl View {
     /// Where in the picture the middle will have been taken from, once the camera has turned by so much: the inverse of
     /// [`Self::error`].
     pub fn point(&self, turn: PanTilt) -> Point {
+        let [right, up, ahead] = self.ray(turn);
+        let width = 2.0 * self.half_width();
+        Point { x: 0.5 + right / ahead / width, y: 0.5 - up / ahead * self.aspect / width }
+    }
+
+    /// The same of as much of the turn as stays within the picture: what lies beyond, or behind, has no place in it.
+    pub fn point_within(&self, turn: PanTilt) -> Point {
+        const HALVINGS: u32 = 40;
+        // Beyond the zenith right and left would change places.
+        let tilt = (self.tilt_deg + turn.tilt).clamp(-90.0, 90.0) - self.tilt_deg;
+        let turn = PanTilt::new(turn.pan.clamp(-180.0, 180.0), tilt);
+        if self.shows(turn) {
+            return self.point(turn);
+        }
+        let (mut inside, mut outside) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let part = (inside + outside) / 2.0;
+            *if self.shows(turn * part) { &mut inside } else { &mut outside } = part;
+        }
+        self.point(turn * inside)
+    }
+
+    /// Whether what will be in the middle after the turn is in the picture.
+    fn shows(&self, turn: PanTilt) -> bool {
+        let Point { x, y } = self.point(turn);
+        self.ray(turn)[2] > 0.0 && (0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y)
+    }
+
+    /// Where the middle after the turn is from the camera: to the right, up and ahead.
+    fn ray(&self, turn: PanTilt) -> [f64; 3] {
         let (pan, elevation) = (turn.pan.to_radians(), (self.tilt_deg + turn.tilt).to_radians());
         let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
         let (sin, cos) = self.tilt_deg.to_radians().sin_cos();
-        let (ahead, up) = (far * cos + high * sin, high * cos - far * sin);
-        let width = 2.0 * self.half_width();
-        Point { x: 0.5 + right / ahead / width, y: 0.5 - up / ahead * self.aspect / width }
+        [right, high * cos - far * sin, far * cos + high * sin]
     }
 
     /// Degrees per second of a point that moves through the picture with `velocity` (frames per second).
@@ -209,6 +237,28 @@ mod tests {
             let view = View { tilt_deg: tilt, ..LEVEL };
             let point = view.point(view.error(Point { x, y }));
             prop_assert!((point.x - x).abs() < 1e-9 && (point.y - y).abs() < 1e-9, "{point:?}");
+        }
+
+        /// However far the camera is to turn, the place named is in the picture, and on that side.
+        #[test]
+        fn a_turn_beyond_the_picture_is_its_edge(
+            pan in -200.0..200.0f64, up in -200.0..200.0f64, tilt in -89.0..89.0f64,
+        ) {
+            let view = View { tilt_deg: tilt, ..LEVEL };
+            let Point { x, y } = view.point_within(PanTilt::new(pan, up));
+            prop_assert!((0.0..=1.0).contains(&x) && (0.0..=1.0).contains(&y), "{x}, {y}");
+            prop_assert!((x - 0.5) * pan >= 0.0, "{x}");
+            let level = view.point_within(PanTilt::new(0.0, up));
+            prop_assert!((0.5 - level.y) * up >= 0.0 && (level.x - 0.5).abs() < 1e-9, "{level:?}");
+            let farther = LEVEL.point_within(PanTilt::new(40f64.copysign(pan) + pan, 0.0));
+            prop_assert!((farther.x - if pan < 0.0 { 0.0 } else { 1.0 }).abs() < 1e-6, "{farther:?}");
+        }
+
+        #[test]
+        fn a_turn_within_the_picture_is_not_shortened(x in 0.001..0.999f64, y in 0.001..0.999f64, tilt in -60.0..60.0f64) {
+            let view = View { tilt_deg: tilt, ..LEVEL };
+            let turn = view.error(Point { x, y });
+            prop_assert_eq!(view.point_within(turn), view.point(turn));
         }
 
         /// Turned by the error, the camera sees the point in the middle.

@@ -34,9 +34,10 @@ impl OscillationGuard {
             self.tilt.see(error.tilt, target.tilt, tolerated_deg, at),
         ];
         if swings.contains(&true) {
-            self.trust = (self.trust * Self::LOWER).max(Self::LOWEST);
+            let before = self.trust;
+            self.trust = (before * Self::LOWER).max(Self::LOWEST);
             (self.pan, self.tilt, self.changed_at) = (Swing::default(), Swing::default(), at);
-            return true;
+            return self.trust < before;
         }
         if self.trust < 1.0 && at.saturating_sub(self.changed_at) > Self::CALM {
             self.trust = (self.trust * Self::RAISE).min(1.0);
@@ -132,6 +133,14 @@ mod tests {
         assert!(lowered(&mut guard, |t| 5.0 * (4.0 * t).sin()) > 1);
         assert!(guard.trust() < 0.5 && guard.trust() >= OscillationGuard::LOWEST);
         assert!(lowered(&mut OscillationGuard::default(), |t| t * (4.0 * t).sin()) > 0);
+    }
+
+    #[test]
+    fn a_swing_that_goes_on_at_the_lowest_gain_is_not_reported_again() {
+        let mut guard = OscillationGuard::default();
+        let times = lowered(&mut guard, |t| 5.0 * (4.0 * t).sin());
+        assert_eq!((times, guard.trust()), (4, OscillationGuard::LOWEST), "1, 0.6, 0.36, 0.216");
+        assert_eq!(lowered(&mut guard, |t| 5.0 * (4.0 * t).sin()), 0);
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Holder, Homing, Job, Lens,
+    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing, Job, Lens,
     LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
     SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
@@ -46,6 +46,8 @@ pub struct Pilot {
     /// The words that end the last move, whatever the mode is by now.
     stop: Command,
     at_limit: bool,
+    /// Since when there is a target and it is not known whether the camera is ours to follow it.
+    unsteered_since: Option<Duration>,
     overtaken: u64,
     reports: Vec<Report>,
 }
@@ -75,6 +77,9 @@ impl Pilot {
     const POLL_RESTING: Duration = Duration::from_secs(5);
     /// A camera that does not tell its position is asked again this much later.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
+
+    /// For so long the camera may go on as it was last told, while it is found out whether it is ours.
+    const UNSTEERED: Duration = Duration::from_secs(1);
 
     /// To be a swing, an offset goes so many dead zones beyond the middle: gait and tracker go beyond one.
     const SWING: f64 = 2.5;
@@ -107,6 +112,7 @@ impl Pilot {
             speed_steps: (0, 0),
             stop: Command::Halt,
             at_limit: false,
+            unsteered_since: None,
             overtaken: 0,
             reports: Vec::new(),
             settings,
@@ -167,6 +173,9 @@ impl Pilot {
         let uncertainty =
             if self.settings.learn { self.calibration.latency_uncertainty() } else { Duration::ZERO };
         self.aim.see(&sight, &view, &self.history, self.calibration.latency(), uncertainty);
+        if self.target.as_ref().is_some_and(|target| target.sight.id != sight.id) {
+            self.oscillation.clear();
+        }
         let tolerated_deg =
             (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
         // Told by the commands it would be no witness against them.
@@ -191,6 +200,7 @@ impl Pilot {
 
     fn lose(&mut self) {
         self.target = None;
+        self.unsteered_since = None;
         self.aim.clear();
         self.controller.rest();
         self.oscillation.clear();
@@ -208,9 +218,13 @@ impl Pilot {
         let interval = Duration::from_secs_f64(1.0 / self.settings.max_rate_hz);
         let retry_at = self.link.retry_at();
         let (command, due) = match self.wish(now) {
+            Wish::Rest if self.authority.queue.is_deaf() => (self.stop, None),
             Wish::Rest => (self.stop, self.scheduler.stop_due(now, interval, retry_at)),
             Wish::Move(_) if self.meeting() => (self.stop, None),
-            Wish::Move(command) => (command, Some(self.scheduler.move_due(&command, interval, retry_at))),
+            Wish::Move(command) => {
+                let not_before = retry_at.max(self.ways.not_before(&command));
+                (command, Some(self.scheduler.move_due(&command, interval, not_before)))
+            }
             Wish::AsIs => (self.stop, None),
         };
         if due.is_some_and(|due| due <= now) {
@@ -222,7 +236,10 @@ impl Pilot {
             return Next::Do(Job::Query(query));
         }
         let operator_until = self.authority.operator_until(now);
-        Next::Wait([due, Some(query_due), self.stale_at(), operator_until].into_iter().flatten().min())
+        let unsteered_until = self.unsteered_since.map(|since| since + Self::UNSTEERED);
+        let unsteered_until = unsteered_until.filter(|until| now < *until);
+        let reasons = [due, Some(query_due), self.stale_at(), operator_until, unsteered_until];
+        Next::Wait(reasons.into_iter().flatten().min())
     }
 
     /// What to ask next, and when.
@@ -232,7 +249,7 @@ impl Pilot {
             None if self.homing.wants_presets() => (Query::Presets, Duration::ZERO),
             None => (Query::Position, self.next_poll),
         };
-        match self.authority.queue.next() {
+        match self.authority.queue.next(self.is_at_rest()) {
             Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),
             _ => (query, at),
         }
@@ -245,6 +262,8 @@ impl Pilot {
         match command {
             _ if command.is_stop() => {}
             Command::Velocity { zoom: Some(_), .. } => self.stop = Command::REST,
+            // A zoom goes on until it is told otherwise.
+            Command::Velocity { .. } if self.stop == Command::REST => {}
             Command::Velocity { .. } => self.stop = Command::Halt,
             Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
                 self.stop = Command::Stop;
@@ -270,8 +289,12 @@ impl Pilot {
         self.overtaken
     }
 
-    /// Whether there is something to move the camera for.
+    /// Whether there is something to do that a stop need not hurry for.
     pub fn has_errand(&self, now: Duration) -> bool {
+        if self.authority.queue.is_deaf() {
+            // A stop would not be heard; the answer under way may make it so.
+            return true;
+        }
         let going_home = self.steps.under_way() && self.homing.is_settled() || self.homing.due(now).is_some();
         self.authority.holder(now).is_none() && (self.has_target(now) || going_home)
     }
@@ -325,20 +348,19 @@ impl Pilot {
     }
 
     fn wish(&mut self, now: Duration) -> Wish {
-        match self.authority.holder(now) {
+        if self.authority.holder(now).is_some() {
             // What moves it is his; what we last said must not outlive our hold on it.
-            Some(Holder::Operator) => return Wish::Rest,
-            // It would be refused.
-            Some(Holder::Queue) => return Wish::AsIs,
-            None => {}
+            return Wish::Rest;
         }
         if !self.has_target(now) {
             self.lose();
         }
         let Some(target) = &mut self.target else { return self.wait(now) };
         if !self.authority.is_ours(now) {
-            return Wish::AsIs;
+            let since = *self.unsteered_since.get_or_insert(now);
+            return if now < since + Self::UNSTEERED { Wish::AsIs } else { Wish::Rest };
         }
+        self.unsteered_since = None;
         target.considered = true;
         let sight = target.sight;
         match self.mode(now) {

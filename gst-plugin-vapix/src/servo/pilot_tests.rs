@@ -1,3 +1,8 @@
+#[path = "pilot/others_tests.rs"]
+mod others;
+#[path = "pilot/words_tests.rs"]
+mod words;
+
 use super::*;
 use crate::servo::Answer;
 use crate::servo::LinkChange;
@@ -27,13 +32,21 @@ impl Rig {
 
     /// Does everything that is due now; `position` answers the commands.
     fn run(&mut self, mut answer: impl FnMut(&Command) -> Result<Answer, Error>) {
+        self.run_jobs(|job| match job {
+            Job::Command(command) => Some(answer(command)),
+            Job::Query(_) => None,
+        });
+    }
+
+    /// The same; `answer` may answer anything.
+    fn run_jobs(&mut self, mut answer: impl FnMut(&Job) -> Option<Result<Answer, Error>>) {
         while let Next::Do(job) = self.pilot.next(self.now) {
             self.pilot.sending(&job, self.now);
-            let result = match &job {
-                Job::Command(command) => {
-                    self.sent.push(*command);
-                    answer(command)
-                }
+            if let Job::Command(command) = &job {
+                self.sent.push(*command);
+            }
+            let result = answer(&job).unwrap_or_else(|| match &job {
+                Job::Command(_) => Ok(Answer::Accepted),
                 Job::Query(Query::Position) => Ok(Answer::Position(Position {
                     pan_deg: Some(0.0),
                     tilt_deg: Some(0.0),
@@ -45,7 +58,7 @@ impl Rig {
                     ..Limits::default()
                 })),
                 Job::Query(_) => Err(Error::Camera("none".to_owned())),
-            };
+            });
             self.pilot.answered(&job, result, self.now, self.now);
         }
     }

@@ -18,6 +18,9 @@ pub struct Ways {
 struct Doubt {
     mode: Mode,
     refusal: Error,
+    since: Duration,
+    /// It was refused again, too soon to count.
+    again: bool,
     /// The camera did something else that it was asked since.
     witnessed: bool,
 }
@@ -40,12 +43,21 @@ impl Ways {
     /// A refused mode is tried again after this: what else the reason was may be over.
     const TRY_AGAIN: Duration = Duration::from_secs(60);
 
+    /// Refusals nearer to each other count once: a camera that starts, or is busy, refuses what it takes a moment later.
+    const APART: Duration = Duration::from_secs(1);
+
     /// The mode to move it by: the wanted one, or the best of the others where that is not to be had. A camera that
     /// does not tell its position is not sent from one to another.
     pub fn choose(&self, wanted: Mode, tells_position: bool, now: Duration) -> Mode {
         let possible = |mode: &Mode| tells_position || *mode != Mode::Absolute || wanted == Mode::Absolute;
         let mut modes = std::iter::once(wanted).chain(Self::ORDER);
         modes.find(|mode| possible(mode) && !self.lacks(*mode, now)).unwrap_or(wanted)
+    }
+
+    /// When a move is worth sending: after two refusals in a row not before a third would count.
+    pub fn not_before(&self, command: &Command) -> Duration {
+        let doubt = self.doubt.as_ref().filter(|doubt| doubt.again && mode_of(command) == Some(doubt.mode));
+        doubt.map_or(Duration::ZERO, |doubt| doubt.since + Self::APART)
     }
 
     /// Whether it is known not to take the words of a mode.
@@ -61,21 +73,30 @@ impl Ways {
             flags.into_iter().filter(|(_, has)| *has == Some(false)).map(|(mode, _)| mode).collect();
     }
 
-    /// The camera refused a command with words. Where one refusal comes on another, and it did something else in
-    /// between, it is the command that it does not take.
+    /// The camera refused a command with words. Where one refusal comes on another, some time later, and it did
+    /// something else in between, it is the command that it does not take.
     pub fn refused(&mut self, command: &Command, refusal: &Error, now: Duration) -> Refusal {
         let Some(mode) = mode_of(command) else { return Refusal::Other };
+        if self.lacks(mode, now) {
+            // Known; until it is tried again.
+            return Refusal::OfMode(mode);
+        }
         match self.doubt.take() {
             Some(doubt) if doubt.mode == mode && doubt.witnessed => {
+                if now < doubt.since + Self::APART {
+                    self.doubt = Some(Doubt { again: true, ..doubt });
+                    return Refusal::Doubtful;
+                }
                 self.refused.retain(|(other, _)| *other != mode);
                 self.refused.push((mode, now));
+                Refusal::OfMode(mode)
             }
             _ => {
-                self.doubt = Some(Doubt { mode, refusal: refusal.clone(), witnessed: false });
-                return Refusal::Doubtful;
+                let refusal = refusal.clone();
+                self.doubt = Some(Doubt { mode, refusal, since: now, again: false, witnessed: false });
+                Refusal::Doubtful
             }
         }
-        Refusal::OfMode(mode)
     }
 
     /// The camera did what it was asked.
@@ -124,14 +145,36 @@ mod tests {
     const SOON: Duration = Duration::from_secs(1);
 
     fn refuse(ways: &mut Ways, command: &Command) -> Refusal {
-        ways.refused(command, &Error::Camera("unknown".to_owned()), SOON)
+        refuse_at(ways, command, SOON)
+    }
+
+    fn refuse_at(ways: &mut Ways, command: &Command, at: Duration) -> Refusal {
+        ways.refused(command, &Error::Camera("unknown".to_owned()), at)
     }
 
     /// Refused for good.
     fn refuse_twice(ways: &mut Ways, command: &Command) -> Refusal {
-        assert_eq!(refuse(ways, command), Refusal::Doubtful);
+        assert_eq!(refuse_at(ways, command, SOON - Ways::APART), Refusal::Doubtful);
         ways.obeyed();
         refuse(ways, command)
+    }
+
+    #[test]
+    fn refusals_at_nearly_the_same_time_are_one() {
+        let mut ways = Ways::default();
+        assert_eq!(refuse(&mut ways, &MOVE), Refusal::Doubtful);
+        ways.obeyed();
+        assert_eq!(ways.not_before(&MOVE), Duration::ZERO, "at once, in case it was a moment's");
+        assert_eq!(refuse_at(&mut ways, &MOVE, SOON + Ways::APART / 2), Refusal::Doubtful);
+        ways.obeyed();
+        assert!(!ways.lacks(Mode::Velocity, SOON + Ways::APART / 2));
+        assert_eq!(ways.not_before(&MOVE), SOON + Ways::APART);
+        assert_eq!(ways.not_before(&STEP), Duration::ZERO);
+        assert_eq!(refuse_at(&mut ways, &MOVE, SOON + Ways::APART), Refusal::OfMode(Mode::Velocity));
+        let mut ways = Ways::default();
+        refuse(&mut ways, &MOVE);
+        ways.accepted(&MOVE);
+        assert_eq!(ways.not_before(&MOVE), Duration::ZERO);
     }
 
     #[test]
@@ -177,6 +220,7 @@ mod tests {
         }
         assert_eq!(ways.choose(Mode::Absolute, true, SOON), Mode::Absolute);
         assert!(ways.lacks(Mode::Absolute, SOON));
+        assert_eq!(refuse(&mut ways, &STEP), Refusal::OfMode(Mode::Absolute), "no doubt of that any more");
         assert_eq!(refuse(&mut ways, &Command::Stop), Refusal::Other);
     }
 }

@@ -152,7 +152,8 @@ impl Camera {
     /// Runs `ptz.cgi` for the client with this cookie, if the control queue lets it.
     pub fn queued_ptz(&self, args: &Args, cookie: Option<&str>) -> Answer {
         self.update(|state| {
-            let (now, moves) = (self.now(), args.iter().all(|arg| arg.0 != "query"));
+            let harmless = self.settings.queue_lets_stop && is_stop(args);
+            let (now, moves) = (self.now(), !harmless && args.iter().all(|arg| arg.0 != "query"));
             let queue = state.device.queue.as_mut();
             match queue.and_then(|queue| queue.objection(cookie, moves, now)) {
                 Some(objection) => Answer::error(objection),
@@ -480,4 +481,14 @@ impl Drop for VirtualCamera {
             let _ = pulse.join();
         }
     }
+}
+
+/// Whether this does nothing but end a move.
+fn is_stop(args: &Args) -> bool {
+    args.iter().all(|(name, value)| match name.as_str() {
+        "continuouspantiltmove" => value == "0,0",
+        "continuouszoommove" => value == "0",
+        "move" => value == "stop",
+        name => name == "camera",
+    })
 }

@@ -191,6 +191,8 @@ pub struct Settings {
     /// Whether it has a control queue (`PTZ.Various.V1.CtlQueueing`): who is first in it moves the camera, and must
     /// ask at least this often.
     pub control_queue: Option<Duration>,
+    /// Whether a stop is taken from whoever is in that queue; Axis documents neither.
+    pub queue_lets_stop: bool,
     /// Where it looks at first, and the preset `Home`; `None` is what suits the world.
     pub home: Option<Pose>,
     /// Who moves its time on.
@@ -215,6 +217,7 @@ impl Default for Settings {
             video: Video::default(),
             presets: Vec::new(),
             control_queue: None,
+            queue_lets_stop: false,
             home: None,
             clock: Clock::Real,
         }

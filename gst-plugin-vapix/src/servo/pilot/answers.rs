@@ -24,7 +24,8 @@ impl Pilot {
         } else {
             self.scheduler.failed(command, false, now);
         }
-        if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
+        let queue = &mut self.authority.queue;
+        if matches!(err, Error::Camera(_)) && (queue.refused_command() || queue.refused(now)) {
             return;
         }
         if self.homing.leads(command) && err.is_refusal() && !err.is_final() {
@@ -49,11 +50,8 @@ impl Pilot {
                 self.introduction.push_front(witness);
                 true
             }
-            Refusal::OfMode(_) if self.ways.lacks(self.mode(now), now) => {
-                // There is none left: it is not for the words.
-                self.ways.forget_refusals();
-                false
-            }
+            // There is none left to turn to: the wanted one is tried on, with the pauses of a fault.
+            Refusal::OfMode(_) if self.ways.lacks(self.mode(now), now) => false,
             Refusal::OfMode(mode) => {
                 if mode == Mode::Velocity {
                     self.stop = Command::Stop;
@@ -67,6 +65,11 @@ impl Pilot {
     pub(super) fn unanswered(&mut self, command: &Command, now: Duration) {
         self.scheduler.failed(command, true, now);
         self.authority.excuse(now + Scheduler::DOUBT);
+        if let Command::Velocity { zoom: Some(zoom), .. } = command
+            && *zoom != 0
+        {
+            self.zoom.commanded(now, *zoom);
+        }
     }
 
     fn command_accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
@@ -79,7 +82,12 @@ impl Pilot {
         match command {
             Command::Velocity { pan, tilt, zoom } => {
                 self.history.push_steps(sent, (*pan, *tilt), &self.map);
-                self.zoom.commanded(sent, zoom.unwrap_or(0));
+                if let Some(zoom) = zoom {
+                    self.zoom.commanded(sent, *zoom);
+                }
+                if *zoom == Some(0) && self.stop == Command::REST {
+                    self.stop = Command::Halt;
+                }
             }
             _ => self.history.push(sent, PanTilt::default()),
         }
@@ -139,6 +147,8 @@ impl Pilot {
                     if self.authority.is_ours(now) {
                         self.calibration.positioned((sent + now) / 2, position);
                     }
+                } else {
+                    self.authority.undecided();
                 }
                 self.positioned(Some(position), (sent + now) / 2, now);
             }
@@ -169,6 +179,9 @@ impl Pilot {
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
+        if query == Query::Position {
+            self.authority.undecided();
+        }
         if let Some(refusal) = self.ways.failed().filter(|_| err.is_refusal() && !err.is_final()) {
             self.asked(query);
             return self.failed(&refusal, true, now);
@@ -220,12 +233,10 @@ impl Pilot {
         let give_way = self.settings.override_timeout;
         match self.authority.positioned(place, (asked, now), &self.history, give_way) {
             Finding::Nothing => {}
-            Finding::Orphan { zooms } => {
-                self.stop = match zooms {
-                    _ if self.ways.lacks(Mode::Velocity, now) => Command::Stop,
-                    true => Command::REST,
-                    false => Command::Halt,
-                };
+            Finding::Orphan => {
+                // That its zoom was not seen to move is no proof that it does not.
+                let lacks_speed = self.ways.lacks(Mode::Velocity, now);
+                self.stop = if lacks_speed { Command::Stop } else { Command::REST };
                 self.scheduler.found_moving();
                 self.reports.push(Report::Orphan);
             }

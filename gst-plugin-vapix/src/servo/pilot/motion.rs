@@ -91,7 +91,9 @@ impl Pilot {
         }
         match mode {
             // What is wrong with the field of view made the angle of the place, and makes a place of it again.
-            Mode::Centre => Wish::Move(centre(view.point(turn), sight.size, jump.map(|jump| jump.factor))),
+            Mode::Centre => {
+                Wish::Move(centre(view.point_within(turn), sight.size, jump.map(|jump| jump.factor)))
+            }
             _ => position.map_or(Wish::AsIs, |position| {
                 Wish::Move(absolute(position + turn, jump.map(|jump| jump.step)))
             }),

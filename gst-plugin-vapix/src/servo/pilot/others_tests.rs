@@ -1,0 +1,148 @@
+//! The camera in others' hands, or perhaps in others' hands.
+
+use super::*;
+use crate::vapix::{Parameters, QueuePlace};
+
+type Said = Option<Result<Answer, Error>>;
+
+/// A camera with a control queue that says so, and where we stand; `None`: it is full. A stop is taken or not.
+fn queued(place: Option<u32>, takes_stops: bool) -> impl Fn(&Job) -> Said {
+    move |job| {
+        let refused = |text: &str| Some(Err(Error::Camera(text.to_owned())));
+        match job {
+            Job::Query(Query::Parameters) => {
+                let control_queue = Some(true);
+                Some(Ok(Answer::Parameters(Parameters { control_queue, ..Parameters::default() })))
+            }
+            Job::Query(Query::Queue(_)) => {
+                let Some(position) = place else { return refused("queue full") };
+                let place = QueuePlace { position, left: None, poll_every: ms(10_000) };
+                Some(Ok(Answer::Place(Some(place))))
+            }
+            Job::Command(command) if place != Some(1) && !(takes_stops && command.is_stop()) => {
+                refused("not in control")
+            }
+            _ => None,
+        }
+    }
+}
+
+impl Rig {
+    /// A camera that turns, after it was told so in our turn.
+    fn turning_in_turn() -> Self {
+        let mut rig = Self { pilot: Pilot::new(ServoSettings::default()), now: ms(1000), sent: Vec::new() };
+        rig.run_jobs(queued(Some(1), true));
+        rig.aside(ms(1000), queued(Some(1), true));
+        assert!(!rig.pilot.is_at_rest());
+        rig.reports();
+        rig
+    }
+
+    /// A target far to the right is seen all the time; returns what was sent.
+    fn aside(&mut self, time: Duration, answer: impl Fn(&Job) -> Said) -> Vec<Command> {
+        self.sent.clear();
+        for _ in 0..time.as_millis() / 50 {
+            self.now += ms(50);
+            self.see(0.9, 0.5);
+            self.run_jobs(&answer);
+        }
+        mem::take(&mut self.sent)
+    }
+}
+
+#[test]
+fn who_loses_the_turn_stops_the_camera() {
+    let mut rig = Rig::turning_in_turn();
+    rig.aside(ms(6000), queued(Some(2), true));
+    assert!(rig.pilot.is_at_rest());
+    assert_eq!(rig.aside(ms(30_000), queued(Some(2), true)), []);
+}
+
+#[test]
+fn a_stop_that_is_refused_out_of_turn_is_tried_at_each_answer_and_says_nothing_of_the_mode() {
+    let mut rig = Rig::turning_in_turn();
+    rig.aside(ms(6000), queued(Some(2), false));
+    assert!(!rig.pilot.is_at_rest());
+    rig.pilot.rest();
+    assert_eq!(rig.aside(ms(20_000), queued(Some(2), false)), [Command::Halt; 4]);
+    let reports = rig.reports();
+    let taken = |report: &Report| matches!(report, Report::TakenOver(_));
+    assert!(reports.iter().all(taken), "{reports:?}");
+    // The end: the place is kept until the camera rests.
+    rig.pilot.leave();
+    rig.aside(ms(6000), queued(Some(2), false));
+    assert!(rig.pilot.is_queued());
+    rig.pilot.rest();
+    rig.run_jobs(queued(Some(1), false));
+    rig.now += ms(6000);
+    rig.run_jobs(queued(Some(1), false));
+    assert!(rig.pilot.is_at_rest() && !rig.pilot.is_queued());
+    assert_eq!(rig.sent.last(), Some(&Command::Halt));
+}
+
+#[test]
+fn who_finds_the_queue_full_after_an_outage_stops_the_camera() {
+    for takes_stops in [true, false] {
+        let mut rig = Rig::turning_in_turn();
+        rig.aside(ms(1000), |_| Some(Err(Error::Broken("reset".to_owned()))));
+        let sent = rig.aside(ms(4000), queued(None, takes_stops));
+        assert!(!sent.is_empty() && sent.iter().all(Command::is_stop), "{sent:?}");
+        assert_eq!(rig.pilot.is_at_rest(), takes_stops);
+        let sent = rig.aside(ms(20_000), queued(None, takes_stops));
+        assert!(sent.len() <= 5 && sent.iter().all(Command::is_stop), "{sent:?}");
+    }
+}
+
+fn at(pan_deg: f64) -> Said {
+    let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom_steps: Some(1.0) };
+    Some(Ok(Answer::Position(position)))
+}
+
+/// A camera whose position is told so, and the rest as usual.
+fn positioned(answer: impl Fn() -> Said) -> impl Fn(&Job) -> Said {
+    move |job| if *job == Job::Query(Query::Position) { answer() } else { None }
+}
+
+#[test]
+fn a_suspicion_that_no_answer_resolves_does_not_leave_the_camera_turning() {
+    let status = Error::Status { status: 503, reason: "Service Unavailable" };
+    let unexpected = Error::Unexpected("garbage".to_owned());
+    for failure in [Error::Camera("busy".to_owned()), Error::NoPtz, unexpected, status] {
+        let mut rig = Rig::new(ServoSettings::default());
+        for _ in 0..10 {
+            rig.after(ms(5000));
+        }
+        // To the right, and back by a hand at the stick.
+        rig.aside(ms(500), |_| None);
+        let asked = std::cell::Cell::new(0);
+        let odd_once = || {
+            asked.set(asked.get() + 1);
+            if asked.get() == 1 { at(-5.0) } else { Some(Err(failure.clone())) }
+        };
+        rig.aside(ms(1500), positioned(odd_once));
+        assert!(asked.get() > 1, "{failure}: it was suspicious");
+        assert!(!rig.pilot.authority.asks(), "{failure}");
+        // On the other side: it is steered there.
+        for _ in 0..30 {
+            rig.now += ms(50);
+            rig.see(0.1, 0.5);
+            rig.run_jobs(positioned(|| Some(Err(failure.clone()))));
+        }
+        assert!(matches!(rig.sent.last(), Some(Command::Velocity { pan: ..0, .. })), "{failure}");
+    }
+}
+
+#[test]
+fn a_camera_that_may_not_be_steered_for_a_while_is_stopped() {
+    let mut rig = Rig::turning_in_turn();
+    rig.pilot.authority.queue.forget();
+    // The queue's answer keeps away.
+    let silent = |job: &Job| match job {
+        Job::Query(Query::Queue(_)) => Some(Err(Error::Unreachable("not now".to_owned()))),
+        _ => None,
+    };
+    let sent = rig.aside(ms(800), silent);
+    assert_eq!(sent, [], "that may pass");
+    rig.aside(ms(1500), silent);
+    assert!(rig.pilot.is_at_rest());
+}
