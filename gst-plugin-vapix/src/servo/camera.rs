@@ -76,8 +76,13 @@ impl CameraModel {
     /// Whether its moves can be made free of proportional speed, one by one (`proportionalspeed=disabled`).
     ///
     /// Firmware that tells its attributes knows the word; one that turns out not to is not asked again.
-    pub fn takes_free_moves(&self) -> bool {
+    fn takes_free_moves(&self) -> bool {
         self.attributes != Attributes::default() && !self.refuses_free_moves
+    }
+
+    /// Whether moves are to be free of proportional speed: not where it is off anyway.
+    pub fn wants_free_moves(&self) -> bool {
+        self.parameters.proportional_speed != Some(false) && self.takes_free_moves()
     }
 
     /// The most degrees per second that proportional speed (on in every recorded dome) leaves at a field of view.

@@ -103,7 +103,9 @@ fn the_camera_turns_towards_the_target() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.see(0.9, 0.2);
     match rig.after(ms(0))[..] {
-        [Command::Velocity { pan, tilt, zoom: None }] => assert!(pan > 0 && tilt > 0, "{pan}, {tilt}"),
+        [Command::Velocity { pan, tilt, zoom: None, free: false }] => {
+            assert!(pan > 0 && tilt > 0, "{pan}, {tilt}")
+        }
         ref other => panic!("{other:?}"),
     }
     assert_eq!(rig.reports(), [Report::Moving]);
@@ -167,7 +169,10 @@ fn at_its_limit_the_camera_is_stopped_in_that_axis_and_it_is_said_once() {
     for _ in 0..5 {
         rig.see(0.9, 0.1);
         for command in rig.after(ms(100)) {
-            assert!(matches!(command, Command::Velocity { pan: 0, tilt: 1.., zoom: None }), "{command:?}");
+            assert!(
+                matches!(command, Command::Velocity { pan: 0, tilt: 1.., zoom: None, .. }),
+                "{command:?}"
+            );
         }
     }
     assert_eq!(rig.reports(), [Report::AtLimit, Report::Moving]);
@@ -299,7 +304,7 @@ fn a_target_goes_stale_while_an_answer_is_waited_for() {
 #[test]
 fn what_was_abandoned_for_a_stop_is_no_fault_but_may_have_acted() {
     let mut rig = Rig::new(ServoSettings::default());
-    let job = Job::Command(Command::Velocity { pan: 10, tilt: 0, zoom: None });
+    let job = Job::Command(Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false });
     rig.pilot.sending(&job, rig.now);
     rig.pilot.abandoned(&job, rig.now);
     rig.pilot.abandoned(&Job::Query(Query::Position), rig.now);

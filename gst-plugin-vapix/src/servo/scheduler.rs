@@ -93,8 +93,8 @@ mod tests {
     use super::*;
 
     const INTERVAL: Duration = Duration::from_millis(100);
-    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None };
-    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0, zoom: None };
+    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false };
+    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0, zoom: None, free: false };
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)

@@ -204,7 +204,7 @@ impl Simulation {
 
     fn obey(&mut self, command: &Command) {
         match *command {
-            Command::Velocity { pan, tilt, zoom } => {
+            Command::Velocity { pan, tilt, zoom, .. } => {
                 self.goal = None;
                 self.wanted = PanTilt::new(self.setup.map.deg_s(pan), self.setup.map.deg_s(tilt));
                 self.zoom_rate =

@@ -139,7 +139,7 @@ fn mode_of(command: &Command) -> Option<Mode> {
 mod tests {
     use super::*;
 
-    const MOVE: Command = Command::Velocity { pan: 1, tilt: 0, zoom: None };
+    const MOVE: Command = Command::Velocity { pan: 1, tilt: 0, zoom: None, free: false };
     const STEP: Command = Command::Absolute { pan_deg: 1.0, tilt_deg: 0.0, speed: 100, zoom: None };
     const PIXEL: Command = Command::Centre { x: 1, y: 1, width: 640, height: 480, zoom_percent: None };
     const SOON: Duration = Duration::from_secs(1);

@@ -11,6 +11,8 @@ pub enum Command {
         tilt: i8,
         /// Speed step of `continuouszoommove`, -100 (out) to 100 (in); `None` leaves the zoom to others.
         zoom: Option<i8>,
+        /// `proportionalspeed=disabled`: free of the bound to the field of view. Newer firmware only (API 1.1).
+        free: bool,
     },
     /// `pan`, `tilt`: move to a position.
     Absolute {
@@ -49,20 +51,21 @@ pub enum Command {
 
 impl Command {
     /// Ends a continuous move of all axes.
-    pub const REST: Self = Self::Velocity { pan: 0, tilt: 0, zoom: Some(0) };
+    pub const REST: Self = Self::Velocity { pan: 0, tilt: 0, zoom: Some(0), free: false };
 
     /// Whether the camera is at rest once it has accepted this.
     pub fn is_stop(&self) -> bool {
-        matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0) })
+        matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0), .. })
     }
 }
 
 impl fmt::Display for Command {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Velocity { pan, tilt, zoom } => {
+            Self::Velocity { pan, tilt, zoom, free } => {
                 write!(f, "continuouspantiltmove={pan},{tilt}")?;
-                zoom.map_or(Ok(()), |zoom| write!(f, "&continuouszoommove={zoom}"))
+                zoom.map_or(Ok(()), |zoom| write!(f, "&continuouszoommove={zoom}"))?;
+                f.write_str(if *free { "&proportionalspeed=disabled" } else { "" })
             }
             Self::Absolute { pan_deg, tilt_deg, speed, zoom } => {
                 write!(f, "pan={pan_deg:.4}&tilt={tilt_deg:.4}&speed={speed}")?;
@@ -89,10 +92,14 @@ mod tests {
     #[test]
     fn commands_are_spelled_as_documented() {
         let spelled = [
-            (Command::Velocity { pan: -49, tilt: 7, zoom: None }, "continuouspantiltmove=-49,7"),
+            (Command::Velocity { pan: -49, tilt: 7, zoom: None, free: false }, "continuouspantiltmove=-49,7"),
             (
-                Command::Velocity { pan: -49, tilt: 7, zoom: Some(-3) },
+                Command::Velocity { pan: -49, tilt: 7, zoom: Some(-3), free: false },
                 "continuouspantiltmove=-49,7&continuouszoommove=-3",
+            ),
+            (
+                Command::Velocity { pan: -49, tilt: 7, zoom: None, free: true },
+                "continuouspantiltmove=-49,7&proportionalspeed=disabled",
             ),
             (
                 Command::Absolute { pan_deg: -12.5, tilt_deg: 3.0, speed: 100, zoom: None },
@@ -121,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_zoom_is_no_rest() {
-        let zooming = |zoom| Command::Velocity { pan: 0, tilt: 0, zoom };
+        let zooming = |zoom| Command::Velocity { pan: 0, tilt: 0, zoom, free: true };
         assert!(zooming(None).is_stop() && zooming(Some(0)).is_stop() && !zooming(Some(1)).is_stop());
     }
 }

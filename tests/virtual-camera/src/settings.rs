@@ -30,6 +30,8 @@ pub enum PtzApi {
     Classic,
     /// Newer firmware: both of them.
     Extended,
+    /// Newer firmware of what is no mechanical dome: `query=attributes`; `proportionalspeed=` is refused.
+    Attributes,
 }
 
 /// By which words of ptz.cgi the camera can be moved. Presets and `move=` are taken in any case.

@@ -28,6 +28,11 @@ impl Pilot {
         if matches!(err, Error::Camera(_)) && (queue.refused_command() || queue.refused(now)) {
             return;
         }
+        if matches!((command, err), (Command::Velocity { .. }, Error::Camera(_)))
+            && self.refused_freedom(command)
+        {
+            return;
+        }
         if self.homing.leads(command) && err.is_refusal() && !err.is_final() {
             self.homing.settled();
             self.reports.push(Report::HomeRefused(err.clone()));
@@ -37,6 +42,15 @@ impl Pilot {
             return;
         }
         self.failed(err, true, now);
+    }
+
+    /// Whether the refusal of a move may be only of its freedom from proportional speed: then it is sent again
+    /// without. Where it is refused even so, it was not for that.
+    fn refused_freedom(&mut self, command: &Command) -> bool {
+        let free = matches!(command, Command::Velocity { free: true, .. });
+        self.camera.refuses_free_moves = free;
+        self.revise();
+        free
     }
 
     /// Whether a refusal is, or may be, only of the words of a mode.
@@ -80,7 +94,7 @@ impl Pilot {
         self.exchange = now.saturating_sub(sent);
         // Counted from its sending on: that is when it can begin to act, however late the answer is.
         match command {
-            Command::Velocity { pan, tilt, zoom } => {
+            Command::Velocity { pan, tilt, zoom, .. } => {
                 self.history.push_steps(sent, (*pan, *tilt), &self.map);
                 if let Some(zoom) = zoom {
                     self.zoom.commanded(sent, *zoom);

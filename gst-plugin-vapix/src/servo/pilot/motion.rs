@@ -19,7 +19,8 @@ impl Pilot {
         let map = &self.map;
         self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
         let (pan, tilt) = self.speed_steps;
-        let command = Command::Velocity { pan, tilt, zoom: self.zoom_speed(sight, now) };
+        let free = (pan, tilt) != (0, 0) && self.camera.wants_free_moves();
+        let command = Command::Velocity { pan, tilt, zoom: self.zoom_speed(sight, now), free };
         if command.is_stop() { Wish::Rest } else { Wish::Move(command) }
     }
 

@@ -57,7 +57,8 @@ impl Device {
 
     fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<Answer, String> {
         let known = |arg: &&(String, String)| self.api == PtzApi::Extended || arg.0 != "proportionalspeed";
-        if let Some((name, _)) = args.iter().find(|(name, _)| !self.moves.take(name)) {
+        let refused = |name: &str| self.api == PtzApi::Attributes && name == "proportionalspeed";
+        if let Some((name, _)) = args.iter().find(|(name, _)| !self.moves.take(name) || refused(name)) {
             return Err(format!("{name}: not supported"));
         }
         let args = args.iter().filter(known).cloned().collect();
@@ -132,7 +133,7 @@ impl Device {
             "presetposall" | "presetposcam" => self.tell_presets(false),
             "presetposcamdata" => self.tell_presets(true),
             "auxiliary" => "Available auxiliary commands for camera 1\r\n".into(),
-            "attributes" if self.api == PtzApi::Extended => self.attributes(),
+            "attributes" if self.api != PtzApi::Classic => self.attributes(),
             _ => return Err(format!("query: unknown value: {subject}")),
         })
     }
@@ -311,6 +312,18 @@ mod tests {
             device.head.advance(Duration::from_millis(1064));
             assert!((device.head.now().tilt_rate_deg_s - expected).abs() < 1e-6, "{:?}", device.head.now());
         }
+    }
+
+    #[test]
+    fn what_is_no_dome_tells_attributes_and_refuses_the_word() {
+        let mut device = device(PtzApi::Attributes);
+        let query = "continuouspantiltmove=0,50&proportionalspeed=disabled";
+        assert_eq!(
+            ask(&mut device, query, 1),
+            Answer::Text("Error:proportionalspeed: not supported\r\n".into())
+        );
+        assert!(device.head.is_at_rest());
+        assert!(text(ask(&mut device, "query=attributes", 1)).contains("speeds="));
     }
 
     #[test]
