@@ -1,3 +1,5 @@
+use std::collections::VecDeque;
+
 use super::*;
 use crate::servo::Answer;
 use crate::servo::LinkChange;
