@@ -73,6 +73,10 @@ pub struct Homing {
     start: Option<Position>,
     /// The number of the preset.
     preset: Option<u32>,
+    /// When to ask for it.
+    presets_at: Duration,
+    /// The speed step of moves to a position.
+    move_speed: Option<u8>,
     /// It is there, or on its way, or cannot get there.
     settled: bool,
 }
@@ -88,7 +92,9 @@ impl Homing {
     pub fn configure(&mut self, home: Option<&Home>, timeout: Duration) {
         self.timeout = timeout;
         if home != self.home.as_ref() {
-            *self = Self { home: home.cloned(), preset: None, settled: false, at_start: false, ..*self };
+            let presets_at = Duration::ZERO;
+            let home = home.cloned();
+            *self = Self { home, preset: None, presets_at, settled: false, at_start: false, ..*self };
         }
     }
 
@@ -134,9 +140,20 @@ impl Homing {
         self.settled
     }
 
-    /// Whether the camera is to be asked for its presets.
-    pub fn wants_presets(&self) -> bool {
-        self.preset.is_none() && !self.settled && matches!(self.home, Some(Home::Preset(_)))
+    /// When the camera is to be asked for its presets, where it is.
+    pub fn presets_due(&self) -> Option<Duration> {
+        let wanted = self.preset.is_none() && !self.settled && matches!(self.home, Some(Home::Preset(_)));
+        wanted.then_some(self.presets_at)
+    }
+
+    /// They went unanswered: not before then again.
+    pub fn ask_presets_at(&mut self, at: Duration) {
+        self.presets_at = at;
+    }
+
+    /// The camera told how fast its moves to a position are.
+    pub fn told_move_speed(&mut self, step: u8) {
+        self.move_speed = Some(step);
     }
 
     /// The camera told its presets; returns the name where it has none of that name.
@@ -166,21 +183,21 @@ impl Homing {
 
     fn command(&self) -> Option<Command> {
         match self.home.as_ref()? {
-            Home::Start => self.start.and_then(command),
-            Home::Position(position) => command(*position),
+            Home::Start => self.start.and_then(|start| self.go_to(start)),
+            Home::Position(position) => self.go_to(*position),
             Home::Preset(_) => self.preset.map(|number| Command::Preset { number }),
         }
     }
-}
 
-fn command(position: Position) -> Option<Command> {
-    Some(Command::Absolute {
-        pan_deg: position.pan_deg?,
-        tilt_deg: position.tilt_deg?,
-        speed: 100,
-        // Within 1 to 9999.
-        zoom: position.zoom_steps.map(|zoom| zoom.clamp(1.0, 9999.0) as u16),
-    })
+    fn go_to(&self, position: Position) -> Option<Command> {
+        Some(Command::Absolute {
+            pan_deg: position.pan_deg?,
+            tilt_deg: position.tilt_deg?,
+            speed: self.move_speed.unwrap_or(Command::FULL_SPEED),
+            // Within 1 to 9999.
+            zoom: position.zoom_steps.map(|zoom| zoom.clamp(1.0, 9999.0) as u16),
+        })
+    }
 }
 
 #[cfg(test)]
@@ -266,10 +283,10 @@ mod tests {
     #[test]
     fn a_preset_goes_by_its_number() {
         let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
-        assert!(homing.wants_presets());
+        assert_eq!(homing.presets_due(), Some(s(0)));
         assert_eq!(alone(&mut homing, 0, 30), []);
         assert_eq!(homing.told_presets(&Presets(vec![(1, "Home".to_owned()), (4, "Gate".to_owned())])), None);
-        assert!(!homing.wants_presets());
+        assert_eq!(homing.presets_due(), None);
         assert_eq!(alone(&mut homing, 30, 60), [(30, Command::Preset { number: 4 })]);
     }
 
@@ -277,7 +294,7 @@ mod tests {
     fn a_preset_that_is_none_is_told_once() {
         let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
         assert_eq!(homing.told_presets(&Presets::default()), Some("Gate".to_owned()));
-        assert!(!homing.wants_presets());
+        assert_eq!(homing.presets_due(), None);
         assert_eq!(alone(&mut homing, 0, 30), []);
         homing.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10));
         assert_eq!(alone(&mut homing, 30, 60).len(), 1);

@@ -14,11 +14,14 @@ mod camera;
 mod control_queue;
 mod controller;
 mod home;
+mod introduction;
 mod learning;
 #[cfg(test)]
 mod learning_tests;
 mod limits;
 mod link;
+#[cfg(test)]
+mod meeting_tests;
 #[cfg(test)]
 mod motion_tests;
 mod operator;
@@ -48,6 +51,7 @@ pub use camera::CameraModel;
 pub use control_queue::ControlQueue;
 pub use controller::{ControlLaw, Controller, Offset};
 pub use home::{Home, Homing};
+pub use introduction::Introduction;
 pub use learning::{Calibration, Turn};
 pub use limits::{LimitGuard, SoftLimits, is_endless, narrower};
 pub use link::{Link, LinkChange};

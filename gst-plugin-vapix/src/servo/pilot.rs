@@ -1,14 +1,13 @@
 mod answers;
 mod motion;
 
-use std::collections::VecDeque;
 use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing, Job, Lens,
-    LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings, Sight,
-    SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
+    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing,
+    Introduction, Job, Lens, LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report,
+    Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
 use crate::vapix::Command;
 
@@ -38,8 +37,7 @@ pub struct Pilot {
     guard: LimitGuard,
     zoom: ZoomDrive,
     target: Option<Target>,
-    /// What is still to be asked of a camera just met.
-    introduction: VecDeque<Query>,
+    introduction: Introduction,
     next_poll: Duration,
     /// The speed steps in force, for the quantiser's hysteresis.
     speed_steps: (i8, i8),
@@ -107,7 +105,7 @@ impl Pilot {
             guard: LimitGuard::default(),
             zoom: ZoomDrive::default(),
             target: None,
-            introduction: Query::INTRODUCTION.into(),
+            introduction: Introduction::default(),
             next_poll: Duration::ZERO,
             speed_steps: (0, 0),
             stop: Command::Halt,
@@ -244,11 +242,11 @@ impl Pilot {
 
     /// What to ask next, and when.
     fn question(&self, now: Duration) -> (Query, Duration) {
-        let (query, at) = match self.introduction.front() {
-            Some(query) => (*query, Duration::ZERO),
-            None if self.homing.wants_presets() => (Query::Presets, Duration::ZERO),
-            None => (Query::Position, self.next_poll),
-        };
+        let poll = (Query::Position, self.next_poll);
+        let presets = self.homing.presets_due().map(|at| (Query::Presets, at));
+        // Of what is due the first; else what will be soonest.
+        let questions = self.introduction.next().into_iter().chain(presets);
+        let (query, at) = questions.chain([poll]).min_by_key(|(_, at)| (*at).max(now)).unwrap_or(poll);
         match self.authority.queue.next(self.is_at_rest()) {
             Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),
             _ => (query, at),
@@ -344,7 +342,7 @@ impl Pilot {
 
     /// Before its first answers the camera is asked, not moved; but not for ever where it does not tell.
     fn meeting(&self) -> bool {
-        !self.introduction.is_empty() && !self.link.faulty()
+        self.introduction.comes_first() && !self.link.faulty()
     }
 
     fn wish(&mut self, now: Duration) -> Wish {

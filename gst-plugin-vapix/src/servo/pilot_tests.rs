@@ -3,6 +3,8 @@ mod others;
 #[path = "pilot/words_tests.rs"]
 mod words;
 
+use std::collections::VecDeque;
+
 use super::*;
 use crate::servo::Answer;
 use crate::servo::LinkChange;

@@ -53,6 +53,9 @@ impl Command {
     /// Ends a continuous move of all axes.
     pub const REST: Self = Self::Velocity { pan: 0, tilt: 0, zoom: Some(0), free: false };
 
+    /// Speed step of moves to a position, of a camera that does not tell its own (`PTZ.UserAdv.U#.MoveSpeed`).
+    pub const FULL_SPEED: u8 = 100;
+
     /// Whether the camera is at rest once it has accepted this.
     pub fn is_stop(&self) -> bool {
         matches!(self, Self::Halt | Self::Stop | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0), .. })

@@ -72,6 +72,12 @@ impl Error {
         !matches!(self, Self::Unreachable(_) | Self::Timeout(_) | Self::Broken(_))
     }
 
+    /// Whether it understood what it was asked, and will answer no more than that if it is asked again.
+    pub fn is_answer(&self) -> bool {
+        matches!(self, Self::Camera(_) | Self::NoPtz | Self::Unexpected(_))
+            || matches!(self, Self::Status { status: 400..=499, .. })
+    }
+
     /// Whether asking again is useless, or harmful, until a setting changes.
     pub fn is_final(&self) -> bool {
         matches!(self, Self::CredentialsMissing | Self::BadCredentials { .. })

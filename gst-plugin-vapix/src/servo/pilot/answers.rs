@@ -33,7 +33,7 @@ impl Pilot {
         {
             return;
         }
-        if self.homing.leads(command) && err.is_refusal() && !err.is_final() {
+        if self.homing.leads(command) && matches!(err, Error::Camera(_)) {
             self.homing.settled();
             self.reports.push(Report::HomeRefused(err.clone()));
             return;
@@ -60,8 +60,7 @@ impl Pilot {
             Refusal::Doubtful => {
                 let tells_position = self.camera.pan_tilt().is_some();
                 let witness = if tells_position { Query::Position } else { Query::Parameters };
-                self.introduction.retain(|pending| *pending != witness);
-                self.introduction.push_front(witness);
+                self.introduction.ask_first(witness);
                 true
             }
             // There is none left to turn to: the wanted one is tried on, with the pauses of a fault.
@@ -184,12 +183,15 @@ impl Pilot {
                 self.camera.attributes = attributes;
                 self.assume_speeds();
             }
-            Answer::MoveSpeed(step) => self.camera.move_speed = Some(step),
+            Answer::MoveSpeed(step) => {
+                self.camera.move_speed = Some(step);
+                self.homing.told_move_speed(step);
+            }
             Answer::Accepted => {}
         }
-        self.asked(query);
         self.revise();
         self.succeeded(false);
+        self.asked(query, now);
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
@@ -197,26 +199,24 @@ impl Pilot {
             self.authority.undecided();
         }
         if let Some(refusal) = self.ways.failed().filter(|_| err.is_refusal() && !err.is_final()) {
-            self.asked(query);
+            self.asked(query, now);
             return self.failed(&refusal, true, now);
         }
         if query != Query::Position {
             // Optional; a camera that is gone will be missed by the next position.
-            if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
-                self.will_not_tell(query, now);
-                return;
+            if err.is_answer() {
+                return self.will_not_tell(query, now);
+            } else if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
+                return self.may_tell_later(query, now);
             }
         } else if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
             return;
-        } else if self.link.connected()
-            && matches!(err, Error::Camera(_) | Error::NoPtz | Error::Unexpected(_))
-        {
-            self.asked(query);
+        } else if self.will_not_tell_position(err) {
             self.positioned(None, now, now);
             if !self.steps.under_way() {
                 self.next_poll = now + Self::POLL_REFUSED;
             }
-            return;
+            return self.asked(query, now);
         }
         self.failed(err, false, now);
     }
@@ -225,16 +225,46 @@ impl Pilot {
         match query {
             Query::Queue(_) => self.authority.queue.failed(now),
             Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
-            _ => self.asked(query),
+            _ => self.asked(query, now),
         }
     }
 
-    /// This need not be asked again; after the last question it is known whom we met.
-    fn asked(&mut self, query: Query) {
-        let meeting = !self.introduction.is_empty();
-        self.introduction.retain(|pending| *pending != query);
-        if meeting && self.introduction.is_empty() {
-            self.reports.push(Report::Met(self.camera.to_string()));
+    /// Whether this is no fault: of a camera just met, which may answer the other questions, or of one that is well.
+    fn will_not_tell_position(&self, err: &Error) -> bool {
+        match err {
+            Error::Camera(_) if self.introduction.holds(Query::Position) => true,
+            Error::Camera(_) | Error::NoPtz | Error::Unexpected(_) => self.link.connected(),
+            _ => false,
+        }
+    }
+
+    fn may_tell_later(&mut self, query: Query, now: Duration) {
+        // Whether the camera is there at all.
+        self.next_poll = now;
+        match query {
+            Query::Queue(_) => self.authority.queue.failed(now),
+            Query::Presets => self.homing.ask_presets_at(now + Self::POLL_RESTING),
+            _ => {
+                if self.introduction.unanswered(query, !self.link.faulty(), now) {
+                    self.met(now);
+                }
+            }
+        }
+    }
+
+    /// This need not be asked again.
+    fn asked(&mut self, query: Query, now: Duration) {
+        if self.introduction.done(query) {
+            self.met(now);
+        }
+    }
+
+    /// After the last question it is known whom we met.
+    fn met(&mut self, now: Duration) {
+        self.reports.push(Report::Met(self.camera.to_string()));
+        if !self.link.connected() {
+            // It told nothing: that is a fault after all.
+            self.next_poll = now;
         }
     }
 

@@ -96,7 +96,7 @@ impl Pilot {
                 Wish::Move(centre(view.point_within(turn), sight.size, jump.map(|jump| jump.factor)))
             }
             _ => position.map_or(Wish::AsIs, |position| {
-                Wish::Move(absolute(position + turn, jump.map(|jump| jump.step)))
+                Wish::Move(absolute(position + turn, self.camera.move_speed, jump.map(|jump| jump.step)))
             }),
         }
     }
@@ -127,11 +127,11 @@ fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Co
 }
 
 /// The command to look there, the short way round.
-fn absolute(position: PanTilt, zoom: Option<u16>) -> Command {
+fn absolute(position: PanTilt, speed: Option<u8>, zoom: Option<u16>) -> Command {
     Command::Absolute {
         pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
         tilt_deg: position.tilt.clamp(-180.0, 180.0),
-        speed: 100,
+        speed: speed.unwrap_or(Command::FULL_SPEED),
         zoom,
     }
 }

@@ -2,8 +2,8 @@
 
 use super::*;
 
-const ZOOM: Command = Command::Velocity { pan: 0, tilt: 0, zoom: Some(20) };
-const TURN: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None };
+const ZOOM: Command = Command::Velocity { pan: 0, tilt: 0, zoom: Some(20), free: false };
+const TURN: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false };
 
 fn accept(rig: &mut Rig, command: Command) {
     let job = Job::Command(command);
@@ -22,7 +22,7 @@ fn a_zoom_is_ended_even_where_the_last_move_was_only_a_turn() {
     rig.pilot.rest();
     assert_eq!(rig.after(ms(10)), [Command::Halt], "it rests since");
     accept(&mut rig, ZOOM);
-    accept(&mut rig, Command::Velocity { pan: 10, tilt: 0, zoom: Some(0) });
+    accept(&mut rig, Command::Velocity { pan: 10, tilt: 0, zoom: Some(0), free: false });
     rig.pilot.rest();
     assert_eq!(rig.after(ms(10)), [Command::Halt]);
 }

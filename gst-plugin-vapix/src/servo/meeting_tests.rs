@@ -1,0 +1,227 @@
+//! What a pilot asks of a camera just met, and what becomes of questions without an answer.
+
+use std::time::Duration;
+
+use super::aim::tests::sight;
+use super::{Answer, Home, Job, LinkChange, Next, Pilot, Query, Report, ServoSettings, Sight, Visibility};
+use crate::vapix::{Command, Error, Limits, Parameters, Position, Presets, Range};
+
+fn ms(ms: u64) -> Duration {
+    Duration::from_millis(ms)
+}
+
+fn timeout() -> Error {
+    Error::Timeout(ms(1))
+}
+
+fn starting() -> Error {
+    Error::Status { status: 503, reason: "Service Unavailable" }
+}
+
+fn refused() -> Error {
+    Error::Camera("none".to_owned())
+}
+
+/// What a willing camera answers.
+fn told(job: &Job) -> Result<Answer, Error> {
+    Ok(match job {
+        Job::Command(_) => Answer::Accepted,
+        Job::Query(Query::Position) => {
+            Answer::Position(Position { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom_steps: Some(1.0) })
+        }
+        Job::Query(Query::Limits) => {
+            Answer::Limits(Limits { pan_deg: Some(Range { min: -170.0, max: 170.0 }), ..Limits::default() })
+        }
+        Job::Query(Query::Parameters) => {
+            Answer::Parameters(Parameters { proportional_speed: Some(false), ..Parameters::default() })
+        }
+        Job::Query(Query::MoveSpeed) => Answer::MoveSpeed(40),
+        Job::Query(Query::Presets) => Answer::Presets(Presets(vec![(4, "Gate".to_owned())])),
+        Job::Query(_) => return Err(refused()),
+    })
+}
+
+struct Meeting {
+    pilot: Pilot,
+    now: Duration,
+    jobs: Vec<Job>,
+    reports: Vec<Report>,
+}
+
+impl Meeting {
+    fn new(settings: ServoSettings) -> Self {
+        Self { pilot: Pilot::new(settings), now: ms(1000), jobs: Vec::new(), reports: Vec::new() }
+    }
+
+    /// Lets time pass, with pictures and with what is due; every answer takes so long.
+    fn run(
+        &mut self,
+        (seconds, per_answer): (u64, Duration),
+        seen: impl Fn(Duration) -> Sight,
+        mut answer: impl FnMut(&Job) -> Result<Answer, Error>,
+    ) {
+        let end = self.now + Duration::from_secs(seconds);
+        while self.now < end {
+            self.pilot.see(seen(self.now), self.now);
+            while let Next::Do(job) = self.pilot.next(self.now) {
+                let sent = self.now;
+                self.pilot.sending(&job, sent);
+                self.now += per_answer;
+                self.jobs.push(job);
+                self.pilot.answered(&job, answer(&job), sent, self.now);
+                self.pilot.see(seen(self.now), self.now);
+            }
+            self.now += ms(40);
+        }
+        self.reports.extend(self.pilot.take_reports());
+    }
+
+    fn asked(&self, query: Query) -> usize {
+        self.jobs.iter().filter(|job| **job == Job::Query(query)).count()
+    }
+
+    fn met(&self) -> Option<&str> {
+        self.reports.iter().find_map(|report| match report {
+            Report::Met(text) => Some(text.as_str()),
+            _ => None,
+        })
+    }
+
+    fn faults(&self) -> usize {
+        let fault = |report: &&Report| {
+            matches!(report, Report::Link(LinkChange::Disconnected(_) | LinkChange::Refused(_)))
+        };
+        self.reports.iter().filter(fault).count()
+    }
+}
+
+fn nobody(now: Duration) -> Sight {
+    Sight { visibility: Visibility::Gone, ..sight(0.5, 0.5, now) }
+}
+
+/// Aside, and farther so as time goes by: there is always something to send.
+fn somebody(now: Duration) -> Sight {
+    sight(0.6 + 0.3 * (now.as_secs_f64() * 3.0).sin().abs(), 0.5, now)
+}
+
+#[test]
+fn a_question_without_an_answer_is_asked_again() {
+    for err in [timeout(), starting(), Error::Broken("reset".to_owned()), Error::TooLong(9)] {
+        let mut meeting = Meeting::new(ServoSettings::default());
+        let mut failures = 2;
+        meeting.run((10, ms(0)), nobody, |job| {
+            if *job == Job::Query(Query::Parameters) && failures > 0 {
+                failures -= 1;
+                return Err(err.clone());
+            }
+            told(job)
+        });
+        assert_eq!(meeting.asked(Query::Parameters), 3, "{err}");
+        assert!(meeting.met().is_some_and(|text| text.contains("not proportional")), "{err}");
+        assert_eq!(meeting.faults(), 0, "{err}");
+    }
+}
+
+#[test]
+fn a_question_without_any_answer_is_given_up_and_so_is_one_that_is_refused() {
+    for (err, times) in [(timeout(), 3), (refused(), 1), (Error::NoPtz, 1)] {
+        let mut meeting = Meeting::new(ServoSettings::default());
+        meeting.run((20, ms(0)), nobody, |job| match job {
+            Job::Query(Query::Limits) => Err(err.clone()),
+            _ => told(job),
+        });
+        assert_eq!(meeting.asked(Query::Limits), times, "{err}");
+        assert!(meeting.met().is_some_and(|text| text.contains("pan not told")), "{err}");
+    }
+}
+
+#[test]
+fn an_outage_takes_no_knowledge_away() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((1, ms(0)), nobody, |job| match job {
+        Job::Query(Query::Position) => told(job),
+        _ => Err(timeout()),
+    });
+    meeting.run((30, ms(0)), nobody, |_| Err(timeout()));
+    assert_eq!(meeting.met(), None);
+    meeting.run((10, ms(0)), nobody, told);
+    let text = meeting.met().unwrap();
+    assert!(text.starts_with("pan -170 to 170") && text.contains("not proportional"), "{text}");
+}
+
+#[test]
+fn a_camera_that_does_not_tell_where_it_looks_tells_the_rest() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((10, ms(0)), nobody, |job| match job {
+        Job::Query(Query::Position) => Err(refused()),
+        _ => told(job),
+    });
+    assert_eq!((meeting.faults(), meeting.asked(Query::Position)), (0, 2), "once, and for the queue's sake");
+    assert!(meeting.met().is_some_and(|text| text.starts_with("pan -170 to 170")));
+    assert!(meeting.reports.contains(&Report::Link(LinkChange::Connected)));
+}
+
+#[test]
+fn a_camera_that_tells_nothing_is_a_fault() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((10, ms(0)), nobody, |_| Err(refused()));
+    assert_eq!(meeting.faults(), 1);
+    assert!(meeting.asked(Query::Position) > 5, "it is asked on");
+}
+
+#[test]
+fn the_first_move_waits_for_no_more_than_it_needs() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((12, ms(1000)), somebody, told);
+    let known = [Job::Query(Query::Position), Job::Query(Query::Limits)];
+    assert_eq!(meeting.jobs[..2], known);
+    assert!(matches!(meeting.jobs[2], Job::Command(_)), "{:?}", meeting.jobs);
+    // The rest when there is nothing to send.
+    meeting.run((12, ms(1000)), nobody, told);
+    assert!(meeting.met().is_some());
+}
+
+#[test]
+fn a_camera_that_is_busy_goes_home_later() {
+    let home = Home::Position(Position { pan_deg: Some(30.0), tilt_deg: Some(0.0), zoom_steps: None });
+    for err in [starting(), timeout()] {
+        let settings =
+            ServoSettings { home: Some(home.clone()), home_timeout: ms(500), ..ServoSettings::default() };
+        let mut meeting = Meeting::new(settings);
+        let mut failures = 2;
+        meeting.run((20, ms(0)), nobody, |job| match job {
+            Job::Command(Command::Absolute { speed, .. }) if failures > 0 => {
+                assert_eq!(*speed, 40, "as it told");
+                failures -= 1;
+                Err(err.clone())
+            }
+            _ => told(job),
+        });
+        let went = |job: &&Job| matches!(job, Job::Command(Command::Absolute { .. }));
+        assert_eq!(meeting.jobs.iter().filter(went).count(), 3, "{err}");
+        assert!(!meeting.reports.iter().any(|report| matches!(report, Report::HomeRefused(_))), "{err}");
+    }
+}
+
+#[test]
+fn presets_that_are_not_told_yet_are_asked_for_later() {
+    for err in [starting(), timeout()] {
+        let settings = ServoSettings {
+            home: Some(Home::Preset("Gate".to_owned())),
+            home_timeout: Duration::ZERO,
+            ..ServoSettings::default()
+        };
+        let mut meeting = Meeting::new(settings);
+        let mut failures = 4;
+        meeting.run((40, ms(0)), nobody, |job| {
+            if *job == Job::Query(Query::Presets) && failures > 0 {
+                failures -= 1;
+                return Err(err.clone());
+            }
+            told(job)
+        });
+        assert!(meeting.jobs.contains(&Job::Command(Command::Preset { number: 4 })), "{err}");
+        assert_eq!(meeting.asked(Query::Presets), 5, "{err}");
+        assert!(!meeting.reports.iter().any(|report| matches!(report, Report::NoSuchPreset(_))), "{err}");
+    }
+}
