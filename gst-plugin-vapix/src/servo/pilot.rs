@@ -184,6 +184,17 @@ impl Pilot {
         self.homing.interrupt();
     }
 
+    /// A predecessor left the camera in a move that this ends.
+    pub fn inherit(&mut self, stop: Command) {
+        self.stop = stop;
+        self.scheduler.found_moving();
+    }
+
+    /// What ends the last move.
+    pub fn stop(&self) -> Command {
+        self.stop
+    }
+
     /// It is the end: with the stop, what is ours is given back.
     pub fn leave(&mut self) {
         self.authority.queue.leave();

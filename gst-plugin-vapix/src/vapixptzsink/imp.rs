@@ -1,4 +1,4 @@
-use std::sync::{LazyLock, Mutex, Weak};
+use std::sync::{LazyLock, Mutex};
 use std::time::Duration;
 
 use glib::Properties;
@@ -9,12 +9,11 @@ use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::clock::Clock;
-use super::inbox::Inbox;
 use super::news::camera_event;
 use super::picture::Picture;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
-use super::worker::{self, Worker};
+use super::worker::{self, Legacy, Worker};
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
 use crate::servo::{Sight, Status};
@@ -204,8 +203,8 @@ pub struct VapixPtzSink {
     )]
     pub(super) settings: Mutex<Settings>,
     worker: Mutex<Option<Worker>>,
-    /// Where the last worker takes its mail, which may outlive its time in order to stop the camera.
-    last_inbox: Mutex<Weak<Inbox>>,
+    /// Of the workers so far, that may still be about to stop their cameras.
+    legacies: Mutex<Vec<Legacy>>,
     stream: Mutex<Stream>,
     /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
     pub(super) news: Mutex<Option<Status>>,
@@ -365,9 +364,6 @@ impl VapixPtzSink {
         *lock(&self.stream) = Stream { lockstep: settings.lockstep, ..Stream::default() };
         let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
         *lock(&self.news) = None;
-        if let Some(inbox) = lock(&self.last_inbox).upgrade() {
-            inbox.quit();
-        }
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
         let worker = Worker::start(client, settings.servo(), clock, move |event| {
@@ -379,7 +375,11 @@ impl VapixPtzSink {
             gst::element_imp_error!(self, gst::ResourceError::Settings, ("{reason}"));
             gst::StateChangeError
         })?;
-        *lock(&self.last_inbox) = worker.weak_inbox();
+        {
+            let mut legacies = lock(&self.legacies);
+            legacies.retain(|legacy| !legacy.is_void() && !worker.succeed(legacy));
+            legacies.push(worker.legacy());
+        }
         *lock(&self.worker) = Some(worker);
         Ok(())
     }

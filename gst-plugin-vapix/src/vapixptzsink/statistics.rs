@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::servo::{Belief, Mode, Status, is_endless};
+use crate::vapix::Command;
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
@@ -10,6 +11,8 @@ pub struct Statistics {
     pub status: Status,
     /// What the camera is taken for by now.
     pub belief: Option<Belief>,
+    /// What ends the last move.
+    pub stop: Option<Command>,
     pub sent: u64,
     pub failed: u64,
     /// Pictures of the target that were overtaken by newer ones before they could be steered by.
