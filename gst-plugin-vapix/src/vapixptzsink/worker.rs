@@ -37,7 +37,10 @@ pub enum Event {
     /// The camera is known to be otherwise than before.
     Status(Status),
     /// The end has come, and the camera has not confirmed its stop in time.
-    GaveUp,
+    GaveUp {
+        /// Whether nothing more may be sent either.
+        halted: bool,
+    },
     /// The worker itself broke.
     Died(String),
 }
@@ -167,7 +170,12 @@ impl Legacy {
     /// Stops the camera, whatever it does, without the pilot, who broke; for a while.
     async fn stop(&self, settings: ClientSettings, inbox: &Inbox) {
         let Ok(mut client) = Client::new(settings) else { return };
-        let stop = lock(&self.statistics).stop.unwrap_or(Command::Stop);
+        let stop = {
+            let mut statistics = lock(&self.statistics);
+            // For whoever comes next, until it is known better.
+            statistics.status.moving = true;
+            statistics.stop.unwrap_or(Command::Stop)
+        };
         let tries = async {
             while !inbox.take().quit {
                 match client.send(&stop).await {
@@ -305,7 +313,7 @@ impl<O: Fn(Event)> Desk<O> {
 
     fn give_up(&mut self) {
         if !self.pilot.is_at_rest() && !mem::replace(&mut self.gave_up, true) {
-            (self.observer)(Event::GaveUp);
+            (self.observer)(Event::GaveUp { halted: self.pilot.halted() });
         }
         self.waiting.clear();
     }
