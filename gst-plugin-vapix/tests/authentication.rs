@@ -37,6 +37,20 @@ fn a_nonce_that_expires_is_no_fault() {
     assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
 }
 
+/// Where nobody is told by 403 what he may not.
+#[test]
+fn an_account_that_may_only_move_the_camera_does() {
+    for auth in [Auth::Basic, Auth::Digest { qop: true }] {
+        let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
+        let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+        rig.set_going(&camera);
+        rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
+        let heard = rig.heard();
+        assert!(!heard.iter().any(Heard::is_warning), "{auth:?}: {heard:?}");
+        assert!((2..=3).contains(&camera.status().refused), "{auth:?}: asked for once");
+    }
+}
+
 #[test]
 fn a_camera_that_wants_credentials_gets_none() {
     let camera = camera(Auth::Basic);

@@ -339,3 +339,39 @@ fn a_stop_outlives_the_element_that_could_not_send_it() {
     camera.set_fault(Fault::None);
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
 }
+
+/// The same, where the element is used again in the meantime, with success or without.
+#[test]
+fn a_stop_outlives_what_the_element_turns_to_next() {
+    let next = common::camera(virtual_camera::Auth::None);
+    for (location, starts) in [(next.url(), true), ("https://127.0.0.1".to_owned(), false)] {
+        let left = common::camera(virtual_camera::Auth::None);
+        let mut rig = Rig::ready(&left.url()).with("timeout", 200u32).play();
+        rig.set_going(&left);
+        left.set_fault(Fault::Refuse);
+        rig.sink.set_state(gst::State::Null).unwrap();
+        let rig = rig.with("location", &location).with("ca-file", "/nowhere.pem");
+        assert_eq!(rig.sink.set_state(gst::State::Playing).is_ok(), starts);
+        assert!(left.status().moving);
+        left.set_fault(Fault::None);
+        assert!(left.wait_for(PATIENCE, |status| !status.moving), "{location}");
+    }
+}
+
+/// And not only where it is found to move by its positions: not every camera tells them.
+#[test]
+fn a_stop_is_handed_over_to_who_comes_next() {
+    let camera = common::camera(virtual_camera::Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    rig.set_going(&camera);
+    camera.set_fault(Fault::Refuse);
+    rig.sink.set_state(gst::State::Null).unwrap();
+    let before = camera.commands().len() as u64;
+    rig.sink.set_state(gst::State::Playing).unwrap();
+    assert!(camera.status().moving);
+    camera.set_fault(Fault::None);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    let told = camera.commands_after(before);
+    let queries = told.iter().take_while(|command| command.query.contains("query=")).count();
+    assert!(queries < 2, "{told:?}");
+}

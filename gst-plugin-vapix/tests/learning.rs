@@ -102,9 +102,10 @@ fn a_camera_that_tells_its_field_of_view_and_speeds_is_believed() {
         Stage::new(settings, |rig| rig.with("camera-speed", 100.0).with_str("speed-curve", "linear"));
     stage.follow(0.1);
     let stats = stage.rig.stats();
-    let (left, right): (f64, f64) = (stats.get("pan-min").unwrap(), stats.get("pan-max").unwrap());
+    let (left, right): (f64, f64) =
+        (stats.get("camera-pan-min").unwrap(), stats.get("camera-pan-max").unwrap());
     assert!((left + right).abs() < 0.01 && (15.0..60.0).contains(&right), "{left} to {right}");
-    assert_eq!((stats.get("endless-pan"), stats.get("zoom-max")), (Ok(false), Ok(9999.0)));
+    assert_eq!((stats.get("camera-endless-pan"), stats.get("camera-zoom-max")), (Ok(false), Ok(9999.0)));
     let (_, fov_deg, speeds) = known(&stage.rig);
     assert!((fov_deg - FOV_DEG).abs() < 0.2, "{fov_deg}");
     for step in [10u8, 24, 60, 100] {

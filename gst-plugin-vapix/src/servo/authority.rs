@@ -224,7 +224,7 @@ mod tests {
         let mut authority = met();
         authority.queue.told(Some(true));
         assert!(!authority.is_ours(s(30)));
-        let place = |position| Some(QueuePlace { position, left: None, poll_every: s(20) });
+        let place = |position| Some(QueuePlace { position, poll_every: s(20) });
         authority.queue.answered(QueueRequest::Request, place(2), s(30));
         assert_eq!(authority.change(s(30)), Some(Some(Holder::Queue)));
         authority.queue.answered(QueueRequest::Query, place(1), s(31));

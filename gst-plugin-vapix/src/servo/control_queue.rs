@@ -108,6 +108,11 @@ impl ControlQueue {
         self.deaf = false;
     }
 
+    /// We may not ask: whether it is our turn shows when we move the camera.
+    pub fn forbidden(&mut self) {
+        (self.state, self.held) = (State::Absent, false);
+    }
+
     /// The connection was lost, and may be with it our place.
     pub fn forget(&mut self) {
         if self.exists() {
@@ -149,7 +154,7 @@ mod tests {
     }
 
     fn place(position: u32) -> Option<QueuePlace> {
-        Some(QueuePlace { position, left: None, poll_every: s(20) })
+        Some(QueuePlace { position, poll_every: s(20) })
     }
 
     #[test]
@@ -194,6 +199,14 @@ mod tests {
         assert_eq!(queue.next(true), Some((QueueRequest::Query, s(4))));
         queue.answered(QueueRequest::Query, place(1), s(4));
         assert!(!queue.refused(s(5)), "it is our turn, so there is something else amiss");
+    }
+
+    #[test]
+    fn where_we_may_not_ask_we_do_not() {
+        let mut queue = ControlQueue::default();
+        queue.told(Some(true));
+        queue.forbidden();
+        assert!(queue.lets_us() && queue.next(true).is_none() && !queue.refused(s(1)) && !queue.is_held());
     }
 
     #[test]

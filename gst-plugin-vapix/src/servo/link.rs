@@ -39,6 +39,8 @@ struct Fault {
 enum FaultKind {
     Silent,
     Refusing,
+    /// Refusing, and to be asked rarely.
+    Forbidden,
     /// Refusing, and to be asked nothing more.
     LockedOut,
 }
@@ -47,6 +49,7 @@ impl FaultKind {
     fn of(err: &Error) -> Self {
         match err {
             err if err.is_final() => Self::LockedOut,
+            Error::NotPermitted { .. } => Self::Forbidden,
             err if err.is_refusal() => Self::Refusing,
             _ => Self::Silent,
         }
@@ -58,6 +61,9 @@ impl Link {
 
     /// Short enough for control to be back within two seconds of the camera's return.
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+    /// What is not permitted is tried again no sooner than this: each time may count as a wrong login.
+    pub const RARELY: Duration = Duration::from_secs(60);
 
     /// A fault that comes again within this time is reported only if it lasts longer.
     const QUIET: Duration = Duration::from_secs(10);
@@ -102,8 +108,11 @@ impl Link {
         self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
         // Who has waited in vain has paused already; else silence would last longer than the camera's.
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
-        self.retry_at = now + self.pause.saturating_sub(waited);
         let kind = FaultKind::of(err);
+        // But once: a server that restarts between challenge and answer refuses alike.
+        let again = self.fault.as_ref().is_some_and(|fault| fault.kind == kind);
+        let rarely = again && kind == FaultKind::Forbidden;
+        self.retry_at = now + if rarely { Self::RARELY } else { self.pause.saturating_sub(waited) };
         let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
         fault.kind = kind;
         fault.of_command |= of_command;
@@ -116,7 +125,9 @@ impl Link {
         self.told.push((kind, now));
         Some(match kind {
             FaultKind::Silent => LinkChange::Disconnected(err.clone()),
-            FaultKind::Refusing | FaultKind::LockedOut => LinkChange::Refused(err.clone()),
+            FaultKind::Refusing | FaultKind::Forbidden | FaultKind::LockedOut => {
+                LinkChange::Refused(err.clone())
+            }
         })
     }
 }
@@ -187,6 +198,22 @@ mod tests {
         }
         link.failed(&Error::Timeout(ms(100)), true, ms(5000));
         assert_eq!(link.retry_at(), ms(5900));
+    }
+
+    #[test]
+    fn what_is_not_permitted_is_tried_once_more_and_then_rarely() {
+        let mut link = Link::default();
+        link.succeeded(false, true);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(link.failed(&forbidden, true, ms(0)), Some(LinkChange::Refused(forbidden.clone())));
+        assert_eq!(link.retry_at(), Link::FIRST_PAUSE);
+        for time in [ms(125), ms(60_125), ms(120_125)] {
+            assert_eq!(link.failed(&forbidden, true, time), None);
+            assert_eq!(link.retry_at(), time + Link::RARELY);
+        }
+        assert!(!link.halted());
+        assert_eq!(link.succeeded(true, false), Some(LinkChange::Connected));
+        assert_eq!(link.retry_at(), Duration::ZERO);
     }
 
     #[test]

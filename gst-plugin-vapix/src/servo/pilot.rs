@@ -5,9 +5,9 @@ use std::mem;
 use std::time::Duration;
 
 use super::{
-    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing,
-    Introduction, Job, Lens, LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report,
-    Scheduler, ServoSettings, Sight, SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
+    Aim, Authority, Belief, Calibration, CameraModel, CommandHistory, Controller, Homing, Introduction, Job,
+    Lens, LimitGuard, Link, Mode, Next, OscillationGuard, PanTilt, Query, Report, Scheduler, ServoSettings,
+    Sight, SpeedMap, Status, Steps, View, Visibility, Ways, ZoomDrive, magnified,
 };
 use crate::vapix::Command;
 
@@ -189,6 +189,17 @@ impl Pilot {
     pub fn rest(&mut self) {
         self.lose();
         self.homing.interrupt();
+    }
+
+    /// A predecessor left the camera in a move that this ends.
+    pub fn inherit(&mut self, stop: Command) {
+        self.stop = stop;
+        self.scheduler.found_moving();
+    }
+
+    /// What ends the last move.
+    pub fn stop(&self) -> Command {
+        self.stop
     }
 
     /// It is the end: with the stop, what is ours is given back.

@@ -223,6 +223,41 @@ fn wrong_credentials_end_all_asking_until_they_change() {
 }
 
 #[test]
+fn what_the_user_may_not_ask_is_not_asked_again_and_the_rest_is_done() {
+    for err in [Error::NotPermitted { user: "root".to_owned() }, Error::CredentialsMissing] {
+        let mut pilot = Pilot::new(ServoSettings::default());
+        let mut asked = Vec::new();
+        while let Next::Do(Job::Query(query)) = pilot.next(ms(1000)) {
+            asked.push(query);
+            let answer = match query {
+                Query::Position => Ok(Answer::Position(Position::default())),
+                _ => Err(err.clone()),
+            };
+            pilot.answered(&Job::Query(query), answer, ms(1000), ms(1000));
+        }
+        assert_eq!(asked, Query::INTRODUCTION);
+        assert!(!pilot.halted() && pilot.status(ms(1000)).connected);
+        pilot.see(sight(0.9, 0.5, ms(1000)), ms(1000));
+        assert!(matches!(pilot.next(ms(1000)), Next::Do(Job::Command(Command::Velocity { .. }))));
+    }
+}
+
+#[test]
+fn a_move_that_the_user_may_not_make_is_tried_rarely() {
+    let mut rig = Rig::new(ServoSettings::default());
+    for _ in 0..1500 {
+        rig.see(0.9, 0.5);
+        rig.run(|_| Err(Error::NotPermitted { user: "root".to_owned() }));
+        rig.now += ms(100);
+    }
+    assert_eq!(mem::take(&mut rig.sent).len(), 4, "at once, once more, and in each minute once");
+    assert!(matches!(rig.reports()[..], [Report::Link(LinkChange::Refused(_))]));
+    rig.now += Link::RARELY;
+    rig.see(0.9, 0.5);
+    assert_eq!(rig.after(ms(0)).len(), 1);
+}
+
+#[test]
 fn absolute_mode_steps_from_rest_to_rest() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
     rig.see(1.0, 0.5);

@@ -49,13 +49,6 @@ impl RateAverage {
         sum / self.samples.len().max(1) as f64
     }
 
-    /// The mean as far as it stands out of the noise: nearly all of a rate well above it, nothing of one below.
-    ///
-    /// Somebody who stands before a tracker that trembles would else be led to and fro for ever.
-    pub fn certain_mean(&self) -> PanTilt {
-        self.axes(|axis| axis.certain_mean())
-    }
-
     /// The rate to expect so long after the newest sample, by the straight line through the samples as far as
     /// it stands out of the noise and of the gait's sway. Never much beyond what was seen: nobody turns for ever.
     pub fn ahead(&self, lead: Duration) -> PanTilt {
@@ -129,6 +122,9 @@ impl Samples {
         if self.0.len() < 3 { f64::INFINITY } else { squares / (2.0 * (self.0.len() - 1) as f64) }
     }
 
+    /// The mean as far as it stands out of the noise: nearly all of a rate well above it, nothing of one below.
+    ///
+    /// Somebody who stands before a tracker that trembles would else be led to and fro for ever.
     fn certain_mean(&self) -> f64 {
         certain(self.mean(), self.variance() / self.0.len() as f64)
     }
@@ -182,6 +178,11 @@ mod tests {
         average
     }
 
+    /// Of pan.
+    fn certain_mean(average: &RateAverage) -> f64 {
+        average.axes(|axis| axis.certain_mean()).pan
+    }
+
     #[test]
     fn the_average_covers_its_window_only() {
         let mut average = RateAverage::new(ms(1000));
@@ -204,12 +205,12 @@ mod tests {
 
     #[test]
     fn a_steady_rate_is_certain_and_a_tremble_is_not() {
-        assert_eq!(average([5.0; 10]).certain_mean().pan, 5.0);
-        assert_eq!(average([3.0, -4.0, 5.0, -3.0, 4.0, -3.0, 4.0]).certain_mean().pan, 0.0);
-        assert_eq!(average([5.0, 5.0]).certain_mean().pan, 0.0);
+        assert_eq!(certain_mean(&average([5.0; 10])), 5.0);
+        assert_eq!(certain_mean(&average([3.0, -4.0, 5.0, -3.0, 4.0, -3.0, 4.0])), 0.0);
+        assert_eq!(certain_mean(&average([5.0, 5.0])), 0.0);
         // A rate that has just changed is no tremble.
         let changed = average([0.0, 0.0, 0.0, 0.0, 12.0, 12.0, 12.0, 12.0]);
-        assert!(changed.certain_mean().pan > 0.75 * changed.mean().pan, "{:?}", changed.certain_mean());
+        assert!(certain_mean(&changed) > 0.75 * changed.mean().pan, "{}", certain_mean(&changed));
     }
 
     #[test]
@@ -239,7 +240,7 @@ mod tests {
         #[test]
         fn what_is_certain_is_part_of_the_mean(rates in prop::collection::vec(-50.0..50.0f64, 0..12)) {
             let average = average(rates);
-            let (mean, certain) = (average.mean().pan, average.certain_mean().pan);
+            let (mean, certain) = (average.mean().pan, certain_mean(&average));
             prop_assert!(certain * mean >= 0.0 && certain.abs() <= mean.abs(), "{certain} of {mean}");
         }
     }

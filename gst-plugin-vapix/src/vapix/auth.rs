@@ -43,6 +43,11 @@ impl Authenticator {
         self.credentials.as_ref().map_or("", |credentials| &credentials.user)
     }
 
+    /// Whether requests are signed: the camera has asked for it.
+    pub fn is_signing(&self) -> bool {
+        self.challenge.is_some()
+    }
+
     /// The `Authorization` of a GET of exactly this path and query; `None` before the first challenge.
     pub fn authorization(&mut self, target: &str) -> Result<Option<HeaderValue>, Error> {
         let (Some(credentials), Some(challenge)) = (&self.credentials, &mut self.challenge) else {

@@ -42,6 +42,8 @@ pub struct Client {
     cookies: Cookies,
     /// Set once user and password were refused: asking again could lock the account.
     locked_out: bool,
+    /// Set once the camera did something for this user and password: what it refuses then is not for them.
+    accepted: bool,
     /// Whether the connection may be one that the camera has closed since its last answer.
     connected: bool,
 }
@@ -64,20 +66,16 @@ impl Client {
             cookies: Cookies::default(),
             settings,
             locked_out: false,
+            accepted: false,
             connected: false,
         })
-    }
-
-    /// What it was made with; the location is the one of HTTPS after a redirect to it.
-    pub fn settings(&self) -> &ClientSettings {
-        &self.settings
     }
 
     /// Takes another user or password, and asks again even where the last were refused.
     pub fn set_credentials(&mut self, credentials: Option<Credentials>) {
         self.authenticator = Authenticator::new(credentials.clone());
         self.settings.credentials = credentials;
-        self.locked_out = false;
+        (self.locked_out, self.accepted) = (false, false);
     }
 
     /// Commands a move. `Ok` means that the camera accepted it, not that it has finished.
@@ -184,8 +182,8 @@ impl Client {
             if status == StatusCode::UNAUTHORIZED {
                 let stale = self.authenticator.challenged(response.headers())?;
                 if signed_fresh && !stale {
-                    self.locked_out = true;
-                    return Err(self.bad_credentials());
+                    self.locked_out = !self.accepted;
+                    return Err(if self.accepted { self.not_permitted() } else { self.bad_credentials() });
                 }
                 signed_fresh = true;
                 // Read to its end, so that the connection can carry the answer to the challenge.
@@ -195,6 +193,7 @@ impl Client {
             } else if status.is_redirection() {
                 self.follow(&response)?;
             } else if status.is_success() {
+                self.accepted |= self.authenticator.is_signing();
                 let body = self.body(response).await?;
                 return Ok(Answer { status, body });
             } else {
@@ -248,6 +247,10 @@ impl Client {
 
     fn bad_credentials(&self) -> Error {
         Error::BadCredentials { user: self.authenticator.user().to_owned() }
+    }
+
+    fn not_permitted(&self) -> Error {
+        Error::NotPermitted { user: self.authenticator.user().to_owned() }
     }
 
     fn failure(&self, err: &reqwest::Error) -> Error {

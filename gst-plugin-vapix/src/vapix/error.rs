@@ -32,6 +32,13 @@ pub enum Error {
         /// The user that was refused.
         user: String,
     },
+    /// The camera asks again for user and password, which it accepted before for something else. To be asked rarely:
+    /// it may count this as a wrong login.
+    #[error("the camera accepts user `{user}`, but not for this")]
+    NotPermitted {
+        /// The user that may not.
+        user: String,
+    },
     /// The camera wants a kind of authentication that is not spoken here.
     #[error("the camera asks for an authentication that is not supported: {0}")]
     UnsupportedAuthentication(String),
@@ -74,7 +81,7 @@ impl Error {
 
     /// Whether it understood what it was asked, and will answer no more than that if it is asked again.
     pub fn is_answer(&self) -> bool {
-        matches!(self, Self::Camera(_) | Self::NoPtz | Self::Unexpected(_))
+        matches!(self, Self::Camera(_) | Self::NoPtz | Self::Unexpected(_) | Self::NotPermitted { .. })
             || matches!(self, Self::Status { status: 400..=499, .. })
     }
 
@@ -98,12 +105,17 @@ impl Error {
                 "Correct `user` or `password`; nothing more is sent until then, so that the account is not locked."
             }
             Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
+            Self::NotPermitted { .. } => {
+                "Give this user the right to control PTZ, or set another `user` and `password`; trying on once a minute, so that the account is not locked."
+            }
             Self::Status { status: 403, .. } => "Give this user the right to control PTZ; trying on.",
             Self::Status { status: 500.., .. } => "It may be starting, or busy; trying on.",
             Self::Status { .. } | Self::Unexpected(_) | Self::TooLong(_) => {
                 "Check that `location` is an Axis camera with VAPIX; trying on."
             }
-            Self::Camera(_) => "Check that `camera` has pan and tilt and takes this `mode`; trying on.",
+            Self::Camera(_) => {
+                "Check that `camera` has pan and tilt, and that its own settings let it be moved; trying on."
+            }
             Self::NoPtz => "Check `camera` and the camera's PTZ settings; trying on.",
         }
     }

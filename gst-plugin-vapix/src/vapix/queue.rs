@@ -32,8 +32,6 @@ impl fmt::Display for QueueRequest {
 pub struct QueuePlace {
     /// 1 is in control; 0 is not in the queue.
     pub position: u32,
-    /// Until our turn comes or ends, where the camera knows.
-    pub left: Option<Duration>,
     /// How often it wants to be asked again.
     pub poll_every: Duration,
 }
@@ -52,22 +50,15 @@ impl QueuePlace {
         }
         let mut numbers =
             body.split("name=\"").skip(1).map(|rest| rest.split('"').next()?.parse::<i64>().ok());
-        let (Some(Some(position)), Some(Some(left)), Some(Some(period))) =
+        let (Some(Some(position)), Some(Some(_)), Some(Some(period))) =
             (numbers.next(), numbers.next(), numbers.next())
         else {
             return Err(unexpected(body));
         };
         Ok(Self {
             position: u32::try_from(position).map_err(|_| unexpected(body))?,
-            // -1 where it is not known.
-            left: u64::try_from(left).ok().map(Duration::from_secs),
             poll_every: Duration::from_secs(period.clamp(Self::POLL_S.0, Self::POLL_S.1).unsigned_abs()),
         })
-    }
-
-    /// Whether we may move the camera.
-    pub fn in_control(&self) -> bool {
-        self.position == 1
     }
 }
 
@@ -80,12 +71,9 @@ mod tests {
     fn the_documented_answer_is_read() {
         let place = QueuePlace::parse(r#"<a name="3"></a><a name="410"></a><a name="5"></a>"#).unwrap();
         assert_eq!(place.position, 3);
-        assert_eq!(place.left, Some(Duration::from_secs(410)));
         assert_eq!(place.poll_every, Duration::from_secs(5));
-        assert!(!place.in_control());
         let first = QueuePlace::parse("<a name=\"1\"></a>\r\n<a name=\"-1\"></a>\r\n<a name=\"20\"></a>\r\n");
-        let first = first.unwrap();
-        assert!(first.in_control() && first.left.is_none());
+        assert_eq!(first.map(|place| place.position), Ok(1));
     }
 
     #[test]
@@ -109,7 +97,6 @@ mod tests {
             let body = format!("<a name=\"{position}\"></a><a name=\"{left}\"></a><a name=\"{period}\"></a>");
             let place = QueuePlace::parse(&body).unwrap();
             prop_assert_eq!(place.position, position);
-            prop_assert_eq!(place.left.map(|left| left.as_secs() as i64), (left >= 0).then_some(left));
             prop_assert_eq!(place.poll_every.as_secs(), period);
         }
     }

@@ -1,4 +1,4 @@
-use std::sync::{LazyLock, Mutex, Weak};
+use std::sync::{LazyLock, Mutex};
 use std::time::Duration;
 
 use glib::Properties;
@@ -9,12 +9,11 @@ use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::clock::Clock;
-use super::inbox::Inbox;
 use super::news::camera_event;
 use super::picture::Picture;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
-use super::worker::{self, Worker};
+use super::worker::{self, Legacy, Worker};
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
 use crate::servo::{Sight, Status};
@@ -204,8 +203,8 @@ pub struct VapixPtzSink {
     )]
     pub(super) settings: Mutex<Settings>,
     worker: Mutex<Option<Worker>>,
-    /// Where the last worker takes its mail, which may outlive its time in order to stop the camera.
-    last_inbox: Mutex<Weak<Inbox>>,
+    /// Of the workers so far, that may still be about to stop their cameras.
+    legacies: Mutex<Vec<Legacy>>,
     stream: Mutex<Stream>,
     /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
     pub(super) news: Mutex<Option<Status>>,
@@ -223,7 +222,7 @@ impl ObjectImpl for VapixPtzSink {
         // The macro has no notion of a structure.
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
-                .blurb("State, commands sent, failed and coalesced, round-trip times in nanoseconds, position and field of view in degrees, latency in nanoseconds and speeds of the steps 1 to 100 in degrees per second as they are known by now, last error")
+                .blurb("state; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own ends camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
                 .read_only()
                 .build();
             VapixPtzSink::derived_properties().iter().cloned().chain([stats]).collect()
@@ -353,7 +352,12 @@ impl BaseSinkImpl for VapixPtzSink {
 
 impl VapixPtzSink {
     fn start_worker(&self) -> Result<(), gst::StateChangeError> {
-        let settings = lock(&self.settings).clone();
+        let (settings, refused) = {
+            let mut settings = lock(&self.settings);
+            let refused = settings.judge_limits();
+            (settings.clone(), refused)
+        };
+        self.limits_refused(&refused);
         let Some(client) = settings.client(environment) else {
             gst::element_imp_error!(
                 self,
@@ -365,9 +369,6 @@ impl VapixPtzSink {
         *lock(&self.stream) = Stream { lockstep: settings.lockstep, ..Stream::default() };
         let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
         *lock(&self.news) = None;
-        if let Some(inbox) = lock(&self.last_inbox).upgrade() {
-            inbox.quit();
-        }
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
         let worker = Worker::start(client, settings.servo(), clock, move |event| {
@@ -379,7 +380,11 @@ impl VapixPtzSink {
             gst::element_imp_error!(self, gst::ResourceError::Settings, ("{reason}"));
             gst::StateChangeError
         })?;
-        *lock(&self.last_inbox) = worker.weak_inbox();
+        {
+            let mut legacies = lock(&self.legacies);
+            legacies.retain(|legacy| !legacy.is_void() && !worker.succeed(legacy));
+            legacies.push(worker.legacy());
+        }
         *lock(&self.worker) = Some(worker);
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! What the streaming thread leaves for the worker. Nothing here ever waits for the network.
 
 use std::mem;
-use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
@@ -10,13 +10,15 @@ use tokio::sync::Notify;
 
 use super::clock::Clock;
 use crate::servo::{ServoSettings, Sight};
-use crate::vapix::Credentials;
+use crate::vapix::{Command, Credentials};
 
 /// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
 #[derive(Debug, Default)]
 pub struct Mail {
     pub credentials: Option<Option<Credentials>>,
     pub servo: Option<ServoSettings>,
+    /// What ends the move in which a predecessor left the camera.
+    pub orphan: Option<Command>,
     /// Forget the target and stop; before `sight`.
     pub rest: bool,
     pub sight: Option<Sight>,
@@ -34,6 +36,8 @@ pub struct Mail {
 #[derive(Debug)]
 pub struct Inbox {
     mail: Mutex<Mail>,
+    /// Whether nobody is there any more to answer; who waits then is not kept waiting.
+    closed: AtomicBool,
     arrived: Notify,
     clock: Clock,
     overtaken: AtomicU64,
@@ -42,7 +46,13 @@ pub struct Inbox {
 impl Inbox {
     /// `clock` is that of everything that is timed here and in the servo.
     pub fn new(clock: Clock) -> Self {
-        Self { mail: Mutex::default(), arrived: Notify::new(), clock, overtaken: AtomicU64::new(0) }
+        Self {
+            mail: Mutex::default(),
+            closed: AtomicBool::new(false),
+            arrived: Notify::new(),
+            clock,
+            overtaken: AtomicU64::new(0),
+        }
     }
 
     /// The time by which everything here and in the servo goes.
@@ -58,7 +68,7 @@ impl Inbox {
     /// The receiver hears when nothing is left to be done at this time, or that there is nobody to do it.
     pub fn settled(&self) -> Receiver<()> {
         let (sender, receiver) = sync_channel(1);
-        self.mail().settling.push(sender);
+        self.with_answerer(|mail| mail.settling.push(sender));
         self.arrived.notify_one();
         receiver
     }
@@ -74,11 +84,11 @@ impl Inbox {
     /// Asks for rest; what was seen before is void. The receiver hears when the camera is at rest.
     pub fn rest(&self) -> Receiver<()> {
         let (sender, receiver) = sync_channel(1);
-        let mut mail = self.mail();
-        mail.rest = true;
-        mail.sight = None;
-        mail.waiting.push(sender);
-        drop(mail);
+        self.with_answerer(|mail| {
+            mail.rest = true;
+            mail.sight = None;
+            mail.waiting.push(sender);
+        });
         self.arrived.notify_one();
         receiver
     }
@@ -94,6 +104,20 @@ impl Inbox {
     pub fn quit(&self) {
         self.mail().quit = true;
         self.arrived.notify_one();
+    }
+
+    /// A predecessor left the camera in a move that this ends.
+    pub fn inherit(&self, stop: Command) {
+        self.mail().orphan = Some(stop);
+        self.arrived.notify_one();
+    }
+
+    /// Nobody is there any more to answer.
+    pub(super) fn close(&self) {
+        let mut mail = self.mail();
+        self.closed.store(true, Ordering::Relaxed);
+        mail.waiting.clear();
+        mail.settling.clear();
     }
 
     pub fn configure(&self, servo: ServoSettings) {
@@ -123,6 +147,15 @@ impl Inbox {
     /// Resolves at a time, unless time is held.
     pub(super) async fn sleep_until(&self, time: Option<Duration>) {
         self.clock.sleep_until(time).await;
+    }
+
+    /// Leaves something that is to be answered, if there is somebody to do it.
+    fn with_answerer(&self, leave: impl FnOnce(&mut Mail)) {
+        let mut mail = self.mail();
+        // Read under the lock, so that nothing is left after all was cleared.
+        if !self.closed.load(Ordering::Relaxed) {
+            leave(&mut mail);
+        }
     }
 
     fn mail(&self) -> MutexGuard<'_, Mail> {

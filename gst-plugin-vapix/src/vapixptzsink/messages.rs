@@ -26,7 +26,7 @@ impl VapixPtzSink {
             Event::Report(Report::AtLimit) => {
                 self.post(
                     CameraChange::AtLimit,
-                    "the target is beyond the end of the camera's pan or tilt range",
+                    "the target is beyond the end of the camera's pan or tilt range, or of `pan-min` … `tilt-max`",
                 );
             }
             Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
@@ -65,7 +65,12 @@ impl VapixPtzSink {
                 ("the camera is moved by mode `{}` now, the best of those that it takes; `mode` stays as it is set", mode.name())
             ),
             Event::Status(status) => *lock(&self.news) = Some(status),
-            Event::GaveUp => gst::element_imp_warning!(
+            Event::GaveUp { halted: true } => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Write,
+                ("the camera has not confirmed its stop and may still be moving; as it refuses `user` and `password`, nothing more is sent: stop it by hand")
+            ),
+            Event::GaveUp { halted: false } => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
                 ("the camera has not confirmed its stop in time and may still be moving; trying on for a minute, or stop it by hand")
@@ -73,7 +78,7 @@ impl VapixPtzSink {
             Event::Died(reason) => gst::element_imp_error!(
                 self,
                 gst::LibraryError::Failed,
-                ("the camera's task broke ({reason}); the camera may still be moving; restart the pipeline")
+                ("the camera's task broke ({reason}); the camera may still be moving, trying on for a minute to stop it; restart the pipeline")
             ),
         }
     }

@@ -31,20 +31,23 @@
 //! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
 //! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
 //! `field-of-view`, and `camera-speed` with `speed-curve` are only where that begins; `learn=false` keeps to them.
-//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the steps 1 to 100),
-//! and the camera's own limits, `pan-min` to `zoom-max` and `endless-pan`. What the camera told of itself is one line of INFO.
+//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the
+//! steps 1 to 100), and the camera's own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What
+//! the camera told of itself is one line of INFO.
 //! A loop that swings about its target all the same is calmed by less gain, with a warning.
 //!
 //! ## Zoom and limits
 //! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
-//! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does, within what
-//! the camera can; an operator may go beyond them. In `mode=centre` the place
-//! in the picture is chosen within them, as well as field of view and position are known.
+//! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does,
+//! within what the camera can; an operator may go beyond them. In `mode=centre` the place in the picture is chosen
+//! within them, as well as field of view and position are known. A pair of which the lower is the higher is refused
+//! with a warning, from READY to PAUSED and while playing, and stays as it was.
 //!
 //! ## Modes
-//! `mode` is what is wished. A camera whose parameters say that it does not take the words of that mode, or that refuses them
-//! while it answers everything else, is moved by the best mode of those it does take: an info message says so, `stats` has it
-//! as `mode`, the property stays as it is. A refused mode is tried again every minute, and when `mode` changes.
+//! `mode` is what is wished. A camera whose parameters say that it does not take the words of that mode, or that
+//! refuses them while it answers everything else, is moved by the best mode of those it does take: an info message
+//! says so, `stats` has it as `mode`, the property stays as it is. A refused mode is tried again every minute, and
+//! when `mode` changes.
 //!
 //! ## Home
 //! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the
@@ -58,17 +61,18 @@
 //!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
-//! `at-limit`, `taken-over`, `resumed`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at its end,
-//! and one that comes and goes is said no more often than every 10 s.
+//! `at-limit`, `taken-over`, `resumed`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at
+//! its end, and one that comes and goes is said no more often than every 10 s.
 //! Upstream events `ptztrack-camera-state` tell detector and tracker what the camera does.
 //!
 //! ## Example pipelines
 //! ```sh
 //! gst-launch-1.0 videotestsrc num-buffers=25 ! video/x-raw,width=320,height=240 ! vapixptzsink location=http://192.168.0.90 user=root password=pass
 //! ```
-//! A camera that is spoken to over HTTPS with a certificate of its own making, and never faster than 30 degrees a second:
+//! A camera that is spoken to over HTTPS with a certificate of its own making, which was saved in a file, and never
+//! faster than 30 degrees a second:
 //! ```sh
-//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 insecure=true max-speed=30 mode=velocity
+//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=https://192.168.0.90 ca-file=camera.pem max-speed=30 mode=velocity
 //! ```
 //! One that goes back to its preset "Door" after 20 s without anybody, zooms, and never looks to the left of 60 degrees:
 //! ```sh

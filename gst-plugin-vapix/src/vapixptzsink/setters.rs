@@ -71,20 +71,41 @@ impl VapixPtzSink {
         };
         self.with_worker(|worker| worker.inbox().configure(servo));
     }
+
+    /// Changes a limit: of a servo that runs, or to be judged when one starts.
+    fn change_limits(&self, change: impl FnOnce(&mut Settings)) {
+        let mut runs = false;
+        self.with_worker(|_| runs = true);
+        let mut refused = Vec::new();
+        self.change_servo(|settings| {
+            change(settings);
+            if runs {
+                refused = settings.judge_limits();
+            }
+        });
+        self.limits_refused(&refused);
+    }
+
+    /// Tells of limits that make no sense.
+    pub(super) fn limits_refused(&self, refused: &[String]) {
+        for refused in refused {
+            gst::element_imp_warning!(self, gst::ResourceError::Settings, ("{refused}"));
+        }
+    }
 }
 
 /// Setters of properties that a running servo takes at once.
 macro_rules! servo_setters {
-    ($($setter:ident: $field:ident, $type:ty;)+) => {
+    ($change:ident: $($setter:ident: $field:ident, $type:ty;)+) => {
         impl VapixPtzSink {
             $(pub(super) fn $setter(&self, value: $type) {
-                self.change_servo(|settings| settings.$field = value);
+                self.$change(|settings| settings.$field = value);
             })+
         }
     };
 }
 
-servo_setters! {
+servo_setters! { change_servo:
     set_mode: mode, Mode;
     set_gain: gain, f64;
     set_dead_zone: dead_zone, f64;
@@ -100,13 +121,16 @@ servo_setters! {
     set_learn: learn, bool;
     set_auto_zoom: auto_zoom, bool;
     set_target_height: target_height, f64;
+    set_home_timeout: home_timeout_ms, u32;
+    set_home_at_start: home_at_start, bool;
+    set_override_timeout: override_timeout_ms, u32;
+}
+
+servo_setters! { change_limits:
     set_pan_min: pan_min_deg, f64;
     set_pan_max: pan_max_deg, f64;
     set_tilt_min: tilt_min_deg, f64;
     set_tilt_max: tilt_max_deg, f64;
     set_zoom_min: zoom_min, u32;
     set_zoom_max: zoom_max, u32;
-    set_home_timeout: home_timeout_ms, u32;
-    set_home_at_start: home_at_start, bool;
-    set_override_timeout: override_timeout_ms, u32;
 }

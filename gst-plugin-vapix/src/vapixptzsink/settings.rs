@@ -1,5 +1,6 @@
 //! The values of the properties, and what they mean to servo and client.
 
+use std::fmt::Display;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -38,6 +39,8 @@ pub struct Settings {
     pub tilt_max_deg: f64,
     pub zoom_min: u32,
     pub zoom_max: u32,
+    /// As they were when they were last judged.
+    kept_limits: SoftLimits,
     pub home: Option<Home>,
     pub home_timeout_ms: u32,
     pub home_at_start: bool,
@@ -77,6 +80,7 @@ impl Default for Settings {
             tilt_max_deg: servo.limits.tilt_deg.max,
             zoom_min: servo.limits.zoom_steps.min as u32,
             zoom_max: servo.limits.zoom_steps.max as u32,
+            kept_limits: servo.limits,
             home: servo.home,
             home_timeout_ms: servo.home_timeout.as_millis() as u32,
             home_at_start: servo.home_at_start,
@@ -112,6 +116,23 @@ impl Settings {
         }
     }
 
+    /// Each pair of limits of which the lower is the higher becomes what it was when it was last judged; returns what
+    /// was refused, in words. Not judged at each change: until both are set, a pair may well be crossed.
+    pub fn judge_limits(&mut self) -> Vec<String> {
+        let SoftLimits { pan_deg, tilt_deg, zoom_steps } = self.kept_limits;
+        let refused = [
+            uncross("pan", (&mut self.pan_min_deg, &mut self.pan_max_deg), (pan_deg.min, pan_deg.max)),
+            uncross("tilt", (&mut self.tilt_min_deg, &mut self.tilt_max_deg), (tilt_deg.min, tilt_deg.max)),
+            uncross(
+                "zoom",
+                (&mut self.zoom_min, &mut self.zoom_max),
+                (zoom_steps.min as u32, zoom_steps.max as u32),
+            ),
+        ];
+        self.kept_limits = self.limits();
+        refused.into_iter().flatten().collect()
+    }
+
     fn limits(&self) -> SoftLimits {
         SoftLimits {
             pan_deg: Range { min: self.pan_min_deg, max: self.pan_max_deg },
@@ -144,6 +165,19 @@ impl Settings {
         };
         Some(Credentials { user: user?, password: password.unwrap_or_else(|| Secret::new("")) })
     }
+}
+
+fn uncross<T: PartialOrd + Display + Copy>(
+    name: &str,
+    (min, max): (&mut T, &mut T),
+    kept: (T, T),
+) -> Option<String> {
+    if *min <= *max {
+        return None;
+    }
+    let refused = format!("`{name}-min`={min} is beyond `{name}-max`={max}");
+    (*min, *max) = kept;
+    Some(format!("{refused}; they stay {min} and {max}"))
 }
 
 /// The process' environment.

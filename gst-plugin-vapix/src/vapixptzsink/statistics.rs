@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use crate::servo::{Belief, Mode, Status, is_endless};
+use crate::vapix::Command;
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
@@ -10,6 +11,8 @@ pub struct Statistics {
     pub status: Status,
     /// What the camera is taken for by now.
     pub belief: Option<Belief>,
+    /// What ends the last move.
+    pub stop: Option<Command>,
     pub sent: u64,
     pub failed: u64,
     /// Pictures of the target that were overtaken by newer ones before they could be steered by.
@@ -63,13 +66,13 @@ impl Statistics {
             .field_if_some("pan", status.position.pan_deg)
             .field_if_some("tilt", status.position.tilt_deg)
             .field_if_some("zoom", status.position.zoom_steps)
-            .field_if_some("pan-min", limits.pan_deg.map(|pan| pan.min))
-            .field_if_some("pan-max", limits.pan_deg.map(|pan| pan.max))
-            .field_if_some("tilt-min", limits.tilt_deg.map(|tilt| tilt.min))
-            .field_if_some("tilt-max", limits.tilt_deg.map(|tilt| tilt.max))
-            .field_if_some("zoom-min", limits.zoom_steps.map(|zoom| zoom.min))
-            .field_if_some("zoom-max", limits.zoom_steps.map(|zoom| zoom.max))
-            .field_if_some("endless-pan", limits.pan_deg.map(is_endless))
+            .field_if_some("camera-pan-min", limits.pan_deg.map(|pan| pan.min))
+            .field_if_some("camera-pan-max", limits.pan_deg.map(|pan| pan.max))
+            .field_if_some("camera-tilt-min", limits.tilt_deg.map(|tilt| tilt.min))
+            .field_if_some("camera-tilt-max", limits.tilt_deg.map(|tilt| tilt.max))
+            .field_if_some("camera-zoom-min", limits.zoom_steps.map(|zoom| zoom.min))
+            .field_if_some("camera-zoom-max", limits.zoom_steps.map(|zoom| zoom.max))
+            .field_if_some("camera-endless-pan", limits.pan_deg.map(is_endless))
             .field_if_some("field-of-view", status.fov_deg)
             .field_if_some("latency", self.belief.map(|belief| nanoseconds(belief.latency)))
             .field_if_some("speeds", self.belief.map(|belief| speeds(&belief)))

@@ -15,7 +15,7 @@ use super::inbox::{Inbox, Mail};
 use super::statistics::Statistics;
 use crate::lock::lock;
 use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Status};
-use crate::vapix::{Client, ClientSettings, Credentials, Error};
+use crate::vapix::{Client, ClientSettings, Command, Credentials, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 const STOP_GRACE: Duration = Duration::from_millis(500);
@@ -37,7 +37,10 @@ pub enum Event {
     /// The camera is known to be otherwise than before.
     Status(Status),
     /// The end has come, and the camera has not confirmed its stop in time.
-    GaveUp,
+    GaveUp {
+        /// Whether nothing more may be sent either.
+        halted: bool,
+    },
     /// The worker itself broke.
     Died(String),
 }
@@ -52,10 +55,22 @@ pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
     !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
 }
 
+/// After a stop that was not confirmed, where no pilot is left to see to it, the next one is sent after this.
+const LAST_WILL_PAUSE: Duration = Duration::from_secs(1);
+
 /// A running worker; dropping it stops the camera and ends the worker, and waits for that within bounds.
 #[derive(Debug)]
 pub struct Worker {
+    camera: (Location, u32),
     inbox: Arc<Inbox>,
+    statistics: Arc<Mutex<Statistics>>,
+}
+
+/// What is left of a worker that was dropped: it may outlive its time in order to stop the camera.
+#[derive(Debug)]
+pub struct Legacy {
+    camera: (Location, u32),
+    inbox: Weak<Inbox>,
     statistics: Arc<Mutex<Statistics>>,
 }
 
@@ -70,12 +85,14 @@ impl Worker {
         clock: Clock,
         observer: impl Fn(Event) + Clone + Send + Sync + 'static,
     ) -> Result<Self, String> {
+        let camera = (client.location.clone(), client.camera);
+        let settings = Arc::new(Mutex::new(client.clone()));
         let client = Client::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let inbox = Arc::new(Inbox::new(clock));
         let pilot = Pilot::new(servo);
-        let (status, belief) = (pilot.status(Duration::ZERO), Some(pilot.belief()));
-        let statistics = Statistics { status, belief, ..Statistics::default() };
+        let (status, belief, stop) = (pilot.status(Duration::ZERO), Some(pilot.belief()), Some(pilot.stop()));
+        let statistics = Statistics { status, belief, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let desk = Desk {
             pilot,
@@ -89,14 +106,20 @@ impl Worker {
             deadline: None,
             gave_up: false,
         };
-        let task = Task { client, desk };
+        let task = Task { client, settings: settings.clone(), desk };
         let running = runtime.spawn(task.run());
+        let worker = Self { camera, inbox, statistics };
+        let legacy = worker.legacy();
+        let inbox = worker.inbox.clone();
         runtime.spawn(async move {
             if let Err(err) = running.await {
+                inbox.close();
                 observer(Event::Died(err.to_string()));
+                let settings = lock(&settings).clone();
+                legacy.stop(settings, &inbox).await;
             }
         });
-        Ok(Self { inbox, statistics })
+        Ok(worker)
     }
 
     /// Where to leave things for it.
@@ -104,14 +127,69 @@ impl Worker {
         &self.inbox
     }
 
-    /// The same, also of a worker that was dropped and still tries to stop the camera.
-    pub fn weak_inbox(&self) -> Weak<Inbox> {
-        Arc::downgrade(&self.inbox)
+    /// What will be left of it.
+    pub fn legacy(&self) -> Legacy {
+        Legacy {
+            camera: self.camera.clone(),
+            inbox: Arc::downgrade(&self.inbox),
+            statistics: self.statistics.clone(),
+        }
+    }
+
+    /// Sees to the camera in place of one that was dropped, if it is the same camera; returns whether it is.
+    pub fn succeed(&self, legacy: &Legacy) -> bool {
+        if legacy.camera != self.camera {
+            return false;
+        }
+        if let Some(inbox) = legacy.inbox.upgrade() {
+            inbox.quit();
+        }
+        if let Some(stop) = legacy.unconfirmed_stop() {
+            self.inbox.inherit(stop);
+        }
+        true
     }
 
     /// The numbers so far.
     pub fn statistics(&self) -> Statistics {
         lock(&self.statistics).clone()
+    }
+}
+
+impl Legacy {
+    /// Whether there is nothing left to do.
+    pub fn is_void(&self) -> bool {
+        self.unconfirmed_stop().is_none() && self.inbox.strong_count() == 0
+    }
+
+    fn unconfirmed_stop(&self) -> Option<Command> {
+        let statistics = lock(&self.statistics);
+        statistics.stop.filter(|_| statistics.status.moving)
+    }
+
+    /// Stops the camera, whatever it does, without the pilot, who broke; for a while.
+    async fn stop(&self, settings: ClientSettings, inbox: &Inbox) {
+        let Ok(mut client) = Client::new(settings) else { return };
+        let stop = {
+            let mut statistics = lock(&self.statistics);
+            // For whoever comes next, until it is known better.
+            statistics.status.moving = true;
+            statistics.stop.unwrap_or(Command::Stop)
+        };
+        let tries = async {
+            while !inbox.take().quit {
+                match client.send(&stop).await {
+                    Ok(()) => {
+                        lock(&self.statistics).status.moving = false;
+                        break;
+                    }
+                    Err(err) if err.is_final() => break,
+                    Err(_) => tokio::time::sleep(LAST_WILL_PAUSE).await,
+                }
+            }
+        };
+        // Whoever cannot be stopped by then is not to be by us.
+        let _ = tokio::time::timeout(LAST_WILL, tries).await;
     }
 }
 
@@ -135,6 +213,8 @@ fn runtime() -> Result<&'static Runtime, std::io::Error> {
 
 struct Task<O> {
     client: Client,
+    /// For whoever must finish what the task has begun.
+    settings: Arc<Mutex<ClientSettings>>,
     desk: Desk<O>,
 }
 
@@ -160,6 +240,7 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
             self.desk.take_mail();
             self.desk.check_deadline();
             if let Some(credentials) = self.desk.credentials.take() {
+                lock(&self.settings).credentials.clone_from(&credentials);
                 self.client.set_credentials(credentials);
                 self.desk.pilot.credentials_changed();
             }
@@ -185,10 +266,11 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
     async fn perform(&mut self, job: Job) {
-        let Self { client, desk } = self;
+        let Self { client, desk, .. } = self;
         let inbox = desk.inbox.clone();
         let sent = inbox.now();
         desk.pilot.sending(&job, sent);
+        lock(&desk.statistics).stop = Some(desk.pilot.stop());
         let mut exchange = pin!(exchange(client, &job));
         let mut give_up_at = None;
         loop {
@@ -231,17 +313,21 @@ impl<O: Fn(Event)> Desk<O> {
 
     fn give_up(&mut self) {
         if !self.pilot.is_at_rest() && !mem::replace(&mut self.gave_up, true) {
-            (self.observer)(Event::GaveUp);
+            (self.observer)(Event::GaveUp { halted: self.pilot.halted() });
         }
         self.waiting.clear();
     }
 
     fn take_mail(&mut self) {
-        let Mail { credentials, servo, rest, sight, waiting, settling, finish, quit } = self.inbox.take();
+        let Mail { credentials, servo, orphan, rest, sight, waiting, settling, finish, quit } =
+            self.inbox.take();
         let now = self.inbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(servo) = servo {
             self.pilot.configure(servo);
+        }
+        if let Some(stop) = orphan {
+            self.pilot.inherit(stop);
         }
         if rest {
             self.pilot.rest();
@@ -315,6 +401,7 @@ impl<O: Fn(Event)> Desk<O> {
             let mut statistics = lock(&self.statistics);
             statistics.status = status;
             statistics.belief = Some(self.pilot.belief());
+            statistics.stop = Some(self.pilot.stop());
             statistics.halted = self.pilot.halted();
             statistics.coalesced = self.pilot.overtaken() + self.inbox.overtaken();
         }
@@ -365,6 +452,7 @@ mod tests {
     use crate::servo::{Sight, Visibility};
     use crate::vapix::{Location, Trust};
     use ptztrack_contract::{Point, Rect, Vector};
+    use std::sync::mpsc::RecvTimeoutError;
     use virtual_camera::VirtualCamera;
 
     const PATIENCE: Duration = Duration::from_secs(20);
@@ -430,5 +518,30 @@ mod tests {
         assert!(seen.iter().any(|event| event.contains("Stopped")), "{seen:?}");
         assert!(!seen.iter().any(|event| event.contains("GaveUp") || event.contains("Died")), "{seen:?}");
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    }
+
+    /// Neither the camera goes on, nor does anybody wait for ever.
+    #[test]
+    fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
+        let camera = camera();
+        let (died, death) = std::sync::mpsc::channel();
+        let worker = start(&camera, move |event| match event {
+            Event::Report(Report::Moving) => panic!("provoked"),
+            Event::Died(_) => died.send(()).unwrap(),
+            _ => {}
+        });
+        let settled = worker.inbox().settled();
+        see(&worker);
+        death.recv_timeout(PATIENCE).unwrap();
+        let is_stop = |query: &str| query.ends_with("continuouspantiltmove=0,0");
+        let mut seen = 0;
+        while !camera.commands().iter().any(|command| is_stop(&command.query)) {
+            assert!(camera.wait_for(PATIENCE, |status| status.commands > seen));
+            seen = camera.status().commands;
+        }
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+        assert_ne!(settled.recv_timeout(PATIENCE), Err(RecvTimeoutError::Timeout));
+        assert_eq!(worker.inbox().settled().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(worker.inbox().finish().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
     }
 }

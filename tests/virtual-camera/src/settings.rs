@@ -171,6 +171,9 @@ pub struct Settings {
     pub user: String,
     /// Its password.
     pub password: String,
+    /// Whether it is good for `ptz.cgi` and the video only: `param.cgi` and `ptzqueue.cgi` answer it with 401, as some
+    /// servers do, and not with 403.
+    pub ptz_only: bool,
     /// How long a Digest nonce is good; a later request is answered with `stale=true`.
     pub nonce_lifetime: Duration,
     /// MAC address without colons; the realm is `AXIS_` and this.
@@ -209,6 +212,7 @@ impl Default for Settings {
             auth: Auth::None,
             user: "root".into(),
             password: "pass".into(),
+            ptz_only: false,
             nonce_lifetime: Duration::from_secs(300),
             serial: "ACCC8E012345".into(),
             ptz_api: PtzApi::Classic,

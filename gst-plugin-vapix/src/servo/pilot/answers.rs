@@ -4,7 +4,7 @@ use std::mem;
 use std::time::Duration;
 
 use super::Pilot;
-use crate::servo::{Answer, Finding, Job, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps};
+use crate::servo::{Answer, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps};
 use crate::vapix::{Command, Error, Position};
 
 impl Pilot {
@@ -203,12 +203,16 @@ impl Pilot {
             return self.failed(&refusal, true, now);
         }
         if query != Query::Position {
-            // Optional; a camera that is gone will be missed by the next position.
-            if err.is_answer() {
-                return self.will_not_tell(query, now);
+            // Optional; a camera that is gone will be missed by the next position. One that lets anybody move it may
+            // want a user for this.
+            let anonymous = self.link.connected() && matches!(err, Error::CredentialsMissing);
+            if err.is_answer() || anonymous {
+                return self.will_not_tell(query, err, now);
             } else if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
                 return self.may_tell_later(query, now);
             }
+        } else if matches!(err, Error::NotPermitted { .. }) {
+            self.next_poll = now + Link::RARELY;
         } else if matches!(err, Error::Camera(_)) && self.authority.queue.refused(now) {
             return;
         } else if self.will_not_tell_position(err) {
@@ -221,8 +225,10 @@ impl Pilot {
         self.failed(err, false, now);
     }
 
-    fn will_not_tell(&mut self, query: Query, now: Duration) {
+    fn will_not_tell(&mut self, query: Query, err: &Error, now: Duration) {
+        let forbidden = matches!(err, Error::NotPermitted { .. } | Error::CredentialsMissing);
         match query {
+            Query::Queue(_) if forbidden => self.authority.queue.forbidden(),
             Query::Queue(_) => self.authority.queue.failed(now),
             Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
             _ => self.asked(query, now),

@@ -16,7 +16,7 @@ fn queued(place: Option<u32>, takes_stops: bool) -> impl Fn(&Job) -> Said {
             }
             Job::Query(Query::Queue(_)) => {
                 let Some(position) = place else { return refused("queue full") };
-                let place = QueuePlace { position, left: None, poll_every: ms(10_000) };
+                let place = QueuePlace { position, poll_every: ms(10_000) };
                 Some(Ok(Answer::Place(Some(place))))
             }
             Job::Command(command) if place != Some(1) && !(takes_stops && command.is_stop()) => {

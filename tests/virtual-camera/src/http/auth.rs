@@ -100,6 +100,15 @@ impl Guard {
         if authorization.is_some() && refusal == Refusal::Unknown {
             self.wrong_logins.fetch_add(1, Ordering::Relaxed);
         }
+        Some(self.challenge(refusal, now))
+    }
+
+    /// The 401 for whoever may not do this, known or not.
+    pub fn forbid(&self, now: Duration) -> Response {
+        self.challenge(Refusal::Unknown, now)
+    }
+
+    fn challenge(&self, refusal: Refusal, now: Duration) -> Response {
         let mut response =
             (StatusCode::UNAUTHORIZED, [(header::CONTENT_TYPE, "text/html")], "<H1>401 Unauthorized</H1>\n")
                 .into_response();
@@ -108,7 +117,7 @@ impl Guard {
                 response.headers_mut().append(header::WWW_AUTHENTICATE, value);
             }
         }
-        Some(response)
+        response
     }
 
     fn check(

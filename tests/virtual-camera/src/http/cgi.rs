@@ -42,6 +42,9 @@ pub(super) async fn queue(
     if site.camera.settings.control_queue.is_none() {
         return StatusCode::NOT_FOUND.into_response();
     }
+    if let Some(refusal) = forbidden(&site) {
+        return refusal;
+    }
     answer(&site, &connection, request, Camera::queue, |_, _, _| {}).await
 }
 
@@ -50,7 +53,18 @@ pub(super) async fn param(
     ConnectInfo(connection): ConnectInfo<Connection>,
     request: Request,
 ) -> Response {
+    if let Some(refusal) = forbidden(&site) {
+        return refusal;
+    }
     answer(&site, &connection, request, Camera::param, |_, _, _| {}).await
+}
+
+/// What says that the account is not good for this.
+fn forbidden(site: &Site) -> Option<Response> {
+    site.camera.settings.ptz_only.then(|| {
+        site.camera.note_refused();
+        site.guard.forbid(auth::time(&site.camera.fault.borrow()))
+    })
 }
 
 async fn answer(
