@@ -84,6 +84,7 @@ use glib::prelude::*;
 use crate::servo;
 
 mod clock;
+mod desk;
 #[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
 mod imp;
 mod inbox;

@@ -1,9 +1,8 @@
 //! The one task that talks to the camera: takes what the streaming thread left, asks the pilot, sends.
 
 use std::cell::Cell;
-use std::mem;
 use std::pin::pin;
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
@@ -11,21 +10,22 @@ use once_cell::sync::OnceCell;
 use tokio::runtime::{Builder, Runtime};
 
 use super::clock::Clock;
-use super::inbox::{Inbox, Mail};
+use super::desk::Desk;
+use super::inbox::Inbox;
 use super::statistics::Statistics;
 use crate::lock::lock;
 use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Status};
-use crate::vapix::{Client, ClientSettings, Command, Credentials, Error, Location};
+use crate::vapix::{Client, ClientSettings, Command, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 const STOP_GRACE: Duration = Duration::from_millis(500);
 
 /// At the end the camera's yes to its stop is waited for this long.
-const FINISH_BUDGET: Duration = Duration::from_secs(2);
+pub const FINISH_BUDGET: Duration = Duration::from_secs(2);
 
 /// A stop that was not confirmed by then goes on being tried for this long, with nobody waiting: the network may
 /// come back.
-const LAST_WILL: Duration = Duration::from_secs(60);
+pub const LAST_WILL: Duration = Duration::from_secs(60);
 
 /// Something the element tells the world.
 #[derive(Debug)]
@@ -94,18 +94,7 @@ impl Worker {
         let (status, belief, stop) = (pilot.status(Duration::ZERO), Some(pilot.belief()), Some(pilot.stop()));
         let statistics = Statistics { status, belief, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
-        let desk = Desk {
-            pilot,
-            inbox: inbox.clone(),
-            statistics: statistics.clone(),
-            observer: observer.clone(),
-            last_status: Status::default(),
-            credentials: None,
-            waiting: Vec::new(),
-            settling: Vec::new(),
-            deadline: None,
-            gave_up: false,
-        };
+        let desk = Desk::new(pilot, inbox.clone(), statistics.clone(), observer.clone());
         let task = Task { client, settings: settings.clone(), desk };
         let running = runtime.spawn(task.run());
         let worker = Self { camera, inbox, statistics };
@@ -218,22 +207,6 @@ struct Task<O> {
     desk: Desk<O>,
 }
 
-/// Everything but the client, which is lent out while a request is in flight.
-struct Desk<O> {
-    pilot: Pilot,
-    inbox: Arc<Inbox>,
-    statistics: Arc<Mutex<Statistics>>,
-    observer: O,
-    last_status: Status,
-    credentials: Option<Option<Credentials>>,
-    waiting: Vec<SyncSender<()>>,
-    settling: Vec<SyncSender<()>>,
-    /// The end, once it has been asked for.
-    deadline: Option<Duration>,
-    /// Nobody waits any more.
-    gave_up: bool,
-}
-
 impl<O: Fn(Event) + Send + Sync> Task<O> {
     async fn run(mut self) {
         loop {
@@ -288,145 +261,6 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 answer = &mut exchange => return desk.answered(&job, answer, sent),
                 () = inbox.arrived() => desk.take_mail(),
                 () = inbox.sleep_until(until) => {}
-            }
-        }
-    }
-}
-
-impl<O: Fn(Event)> Desk<O> {
-    /// Whether the end has come: at rest, out of time, or with no right to speak.
-    fn is_over(&self) -> bool {
-        self.deadline.is_some_and(|deadline| {
-            let done = self.pilot.is_at_rest() && !self.pilot.is_queued();
-            done || self.pilot.halted() || deadline <= self.inbox.now()
-        })
-    }
-
-    /// When the time for a confirmed stop is over, nobody waits for it any more; it is tried on for a while.
-    fn check_deadline(&mut self) {
-        let now = self.inbox.now();
-        if !self.gave_up && self.deadline.is_some_and(|deadline| deadline <= now) {
-            self.give_up();
-            self.deadline = Some(now + LAST_WILL);
-        }
-    }
-
-    fn give_up(&mut self) {
-        if !self.pilot.is_at_rest() && !mem::replace(&mut self.gave_up, true) {
-            (self.observer)(Event::GaveUp { halted: self.pilot.halted() });
-        }
-        self.waiting.clear();
-    }
-
-    fn take_mail(&mut self) {
-        let Mail { credentials, servo, orphan, rest, sight, waiting, settling, finish, quit } =
-            self.inbox.take();
-        let now = self.inbox.now();
-        self.credentials = credentials.or(self.credentials.take());
-        if let Some(servo) = servo {
-            self.pilot.configure(servo);
-        }
-        if let Some(stop) = orphan {
-            self.pilot.inherit(stop);
-        }
-        if rest {
-            self.pilot.rest();
-        }
-        if finish {
-            self.deadline.get_or_insert(now + FINISH_BUDGET);
-            self.pilot.leave();
-        }
-        if quit {
-            (self.deadline, self.gave_up) = (Some(now), true);
-        }
-        if let Some(sight) = sight.filter(|_| self.deadline.is_none()) {
-            self.pilot.see(sight, now);
-        }
-        self.waiting.extend(waiting);
-        self.settling.extend(settling);
-    }
-
-    /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
-    fn is_in_vain(&mut self, job: &Job, now: Duration) -> bool {
-        match job {
-            Job::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
-            Job::Query(_) => {
-                self.tell_rest();
-                self.is_over()
-            }
-        }
-    }
-
-    /// Whether something else than a stop is in flight while a stop is what the camera needs.
-    fn stop_waits_behind(&self, job: &Job, now: Duration) -> bool {
-        let may_move = match job {
-            Job::Command(command) => !command.is_stop(),
-            Job::Query(_) => !self.pilot.is_at_rest(),
-        };
-        may_move && !self.pilot.has_errand(now)
-    }
-
-    fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration) {
-        let now = self.inbox.now();
-        self.count(job, answer.as_ref().err().cloned(), now.saturating_sub(sent));
-        self.pilot.answered(job, answer, sent, now);
-    }
-
-    fn abandoned(&mut self, job: &Job, sent: Duration) {
-        let now = self.inbox.now();
-        let waited = now.saturating_sub(sent);
-        self.count(job, Some(Error::Timeout(waited)), waited);
-        self.pilot.abandoned(job, now);
-    }
-
-    fn count(&self, job: &Job, failure: Option<Error>, round_trip: Duration) {
-        {
-            let mut statistics = lock(&self.statistics);
-            if let Some(err) = &failure {
-                statistics.last_error = Some(err.to_string());
-            }
-            match (job, &failure) {
-                (Job::Query(_), _) => {}
-                (Job::Command(_), Some(_)) => statistics.failed += 1,
-                (Job::Command(_), None) => statistics.succeeded(round_trip),
-            }
-        }
-        (self.observer)(Event::Exchanged { job: *job, failure, round_trip });
-    }
-
-    /// Tells what has changed: reports and status; and those who wait for rest.
-    fn publish(&mut self) {
-        let status = self.pilot.status(self.inbox.now());
-        {
-            let mut statistics = lock(&self.statistics);
-            statistics.status = status;
-            statistics.belief = Some(self.pilot.belief());
-            statistics.stop = Some(self.pilot.stop());
-            statistics.halted = self.pilot.halted();
-            statistics.coalesced = self.pilot.overtaken() + self.inbox.overtaken();
-        }
-        for report in self.pilot.take_reports() {
-            (self.observer)(Event::Report(report));
-        }
-        if status != self.last_status {
-            self.last_status = status;
-            (self.observer)(Event::Status(status));
-        }
-        self.tell_rest();
-    }
-
-    /// Nothing is to be done at this time that has not been done.
-    fn tell_settled(&mut self) {
-        for settling in self.settling.drain(..) {
-            let _ = settling.try_send(());
-        }
-    }
-
-    fn tell_rest(&mut self) {
-        if self.pilot.is_at_rest() {
-            // Who waits no longer is not there to be told.
-            for waiting in self.waiting.drain(..) {
-                let _ = waiting.try_send(());
             }
         }
     }

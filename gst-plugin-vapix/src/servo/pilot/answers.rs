@@ -24,24 +24,26 @@ impl Pilot {
         } else {
             self.scheduler.failed(command, false, now);
         }
+        if !matches!(err, Error::Camera(_)) || !self.is_understood(command, err, now) {
+            self.failed(err, true, now);
+        }
+    }
+
+    /// Whether it is known why the camera refuses a command, so that it is no fault.
+    fn is_understood(&mut self, command: &Command, err: &Error, now: Duration) -> bool {
         let queue = &mut self.authority.queue;
-        if matches!(err, Error::Camera(_)) && (queue.refused_command() || queue.refused(now)) {
-            return;
+        if queue.refused_command() || queue.refused(now) {
+            return true;
         }
-        if matches!((command, err), (Command::Velocity { .. }, Error::Camera(_)))
-            && self.refused_freedom(command)
-        {
-            return;
+        if matches!(command, Command::Velocity { .. }) && self.refused_freedom(command) {
+            return true;
         }
-        if self.homing.leads(command) && matches!(err, Error::Camera(_)) {
+        if self.homing.leads(command) {
             self.homing.settled();
             self.reports.push(Report::HomeRefused(err.clone()));
-            return;
+            return true;
         }
-        if matches!(err, Error::Camera(_)) && self.refused_a_mode(command, err, now) {
-            return;
-        }
-        self.failed(err, true, now);
+        self.refused_a_mode(command, err, now)
     }
 
     /// Whether the refusal of a move may be only of its freedom from proportional speed: then it is sent again
