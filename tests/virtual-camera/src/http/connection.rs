@@ -127,8 +127,11 @@ impl Door {
         self.listener = None;
         let silent = *self.fault.borrow() == Fault::BlackHole;
         if silent {
-            let _full = full_queue(self.address).await;
-            self.fault_over().await;
+            let address = self.address;
+            tokio::select! {
+                () = full_queue(address) => {}
+                () = self.fault_over() => {}
+            }
         } else {
             // A socket that does not listen refuses.
             let _reserved = reserve(self.address);
@@ -152,11 +155,12 @@ impl Door {
     }
 }
 
-/// A socket whose queue is full, and what fills it: the kernel drops whatever else comes.
-async fn full_queue(address: SocketAddr) -> io::Result<(TcpListener, TcpStream)> {
-    let listener = reserve(address)?.listen(0)?;
-    let filling = TcpStream::connect(address).await?;
-    Ok((listener, filling))
+/// Holds a socket whose queue is full, for as long as it is awaited: the kernel drops whatever comes.
+async fn full_queue(address: SocketAddr) {
+    let _listener = reserve(address).and_then(|socket| socket.listen(0));
+    // Where a client was quicker, the queue is full of it, and this goes unanswered for minutes.
+    let _filling = TcpStream::connect(address).await;
+    pending().await
 }
 
 impl Listener for Door {
