@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{CommandHistory, ControlQueue, OperatorWatch, PanTilt, Verdict};
+use super::{Commands, ControlQueue, OperatorWatch, PanTilt, Verdict};
 
 /// Whether the camera is ours to move: an operator comes first, and so does whoever holds the control queue.
 #[derive(Debug, Default)]
@@ -56,10 +56,10 @@ impl Authority {
         &mut self,
         (position, zoom_steps): (PanTilt, Option<f64>),
         (asked, answered): (Duration, Duration),
-        commands: &CommandHistory,
+        commands: Commands,
         give_way: Duration,
     ) -> Finding {
-        let verdict = self.watch.position(position, asked, answered, commands);
+        let verdict = self.watch.position((position, zoom_steps), (asked, answered), commands);
         if self.is_orphan(position, zoom_steps, answered) {
             return Finding::Orphan;
         }
@@ -147,6 +147,7 @@ impl Authority {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::servo::CommandHistory;
     use crate::vapix::{QueuePlace, QueueRequest};
 
     const GIVE_WAY: Duration = Duration::from_secs(10);
@@ -155,9 +156,18 @@ mod tests {
         Duration::from_secs(s)
     }
 
+    fn tell_place(
+        authority: &mut Authority,
+        place: (PanTilt, Option<f64>),
+        at: Duration,
+        give_way: Duration,
+    ) -> Finding {
+        let nothing = CommandHistory::default();
+        authority.positioned(place, (at, at), Commands { pan_tilt: &nothing, zoom: None }, give_way)
+    }
+
     fn tell(authority: &mut Authority, pan: f64, at: Duration) -> Finding {
-        let place = (PanTilt::new(pan, 0.0), Some(1.0));
-        authority.positioned(place, (at, at), &CommandHistory::default(), GIVE_WAY)
+        tell_place(authority, (PanTilt::new(pan, 0.0), Some(1.0)), at, GIVE_WAY)
     }
 
     fn met() -> Authority {
@@ -190,9 +200,7 @@ mod tests {
         let mut authority = met();
         for pan in [9.0, 9.0, 30.0, 30.0] {
             let place = (PanTilt::new(pan, 0.0), None);
-            let finding =
-                authority.positioned(place, (s(30), s(30)), &CommandHistory::default(), Duration::ZERO);
-            assert_eq!(finding, Finding::Nothing);
+            assert_eq!(tell_place(&mut authority, place, s(30), Duration::ZERO), Finding::Nothing);
         }
     }
 
@@ -207,8 +215,7 @@ mod tests {
         let mut authority = Authority::default();
         tell(&mut authority, 0.0, s(1));
         let zoomed = (PanTilt::default(), Some(100.0));
-        let finding = authority.positioned(zoomed, (s(2), s(2)), &CommandHistory::default(), GIVE_WAY);
-        assert_eq!(finding, Finding::Orphan);
+        assert_eq!(tell_place(&mut authority, zoomed, s(2), GIVE_WAY), Finding::Orphan);
     }
 
     #[test]

@@ -55,7 +55,7 @@ pub use introduction::Introduction;
 pub use learning::{Calibration, Turn};
 pub use limits::{LimitGuard, SoftLimits, is_endless, narrower};
 pub use link::{Link, LinkChange};
-pub use operator::{OperatorWatch, Verdict};
+pub use operator::{Commands, OperatorWatch, Verdict};
 pub use optics::{Lens, View, magnified};
 pub use oscillation::OscillationGuard;
 pub use pan_tilt::PanTilt;

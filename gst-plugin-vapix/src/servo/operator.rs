@@ -2,6 +2,15 @@ use std::time::Duration;
 
 use super::{CommandHistory, PanTilt};
 
+/// What was commanded.
+#[derive(Debug, Clone, Copy)]
+pub struct Commands<'a> {
+    /// Rates of pan and tilt.
+    pub pan_tilt: &'a CommandHistory,
+    /// Speed steps of the zoom, as the pan of a history; `None`: the zoom is anybody's.
+    pub zoom: Option<&'a CommandHistory>,
+}
+
 /// Tells from the positions a camera reports whether somebody else moves it.
 ///
 /// A hand that is taken for the camera's own noise costs a moment of quarrel; one that is seen where there is none
@@ -21,6 +30,7 @@ pub struct OperatorWatch {
 #[derive(Debug, Clone, Copy)]
 struct Place {
     position: PanTilt,
+    zoom_steps: Option<f64>,
     asked: Duration,
 }
 
@@ -39,6 +49,9 @@ impl OperatorWatch {
     /// Turns up to this come from noise, from whole degrees told, from an end that springs back.
     const TOLERANCE_DEG: f64 = 1.5;
 
+    /// So do zooms up to this, and from a lens that settles: 1 % of its travel.
+    const TOLERANCE_ZOOM_STEPS: f64 = 100.0;
+
     /// A command acts no later than this, rest included, and positions are no older.
     const LATEST: Duration = Duration::from_secs(2);
 
@@ -54,17 +67,16 @@ impl OperatorWatch {
     /// Judges a position that was asked for and answered then.
     pub fn position(
         &mut self,
-        position: PanTilt,
-        asked: Duration,
-        answered: Duration,
-        commands: &CommandHistory,
+        (position, zoom_steps): (PanTilt, Option<f64>),
+        (asked, answered): (Duration, Duration),
+        commands: Commands,
     ) -> Verdict {
-        let place = Place { position, asked };
+        let place = Place { position, zoom_steps, asked };
         let Some(before) = self.place else {
             self.place = Some(place);
             return Verdict::Ours;
         };
-        if self.explains(&before, position, answered, commands) {
+        if self.explains(&before, &place, answered, commands) {
             *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
             return Verdict::Ours;
         }
@@ -100,38 +112,54 @@ impl OperatorWatch {
         self.suspects
     }
 
-    fn explains(
-        &self,
-        before: &Place,
-        position: PanTilt,
-        answered: Duration,
-        commands: &CommandHistory,
-    ) -> bool {
+    fn explains(&self, before: &Place, place: &Place, answered: Duration, commands: Commands) -> bool {
         if before.asked <= self.excused_until {
             return true;
         }
-        let turn = position - before.position;
         let since = before.asked.saturating_sub(Self::LATEST);
-        let rates: Vec<PanTilt> = commands.rates_between(since, answered).collect();
-        let still = rates.iter().all(|rate| rate.largest() == 0.0);
-        if !still {
-            let steep = before.position.tilt.abs().max(position.tilt.abs()) > Self::STEEP_DEG;
-            let long = answered.saturating_sub(before.asked) > Self::LONGEST;
-            if steep || long {
-                return true;
-            }
-        }
-        let commanded = commands.rotation(since, answered);
-        let pan = (turn.pan + 180.0).rem_euclid(360.0) - 180.0;
-        let unclear = !still && pan.abs().max(commanded.pan.abs()) > Self::CLEAR_DEG;
-        (unclear || told(pan, rates.iter().map(|rate| rate.pan)))
-            && told(turn.tilt, rates.iter().map(|rate| rate.tilt))
+        explains_turn(before, place, (since, answered), commands.pan_tilt)
+            && commands.zoom.is_none_or(|zoom| explains_zoom(before, place, (since, answered), zoom))
     }
 }
 
-/// Whether an axis was told to turn that way at any time.
-fn told(turn_deg: f64, mut rates: impl Iterator<Item = f64>) -> bool {
-    turn_deg.abs() <= OperatorWatch::TOLERANCE_DEG || rates.any(|rate| rate * turn_deg > 0.0)
+fn explains_turn(
+    before: &Place,
+    place: &Place,
+    (since, answered): (Duration, Duration),
+    commands: &CommandHistory,
+) -> bool {
+    let turn = place.position - before.position;
+    let rates: Vec<PanTilt> = commands.rates_between(since, answered).collect();
+    let still = rates.iter().all(|rate| rate.largest() == 0.0);
+    if !still {
+        let steep = before.position.tilt.abs().max(place.position.tilt.abs()) > OperatorWatch::STEEP_DEG;
+        let long = answered.saturating_sub(before.asked) > OperatorWatch::LONGEST;
+        if steep || long {
+            return true;
+        }
+    }
+    let commanded = commands.rotation(since, answered);
+    let pan = (turn.pan + 180.0).rem_euclid(360.0) - 180.0;
+    let unclear = !still && pan.abs().max(commanded.pan.abs()) > OperatorWatch::CLEAR_DEG;
+    let tolerance = OperatorWatch::TOLERANCE_DEG;
+    (unclear || told(pan, tolerance, rates.iter().map(|rate| rate.pan)))
+        && told(turn.tilt, tolerance, rates.iter().map(|rate| rate.tilt))
+}
+
+fn explains_zoom(
+    before: &Place,
+    place: &Place,
+    (since, answered): (Duration, Duration),
+    commands: &CommandHistory,
+) -> bool {
+    let zoomed = before.zoom_steps.zip(place.zoom_steps).map_or(0.0, |(from, to)| to - from);
+    let speeds = commands.rates_between(since, answered).map(|rate| rate.pan);
+    told(zoomed, OperatorWatch::TOLERANCE_ZOOM_STEPS, speeds)
+}
+
+/// Whether an axis was told to move that way at any time.
+fn told(moved: f64, tolerance: f64, mut rates: impl Iterator<Item = f64>) -> bool {
+    moved.abs() <= tolerance || rates.any(|rate| rate * moved > 0.0)
 }
 
 #[cfg(test)]
@@ -148,6 +176,8 @@ mod tests {
     struct Rig {
         watch: OperatorWatch,
         commands: CommandHistory,
+        zooms: CommandHistory,
+        zoom_steps: f64,
         now: Duration,
     }
 
@@ -166,7 +196,9 @@ mod tests {
         fn tell_after(&mut self, wait: Duration, pan: f64, tilt: f64) -> Verdict {
             self.now += wait;
             let asked = self.now.saturating_sub(ms(100));
-            self.watch.position(PanTilt::new(pan, tilt), asked, self.now, &self.commands)
+            let place = (PanTilt::new(pan, tilt), Some(self.zoom_steps));
+            let commands = Commands { pan_tilt: &self.commands, zoom: Some(&self.zooms) };
+            self.watch.position(place, (asked, self.now), commands)
         }
 
         fn command(&mut self, pan: f64, tilt: f64) {
@@ -195,6 +227,36 @@ mod tests {
         let mut rig = Rig::armed();
         rig.command(5.0, 0.0);
         assert_eq!(rig.tell(5.0, 4.0), Verdict::Suspicious, "an axis that was told nothing");
+    }
+
+    #[test]
+    fn a_zoom_that_was_not_told_is_somebodys_and_one_that_was_is_ours() {
+        let mut rig = Rig::armed();
+        rig.zooms.push(rig.now, PanTilt::new(40.0, 0.0));
+        rig.zoom_steps = 900.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+        rig.zoom_steps = 300.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious, "the other way");
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Foreign);
+        rig.zooms.push(rig.now, PanTilt::default());
+        rig.now += ms(10_000);
+        rig.tell(0.0, 0.0);
+        rig.zoom_steps = 390.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours, "it settles");
+        rig.zoom_steps = 900.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious);
+    }
+
+    #[test]
+    fn where_the_zoom_is_anybodys_it_tells_nothing() {
+        let mut watch = OperatorWatch::default();
+        let commands = CommandHistory::default();
+        for second in 1..20 {
+            let place = (PanTilt::default(), Some(500.0 * second as f64));
+            let asked = ms(1000 * second);
+            let commands = Commands { pan_tilt: &commands, zoom: None };
+            assert_eq!(watch.position(place, (asked, asked), commands), Verdict::Ours);
+        }
     }
 
     #[test]

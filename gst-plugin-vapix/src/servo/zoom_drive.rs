@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Lens, Sight, ZoomController, ZoomTrack};
+use super::{CommandHistory, Lens, Sight, ZoomController, ZoomTrack};
 use crate::vapix::Range;
 
 /// Turns the wish for a target of some height into zoom speeds and zoom steps of one lens.
@@ -54,6 +54,11 @@ impl ZoomDrive {
     /// From then on the zoom moves at a speed step.
     pub fn commanded(&mut self, at: Duration, speed: i8) {
         self.track.commanded(at, speed);
+    }
+
+    /// The speed steps it was told, as the pan of a history.
+    pub fn commands(&self) -> &CommandHistory {
+        self.track.commands()
     }
 
     /// Whether a picture shows the zoom moving, or some that is to come does.

@@ -53,6 +53,11 @@ impl ZoomTrack {
         Some(step + self.moved(at.saturating_sub(delay), sent_until))
     }
 
+    /// The speed steps it was told, as the pan of a history.
+    pub fn commands(&self) -> &CommandHistory {
+        &self.commanded
+    }
+
     /// Whether it was told to move at that time.
     pub fn moves(&self, at: Duration) -> bool {
         self.commanded.rate_at(at).pan != 0.0

@@ -4,7 +4,9 @@ use std::mem;
 use std::time::Duration;
 
 use super::Pilot;
-use crate::servo::{Answer, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps};
+use crate::servo::{
+    Answer, Commands, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps,
+};
 use crate::vapix::{Command, Error, Position};
 
 impl Pilot {
@@ -283,7 +285,10 @@ impl Pilot {
         }
         let place = (position, self.camera.position.zoom_steps);
         let give_way = self.settings.override_timeout;
-        match self.authority.positioned(place, (asked, now), &self.history, give_way) {
+        // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
+        let zoom = self.settings.target_height.map(|_| self.zoom.commands());
+        let commands = Commands { pan_tilt: &self.history, zoom };
+        match self.authority.positioned(place, (asked, now), commands, give_way) {
             Finding::Nothing => {}
             Finding::Orphan => {
                 // That its zoom was not seen to move is no proof that it does not.
