@@ -176,9 +176,21 @@ fn the_first_move_waits_for_no_more_than_it_needs() {
     let known = [Job::Query(Query::Position), Job::Query(Query::Limits)];
     assert_eq!(meeting.jobs[..2], known);
     assert!(matches!(meeting.jobs[2], Job::Command(_)), "{:?}", meeting.jobs);
-    // The rest when there is nothing to send.
-    meeting.run((12, ms(1000)), nobody, told);
-    assert!(meeting.met().is_some());
+}
+
+#[test]
+fn who_never_lets_up_does_not_keep_a_slow_camera_from_being_asked() {
+    for (per_answer, seconds) in [(ms(400), 20), (ms(1000), 40)] {
+        let mut meeting = Meeting::new(ServoSettings::default());
+        meeting.run((seconds, per_answer), somebody, told);
+        assert!(meeting.met().is_some(), "{per_answer:?}: {:?}", meeting.jobs);
+        let (before, asked) = (meeting.jobs.len(), meeting.asked(Query::Position));
+        meeting.run((60, per_answer), somebody, told);
+        let polls = meeting.asked(Query::Position) - asked;
+        let jobs = meeting.jobs.len() - before;
+        assert!(polls >= 4, "{per_answer:?}: {polls} in a minute, so that others are noticed");
+        assert!(jobs >= 5 * polls, "{per_answer:?}: {polls} of {jobs}, the rest are moves");
+    }
 }
 
 #[test]

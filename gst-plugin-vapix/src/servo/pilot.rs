@@ -39,6 +39,8 @@ pub struct Pilot {
     target: Option<Target>,
     introduction: Introduction,
     next_poll: Duration,
+    /// When the camera last answered a question, or did not.
+    asked_at: Duration,
     /// The speed steps in force, for the quantiser's hysteresis.
     speed_steps: (i8, i8),
     /// The words that end the last move, whatever the mode is by now.
@@ -76,6 +78,10 @@ impl Pilot {
     /// A camera that does not tell its position is asked again this much later.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
 
+    /// For as long as so many of them take, a question gives way to moves: a slow camera leaves no time between
+    /// them, and is moved all the worse for each answer that is waited for.
+    const PATIENCE: u32 = 10;
+
     /// For so long the camera may go on as it was last told, while it is found out whether it is ours.
     const UNSTEERED: Duration = Duration::from_secs(1);
 
@@ -107,6 +113,7 @@ impl Pilot {
             target: None,
             introduction: Introduction::default(),
             next_poll: Duration::ZERO,
+            asked_at: Duration::ZERO,
             speed_steps: (0, 0),
             stop: Command::Halt,
             at_limit: false,
@@ -236,11 +243,12 @@ impl Pilot {
             }
             Wish::AsIs => (self.stop, None),
         };
-        if due.is_some_and(|due| due <= now) {
-            return Next::Do(Job::Command(command));
-        }
         let (query, query_due) = self.question(now);
         let query_due = query_due.max(retry_at);
+        let overdue = query_due.max(self.asked_at) + self.interval() * Self::PATIENCE <= now;
+        if due.is_some_and(|due| due <= now) && (command.is_stop() || !overdue) {
+            return Next::Do(Job::Command(command));
+        }
         if query_due <= now {
             return Next::Do(Job::Query(query));
         }

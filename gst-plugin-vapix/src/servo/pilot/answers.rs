@@ -12,6 +12,9 @@ use crate::vapix::{Command, Error, Position};
 impl Pilot {
     /// The camera answered what was sent then, or did not.
     pub fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration, now: Duration) {
+        if matches!(job, Job::Query(_)) {
+            self.asked_at = now;
+        }
         match (job, answer) {
             (Job::Command(command), Ok(_)) => self.command_accepted(command, sent, now),
             (Job::Command(command), Err(err)) => self.command_failed(command, &err, now),

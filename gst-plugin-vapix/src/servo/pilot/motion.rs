@@ -47,7 +47,7 @@ impl Pilot {
     }
 
     /// From one command to the next.
-    fn interval(&self) -> Duration {
+    pub(super) fn interval(&self) -> Duration {
         Duration::from_secs_f64(1.0 / self.settings.max_rate_hz).max(self.exchange)
     }
 
