@@ -63,7 +63,9 @@ impl Meeting {
         let end = self.now + Duration::from_secs(seconds);
         while self.now < end {
             self.pilot.see(seen(self.now), self.now);
-            while let Next::Do(job) = self.pilot.next(self.now) {
+            while self.now < end
+                && let Next::Do(job) = self.pilot.next(self.now)
+            {
                 let sent = self.now;
                 self.pilot.sending(&job, sent);
                 self.now += per_answer;
@@ -99,9 +101,10 @@ fn nobody(now: Duration) -> Sight {
     Sight { visibility: Visibility::Gone, ..sight(0.5, 0.5, now) }
 }
 
-/// Aside, and farther so as time goes by: there is always something to send.
+/// Who is somewhere else at every moment: there is always something to send.
 fn somebody(now: Duration) -> Sight {
-    sight(0.6 + 0.3 * (now.as_secs_f64() * 3.0).sin().abs(), 0.5, now)
+    let time_s = now.as_secs_f64();
+    sight(0.6 + 0.3 * (3.0 * time_s).sin().abs(), 0.5 + 0.1 * (2.3 * time_s).sin(), now)
 }
 
 #[test]
