@@ -8,7 +8,7 @@ use std::time::Duration;
 use common::stage::{FRAME, Stage};
 use common::{Heard, PATIENCE, Rig, target};
 use gst::prelude::*;
-use ptztrack_contract::{CameraChange, TargetMeta, TargetState};
+use ptztrack_contract::{CameraChange, Rect, TargetMeta, TargetState};
 use virtual_camera::{Clock, Fault, Kinematics, Pose, Settings, SpeedMap, VirtualCamera};
 
 const TAKEN_OVER: Heard = Heard::Camera(CameraChange::TakenOver);
@@ -111,6 +111,19 @@ fn zooming_by_hand_is_no_override() {
     stage.camera.operate("zoom=3000");
     stage.run(8.0, &centred());
     assert_eq!(stage.times(&TAKEN_OVER), 0);
+}
+
+#[test]
+fn zooming_by_hand_against_auto_zoom_is_an_override() {
+    let auto = |rig: Rig| rig.with("auto-zoom", true).with("target-height", 0.4);
+    let mut stage = Stage::new(Settings::default(), auto);
+    // As tall as is wished: nothing zooms.
+    let mut person = centred();
+    person.bounds = Rect { y: 0.3, height: 0.4, ..person.bounds };
+    stage.run(12.0, &person);
+    assert_eq!(stage.times(&TAKEN_OVER), 0);
+    stage.camera.operate("zoom=3000");
+    run_until(&mut stage, &TAKEN_OVER, 3.0, &person);
 }
 
 /// The camera's delays, speeds and ends differ from all that is assumed, and nobody else is there.

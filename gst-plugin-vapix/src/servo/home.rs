@@ -2,6 +2,7 @@ use std::fmt;
 use std::str::FromStr;
 use std::time::Duration;
 
+use super::{PanTilt, SoftLimits};
 use crate::vapix::{Command, Position, Presets};
 
 /// Where the camera waits for a target.
@@ -62,6 +63,8 @@ impl Home {
 #[derive(Debug, Default)]
 pub struct Homing {
     home: Option<Home>,
+    /// A direction beyond them is not gone to; a preset is the camera's own business.
+    limits: SoftLimits,
     timeout: Duration,
     /// When it was first seen that nobody is there.
     alone_since: Option<Duration>,
@@ -83,14 +86,14 @@ pub struct Homing {
 
 impl Homing {
     /// Takes the settings. `at_start`: go there before the first target too, without waiting.
-    pub fn new(home: Option<Home>, timeout: Duration, at_start: bool) -> Self {
+    pub fn new(home: Option<Home>, timeout: Duration, at_start: bool, limits: SoftLimits) -> Self {
         let settled = home == Some(Home::Start);
-        Self { home, timeout, at_start, settled, untouched: true, ..Self::default() }
+        Self { home, limits, timeout, at_start, settled, untouched: true, ..Self::default() }
     }
 
     /// Takes other settings.
-    pub fn configure(&mut self, home: Option<&Home>, timeout: Duration) {
-        self.timeout = timeout;
+    pub fn configure(&mut self, home: Option<&Home>, timeout: Duration, limits: SoftLimits) {
+        (self.timeout, self.limits) = (timeout, limits);
         if home != self.home.as_ref() {
             let presets_at = Duration::ZERO;
             let home = home.cloned();
@@ -190,12 +193,16 @@ impl Homing {
     }
 
     fn go_to(&self, position: Position) -> Option<Command> {
+        let place = self.limits.nearest(PanTilt::new(position.pan_deg?, position.tilt_deg?));
+        let zooms = self.limits.zoom_steps;
         Some(Command::Absolute {
-            pan_deg: position.pan_deg?,
-            tilt_deg: position.tilt_deg?,
+            pan_deg: place.pan,
+            tilt_deg: place.tilt,
             speed: self.move_speed.unwrap_or(Command::FULL_SPEED),
             // Within 1 to 9999.
-            zoom: position.zoom_steps.map(|zoom| zoom.clamp(1.0, 9999.0) as u16),
+            zoom: position
+                .zoom_steps
+                .map(|zoom| zoom.min(zooms.max).max(zooms.min).clamp(1.0, 9999.0) as u16),
         })
     }
 }
@@ -203,6 +210,7 @@ impl Homing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vapix::Range;
     use proptest::prelude::*;
 
     fn s(s: u64) -> Duration {
@@ -211,6 +219,10 @@ mod tests {
 
     fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {
         Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }
+    }
+
+    fn going(home: Option<Home>, timeout: Duration, at_start: bool) -> Homing {
+        Homing::new(home, timeout, at_start, SoftLimits::default())
     }
 
     fn alone(homing: &mut Homing, from: u64, to: u64) -> Vec<(u64, Command)> {
@@ -240,7 +252,7 @@ mod tests {
     #[test]
     fn it_goes_home_once_when_nobody_was_seen_for_a_while() {
         let home = Home::Position(at(5.0, 1.0, Some(20.0)));
-        let mut homing = Homing::new(Some(home), s(10), false);
+        let mut homing = going(Some(home), s(10), false);
         let there = Command::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 100, zoom: Some(20) };
         assert_eq!(alone(&mut homing, 3, 60), [(13, there)]);
         homing.not_alone();
@@ -253,23 +265,23 @@ mod tests {
 
     #[test]
     fn without_pictures_nobody_knows_that_nobody_is_there() {
-        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
+        let mut homing = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
         homing.alone(s(0), s(1));
         assert_eq!(homing.due(s(20)), None);
     }
 
     #[test]
     fn at_the_start_it_does_not_wait() {
-        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        let mut homing = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
         assert_eq!(alone(&mut homing, 0, 30).len(), 1);
-        let mut homing = Homing::new(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        let mut homing = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
         homing.strayed();
         assert_eq!(alone(&mut homing, 0, 30)[0].0, 10, "there was a target first");
     }
 
     #[test]
     fn where_it_started_is_where_it_was_before_our_first_command() {
-        let mut homing = Homing::new(Some(Home::Start), s(10), true);
+        let mut homing = going(Some(Home::Start), s(10), true);
         homing.positioned(at(7.0, -2.0, Some(1.0)));
         assert_eq!(alone(&mut homing, 0, 30), [], "it is there");
         homing.positioned(at(7.5, -2.0, Some(1.0)));
@@ -281,8 +293,25 @@ mod tests {
     }
 
     #[test]
+    fn a_home_beyond_the_limits_is_gone_to_as_far_as_they_allow() {
+        let within = |min, max| Range { min, max };
+        let limits = SoftLimits {
+            pan_deg: within(-30.0, 60.0),
+            tilt_deg: within(-20.0, 5.0),
+            zoom_steps: within(100.0, 2000.0),
+        };
+        let there = Command::Absolute { pan_deg: 60.0, tilt_deg: -20.0, speed: 100, zoom: Some(2000) };
+        let beyond = Home::Position(at(100.0, -60.0, Some(9999.0)));
+        let mut homing = Homing::new(Some(beyond.clone()), s(0), false, limits);
+        assert_eq!(alone(&mut homing, 3, 5), [(3, there)]);
+        let mut homing = going(Some(beyond.clone()), s(0), false);
+        homing.configure(Some(&beyond), s(0), limits);
+        assert_eq!(alone(&mut homing, 3, 5), [(3, there)]);
+    }
+
+    #[test]
     fn a_preset_goes_by_its_number() {
-        let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        let mut homing = going(Some(Home::Preset("Gate".to_owned())), s(10), false);
         assert_eq!(homing.presets_due(), Some(s(0)));
         assert_eq!(alone(&mut homing, 0, 30), []);
         assert_eq!(homing.told_presets(&Presets(vec![(1, "Home".to_owned()), (4, "Gate".to_owned())])), None);
@@ -292,11 +321,11 @@ mod tests {
 
     #[test]
     fn a_preset_that_is_none_is_told_once() {
-        let mut homing = Homing::new(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        let mut homing = going(Some(Home::Preset("Gate".to_owned())), s(10), false);
         assert_eq!(homing.told_presets(&Presets::default()), Some("Gate".to_owned()));
         assert_eq!(homing.presets_due(), None);
         assert_eq!(alone(&mut homing, 0, 30), []);
-        homing.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10));
+        homing.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10), SoftLimits::default());
         assert_eq!(alone(&mut homing, 30, 60).len(), 1);
     }
 

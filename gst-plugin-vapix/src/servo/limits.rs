@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{CommandHistory, PanTilt};
+use super::{CommandHistory, PanTilt, around_deg};
 use crate::vapix::{Limits, Range};
 
 /// How far the camera may be moved, whatever it could.
@@ -24,6 +24,23 @@ impl Default for SoftLimits {
     }
 }
 
+impl SoftLimits {
+    /// Whether pan or tilt have a limit that one must know the camera's position to keep.
+    pub fn bound_turns(&self) -> bool {
+        let none = Self::default();
+        (self.pan_deg, self.tilt_deg) != (none.pan_deg, none.tilt_deg)
+    }
+
+    /// A direction, or the nearest to it that is within.
+    pub fn nearest(&self, position: PanTilt) -> PanTilt {
+        let Range { min, max } = self.pan_deg;
+        let pan = around_deg((min + max) / 2.0, position.pan);
+        // Crossed, in the moment between the setting of two: as it is.
+        let within = |angle: f64, range: Range| angle.min(range.max).max(range.min);
+        PanTilt::new(within(pan, self.pan_deg), within(position.tilt, self.tilt_deg))
+    }
+}
+
 /// Keeps the camera from being driven against its ends, and knows when it has got there.
 #[derive(Debug, Default)]
 pub struct LimitGuard {
@@ -38,14 +55,14 @@ impl LimitGuard {
     /// Having been there, it has left by this; before, it only finds that it was not quite there.
     const LEFT_DEG: f64 = 3.0;
 
-    /// The camera told where it looks, or would not.
-    pub fn told(&mut self, at: Duration, position: Option<PanTilt>) {
-        self.told = position.map(|position| (at, position));
+    /// The camera told where it looks.
+    pub fn told(&mut self, at: Duration, position: PanTilt) {
+        self.told = Some((at, position));
     }
 
-    /// Where everything commanded so far takes the camera. `delay`: of commands.
+    /// Where everything commanded so far takes the camera, where that is known. `delay`: of commands.
     pub fn position(&self, history: &CommandHistory, delay: Duration, now: Duration) -> Option<PanTilt> {
-        let (at, position) = self.told?;
+        let (at, position) = self.told.filter(|(at, _)| now <= *at + CommandHistory::SPAN)?;
         Some(position + history.rotation(at.saturating_sub(delay), now))
     }
 
@@ -63,8 +80,10 @@ impl LimitGuard {
         };
         let pan = Some(narrower(hard.pan_deg, soft.pan_deg)).filter(|range| !is_endless(*range));
         let tilt = Some(narrower(hard.tilt_deg, soft.tilt_deg));
+        // The same place has many angles: that within the range counts, or the nearest to it.
+        let pan_deg = around_deg(pan.map_or(0.0, |range| (range.min + range.max) / 2.0), position.pan);
         let near_deg = if self.at_limit { Self::LEFT_DEG } else { Self::NEAR_DEG };
-        let (pan, pan_held) = held(rate.pan, position.pan, pan, lasting_s, near_deg);
+        let (pan, pan_held) = held(rate.pan, pan_deg, pan, lasting_s, near_deg);
         let (tilt, tilt_held) = held(rate.tilt, position.tilt, tilt, lasting_s, near_deg);
         self.at_limit = pan_held || tilt_held;
         PanTilt::new(pan, tilt)
@@ -136,9 +155,42 @@ mod tests {
         let (mut guard, mut history) = (LimitGuard::default(), CommandHistory::default());
         let ms = Duration::from_millis;
         assert_eq!(guard.position(&history, ms(100), ms(0)), None);
-        guard.told(ms(1000), Some(PanTilt::new(5.0, 0.0)));
+        guard.told(ms(1000), PanTilt::new(5.0, 0.0));
         history.push(ms(800), PanTilt::new(10.0, 0.0));
         assert_eq!(guard.position(&history, ms(100), ms(1400)), Some(PanTilt::new(10.0, 0.0)));
+        assert_eq!(
+            guard.position(&history, ms(100), ms(60_000)),
+            None,
+            "nobody knows what it was told since"
+        );
+    }
+
+    /// A little beyond 180 degrees a camera tells a little more than -180.
+    #[test]
+    fn a_limit_at_the_seam_is_one_from_both_sides() {
+        let soft = SoftLimits { pan_deg: Range { min: -60.0, max: 180.0 }, ..SoftLimits::default() };
+        for pan in [180.0, -180.0, -179.8] {
+            assert_eq!(apply(10.0, pan, &limits(None), &soft), (0.0, true), "{pan}");
+            assert_eq!(apply(-10.0, pan, &limits(None), &soft), (-10.0, false), "{pan}: back in");
+        }
+        assert_eq!(apply(-10.0, -60.0, &limits(None), &soft), (0.0, true));
+    }
+
+    #[test]
+    fn the_nearest_direction_is_within() {
+        let soft = SoftLimits {
+            pan_deg: Range { min: -60.0, max: 180.0 },
+            tilt_deg: Range { min: -30.0, max: 10.0 },
+            ..SoftLimits::default()
+        };
+        for ((pan, tilt), expected) in
+            [((100.0, 0.0), (100.0, 0.0)), ((-179.0, -80.0), (180.0, -30.0)), ((-80.0, 20.0), (-60.0, 10.0))]
+        {
+            let (pan_within, tilt_within) = expected;
+            assert_eq!(soft.nearest(PanTilt::new(pan, tilt)), PanTilt::new(pan_within, tilt_within));
+        }
+        assert!(soft.bound_turns() && !SoftLimits::default().bound_turns());
+        assert_eq!(SoftLimits::default().nearest(PanTilt::new(-180.0, 5.0)), PanTilt::new(180.0, 5.0));
     }
 
     #[test]

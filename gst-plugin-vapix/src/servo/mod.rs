@@ -58,7 +58,7 @@ pub use link::{Link, LinkChange};
 pub use operator::{Commands, OperatorWatch, Verdict};
 pub use optics::{Lens, View, magnified};
 pub use oscillation::OscillationGuard;
-pub use pan_tilt::PanTilt;
+pub use pan_tilt::{PanTilt, around_deg};
 pub use pilot::Pilot;
 pub use prediction::CommandHistory;
 pub use rate::RateAverage;

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{CommandHistory, PanTilt};
+use super::{CommandHistory, PanTilt, around_deg};
 
 /// What was commanded.
 #[derive(Debug, Clone, Copy)]
@@ -32,6 +32,15 @@ struct Place {
     position: PanTilt,
     zoom_steps: Option<f64>,
     asked: Duration,
+}
+
+impl Place {
+    /// This, but where the camera was before.
+    fn seen_from(self, before: &Self) -> Self {
+        // Where the zoom was is forgotten while it is anybody's.
+        let zoom_steps = self.zoom_steps.map(|now| before.zoom_steps.unwrap_or(now));
+        Self { position: before.position, zoom_steps, ..self }
+    }
 }
 
 /// What a position tells.
@@ -71,12 +80,16 @@ impl OperatorWatch {
         (asked, answered): (Duration, Duration),
         commands: Commands,
     ) -> Verdict {
+        let zoom_steps = commands.zoom.and(zoom_steps);
         let place = Place { position, zoom_steps, asked };
         let Some(before) = self.place else {
             self.place = Some(place);
             return Verdict::Ours;
         };
         if self.explains(&before, &place, answered, commands) {
+            let alone = asked > self.excused_until && is_still(&before, answered, commands);
+            // What turns slowly by somebody's hand turns far in time.
+            let place = if alone { place.seen_from(&before) } else { place };
             *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
             return Verdict::Ours;
         }
@@ -122,6 +135,14 @@ impl OperatorWatch {
     }
 }
 
+/// Whether no command could move the camera since then.
+fn is_still(before: &Place, answered: Duration, commands: Commands) -> bool {
+    let since = before.asked.saturating_sub(OperatorWatch::LATEST);
+    let rests =
+        |history: &CommandHistory| history.rates_between(since, answered).all(|rate| rate.largest() == 0.0);
+    rests(commands.pan_tilt) && commands.zoom.is_none_or(rests)
+}
+
 fn explains_turn(
     before: &Place,
     place: &Place,
@@ -139,7 +160,7 @@ fn explains_turn(
         }
     }
     let commanded = commands.rotation(since, answered);
-    let pan = (turn.pan + 180.0).rem_euclid(360.0) - 180.0;
+    let pan = around_deg(0.0, turn.pan);
     let unclear = !still && pan.abs().max(commanded.pan.abs()) > OperatorWatch::CLEAR_DEG;
     let tolerance = OperatorWatch::TOLERANCE_DEG;
     (unclear || told(pan, tolerance, rates.iter().map(|rate| rate.pan)))
@@ -214,6 +235,21 @@ mod tests {
             assert!(rig.watch.suspects());
             assert_eq!(rig.tell_after(ms(100), pan, tilt), Verdict::Foreign);
             assert_eq!(rig.tell(pan, tilt), Verdict::Ours, "it rests there");
+        }
+    }
+
+    #[test]
+    fn a_hand_that_turns_slowly_is_noticed_too() {
+        for (pan, tilt, zoom) in [(0.4, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 30.0)] {
+            let mut rig = Rig::armed();
+            let verdicts: Vec<Verdict> = (1..=5)
+                .map(|second| {
+                    let turned = f64::from(second);
+                    rig.zoom_steps = zoom * turned;
+                    rig.tell(pan * turned, tilt * turned)
+                })
+                .collect();
+            assert_eq!(verdicts[2..], [Verdict::Ours, Verdict::Suspicious, Verdict::Foreign]);
         }
     }
 
@@ -349,7 +385,7 @@ mod tests {
                     ticks += 1;
                     if ticks.is_multiple_of(10) {
                         let told = |angle: f64| ((angle + wobble(ticks / 10)) / coarse).round() * coarse;
-                        let told_pan = (told(at.pan) + 180.0).rem_euclid(360.0) - 180.0;
+                        let told_pan = around_deg(0.0, told(at.pan));
                         prop_assert_eq!(rig.tell_after(STEP, told_pan, told(at.tilt)), Verdict::Ours);
                     } else {
                         rig.now += STEP;

@@ -26,6 +26,12 @@ impl PanTilt {
     }
 }
 
+/// An angle in degrees as what it is within the circle around `middle_deg`: up to half a turn to either side of it.
+pub fn around_deg(middle_deg: f64, angle_deg: f64) -> f64 {
+    // The half turn itself is one to the right; what is within already is exactly that.
+    angle_deg - 360.0 * ((angle_deg - middle_deg - 180.0) / 360.0).ceil()
+}
+
 impl Add for PanTilt {
     type Output = Self;
 
@@ -55,5 +61,26 @@ impl Div<f64> for PanTilt {
 
     fn div(self, divisor: f64) -> Self {
         Self::new(self.pan / divisor, self.tilt / divisor)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_is_taken_the_short_way_round() {
+        for (middle, angle, expected) in [
+            (0.0, 190.0, -170.0),
+            (0.0, -190.0, 170.0),
+            (0.0, 180.0, 180.0),
+            (0.0, -180.0, 180.0),
+            (0.0, 725.0, 5.0),
+            (60.0, -179.8, 180.2),
+            (60.0, -100.0, -100.0),
+            (175.0, -10.0, 350.0),
+        ] {
+            assert!((around_deg(middle, angle) - expected).abs() < 1e-9, "{middle}, {angle}");
+        }
     }
 }

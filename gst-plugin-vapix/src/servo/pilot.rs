@@ -103,7 +103,12 @@ impl Pilot {
             authority: Authority::default(),
             ways: Ways::default(),
             mode_told: settings.mode,
-            homing: Homing::new(settings.home.clone(), settings.home_timeout, settings.home_at_start),
+            homing: Homing::new(
+                settings.home.clone(),
+                settings.home_timeout,
+                settings.home_at_start,
+                settings.limits,
+            ),
             history: CommandHistory::default(),
             controller: Controller::default(),
             oscillation: OscillationGuard::default(),
@@ -131,7 +136,7 @@ impl Pilot {
         }
         let before = mem::replace(&mut self.settings, settings);
         let now = &self.settings;
-        self.homing.configure(now.home.as_ref(), now.home_timeout);
+        self.homing.configure(now.home.as_ref(), now.home_timeout, now.limits);
         if now.mode != before.mode {
             self.ways.forget_refusals();
             self.mode_told = now.mode;
@@ -145,6 +150,9 @@ impl Pilot {
         }
         if now.speed_map() != before.speed_map() {
             self.assume_speeds();
+        }
+        if self.settings.limits != before.limits {
+            self.judge_limits();
         }
         self.revise();
     }
@@ -396,7 +404,9 @@ impl Pilot {
         if self.steps.under_way() && self.homing.is_settled() {
             return Wish::AsIs;
         }
-        let home = self.homing.due(now).filter(|_| self.authority.is_ours(now));
+        // A zoom at its own speed is no part of the move home, and would go on.
+        let free = self.authority.is_ours(now) && !self.zoom.is_moving(now);
+        let home = self.homing.due(now).filter(|_| free);
         home.map_or(Wish::Rest, Wish::Move)
     }
 

@@ -1,5 +1,7 @@
 #[path = "pilot/others_tests.rs"]
 mod others;
+#[path = "pilot/places_tests.rs"]
+mod places;
 #[path = "pilot/words_tests.rs"]
 mod words;
 
@@ -167,7 +169,7 @@ fn commands_keep_to_the_rate() {
 #[test]
 fn at_its_limit_the_camera_is_stopped_in_that_axis_and_it_is_said_once() {
     let mut rig = Rig::new(ServoSettings::default());
-    rig.pilot.guard.told(rig.now, Some(PanTilt::new(170.0, 0.0)));
+    rig.pilot.guard.told(rig.now, PanTilt::new(170.0, 0.0));
     for _ in 0..5 {
         rig.see(0.9, 0.1);
         for command in rig.after(ms(100)) {

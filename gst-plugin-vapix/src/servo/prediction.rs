@@ -18,7 +18,7 @@ struct Entry {
 
 impl CommandHistory {
     /// Longer than any latency that is allowed for.
-    const SPAN: Duration = Duration::from_secs(10);
+    pub const SPAN: Duration = Duration::from_secs(10);
 
     /// From `at` on the camera turns with `rate`.
     pub fn push(&mut self, at: Duration, rate: PanTilt) {

@@ -7,7 +7,7 @@ use ptztrack_contract::{Point, Rect, Vector};
 
 use super::{
     Answer, Belief, Job, Lens, Next, PanTilt, Pilot, Query, ServoSettings, Sight, SpeedCurve, SpeedMap, View,
-    Visibility, magnified,
+    Visibility, around_deg, magnified,
 };
 use crate::vapix::{Command, Error, Limits, Position, Range};
 
@@ -238,7 +238,7 @@ impl Simulation {
         if let Some((goal, zoom)) = self.goal {
             // Fast, and slower near the end.
             let way = goal - self.pose;
-            let way = PanTilt::new((way.pan + 180.0).rem_euclid(360.0) - 180.0, way.tilt);
+            let way = PanTilt::new(around_deg(0.0, way.pan), way.tilt);
             let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
             self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
             self.zoom_rate = zoom.map_or(0.0, |zoom| {
@@ -349,7 +349,7 @@ impl Simulation {
             }
             Job::Command(_) => Answer::Accepted,
             Job::Query(Query::Position) if self.setup.tells_position => Answer::Position(Position {
-                pan_deg: Some((self.pose.pan + 180.0).rem_euclid(360.0) - 180.0),
+                pan_deg: Some(around_deg(0.0, self.pose.pan)),
                 tilt_deg: Some(self.pose.tilt),
                 zoom_steps: Some(self.setup.zoom_step.round()),
             }),

@@ -94,6 +94,8 @@ pub enum Report {
     Stopped,
     /// The target lies beyond the camera's range.
     AtLimit,
+    /// The camera does not tell where it looks: the limits of pan and tilt that are set cannot be kept.
+    LimitsUnkept,
     /// The camera swung to and fro about the target: from now on only this part of the speed is asked for.
     Swinging(f64),
     /// Somebody else moves the camera: it is left to him.

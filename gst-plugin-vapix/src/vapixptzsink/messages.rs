@@ -29,6 +29,11 @@ impl VapixPtzSink {
                     "the target is beyond the end of the camera's pan or tilt range, or of `pan-min` … `tilt-max`",
                 );
             }
+            Event::Report(Report::LimitsUnkept) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera does not tell where it looks: `pan-min` … `tilt-max` cannot be kept. Set limits in the camera itself")
+            ),
             Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,

@@ -52,12 +52,13 @@
 //! ## Home
 //! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the
 //! name of a preset, or `start`, where it looked when it was met; with `home-at-start` before the first target too.
+//! All but a preset is kept within the limits that are set.
 //!
 //! ## Operators
 //! An operator comes first. When the camera's position contradicts what it was told, or its control queue says
 //! that it is somebody else's turn, it is not steered until nobody has moved it for `override-timeout`, or until
-//! our turn. Only a turn that no command explains, of more than 1.5 degrees, counts; zooming by hand does not. A
-//! camera that is found moving at the start is stopped: whoever set it going may not be there any more.
+//! our turn. Only a turn that no command explains, of more than 1.5 degrees, counts; zooming by hand does only with
+//! `auto-zoom`. A camera that is found moving at the start is stopped: whoever set it going may not be there any more.
 //!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,

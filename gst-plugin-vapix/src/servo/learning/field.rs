@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::Turn;
-use crate::servo::PanTilt;
+use crate::servo::{PanTilt, around_deg};
 
 /// Learns how wide the picture is: how far the camera turned, by its own word, against how far it seemed to.
 #[derive(Debug, Default)]
@@ -135,7 +135,7 @@ impl FieldLearner {
 
 fn turn_between(from: PanTilt, to: PanTilt) -> PanTilt {
     let turn = to - from;
-    PanTilt::new((turn.pan + 180.0).rem_euclid(360.0) - 180.0, turn.tilt)
+    PanTilt::new(around_deg(0.0, turn.pan), turn.tilt)
 }
 
 fn dot(a: PanTilt, b: PanTilt) -> f64 {

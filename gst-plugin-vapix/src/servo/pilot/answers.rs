@@ -224,7 +224,8 @@ impl Pilot {
             return;
         } else if self.will_not_tell_position(err) {
             self.positioned(None, now, now);
-            if !self.steps.under_way() {
+            // One that told it before is well again soon.
+            if !self.steps.under_way() && self.camera.pan_tilt().is_none() {
                 self.next_poll = now + Self::POLL_REFUSED;
             }
             return self.asked(query, now);
@@ -275,9 +276,18 @@ impl Pilot {
     /// After the last question it is known whom we met.
     fn met(&mut self, now: Duration) {
         self.reports.push(Report::Met(self.camera.to_string()));
+        self.judge_limits();
         if !self.link.connected() {
             // It told nothing: that is a fault after all.
             self.next_poll = now;
+        }
+    }
+
+    /// Whether the limits can be kept is known after the last question.
+    pub(super) fn judge_limits(&mut self) {
+        let blind = self.introduction.next().is_none() && self.camera.pan_tilt().is_none();
+        if blind && self.settings.limits.bound_turns() {
+            self.reports.push(Report::LimitsUnkept);
         }
     }
 
@@ -306,7 +316,9 @@ impl Pilot {
 
     /// The camera told its position as of a time, or does not tell.
     fn positioned(&mut self, position: Option<Position>, at: Duration, now: Duration) {
-        self.guard.told(at, position.and(self.camera.pan_tilt()));
+        if let Some(place) = position.and(self.camera.pan_tilt()) {
+            self.guard.told(at, place);
+        }
         self.zoom.told(at, position.and_then(|position| position.zoom_steps), self.calibration.latency());
         if self.steps.position(position, now) {
             self.scheduler.arrived();

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ptztrack_contract::Point;
 
 use super::{Pilot, Wish};
-use crate::servo::{ControlLaw, Mode, PanTilt, Report, Sight, View, ZoomGoal, narrower};
+use crate::servo::{ControlLaw, Mode, PanTilt, Report, Sight, View, ZoomGoal, around_deg, narrower};
 use crate::vapix::Command;
 
 impl Pilot {
@@ -129,7 +129,7 @@ fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Co
 /// The command to look there, the short way round.
 fn absolute(position: PanTilt, speed: Option<u8>, zoom: Option<u16>) -> Command {
     Command::Absolute {
-        pan_deg: (position.pan + 180.0).rem_euclid(360.0) - 180.0,
+        pan_deg: around_deg(0.0, position.pan),
         tilt_deg: position.tilt.clamp(-180.0, 180.0),
         speed: speed.unwrap_or(Command::FULL_SPEED),
         zoom,
