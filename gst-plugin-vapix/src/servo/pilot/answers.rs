@@ -108,7 +108,7 @@ impl Pilot {
         }
         match command {
             Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
-                self.steps.begin(now);
+                self.steps.begin(sent);
                 self.authority.excuse(now);
                 self.next_poll = now + Steps::POLL;
             }
@@ -299,10 +299,18 @@ impl Pilot {
     /// The camera told its position as of a time, or does not tell.
     fn positioned(&mut self, position: Option<Position>, at: Duration, now: Duration) {
         self.guard.told(at, position.and(self.camera.pan_tilt()));
-        self.zoom.told(at, position.and_then(|position| position.zoom_steps), self.calibration.latency());
-        if self.steps.position(position, now) {
+        let latency = self.calibration.latency();
+        let arrived = self.steps.position(position, now, latency);
+        if !self.steps.under_way() {
+            self.zoom.told(at, position.and_then(|position| position.zoom_steps), latency);
+        }
+        if arrived {
             self.scheduler.arrived();
             self.reports.push(Report::Stopped);
+            // It came before this was known.
+            if let Some(sight) = self.target.as_ref().map(|target| target.sight) {
+                self.measure(&sight, now);
+            }
         }
         self.next_poll = now
             + match (self.steps.under_way(), self.scheduler.may_move()) {
