@@ -159,6 +159,24 @@ fn the_speed_map_is_found_within_20_s() {
     assert_right("linear", 300, &WALKS, TENTH, linear);
 }
 
+/// Of curves that no floor bends, taken for a cubic one.
+#[test]
+fn any_growing_speed_map_is_found_within_20_s() {
+    type Curve = fn(f64) -> f64;
+    let curves: [(&str, Curve); 3] = [
+        ("in proportion", |step| 1.0 * step),
+        ("twice as fast", |step| 2.0 * step),
+        ("by the root", |step| 6.0 * step.sqrt()),
+    ];
+    for (curve, deg_s) in curves {
+        for delay_ms in [100, 300] {
+            assert_right(curve, delay_ms, &WALKS, TENTH, |setup| {
+                setup.map = SpeedMap::new(100.0, SpeedCurve::Linear).times(|step| deg_s(step) / step);
+            });
+        }
+    }
+}
+
 /// The speeds then fit the field of view that was set: in the picture they are right.
 #[test]
 fn a_camera_that_does_not_tell_its_position_is_learned_by_the_picture() {

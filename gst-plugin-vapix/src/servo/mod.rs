@@ -69,5 +69,5 @@ pub use steps::Steps;
 pub use talk::{Answer, Belief, Job, Next, Query, Report, Status};
 pub use ways::{Refusal, Ways};
 pub use zoom::ZoomController;
-pub use zoom_drive::{ZoomDrive, ZoomGoal};
+pub use zoom_drive::{Jump, ZoomDrive, ZoomGoal};
 pub use zoom_track::ZoomTrack;

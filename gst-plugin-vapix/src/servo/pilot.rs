@@ -179,9 +179,7 @@ impl Pilot {
             self.calibration.see(&sight, &self.view(&sight), &self.history, maps);
             self.revise();
         }
-        if self.settings.target_height.is_some() {
-            self.zoom.see(&sight, &self.lens(), self.calibration.latency());
-        }
+        self.measure(&sight, now);
         let view = self.view(&sight);
         let uncertainty =
             if self.settings.learn { self.calibration.latency_uncertainty() } else { Duration::ZERO };

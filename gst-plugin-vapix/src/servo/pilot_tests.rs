@@ -272,7 +272,7 @@ fn absolute_mode_steps_from_rest_to_rest() {
     rig.see(1.0, 0.5);
     assert_eq!(rig.after(ms(100)), [], "under way");
     rig.after(ms(200));
-    rig.after(ms(200));
+    rig.after(ms(150));
     assert_eq!(rig.reports(), [Report::Moving, Report::Stopped]);
     rig.see(1.0, 0.5);
     assert_eq!(rig.after(ms(10)), [], "the picture does not show the rest yet");

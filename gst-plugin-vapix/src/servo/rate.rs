@@ -101,6 +101,9 @@ impl Samples {
     /// walk is exaggerated; with less, who starts or turns is followed late.
     const STRETCH: f64 = 0.3;
 
+    /// Samples further apart than this differ by more than their noise.
+    const PAUSE_S: f64 = 0.25;
+
     /// At least one.
     pub fn new(samples: impl Iterator<Item = (f64, f64)>) -> Self {
         Self(samples.collect())
@@ -116,10 +119,14 @@ impl Samples {
     }
 
     /// Variance of a sample, from the differences of neighbours (von Neumann), which a change of the rate itself
-    /// hardly swells. Of two or fewer nothing can be said.
+    /// hardly swells unless there is a pause in between. Of two or fewer nothing can be said.
     fn variance(&self) -> f64 {
-        let squares: f64 = self.0.windows(2).map(|pair| (pair[1].1 - pair[0].1).powi(2)).sum();
-        if self.0.len() < 3 { f64::INFINITY } else { squares / (2.0 * (self.0.len() - 1) as f64) }
+        let neighbours = self.0.windows(2).filter(|pair| pair[1].0 - pair[0].0 <= Self::PAUSE_S);
+        let squares: Vec<f64> = neighbours.map(|pair| (pair[1].1 - pair[0].1).powi(2)).collect();
+        if squares.len() < 2 {
+            return f64::INFINITY;
+        }
+        squares.iter().sum::<f64>() / (2.0 * squares.len() as f64)
     }
 
     /// The mean as far as it stands out of the noise: nearly all of a rate well above it, nothing of one below.

@@ -15,6 +15,10 @@ pub enum SpeedCurve {
 pub struct SpeedMap {
     /// Degrees per second of the steps 0 to 100.
     curve: [f64; Self::STEPS + 1],
+    /// The same without the floor.
+    bare: [f64; Self::STEPS + 1],
+    /// Degrees per second that every step does at least.
+    floor_deg_s: f64,
     /// Degrees per second that no step exceeds (proportional speed), or infinity.
     cap_deg_s: f64,
 }
@@ -31,13 +35,11 @@ impl SpeedMap {
 
     /// The curve that reaches so many degrees per second at step 100.
     pub fn new(full_deg_s: f64, curve: SpeedCurve) -> Self {
-        Self::of(|step| {
-            let share = step / Self::STEPS as f64;
-            match curve {
-                SpeedCurve::Linear => full_deg_s * share,
-                SpeedCurve::Cubic => (full_deg_s * share.powi(3)).max(Self::FLOOR_DEG_S),
-            }
-        })
+        let share = |step: f64| step / Self::STEPS as f64;
+        match curve {
+            SpeedCurve::Linear => Self::of(0.0, |step| full_deg_s * share(step)),
+            SpeedCurve::Cubic => Self::of(Self::FLOOR_DEG_S, |step| full_deg_s * share(step).powi(3)),
+        }
     }
 
     /// The curve through rows of steps and degrees per second, a power of the step in between (a
@@ -45,7 +47,7 @@ impl SpeedMap {
     pub fn through(rows: &[StepMeaning]) -> Option<Self> {
         let rows: Vec<_> = rows.iter().filter(|row| row.step > 0.0 && row.value > 0.0).collect();
         let (first, last) = (rows.first()?, rows.last()?);
-        Some(Self::of(|step| {
+        Some(Self::of(0.0, |step| {
             let above = rows.partition_point(|row| row.step < step);
             match (above.checked_sub(1).and_then(|below| rows.get(below)), rows.get(above)) {
                 (Some(low), Some(high)) => {
@@ -58,19 +60,28 @@ impl SpeedMap {
         }))
     }
 
-    fn of(deg_s: impl Fn(f64) -> f64) -> Self {
-        let mut curve = [0.0f64; Self::STEPS + 1];
-        for step in 1..curve.len() {
+    fn of(floor_deg_s: f64, deg_s: impl Fn(f64) -> f64) -> Self {
+        let mut bare = [0.0f64; Self::STEPS + 1];
+        for step in 1..bare.len() {
             let speed = deg_s(step as f64);
             // What is no number compares with nothing; and a larger step is never slower.
-            curve[step] = if speed.is_finite() { speed.max(curve[step - 1]) } else { curve[step - 1] };
+            bare[step] = if speed.is_finite() { speed.max(bare[step - 1]) } else { bare[step - 1] };
         }
-        Self { curve, cap_deg_s: f64::INFINITY }
+        let mut curve = bare.map(|speed| speed.max(floor_deg_s));
+        curve[0] = 0.0;
+        Self { curve, bare, floor_deg_s, cap_deg_s: f64::INFINITY }
     }
 
-    /// The same with each step's speed (by the step, 1 to 100) multiplied; it still grows.
+    /// The same with each step's speed (by the step, 1 to 100) multiplied, as it is without the floor; it still grows,
+    /// and the floor stays.
     pub fn times(&self, factor: impl Fn(f64) -> f64) -> Self {
-        Self { cap_deg_s: self.cap_deg_s, ..Self::of(|step| self.curve[step as usize] * factor(step)) }
+        let times = Self::of(self.floor_deg_s, |step| self.bare[step as usize] * factor(step));
+        Self { cap_deg_s: self.cap_deg_s, ..times }
+    }
+
+    /// Degrees per second of a step, 0 to 100, if there were no floor.
+    pub fn bare_deg_s(&self, step: u8) -> f64 {
+        self.bare[usize::from(step).min(Self::STEPS)]
     }
 
     /// The same, with no step faster than this.
@@ -167,6 +178,15 @@ mod tests {
         assert_eq!(linear.step(10.4, 11), 11);
         assert_eq!(linear.step(10.8, 10), 11);
         assert_eq!(linear.step(-10.6, 10), -11);
+    }
+
+    #[test]
+    fn a_floor_is_no_part_of_the_curve() {
+        let linear = SpeedMap::new(450.0, SpeedCurve::Cubic).times(|step| (100.0 / step).powi(2));
+        assert!((1..=100).all(|step| (linear.deg_s(step) - 4.5 * f64::from(step)).abs() < 1e-9));
+        let slow = SpeedMap::new(450.0, SpeedCurve::Cubic).times(|_| 1e-3);
+        assert_eq!(slow.deg_s(1), SpeedMap::FLOOR_DEG_S);
+        assert!((slow.deg_s(100) - 0.45).abs() < 1e-9);
     }
 
     proptest! {

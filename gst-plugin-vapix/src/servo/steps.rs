@@ -5,17 +5,27 @@ use crate::vapix::Position;
 
 /// Moves from position to position: the next begins when the camera is at rest and was looked through since.
 #[derive(Debug)]
-pub struct Steps(Phase);
+pub struct Steps {
+    phase: Phase,
+    /// How long the last one took that came to rest by itself.
+    lasted: Duration,
+}
 
 #[derive(Debug)]
 enum Phase {
-    AtRest { since: Duration },
-    UnderWay { since: Duration, seen: Option<Position> },
+    AtRest {
+        since: Duration,
+    },
+    /// `seen`: where the camera was, and when.
+    UnderWay {
+        since: Duration,
+        seen: Option<(Position, Duration)>,
+    },
 }
 
 impl Default for Steps {
     fn default() -> Self {
-        Self(Phase::AtRest { since: Duration::ZERO })
+        Self { phase: Phase::AtRest { since: Duration::ZERO }, lasted: Self::USUAL }
     }
 }
 
@@ -25,6 +35,9 @@ impl Steps {
 
     /// Zoom steps this near to each other are the same.
     const SAME_ZOOM: f64 = 10.0;
+
+    /// As long as a step of some degrees takes until it is seen to be over.
+    const USUAL: Duration = Duration::from_millis(600);
 
     /// How often the position is asked for while under way.
     pub const POLL: Duration = Duration::from_millis(150);
@@ -37,38 +50,56 @@ impl Steps {
 
     /// Whether the picture taken then, with everything `latency` late, shows the camera at rest.
     pub fn shows_rest(&self, taken_at: Duration, latency: Duration) -> bool {
-        matches!(self.0, Phase::AtRest { since } if since.is_zero() || taken_at >= since + latency)
+        matches!(self.phase, Phase::AtRest { since } if since.is_zero() || taken_at >= since + latency)
+    }
+
+    /// Whether the picture taken then shows the camera where it last rested.
+    pub fn shows_last_rest(&self, taken_at: Duration, latency: Duration) -> bool {
+        match self.phase {
+            Phase::AtRest { .. } => self.shows_rest(taken_at, latency),
+            Phase::UnderWay { since, .. } => taken_at < since + latency,
+        }
     }
 
     /// Whether a move is under way.
     pub fn under_way(&self) -> bool {
-        matches!(self.0, Phase::UnderWay { .. })
+        matches!(self.phase, Phase::UnderWay { .. })
     }
 
-    /// A move was accepted.
-    pub fn begin(&mut self, now: Duration) {
-        self.0 = Phase::UnderWay { since: now, seen: None };
+    /// How long it will be from one step to the next, by the last one, with everything `latency` late.
+    pub fn interval(&self, latency: Duration) -> Duration {
+        self.lasted + latency
+    }
+
+    /// A move that was sent then was accepted.
+    pub fn begin(&mut self, sent: Duration) {
+        self.phase = Phase::UnderWay { since: sent, seen: None };
     }
 
     /// A stop was accepted.
     pub fn rest(&mut self, now: Duration) {
-        self.0 = Phase::AtRest { since: now };
+        self.phase = Phase::AtRest { since: now };
     }
 
-    /// The camera told its position, or would not; returns whether it has come to rest by this.
-    pub fn position(&mut self, position: Option<Position>, now: Duration) -> bool {
-        let Phase::UnderWay { since, seen } = &mut self.0 else { return false };
-        let long = now.saturating_sub(*since) > Self::LONGEST;
+    /// The camera told its position, or would not; returns whether it has come to rest by this. A command acts within
+    /// the `latency`.
+    pub fn position(&mut self, position: Option<Position>, now: Duration, latency: Duration) -> bool {
+        let Phase::UnderWay { since, seen } = &mut self.phase else { return false };
+        let begun = *since;
+        let lasted = now.saturating_sub(begun);
+        let long = lasted > Self::LONGEST;
         let tolerance_deg = if long { Self::NOISE_DEG } else { Self::SAME_DEG };
-        let rests = match seen.zip(position) {
-            Some((before, now)) => same(&before, &now, tolerance_deg),
-            None => long,
+        let rests_since = match seen.zip(position) {
+            Some(((before, at), position)) => same(&before, &position, tolerance_deg).then_some(at),
+            None => long.then_some(now),
         };
-        if rests {
-            self.rest(now);
+        if let Some(since) = rests_since {
+            self.lasted = since.saturating_sub(begun);
+            self.rest(since);
             return true;
         }
-        *seen = position;
+        // Before it begins it is at rest too.
+        *seen = position.filter(|_| lasted >= latency).map(|position| (position, now));
         false
     }
 }
@@ -99,20 +130,34 @@ mod tests {
         assert!(steps.shows_rest(ms(0), ms(200)));
         steps.begin(ms(1000));
         assert!(!steps.shows_rest(ms(5000), ms(200)));
-        assert!(!steps.position(at(1.0, 500.0), ms(1000)));
-        assert!(!steps.position(at(2.0, 900.0), ms(1150)));
-        assert!(!steps.position(at(2.0, 999.0), ms(1300)));
-        assert!(steps.position(at(2.01, 1000.0), ms(1450)));
-        assert!(!steps.shows_rest(ms(1600), ms(200)));
-        assert!(steps.shows_rest(ms(1650), ms(200)));
+        assert!(!steps.position(at(1.0, 500.0), ms(1000), ms(200)));
+        assert!(!steps.position(at(2.0, 900.0), ms(1150), ms(200)));
+        assert!(!steps.position(at(2.0, 999.0), ms(1300), ms(200)));
+        assert!(steps.position(at(2.01, 1000.0), ms(1450), ms(200)));
+        // It rested at 1300, before that was known.
+        assert!(!steps.shows_rest(ms(1450), ms(200)));
+        assert!(steps.shows_rest(ms(1500), ms(200)));
+        assert_eq!(steps.interval(ms(200)), ms(500));
+    }
+
+    #[test]
+    fn before_it_begins_a_step_is_not_over() {
+        let mut steps = Steps::default();
+        steps.begin(ms(1000));
+        assert!(steps.shows_last_rest(ms(1499), ms(500)));
+        assert!(!steps.shows_last_rest(ms(1500), ms(500)));
+        for now in [1150, 1300, 1450, 1600] {
+            assert!(!steps.position(at(1.0, 500.0), ms(now), ms(500)), "{now}");
+        }
+        assert!(steps.position(at(1.0, 500.0), ms(1750), ms(500)));
     }
 
     #[test]
     fn a_camera_that_does_not_tell_is_waited_for() {
         let mut steps = Steps::default();
         steps.begin(ms(1000));
-        assert!(!steps.position(None, ms(2000)));
-        assert!(steps.position(None, ms(4001)));
+        assert!(!steps.position(None, ms(2000), ms(200)));
+        assert!(steps.position(None, ms(4001), ms(200)));
         assert!(!steps.under_way());
     }
 }

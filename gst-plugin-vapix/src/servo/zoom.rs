@@ -37,6 +37,10 @@ impl ZoomController {
     /// Part of the error that is made good in a second: half of what pan and tilt do by default.
     const GAIN: f64 = 1.0;
 
+    /// A longer pause between two pictures counts as one of this length: there is never more than one in the window, and
+    /// it never fills it.
+    const PAUSE: Duration = Duration::from_millis(500);
+
     /// Logarithm of the magnification per second, at most ...
     const FASTEST: f64 = 0.6;
 
@@ -51,9 +55,6 @@ impl ZoomController {
 
     /// From a target that is growing or shrinking less than this, per second, the zoom may rest.
     const STEADY: f64 = 0.03;
-
-    /// A zoom from rest to rest aims at the target's height this much later: for as long at least it will do.
-    const STEP: Duration = Duration::from_millis(800);
 
     /// A target farther than this from the middle, in picture widths or heights, is not zoomed in on.
     const OFF_CENTRE: f64 = 0.25;
@@ -74,10 +75,17 @@ impl ZoomController {
                 self.sizes.clear();
             }
             self.sizes.push_back((sight.taken_at, size));
-            while self.sizes.front().is_some_and(|(first, _)| *first + Self::WINDOW < sight.taken_at) {
+            while self.seen_for() > Self::WINDOW {
                 self.sizes.pop_front();
             }
         }
+    }
+
+    /// How long the heights were watched, of each pause between two pictures a little only: during a move from rest to
+    /// rest there are none.
+    fn seen_for(&self) -> Duration {
+        let pairs = self.sizes.iter().zip(self.sizes.iter().skip(1));
+        pairs.map(|((before, _), (after, _))| (*after - *before).min(Self::PAUSE)).sum()
     }
 
     /// Forgets the target.
@@ -110,14 +118,16 @@ impl ZoomController {
         if self.view == Outlook::OffCentre { rate.min(0.0) } else { rate }
     }
 
-    /// By what factor to magnify at once, for a zoom from rest to rest; `None`: it is well as it is.
-    pub fn factor(&self, target_height: f64, magnification: f64) -> Option<f64> {
+    /// By what factor to magnify at once, for a zoom from rest to rest that is to be right `lead` after the last
+    /// picture, and whether that is worth a move of its own; `None`: it is well as it is.
+    pub fn factor(&self, target_height: f64, magnification: f64, lead: Duration) -> Option<(f64, bool)> {
         let error = match self.view {
             Outlook::Uncertain => -Self::WIDENING,
-            _ => target_height.ln() - magnification.ln() - self.size(Self::STEP)?.expected,
+            _ => target_height.ln() - magnification.ln() - self.size(lead)?.expected,
         };
         let allowed = if self.view == Outlook::OffCentre { error.min(0.0) } else { error };
-        (allowed.abs() > Self::START).then(|| allowed.clamp(-Self::FASTEST, Self::FASTEST).exp())
+        let factor = allowed.clamp(-Self::FASTEST, Self::FASTEST).exp();
+        (allowed.abs() > Self::REST).then_some((factor, allowed.abs() > Self::START))
     }
 
     fn size(&self, lead: Duration) -> Option<Size> {
@@ -202,17 +212,30 @@ mod tests {
         let mut zoom = seen(|_| 0.2);
         zoom.see(&Sight { visibility: Visibility::Predicted, ..target(0.2, 2000) }, 1.0);
         assert!(zoom.rate(0.3, 1.0, lead) < 0.0);
-        assert!(zoom.factor(0.3, 1.0).unwrap() < 1.0);
+        assert!(zoom.factor(0.3, 1.0, lead).unwrap().0 < 1.0);
         let cut = Rect { x: 0.45, y: 0.0, width: 0.1, height: 0.2 };
         zoom.see(&Sight { bounds: cut, ..target(0.2, 2040) }, 1.0);
         assert!(zoom.rate(0.3, 1.0, lead) < 0.0);
         let aside = Rect { x: 0.85, y: 0.4, width: 0.1, height: 0.2 };
         zoom.see(&Sight { bounds: aside, ..target(0.2, 2080) }, 1.0);
         assert_eq!(zoom.rate(0.3, 1.0, lead), 0.0);
-        assert_eq!(zoom.factor(0.3, 1.0), None);
+        assert_eq!(zoom.factor(0.3, 1.0, lead), None);
         zoom.see(&target(0.2, 2120), 1.0);
         assert!(zoom.rate(0.3, 1.0, lead) > 0.0);
-        assert!((zoom.factor(0.3, 1.0).unwrap() - 1.5).abs() < 0.05);
+        assert!((zoom.factor(0.3, 1.0, lead).unwrap().0 - 1.5).abs() < 0.05);
+    }
+
+    #[test]
+    fn growth_is_seen_across_a_pause() {
+        let mut zoom = ZoomController::default();
+        let trembling = |at: u64| 0.005 * ((at * 7919 % 100) as f64 / 50.0 - 1.0);
+        for at in (0..400).step_by(40).chain((1200..1300).step_by(40)) {
+            let height = 0.3 * (-0.3 * at as f64 / 1000.0 + trembling(at)).exp();
+            zoom.see(&target(height, at), 1.0);
+        }
+        let size = zoom.size(Duration::from_millis(500)).unwrap();
+        assert!((size.growth + 0.3).abs() < 0.02, "{}", size.growth);
+        assert!((size.expected - (0.3f64.ln() - 0.3 * 1.78)).abs() < 0.02, "{}", size.expected);
     }
 
     proptest! {

@@ -26,6 +26,8 @@ pub struct Jump {
     pub step: u16,
     /// By what that magnifies.
     pub factor: f64,
+    /// Whether it is worth a move of its own; else it goes along with one.
+    pub pressing: bool,
 }
 
 impl ZoomDrive {
@@ -94,14 +96,22 @@ impl ZoomDrive {
         Some((steps_s / self.track.full_step_s() * 100.0).round().clamp(-100.0, 100.0) as i8)
     }
 
-    /// The zoom to do at once; `None`: it is well as it is.
-    pub fn jump(&self, goal: &ZoomGoal, lens: &Lens, now: Duration, latency: Duration) -> Option<Jump> {
+    /// The zoom to do at once, for the height to be right `lead` after the last picture; `None`: it is well as it is.
+    pub fn jump(
+        &self,
+        goal: &ZoomGoal,
+        lens: &Lens,
+        latency: Duration,
+        now: Duration,
+        lead: Duration,
+    ) -> Option<Jump> {
         let step = self.track.step(now, delay(latency))?;
-        let factor = self.controller.factor(goal.target_height, lens.magnification(step))?;
+        let (factor, pressing) =
+            self.controller.factor(goal.target_height, lens.magnification(step), lead)?;
         let there = within(lens.step_magnified(step, factor)?, goal.steps).round();
         let factor = lens.magnification(there) / lens.magnification(step);
         // Less than a hundredth is what rounding leaves at the lens' ends.
-        ((factor - 1.0).abs() > 0.01).then_some(Jump { step: there as u16, factor })
+        ((factor - 1.0).abs() > 0.01).then_some(Jump { step: there as u16, factor, pressing })
     }
 }
 
@@ -166,10 +176,10 @@ mod tests {
     #[test]
     fn at_once_it_goes_where_the_height_is_right() {
         let (drive_, _, now) = drive(1.0, 0.25);
-        let Jump { step, factor } = drive_.jump(&GOAL, &lens(), now, LATENCY).unwrap();
+        let Jump { step, factor, .. } = drive_.jump(&GOAL, &lens(), LATENCY, now, LATENCY).unwrap();
         assert!((factor - 1.6).abs() < 0.01 && (lens().magnification(step.into()) - 1.6).abs() < 0.01);
         let (drive_, _, now) = drive(9999.0, 0.25);
-        assert_eq!(drive_.jump(&GOAL, &lens(), now, LATENCY), None);
+        assert_eq!(drive_.jump(&GOAL, &lens(), LATENCY, now, LATENCY), None);
     }
 
     #[test]

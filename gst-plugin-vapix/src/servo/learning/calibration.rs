@@ -173,8 +173,8 @@ mod tests {
                 prop_assert!(calibration.latency() <= Duration::from_millis(1600), "{:?}", calibration.latency());
                 prop_assert!((0.33..=3.01).contains(&calibration.field_factor()));
                 for step in [1, 10, 50, 100] {
-                    let (known, at_most) = (map.deg_s(step), 251.0 * assumed.deg_s(100));
-                    prop_assert!(known >= assumed.deg_s(step) / 251.0 && known <= at_most, "{step}: {known}");
+                    let (known, at_most) = (map.deg_s(step), 501.0 * assumed.deg_s(100));
+                    prop_assert!(known >= assumed.deg_s(step) / 501.0 && known <= at_most, "{step}: {known}");
                 }
             }
         }

@@ -4,7 +4,8 @@ use std::time::Duration;
 use super::{Regression, Turn};
 use crate::servo::{CommandHistory, PanTilt, SpeedMap};
 
-/// Learns how fast the speed steps really are, as a factor on the map that was assumed.
+/// Learns how fast the speed steps really are, as a factor on the map that was assumed: on its bare curve, as the kink
+/// of a floor that another curve has not is no straight line between any two steps.
 ///
 /// Its logarithm is the sum of an offset (the camera is faster as a whole), a slope over the logarithm of
 /// the step (another exponent: a linear camera taken for a cubic one), a slope over the logarithm of the
@@ -35,8 +36,8 @@ const MIDDLE_STEP: f64 = 20.0;
 const MIDDLE_FOV_DEG: f64 = 55.0;
 
 /// No speed is taken to be further than this factor from the assumed one: enough for a camera whose steps are in
-/// proportion where those of the same greatest speed were to grow by the cube.
-const LARGEST_FACTOR: f64 = 250.0;
+/// proportion where those of the same greatest speed were to grow by the cube, from a floor on: at step 5, by 400.
+const LARGEST_FACTOR: f64 = 500.0;
 
 /// Part of the prior's variance that is forgotten in a second.
 const FORGOTTEN_PER_S: f64 = 2e-4;
@@ -138,7 +139,10 @@ impl SpeedLearner {
             // Slower only as far as that is sure: a step that was never tried may fling the camera round.
             let cautious =
                 (logarithm + CAUTION * self.regression.deviation(&features)).min(0.0).max(logarithm);
-            cautious.clamp(-LARGEST_FACTOR.ln(), LARGEST_FACTOR.ln()).exp()
+            // Of what is really assumed, which for slow steps may be more than the curve has. What is no number bounds
+            // nothing.
+            let raised = assumed.deg_s(step as i8) / assumed.bare_deg_s(step as u8);
+            cautious.min((raised * LARGEST_FACTOR).ln()).max(-LARGEST_FACTOR.ln()).exp()
         })
     }
 
@@ -230,9 +234,10 @@ impl SpeedLearner {
     fn way(&self, about: &Seen, from: Duration, to: Duration) -> Option<Way> {
         let mut way = Way { degrees: 0.0, features: [0.0; FEATURES] };
         for (steps, seconds) in about.history.steps_between(from, to) {
-            let step = (about.axis.step)(steps).saturating_abs();
+            let step = (about.axis.step)(steps).unsigned_abs();
             let features = features(f64::from(step), about.fov_deg);
-            let degrees = about.maps.assumed.deg_s(step) * self.regression.predict(&features).exp() * seconds;
+            let degrees =
+                about.maps.assumed.bare_deg_s(step) * self.regression.predict(&features).exp() * seconds;
             way.degrees += degrees;
             for (sum, feature) in way.features.iter_mut().zip(features) {
                 *sum += degrees * feature;

@@ -113,7 +113,7 @@ impl Pilot {
         }
         match command {
             Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
-                self.steps.begin(now);
+                self.steps.begin(sent);
                 self.authority.excuse(now);
                 self.next_poll = now + Steps::POLL;
             }
@@ -319,10 +319,18 @@ impl Pilot {
         if let Some(place) = position.and(self.camera.pan_tilt()) {
             self.guard.told(at, place);
         }
-        self.zoom.told(at, position.and_then(|position| position.zoom_steps), self.calibration.latency());
-        if self.steps.position(position, now) {
+        let latency = self.calibration.latency();
+        let arrived = self.steps.position(position, now, latency);
+        if !self.steps.under_way() {
+            self.zoom.told(at, position.and_then(|position| position.zoom_steps), latency);
+        }
+        if arrived {
             self.scheduler.arrived();
             self.reports.push(Report::Stopped);
+            // It came before this was known.
+            if let Some(sight) = self.target.as_ref().map(|target| target.sight) {
+                self.measure(&sight, now);
+            }
         }
         self.next_poll = now
             + match (self.steps.under_way(), self.scheduler.may_move()) {

@@ -5,7 +5,7 @@ use std::time::Duration;
 use ptztrack_contract::Point;
 
 use super::{Pilot, Wish};
-use crate::servo::{ControlLaw, Mode, PanTilt, Report, Sight, View, ZoomGoal, around_deg, narrower};
+use crate::servo::{ControlLaw, Jump, Mode, PanTilt, Report, Sight, View, ZoomGoal, around_deg, narrower};
 use crate::vapix::Command;
 
 impl Pilot {
@@ -76,18 +76,17 @@ impl Pilot {
         }
         let view = self.view(sight);
         let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
-        let jump = self
-            .zoom_goal()
-            .and_then(|goal| self.zoom.jump(&goal, &self.camera.lens()?, now, self.calibration.latency()));
+        let jump = self.jump(sight, now);
+        let zooms = jump.is_some_and(|jump| jump.pressing);
         let dead_zone_deg = self.settings.dead_zone * view.horizontal_fov_deg;
-        if error.largest() <= dead_zone_deg && jump.is_none() {
+        if error.largest() <= dead_zone_deg && !zooms {
             return Wish::AsIs;
         }
         let position = self.camera.pan_tilt();
         let turn = self.limited(error, position, 1.0);
         // An axis that is at its end is no reason to correct the other by next to nothing.
         let worth = |error: f64, turn: f64| error.abs() > dead_zone_deg && turn != 0.0;
-        if !worth(error.pan, turn.pan) && !worth(error.tilt, turn.tilt) && jump.is_none() {
+        if !worth(error.pan, turn.pan) && !worth(error.tilt, turn.tilt) && !zooms {
             return Wish::AsIs;
         }
         match mode {
@@ -99,6 +98,24 @@ impl Pilot {
                 Wish::Move(absolute(position + turn, self.camera.move_speed, jump.map(|jump| jump.step)))
             }),
         }
+    }
+
+    /// Finds how tall the target is, to zoom by.
+    pub(super) fn measure(&mut self, sight: &Sight, now: Duration) {
+        let latency = self.calibration.latency();
+        // How much a picture is magnified nobody knows while a step is under way.
+        let known = self.mode(now) == Mode::Velocity || self.steps.shows_last_rest(sight.taken_at, latency);
+        if self.settings.target_height.is_some() && known {
+            self.zoom.see(sight, &self.lens(), latency);
+        }
+    }
+
+    /// How a step is to zoom: so that the height is right half way to the next one.
+    fn jump(&self, sight: &Sight, now: Duration) -> Option<Jump> {
+        let latency = self.calibration.latency();
+        let shown_after = now.saturating_sub(sight.taken_at) + latency;
+        let lead = shown_after + self.steps.interval(latency) / 2;
+        self.zoom.jump(&self.zoom_goal()?, &self.camera.lens()?, latency, now, lead)
     }
 
     fn report_limit(&mut self) {
