@@ -3,7 +3,10 @@
 
 mod common;
 
-use common::{Heard, Rig, camera, init, target};
+use std::sync::Barrier;
+use std::time::Instant;
+
+use common::{Heard, PATIENCE, Rig, camera, init, target};
 use gst::prelude::*;
 use ptztrack_contract::TargetState;
 use virtual_camera::Auth;
@@ -161,4 +164,52 @@ fn any_layout_of_the_pixels_is_welcome() {
     pad.set_active(true).unwrap();
     assert!(pad.query(&mut query));
     assert!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some());
+}
+
+/// As an application's handler of messages may.
+#[test]
+fn what_is_set_while_it_starts_counts() {
+    let camera = camera(Auth::Basic);
+    let rig = Rig::ready(&camera.url()).with("pan-min", 50.0).with("pan-max", -50.0);
+    let sink = rig.sink.clone();
+    rig.bus.set_sync_handler(move |_, message| {
+        if message.type_() == gst::MessageType::Warning {
+            sink.set_property("user", "root");
+            sink.set_property("password", "pass");
+        }
+        gst::BusSyncReply::Pass
+    });
+    let mut rig = rig.play();
+    rig.set_going(&camera);
+    // It holds the sink, which holds the bus.
+    rig.bus.unset_sync_handler();
+}
+
+#[test]
+fn of_two_who_set_at_once_the_servo_hears_the_last() {
+    let camera = camera(Auth::None);
+    let rig = Rig::playing(&camera.url());
+    let mode = || {
+        let value = rig.sink.property_value("mode");
+        glib::EnumValue::from_value(&value).unwrap().1.nick().to_owned()
+    };
+    for _ in 0..300 {
+        let barrier = Barrier::new(2);
+        std::thread::scope(|scope| {
+            for names in [["velocity", "centre"], ["absolute", "velocity"]] {
+                let (barrier, sink) = (&barrier, &rig.sink);
+                scope.spawn(move || {
+                    barrier.wait();
+                    for name in names.into_iter().cycle().take(20) {
+                        sink.set_property_from_str("mode", name);
+                    }
+                });
+            }
+        });
+        let start = Instant::now();
+        while rig.stats().get::<&str>("mode").unwrap() != mode() {
+            assert!(start.elapsed() < PATIENCE, "{} is set", mode());
+            std::thread::yield_now();
+        }
+    }
 }
