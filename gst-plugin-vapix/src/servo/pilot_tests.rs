@@ -208,6 +208,31 @@ fn a_failed_stop_is_repeated() {
 }
 
 #[test]
+fn what_a_predecessor_left_is_stopped_twice() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.pilot.inherit(Command::REST, rig.now);
+    assert_eq!(rig.after(ms(0)), [Command::REST]);
+    assert!(rig.pilot.is_at_rest() && !rig.pilot.stays_at_rest());
+    assert_eq!(rig.after(ms(5000)), []);
+    assert_eq!(rig.after(ms(1000)), [Command::REST], "he may have said something that acts late");
+    assert!(rig.pilot.stays_at_rest());
+    assert_eq!(rig.after(ms(60_000)), []);
+}
+
+#[test]
+fn a_camera_that_hears_is_stopped_before_we_are_somebody_else() {
+    let mut rig = Rig::new(ServoSettings::default());
+    assert_eq!(rig.pilot.parting_stop(), None);
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    assert_eq!(rig.pilot.parting_stop(), Some(Command::Halt));
+    rig.see(0.1, 0.5);
+    rig.now += ms(200);
+    rig.run(|_| Err(Error::BadCredentials { user: "root".to_owned() }));
+    assert_eq!(rig.pilot.parting_stop(), None, "nor would it listen");
+}
+
+#[test]
 fn wrong_credentials_end_all_asking_until_they_change() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.see(0.9, 0.5);

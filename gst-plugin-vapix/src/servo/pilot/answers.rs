@@ -105,7 +105,7 @@ impl Pilot {
                 if let Some(zoom) = zoom {
                     self.zoom.commanded(sent, *zoom);
                 }
-                if *zoom == Some(0) && self.stop == Command::REST {
+                if *zoom == Some(0) && self.stop == Command::REST && !self.scheduler.in_doubt() {
                     self.stop = Command::Halt;
                 }
             }

@@ -93,6 +93,24 @@ fn who_finds_the_queue_full_after_an_outage_stops_the_camera() {
     }
 }
 
+#[test]
+fn the_place_is_kept_for_the_second_stop_of_an_unanswered_move() {
+    let mut rig = Rig::turning_in_turn();
+    let in_turn = |job: &Job| queued(Some(1), true)(job);
+    rig.aside(ms(2500), |job| match job {
+        Job::Command(_) => Some(Err(Error::Timeout(ms(1)))),
+        Job::Query(_) => in_turn(job),
+    });
+    rig.pilot.rest();
+    rig.pilot.leave();
+    rig.now += ms(1000);
+    rig.run_jobs(in_turn);
+    assert!(rig.pilot.is_at_rest() && rig.pilot.is_queued());
+    rig.now += ms(6000);
+    rig.run_jobs(in_turn);
+    assert!(rig.pilot.stays_at_rest() && !rig.pilot.is_queued());
+}
+
 fn at(pan_deg: f64) -> Said {
     let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom_steps: Some(1.0) };
     Some(Ok(Answer::Position(position)))
