@@ -38,6 +38,8 @@ pub struct Pilot {
     zoom: ZoomDrive,
     target: Option<Target>,
     introduction: Introduction,
+    /// What was last told of it.
+    met_as: Option<String>,
     next_poll: Duration,
     /// When the camera last answered a question, or did not.
     asked_at: Duration,
@@ -112,6 +114,7 @@ impl Pilot {
             zoom: ZoomDrive::default(),
             target: None,
             introduction: Introduction::default(),
+            met_as: None,
             next_poll: Duration::ZERO,
             asked_at: Duration::ZERO,
             speed_steps: (0, 0),
@@ -152,6 +155,9 @@ impl Pilot {
     /// The camera may be asked anew: who we are has changed.
     pub fn credentials_changed(&mut self) {
         self.link = Link::default();
+        self.introduction.renew();
+        self.authority.queue.permitted();
+        self.next_poll = Duration::ZERO;
     }
 
     /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.

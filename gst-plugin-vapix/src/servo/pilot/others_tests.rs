@@ -1,6 +1,7 @@
 //! The camera in others' hands, or perhaps in others' hands.
 
 use super::*;
+use crate::servo::Holder;
 use crate::vapix::{Parameters, QueuePlace};
 
 type Said = Option<Result<Answer, Error>>;
@@ -90,6 +91,12 @@ fn who_finds_the_queue_full_after_an_outage_stops_the_camera() {
         assert_eq!(rig.pilot.is_at_rest(), takes_stops);
         let sent = rig.aside(ms(20_000), queued(None, takes_stops));
         assert!(sent.len() <= 5 && sent.iter().all(Command::is_stop), "{sent:?}");
+        let taken = Report::TakenOver(Holder::Queue);
+        assert_eq!(rig.reports().iter().filter(|report| **report == taken).count(), 1);
+        assert!(rig.pilot.status(rig.now).taken_over);
+        let sent = rig.aside(ms(6000), queued(Some(1), true));
+        assert!(sent.iter().any(|command| !command.is_stop()), "{sent:?}");
+        assert!(rig.reports().contains(&Report::Resumed) && !rig.pilot.status(rig.now).taken_over);
     }
 }
 
