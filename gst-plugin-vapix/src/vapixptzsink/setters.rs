@@ -150,3 +150,36 @@ servo_setters! { change_limits:
     set_zoom_min: zoom_min, u32;
     set_zoom_max: zoom_max, u32;
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gst::prelude::*;
+
+    /// Else of two that come at once the worker may be left with the older.
+    #[test]
+    fn nobody_changes_anything_before_the_worker_has_heard_of_the_last_change() {
+        gst::init().unwrap();
+        for (name, value) in [("gain", 7.0.to_send_value()), ("password", "pass".to_send_value())] {
+            let sink = glib::Object::new::<super::super::VapixPtzSink>();
+            let (sink, imp) = (&sink, sink.imp());
+            std::thread::scope(|scope| {
+                // Nothing comes to the worker.
+                let worker = lock(&imp.worker);
+                scope.spawn(move || sink.set_property_from_value(name, &value));
+                let mut barred = 0;
+                while barred < 1000 {
+                    std::thread::yield_now();
+                    barred = match imp.settings.try_lock() {
+                        Ok(settings) => {
+                            assert!(settings.gain != 7.0 && settings.password.is_none(), "{name}");
+                            0
+                        }
+                        Err(_) => barred + 1,
+                    };
+                }
+                drop(worker);
+            });
+        }
+    }
+}
