@@ -267,4 +267,34 @@ mod tests {
         queue.forget();
         assert_eq!(queue.next(true), Some((QueueRequest::Request, s(0))));
     }
+
+    #[test]
+    fn a_queue_that_lets_nobody_in_is_in_others_hands_and_one_that_is_silent_is_not() {
+        let mut queue = ControlQueue::default();
+        assert!(queue.refused(s(0)));
+        queue.turned_away(s(0));
+        assert!(!queue.is_held(), "there may be none");
+        queue.told(Some(true));
+        queue.failed(s(1));
+        assert!(!queue.is_held());
+        queue.turned_away(s(6));
+        assert!(queue.is_held() && !queue.lets_us());
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(6) + ControlQueue::PAUSE)));
+        queue.answered(QueueRequest::Request, place(1), s(11));
+        assert!(!queue.is_held() && queue.lets_us());
+        queue.leave();
+        queue.turned_away(s(12));
+        assert!(!queue.is_held(), "we are on our way out");
+    }
+
+    #[test]
+    fn a_queue_that_was_switched_off_holds_nobody() {
+        let mut queue = ControlQueue::default();
+        queue.told(Some(true));
+        queue.turned_away(s(0));
+        queue.told(None);
+        assert!(queue.is_held());
+        queue.told(Some(false));
+        assert!(!queue.is_held() && queue.lets_us() && queue.next(true).is_none());
+    }
 }

@@ -37,7 +37,7 @@ struct Stream {
     lockstep: bool,
 }
 
-/// No lock is held while anything is posted, pushed or waited for. Of all locks only these are held together, in this
+/// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
 /// order: `settings`, `worker`, so that changes come to the worker in the order in which they were made.
 #[derive(Default, Properties)]
 #[properties(wrapper_type = super::VapixPtzSink)]
