@@ -6,6 +6,7 @@ mod common;
 use std::time::Duration;
 
 use common::{Heard, Rig, camera, target};
+use gst::prelude::*;
 use ptztrack_contract::TargetState;
 use virtual_camera::{Auth, Settings, VirtualCamera};
 
@@ -60,4 +61,20 @@ fn a_camera_that_wants_credentials_gets_none() {
     let Some(Heard::Warning(text)) = heard.last() else { panic!("{heard:?}") };
     assert!(text.contains("`user` and `password`"), "{text}");
     assert_eq!(camera.status().refused, 1);
+}
+
+/// With a wrong one nobody can.
+#[test]
+fn a_camera_that_turns_is_stopped_before_the_password_changes() {
+    let camera = camera(Auth::Digest { qop: true });
+    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    rig.set_going(&camera);
+    rig.sink.set_property("password", "falsch");
+    rig.push_until(&target(TargetState::Tracking, 0.9, 0.4), &camera, |status| !status.moving);
+    let here = target(TargetState::Tracking, 0.9, 0.4);
+    let heard = rig.push_until_message(&here, Heard::is_warning);
+    assert!(matches!(heard.last(), Some(Heard::Warning(text)) if text.contains("refuses user")), "{heard:?}");
+    assert!(!camera.status().moving);
+    rig.sink.set_property("password", "pass");
+    rig.set_going(&camera);
 }

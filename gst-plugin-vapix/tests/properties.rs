@@ -162,3 +162,24 @@ fn any_layout_of_the_pixels_is_welcome() {
     assert!(pad.query(&mut query));
     assert!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some());
 }
+
+/// As an application's handler of messages may.
+#[test]
+fn what_is_set_while_it_starts_counts() {
+    let camera = camera(Auth::Basic);
+    let rig = Rig::ready(&camera.url()).with("pan-min", 50.0).with("pan-max", -50.0);
+    let sink = rig.sink.clone();
+    rig.bus.set_sync_handler(move |_, message| {
+        if let gst::MessageView::Warning(warning) = message.view()
+            && warning.error().message().contains("pan-min")
+        {
+            sink.set_property("user", "root");
+            sink.set_property("password", "pass");
+        }
+        gst::BusSyncReply::Pass
+    });
+    let mut rig = rig.play();
+    rig.set_going(&camera);
+    // It holds the sink, which holds the bus.
+    rig.bus.unset_sync_handler();
+}

@@ -63,6 +63,11 @@ impl CameraModel {
         self.lens_or_fixed(wide_fov_deg).fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
     }
 
+    /// The same, zoomed out.
+    pub fn fov_zoomed_out_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
+        self.lens_or_fixed(wide_fov_deg).fov_deg(OPTICAL_STEPS.min)
+    }
+
     /// Whether it told its field of view.
     pub fn tells_fov(&self) -> bool {
         self.limits().field_angle_deg.is_some()

@@ -23,6 +23,8 @@ enum State {
     Unknown,
     /// There is none.
     Absent,
+    /// We may not ask: whether it is our turn shows when we move the camera.
+    Forbidden,
     /// The camera refused something, as it would in others' hands: perhaps there is one.
     Presumed,
     /// There is one, and we are not in it.
@@ -37,11 +39,14 @@ impl ControlQueue {
     /// A camera that names no time, or does not answer, is asked again after this.
     const PAUSE: Duration = Duration::from_secs(5);
 
-    /// The camera's parameters tell whether there is a queue.
+    /// The camera's parameters tell whether there is a queue; what it refused is a better witness.
     pub fn told(&mut self, queueing: Option<bool>) {
         match (queueing, self.state) {
             (Some(true), State::Unknown | State::Absent) => self.state = State::Outside,
             (Some(false), State::Unknown) => self.state = State::Absent,
+            (Some(false), _) if self.exists() => {
+                *self = Self { state: State::Absent, held: false, deaf: false, ..*self };
+            }
             _ => {}
         }
     }
@@ -78,7 +83,7 @@ impl ControlQueue {
     pub fn next(&self, at_rest: bool) -> Option<(QueueRequest, Duration)> {
         let leaving = self.leaving && at_rest;
         match self.state {
-            State::Unknown | State::Absent => None,
+            State::Unknown | State::Absent | State::Forbidden => None,
             State::Waiting | State::InControl if leaving => Some((QueueRequest::Drop, Duration::ZERO)),
             _ if leaving => None,
             State::Presumed | State::Outside => Some((QueueRequest::Request, self.ask_at)),
@@ -101,16 +106,29 @@ impl ControlQueue {
         self.ask_at = now + place.map_or(Self::PAUSE, |place| place.poll_every) / 2;
     }
 
-    /// The camera refused to say.
+    /// The camera did not say.
     pub fn failed(&mut self, now: Duration) {
         self.state = if self.state == State::Presumed { State::Absent } else { State::Outside };
         self.ask_at = now + Self::PAUSE;
         self.deaf = false;
     }
 
-    /// We may not ask: whether it is our turn shows when we move the camera.
+    /// The camera refused to let us in: so many are before us that there is no place.
+    pub fn turned_away(&mut self, now: Duration) {
+        self.failed(now);
+        self.held = self.exists() && !self.leaving;
+    }
+
+    /// We may not ask.
     pub fn forbidden(&mut self) {
-        (self.state, self.held) = (State::Absent, false);
+        (self.state, self.held) = (State::Forbidden, false);
+    }
+
+    /// Now we may perhaps.
+    pub fn permitted(&mut self) {
+        if self.state == State::Forbidden {
+            self.state = State::Unknown;
+        }
     }
 
     /// The connection was lost, and may be with it our place.
@@ -136,12 +154,12 @@ impl ControlQueue {
     }
 
     fn exists(&self) -> bool {
-        !matches!(self.state, State::Unknown | State::Absent | State::Presumed)
+        matches!(self.state, State::Outside | State::Waiting | State::InControl)
     }
 
     /// Whether we may move the camera.
     pub fn lets_us(&self) -> bool {
-        matches!(self.state, State::Unknown | State::Absent | State::InControl)
+        !matches!(self.state, State::Presumed | State::Outside | State::Waiting)
     }
 }
 
@@ -248,5 +266,35 @@ mod tests {
         queue.answered(QueueRequest::Request, place(1), s(0));
         queue.forget();
         assert_eq!(queue.next(true), Some((QueueRequest::Request, s(0))));
+    }
+
+    #[test]
+    fn a_queue_that_lets_nobody_in_is_in_others_hands_and_one_that_is_silent_is_not() {
+        let mut queue = ControlQueue::default();
+        assert!(queue.refused(s(0)));
+        queue.turned_away(s(0));
+        assert!(!queue.is_held(), "there may be none");
+        queue.told(Some(true));
+        queue.failed(s(1));
+        assert!(!queue.is_held());
+        queue.turned_away(s(6));
+        assert!(queue.is_held() && !queue.lets_us());
+        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(6) + ControlQueue::PAUSE)));
+        queue.answered(QueueRequest::Request, place(1), s(11));
+        assert!(!queue.is_held() && queue.lets_us());
+        queue.leave();
+        queue.turned_away(s(12));
+        assert!(!queue.is_held(), "we are on our way out");
+    }
+
+    #[test]
+    fn a_queue_that_was_switched_off_holds_nobody() {
+        let mut queue = ControlQueue::default();
+        queue.told(Some(true));
+        queue.turned_away(s(0));
+        queue.told(None);
+        assert!(queue.is_held());
+        queue.told(Some(false));
+        assert!(!queue.is_held() && queue.lets_us() && queue.next(true).is_none());
     }
 }

@@ -3,18 +3,31 @@ use std::time::Duration;
 
 use super::Query;
 
-/// What is still to be asked of a camera just met.
+/// What is still to be asked of the camera, just met or met again.
 #[derive(Debug)]
 pub struct Introduction {
-    /// Each with how often it went unanswered.
-    pending: VecDeque<(Query, u32)>,
+    pending: VecDeque<Pending>,
     next_at: Duration,
+}
+
+#[derive(Debug)]
+struct Pending {
+    query: Query,
+    /// How often it went unanswered.
+    tries: u32,
+    /// The camera is not to be moved before it was asked this.
+    vital: bool,
+}
+
+impl Pending {
+    fn new(query: Query) -> Self {
+        Self { query, tries: 0, vital: matches!(query, Query::Position | Query::Limits) }
+    }
 }
 
 impl Default for Introduction {
     fn default() -> Self {
-        let pending = Query::INTRODUCTION.into_iter().map(|query| (query, 0)).collect();
-        Self { pending, next_at: Duration::ZERO }
+        Self { pending: Query::INTRODUCTION.map(Pending::new).into(), next_at: Duration::ZERO }
     }
 }
 
@@ -27,30 +40,41 @@ impl Introduction {
 
     /// What to ask next, and when.
     pub fn next(&self) -> Option<(Query, Duration)> {
-        self.pending.front().map(|(query, _)| (*query, self.next_at))
+        self.pending.front().map(|pending| (pending.query, self.next_at))
     }
 
     /// Whether this is still to be asked.
     pub fn holds(&self, query: Query) -> bool {
-        self.pending.iter().any(|(pending, _)| *pending == query)
+        self.pending.iter().any(|pending| pending.query == query)
     }
 
     /// Whether the camera was not asked yet where it looks and how far it can, without which it is not to be moved.
     pub fn comes_first(&self) -> bool {
-        let vital = |query: Query| matches!(query, Query::Position | Query::Limits);
-        self.pending.iter().any(|(query, unanswered)| vital(*query) && *unanswered == 0)
+        self.pending.iter().any(|pending| pending.vital)
     }
 
     /// This is to be asked before all else.
     pub fn ask_first(&mut self, query: Query) {
-        self.pending.retain(|(pending, _)| *pending != query);
-        self.pending.push_front((query, 0));
+        self.done(query);
+        self.pending.push_front(Pending::new(query));
+    }
+
+    /// All is to be asked once more, while the camera is moved by what it told before. Where it looks it is asked anyway.
+    pub fn renew(&mut self) {
+        for pending in &mut self.pending {
+            pending.tries = 0;
+        }
+        for query in Query::INTRODUCTION {
+            if query != Query::Position && !self.holds(query) {
+                self.pending.push_back(Pending { vital: false, ..Pending::new(query) });
+            }
+        }
     }
 
     /// This need not be asked again. Returns whether it was the last.
     pub fn done(&mut self, query: Query) -> bool {
         let before = self.pending.len();
-        self.pending.retain(|(pending, _)| *pending != query);
+        self.pending.retain(|pending| pending.query != query);
         before > 0 && self.pending.is_empty()
     }
 
@@ -58,15 +82,15 @@ impl Introduction {
     /// Returns whether nothing is left to ask.
     pub fn unanswered(&mut self, query: Query, counts: bool, now: Duration) -> bool {
         self.next_at = now + Self::PAUSE;
-        let Some(index) = self.pending.iter().position(|(pending, _)| *pending == query) else {
+        let Some(index) = self.pending.iter().position(|pending| pending.query == query) else {
             return false;
         };
-        let tries = self.pending[index].1 + u32::from(counts);
+        let tries = self.pending[index].tries + u32::from(counts);
         let last = self.done(query);
         if tries >= Self::TRIES {
             return last;
         }
-        self.pending.push_back((query, tries));
+        self.pending.push_back(Pending { query, tries, vital: false });
         false
     }
 }
@@ -102,5 +126,26 @@ mod tests {
         introduction.ask_first(Query::Parameters);
         assert_eq!(introduction.next(), Some((Query::Parameters, Duration::ZERO)));
         assert!(!introduction.done(Query::Parameters) && !introduction.holds(Query::Parameters));
+    }
+
+    #[test]
+    fn all_is_asked_once_more_without_keeping_the_camera_from_being_moved() {
+        let mut introduction = Introduction::default();
+        introduction.renew();
+        assert!(introduction.comes_first(), "it was not asked at all yet");
+        for query in Query::INTRODUCTION {
+            introduction.done(query);
+        }
+        for query in [Query::Limits, Query::Attributes, Query::Parameters, Query::MoveSpeed] {
+            introduction.renew();
+            assert!(introduction.holds(query) && !introduction.holds(Query::Position));
+            assert!(!introduction.comes_first());
+            introduction.done(query);
+        }
+        introduction.unanswered(Query::Limits, true, NOW);
+        introduction.unanswered(Query::Limits, true, NOW);
+        introduction.renew();
+        introduction.unanswered(Query::Limits, true, NOW);
+        assert!(introduction.holds(Query::Limits), "the tries are counted anew");
     }
 }

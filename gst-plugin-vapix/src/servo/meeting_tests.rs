@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::aim::tests::sight;
 use super::{Answer, Home, Job, LinkChange, Next, Pilot, Query, Report, ServoSettings, Sight, Visibility};
-use crate::vapix::{Command, Error, Limits, Parameters, Position, Presets, Range};
+use crate::vapix::{Command, Error, Limits, Parameters, Position, Presets, QueueRequest, Range};
 
 fn ms(ms: u64) -> Duration {
     Duration::from_millis(ms)
@@ -150,6 +150,83 @@ fn an_outage_takes_no_knowledge_away() {
     meeting.run((10, ms(0)), nobody, told);
     let text = meeting.met().unwrap();
     assert!(text.starts_with("pan -170 to 170") && text.contains("not proportional"), "{text}");
+}
+
+#[test]
+fn what_a_starting_camera_refused_to_tell_is_asked_after_its_first_outage() {
+    for err in [refused(), Error::NoPtz, Error::Status { status: 404, reason: "Not Found" }, starting()] {
+        let mut meeting = Meeting::new(ServoSettings::default());
+        meeting.run((20, ms(0)), nobody, |job| match job {
+            Job::Query(Query::Position) => told(job),
+            _ => Err(err.clone()),
+        });
+        assert!(meeting.met().is_some_and(|text| text.contains("pan not told")), "{err}");
+        meeting.reports.clear();
+        meeting.run((10, ms(0)), nobody, |_| Err(timeout()));
+        meeting.run((10, ms(0)), nobody, told);
+        let text = meeting.met().unwrap();
+        assert!(text.starts_with("pan -170 to 170") && text.contains("not proportional"), "{err}: {text}");
+    }
+}
+
+#[test]
+fn after_an_outage_all_is_asked_and_only_what_is_new_is_told() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    let outage = |meeting: &mut Meeting, answer: fn(&Job) -> Result<Answer, Error>| {
+        meeting.reports.clear();
+        meeting.run((20, ms(0)), nobody, |_| Err(timeout()));
+        meeting.run((20, ms(0)), nobody, answer);
+    };
+    meeting.run((10, ms(0)), nobody, told);
+    assert!(meeting.met().is_some());
+    outage(&mut meeting, told);
+    assert_eq!((meeting.met(), meeting.asked(Query::Limits), meeting.asked(Query::MoveSpeed)), (None, 2, 2));
+    outage(&mut meeting, |job| match job {
+        Job::Query(Query::Limits) => {
+            Ok(Answer::Limits(Limits { pan_deg: Some(Range { min: -90.0, max: 90.0 }), ..Limits::default() }))
+        }
+        Job::Query(Query::Position) => told(job),
+        _ => Err(refused()),
+    });
+    let text = meeting.met().unwrap();
+    assert!(text.starts_with("pan -90 to 90") && text.contains("not proportional"), "{text}");
+}
+
+/// It has been asked before.
+#[test]
+fn after_an_outage_the_first_move_waits_for_no_question() {
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((10, ms(100)), somebody, told);
+    meeting.run((10, ms(100)), somebody, |_| Err(timeout()));
+    let before = meeting.jobs.len();
+    meeting.run((10, ms(100)), somebody, told);
+    assert!(meeting.jobs[before..before + 3].iter().any(|job| matches!(job, Job::Command(_))));
+    assert_eq!(meeting.asked(Query::Limits), 2);
+}
+
+#[test]
+fn another_user_may_ask_what_the_last_might_not() {
+    let forbidden = || Err(Error::NotPermitted { user: "root".to_owned() });
+    let queueing = |job: &Job| match job {
+        Job::Query(Query::Parameters) => {
+            Ok(Answer::Parameters(Parameters { control_queue: Some(true), ..Parameters::default() }))
+        }
+        _ => told(job),
+    };
+    let asked_for_control = |meeting: &Meeting| meeting.asked(Query::Queue(QueueRequest::Request));
+    let mut meeting = Meeting::new(ServoSettings::default());
+    meeting.run((10, ms(0)), nobody, |job| match job {
+        Job::Query(Query::Position | Query::Parameters) => queueing(job),
+        _ => forbidden(),
+    });
+    assert_eq!((meeting.asked(Query::Limits), asked_for_control(&meeting)), (1, 1));
+    meeting.run((10, ms(0)), nobody, |_| Err(timeout()));
+    meeting.run((10, ms(0)), nobody, queueing);
+    assert_eq!(asked_for_control(&meeting), 1, "who may not does not try again: it counts as a wrong login");
+    meeting.reports.clear();
+    meeting.pilot.credentials_changed();
+    meeting.run((10, ms(0)), nobody, queueing);
+    assert_eq!((meeting.asked(Query::Limits), asked_for_control(&meeting)), (3, 3));
 }
 
 #[test]

@@ -38,6 +38,8 @@ pub struct Pilot {
     zoom: ZoomDrive,
     target: Option<Target>,
     introduction: Introduction,
+    /// What was last told of it.
+    met_as: Option<String>,
     next_poll: Duration,
     /// When the camera last answered a question, or did not.
     asked_at: Duration,
@@ -117,6 +119,7 @@ impl Pilot {
             zoom: ZoomDrive::default(),
             target: None,
             introduction: Introduction::default(),
+            met_as: None,
             next_poll: Duration::ZERO,
             asked_at: Duration::ZERO,
             speed_steps: (0, 0),
@@ -160,6 +163,15 @@ impl Pilot {
     /// The camera may be asked anew: who we are has changed.
     pub fn credentials_changed(&mut self) {
         self.link = Link::default();
+        self.introduction.renew();
+        self.authority.queue.permitted();
+        self.next_poll = Duration::ZERO;
+    }
+
+    /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.
+    pub fn parting_stop(&self) -> Option<Command> {
+        let is_heard = !self.link.halted() && !self.authority.queue.is_deaf();
+        (is_heard && !self.is_at_rest()).then_some(self.stop)
     }
 
     /// Takes the newest picture of the target.
@@ -205,9 +217,9 @@ impl Pilot {
     }
 
     /// A predecessor left the camera in a move that this ends.
-    pub fn inherit(&mut self, stop: Command) {
+    pub fn inherit(&mut self, stop: Command, now: Duration) {
         self.stop = stop;
-        self.scheduler.found_moving();
+        self.scheduler.inherited(now);
     }
 
     /// What ends the last move.
@@ -272,7 +284,7 @@ impl Pilot {
         // Of what is due the first; else what will be soonest.
         let questions = self.introduction.next().into_iter().chain(presets);
         let (query, at) = questions.chain([poll]).min_by_key(|(_, at)| (*at).max(now)).unwrap_or(poll);
-        match self.authority.queue.next(self.is_at_rest()) {
+        match self.authority.queue.next(self.stays_at_rest()) {
             Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),
             _ => (query, at),
         }
@@ -305,6 +317,11 @@ impl Pilot {
     /// Whether the camera does not move on our behalf, as far as can be known.
     pub fn is_at_rest(&self) -> bool {
         !self.scheduler.may_move()
+    }
+
+    /// Whether it rests for good: nothing that went unanswered can set it going any more.
+    pub fn stays_at_rest(&self) -> bool {
+        self.is_at_rest() && !self.scheduler.in_doubt()
     }
 
     /// Pictures of the target that came while a request was in flight, and were followed by newer ones in that time.

@@ -11,7 +11,7 @@ use super::*;
 use crate::servo::Answer;
 use crate::servo::LinkChange;
 use crate::servo::aim::tests::sight;
-use crate::vapix::{Error, Limits, Position, Range};
+use crate::vapix::{Attributes, Error, Limits, Position, Range, StepMeaning};
 use proptest::prelude::*;
 
 fn ms(ms: u64) -> Duration {
@@ -207,6 +207,60 @@ fn a_failed_stop_is_repeated() {
         .filter(|report| matches!(report, Report::Link(LinkChange::Disconnected(_))))
         .count();
     assert_eq!(disconnected, 1);
+}
+
+#[test]
+fn what_a_predecessor_left_is_stopped_twice() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.pilot.inherit(Command::REST, rig.now);
+    assert_eq!(rig.after(ms(0)), [Command::REST]);
+    assert!(rig.pilot.is_at_rest() && !rig.pilot.stays_at_rest());
+    assert_eq!(rig.after(ms(5000)), []);
+    assert_eq!(rig.after(ms(1000)), [Command::REST], "he may have said something that acts late");
+    assert!(rig.pilot.stays_at_rest());
+    assert_eq!(rig.after(ms(60_000)), []);
+}
+
+#[test]
+fn a_camera_that_hears_is_stopped_before_we_are_somebody_else() {
+    let mut rig = Rig::new(ServoSettings::default());
+    assert_eq!(rig.pilot.parting_stop(), None);
+    rig.see(0.9, 0.5);
+    rig.after(ms(0));
+    assert_eq!(rig.pilot.parting_stop(), Some(Command::Halt));
+    rig.see(0.1, 0.5);
+    rig.now += ms(200);
+    rig.run(|_| Err(Error::BadCredentials { user: "root".to_owned() }));
+    assert_eq!(rig.pilot.parting_stop(), None, "nor would it listen");
+}
+
+#[test]
+fn what_was_learned_outlives_the_same_answers_and_no_others() {
+    let mut rig = Rig::new(ServoSettings::default());
+    let limits = |wide| Limits { field_angle_deg: Some(Range { min: 3.2, max: wide }), ..Limits::default() };
+    let attributes = |fastest| Attributes {
+        speeds: [(1.0, 0.05), (100.0, fastest)].map(|(step, value)| StepMeaning { step, value }).to_vec(),
+        ..Attributes::default()
+    };
+    let tell = |rig: &mut Rig, query, answer| {
+        rig.pilot.answered(&Job::Query(query), Ok(answer), rig.now, rig.now);
+        format!("{:?}", rig.pilot.calibration)
+    };
+    tell(&mut rig, Query::Limits, Answer::Limits(limits(60.0)));
+    tell(&mut rig, Query::Attributes, Answer::Attributes(attributes(150.0)));
+    for step in 0..100 {
+        rig.pilot.calibration.positioned(rig.now, PanTilt::new(0.1 * f64::from(step), 0.0));
+        let ego_velocity = Some(ptztrack_contract::Vector { x: -0.02, y: 0.0 });
+        rig.pilot.see(Sight { ego_velocity, ..sight(0.9, 0.5, rig.now) }, rig.now);
+        rig.after(ms(40));
+    }
+    let learned = format!("{:?}", rig.pilot.calibration);
+    assert_eq!(tell(&mut rig, Query::Limits, Answer::Limits(limits(60.0))), learned);
+    assert_eq!(tell(&mut rig, Query::Attributes, Answer::Attributes(attributes(150.0))), learned);
+    let without_field = tell(&mut rig, Query::Limits, Answer::Limits(limits(50.0)));
+    assert_ne!(without_field, learned);
+    let without_speeds = tell(&mut rig, Query::Attributes, Answer::Attributes(attributes(90.0)));
+    assert_ne!(without_speeds, without_field);
 }
 
 #[test]

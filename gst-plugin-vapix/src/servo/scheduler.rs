@@ -82,9 +82,20 @@ impl Scheduler {
         self.stop_tried = false;
     }
 
+    /// The same, and not all that he said may have been acted on yet.
+    pub fn inherited(&mut self, now: Duration) {
+        self.found_moving();
+        self.doubt_until = Some(now + Self::DOUBT);
+    }
+
     /// Whether the camera may be moving on our behalf.
     pub fn may_move(&self) -> bool {
         self.may_move
+    }
+
+    /// Whether it may yet act on a move that went unanswered, even where it is at rest.
+    pub fn in_doubt(&self) -> bool {
+        self.doubt_until.is_some()
     }
 }
 

@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use super::inbox::{Inbox, Mail};
 use super::statistics::Statistics;
-use super::worker::{Event, FINISH_BUDGET, LAST_WILL};
+use super::worker::{Event, FINISH_BUDGET, LAST_WILL, STOP_GRACE};
 use crate::lock::lock;
 use crate::servo::{Answer, Job, Pilot, Status};
 use crate::vapix::{Credentials, Error};
@@ -45,10 +45,10 @@ impl<O: Fn(Event)> Desk<O> {
         }
     }
 
-    /// Whether the end has come: at rest, out of time, or with no right to speak.
+    /// Whether the end has come: at rest for good, out of time, or with no right to speak.
     pub fn is_over(&self) -> bool {
         self.deadline.is_some_and(|deadline| {
-            let done = self.pilot.is_at_rest() && !self.pilot.is_queued();
+            let done = self.pilot.stays_at_rest() && !self.pilot.is_queued();
             done || self.pilot.halted() || deadline <= self.inbox.now()
         })
     }
@@ -63,7 +63,7 @@ impl<O: Fn(Event)> Desk<O> {
     }
 
     pub fn give_up(&mut self) {
-        if !self.pilot.is_at_rest() && !mem::replace(&mut self.gave_up, true) {
+        if !mem::replace(&mut self.gave_up, true) && !self.pilot.is_at_rest() {
             (self.observer)(Event::GaveUp { halted: self.pilot.halted() });
         }
         self.waiting.clear();
@@ -78,7 +78,7 @@ impl<O: Fn(Event)> Desk<O> {
             self.pilot.configure(servo);
         }
         if let Some(stop) = orphan {
-            self.pilot.inherit(stop);
+            self.pilot.inherit(stop, now);
         }
         if rest {
             self.pilot.rest();
@@ -108,8 +108,14 @@ impl<O: Fn(Event)> Desk<O> {
         }
     }
 
+    /// When to abandon what is in flight for a stop that waits behind it, after what was said of that before: a stop
+    /// that is not due any more hurries nobody.
+    pub fn give_up_at(&self, job: &Job, before: Option<Duration>, now: Duration) -> Option<Duration> {
+        self.stop_waits_behind(job, now).then(|| before.unwrap_or(now + STOP_GRACE))
+    }
+
     /// Whether something else than a stop is in flight while a stop is what the camera needs.
-    pub fn stop_waits_behind(&self, job: &Job, now: Duration) -> bool {
+    fn stop_waits_behind(&self, job: &Job, now: Duration) -> bool {
         let may_move = match job {
             Job::Command(command) => !command.is_stop(),
             Job::Query(_) => !self.pilot.is_at_rest(),
@@ -148,13 +154,14 @@ impl<O: Fn(Event)> Desk<O> {
     /// Tells what has changed: reports and status; and those who wait for rest.
     pub fn publish(&mut self) {
         let status = self.pilot.status(self.inbox.now());
+        let (belief, stop) = (Some(self.pilot.belief()), Some(self.pilot.stop()));
+        let (may_yet_move, halted) = (!self.pilot.stays_at_rest(), self.pilot.halted());
+        let coalesced = self.pilot.overtaken() + self.inbox.overtaken();
         {
             let mut statistics = lock(&self.statistics);
-            statistics.status = status;
-            statistics.belief = Some(self.pilot.belief());
-            statistics.stop = Some(self.pilot.stop());
-            statistics.halted = self.pilot.halted();
-            statistics.coalesced = self.pilot.overtaken() + self.inbox.overtaken();
+            (statistics.status, statistics.belief, statistics.stop) = (status, belief, stop);
+            (statistics.may_yet_move, statistics.halted) = (may_yet_move, halted);
+            statistics.coalesced = coalesced;
         }
         for report in self.pilot.take_reports() {
             (self.observer)(Event::Report(report));
@@ -180,5 +187,136 @@ impl<O: Fn(Event)> Desk<O> {
                 let _ = waiting.try_send(());
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::servo::{Next, Query, ServoSettings, Sight, Visibility};
+    use crate::vapix::{Command, Position};
+    use crate::vapixptzsink::clock::Clock;
+    use ptztrack_contract::{Point, Rect, Vector};
+    use std::sync::mpsc::Receiver;
+
+    const MOVE: Job = Job::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    fn timeout() -> Result<Answer, Error> {
+        Err(Error::Timeout(ms(1)))
+    }
+
+    /// What the world was told.
+    type Told = Receiver<Event>;
+
+    /// A desk at one second of its time.
+    fn desk() -> (Desk<impl Fn(Event)>, Told) {
+        let (events, told) = std::sync::mpsc::channel();
+        let inbox = Arc::new(Inbox::new(Clock::held()));
+        inbox.hold_at(ms(1000));
+        let pilot = Pilot::new(ServoSettings::default());
+        (Desk::new(pilot, inbox, Arc::default(), move |event| drop(events.send(event))), told)
+    }
+
+    impl<O: Fn(Event)> Desk<O> {
+        fn see(&mut self, visibility: Visibility) {
+            self.inbox.see(Sight {
+                visibility,
+                id: 1,
+                centroid: Point { x: 0.9, y: 0.5 },
+                bounds: Rect::default(),
+                velocity: Vector::default(),
+                ego_velocity: None,
+                size: (320, 240),
+                aspect: 4.0 / 3.0,
+                taken_at: self.inbox.now(),
+            });
+            self.take_mail();
+        }
+
+        /// Does what is due at this time; returns the commands.
+        fn serve_at(
+            &mut self,
+            at: Duration,
+            answer: impl Fn(&Command) -> Result<Answer, Error>,
+        ) -> Vec<Command> {
+            self.inbox.hold_at(at);
+            self.take_mail();
+            self.check_deadline();
+            let mut sent = Vec::new();
+            let now = self.inbox.now();
+            while let Next::Do(job) = self.pilot.next(now) {
+                let answer = match &job {
+                    Job::Command(command) => {
+                        sent.push(*command);
+                        answer(command)
+                    }
+                    Job::Query(Query::Position) => Ok(Answer::Position(Position::default())),
+                    Job::Query(_) => Err(Error::Camera("none".to_owned())),
+                };
+                self.pilot.sending(&job, now);
+                self.answered(&job, answer, now);
+            }
+            self.publish();
+            sent
+        }
+
+        /// A move goes unanswered, the end comes, and with it a stop; returns who waits for that.
+        fn end_in_doubt(&mut self) -> Receiver<()> {
+            self.see(Visibility::Seen);
+            self.serve_at(ms(1000), |_| timeout());
+            let rest = self.inbox.finish();
+            assert_eq!(self.serve_at(ms(2000), |_| Ok(Answer::Accepted)), [Command::Halt]);
+            assert!(self.pilot.is_at_rest());
+            rest
+        }
+    }
+
+    fn gave_up(told: &Told) -> bool {
+        told.try_iter().any(|event| matches!(event, Event::GaveUp { .. }))
+    }
+
+    #[test]
+    fn at_the_end_too_an_unanswered_move_is_stopped_twice_and_nobody_waits_for_that() {
+        let (mut desk, told) = desk();
+        let rest = desk.end_in_doubt();
+        assert_eq!(rest.try_recv(), Ok(()));
+        assert!(!desk.is_over() && lock(&desk.statistics).may_yet_move);
+        assert_eq!(desk.serve_at(ms(5000), |_| Ok(Answer::Accepted)), []);
+        assert!(!desk.is_over());
+        assert_eq!(desk.serve_at(ms(9000), |_| Ok(Answer::Accepted)), [Command::Halt]);
+        assert!(desk.is_over() && !lock(&desk.statistics).may_yet_move);
+        assert!(!gave_up(&told));
+    }
+
+    #[test]
+    fn a_second_stop_that_is_not_confirmed_is_not_tried_for_ever() {
+        let (mut desk, told) = desk();
+        desk.end_in_doubt();
+        let mut now = ms(5000);
+        while now < ms(2000) + FINISH_BUDGET + LAST_WILL {
+            desk.serve_at(now, |_| timeout());
+            assert!(!desk.is_over());
+            now += ms(1000);
+        }
+        desk.serve_at(now + ms(5000), |_| timeout());
+        assert!(desk.is_over() && !gave_up(&told));
+    }
+
+    #[test]
+    fn only_a_stop_that_still_waits_has_a_move_abandoned() {
+        let (mut desk, _) = desk();
+        desk.see(Visibility::Seen);
+        assert_eq!(desk.give_up_at(&MOVE, None, ms(1000)), None);
+        desk.see(Visibility::Gone);
+        let at = desk.give_up_at(&MOVE, None, ms(1000));
+        assert_eq!(at, Some(ms(1000) + STOP_GRACE));
+        assert_eq!(desk.give_up_at(&MOVE, at, ms(1400)), at);
+        desk.see(Visibility::Seen);
+        assert_eq!(desk.give_up_at(&MOVE, at, ms(1450)), None);
+        assert_eq!(desk.give_up_at(&Job::Command(Command::Halt), None, ms(1450)), None);
     }
 }

@@ -37,7 +37,8 @@ struct Stream {
     lockstep: bool,
 }
 
-/// The locks are never held together, nor while anything is posted, pushed or waited for.
+/// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
+/// order: `settings`, `worker`, so that changes come to the worker in the order in which they were made.
 #[derive(Default, Properties)]
 #[properties(wrapper_type = super::VapixPtzSink)]
 pub struct VapixPtzSink {
@@ -202,7 +203,7 @@ pub struct VapixPtzSink {
         blurb = "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras"
     )]
     pub(super) settings: Mutex<Settings>,
-    worker: Mutex<Option<Worker>>,
+    pub(super) worker: Mutex<Option<Worker>>,
     /// Of the workers so far, that may still be about to stop their cameras.
     legacies: Mutex<Vec<Legacy>>,
     stream: Mutex<Stream>,
@@ -385,7 +386,7 @@ impl VapixPtzSink {
             legacies.retain(|legacy| !legacy.is_void() && !worker.succeed(legacy));
             legacies.push(worker.legacy());
         }
-        *lock(&self.worker) = Some(worker);
+        self.install(worker, &settings);
         Ok(())
     }
 

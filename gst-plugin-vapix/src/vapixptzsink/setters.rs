@@ -4,6 +4,7 @@ use gst::subclass::prelude::*;
 
 use super::imp::VapixPtzSink;
 use super::settings::{Settings, environment};
+use super::worker::Worker;
 use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
 use crate::servo::Home;
@@ -48,28 +49,43 @@ impl VapixPtzSink {
     }
 
     pub(super) fn set_user(&self, user: Option<String>) {
-        lock(&self.settings).user = user;
-        self.credentials_changed();
+        self.change_credentials(|settings| settings.user = user);
     }
 
     pub(super) fn set_password(&self, password: Option<String>) {
-        lock(&self.settings).password = password.map(Secret::new);
-        self.credentials_changed();
+        self.change_credentials(|settings| settings.password = password.map(Secret::new));
     }
 
-    fn credentials_changed(&self) {
-        let credentials = lock(&self.settings).credentials(environment);
+    /// Changes who we are. The worker hears of it before anybody else can change it again: it shall end with what is set.
+    fn change_credentials(&self, change: impl FnOnce(&mut Settings)) {
+        let mut settings = lock(&self.settings);
+        change(&mut settings);
+        let credentials = settings.credentials(environment);
         self.with_worker(|worker| worker.inbox().set_credentials(credentials));
     }
 
-    /// Changes a setting of the servo, also of one that runs.
+    /// Changes a setting of the servo, also of one that runs; it hears of it likewise.
     fn change_servo(&self, change: impl FnOnce(&mut Settings)) {
-        let servo = {
-            let mut settings = lock(&self.settings);
-            change(&mut settings);
-            settings.servo()
-        };
+        let mut settings = lock(&self.settings);
+        change(&mut settings);
+        let servo = settings.servo();
         self.with_worker(|worker| worker.inbox().configure(servo));
+    }
+
+    /// From here on the worker hears of changes; at first of those since it was started with `before`.
+    pub(super) fn install(&self, worker: Worker, before: &Settings) {
+        let refused = {
+            let mut settings = lock(&self.settings);
+            let refused = settings.judge_limits();
+            worker.inbox().configure(settings.servo());
+            let credentials = settings.credentials(environment);
+            if credentials != before.credentials(environment) {
+                worker.inbox().set_credentials(credentials);
+            }
+            *lock(&self.worker) = Some(worker);
+            refused
+        };
+        self.limits_refused(&refused);
     }
 
     /// Changes a limit: of a servo that runs, or to be judged when one starts.
@@ -133,4 +149,37 @@ servo_setters! { change_limits:
     set_tilt_max: tilt_max_deg, f64;
     set_zoom_min: zoom_min, u32;
     set_zoom_max: zoom_max, u32;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use gst::prelude::*;
+
+    /// Else of two that come at once the worker may be left with the older.
+    #[test]
+    fn nobody_changes_anything_before_the_worker_has_heard_of_the_last_change() {
+        gst::init().unwrap();
+        for (name, value) in [("gain", 7.0.to_send_value()), ("password", "pass".to_send_value())] {
+            let sink = glib::Object::new::<super::super::VapixPtzSink>();
+            let (sink, imp) = (&sink, sink.imp());
+            std::thread::scope(|scope| {
+                // Nothing comes to the worker.
+                let worker = lock(&imp.worker);
+                scope.spawn(move || sink.set_property_from_value(name, &value));
+                let mut barred = 0;
+                while barred < 1000 {
+                    std::thread::yield_now();
+                    barred = match imp.settings.try_lock() {
+                        Ok(settings) => {
+                            assert!(settings.gain != 7.0 && settings.password.is_none(), "{name}");
+                            0
+                        }
+                        Err(_) => barred + 1,
+                    };
+                }
+                drop(worker);
+            });
+        }
+    }
 }

@@ -13,6 +13,8 @@ pub struct Statistics {
     pub belief: Option<Belief>,
     /// What ends the last move.
     pub stop: Option<Command>,
+    /// The camera does not rest for good: it moves, or something unanswered may set it going.
+    pub may_yet_move: bool,
     pub sent: u64,
     pub failed: u64,
     /// Pictures of the target that were overtaken by newer ones before they could be steered by.

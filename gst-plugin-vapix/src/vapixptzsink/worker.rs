@@ -18,7 +18,7 @@ use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Statu
 use crate::vapix::{Client, ClientSettings, Command, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
-const STOP_GRACE: Duration = Duration::from_millis(500);
+pub const STOP_GRACE: Duration = Duration::from_millis(500);
 
 /// At the end the camera's yes to its stop is waited for this long.
 pub const FINISH_BUDGET: Duration = Duration::from_secs(2);
@@ -153,7 +153,7 @@ impl Legacy {
 
     fn unconfirmed_stop(&self) -> Option<Command> {
         let statistics = lock(&self.statistics);
-        statistics.stop.filter(|_| statistics.status.moving)
+        statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
     }
 
     /// Stops the camera, whatever it does, without the pilot, who broke; for a while.
@@ -212,10 +212,8 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         loop {
             self.desk.take_mail();
             self.desk.check_deadline();
-            if let Some(credentials) = self.desk.credentials.take() {
-                lock(&self.settings).credentials.clone_from(&credentials);
-                self.client.set_credentials(credentials);
-                self.desk.pilot.credentials_changed();
+            if self.desk.credentials.is_some() {
+                self.change_credentials().await;
             }
             self.desk.publish();
             if self.desk.is_over() {
@@ -237,20 +235,34 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         self.desk.give_up();
     }
 
+    /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
+    /// may it answer.
+    async fn change_credentials(&mut self) {
+        if let Some(stop) = self.desk.pilot.parting_stop() {
+            self.perform(Job::Command(stop)).await;
+            // A password often follows on the user's heels.
+            self.desk.take_mail();
+        }
+        if let Some(credentials) = self.desk.credentials.take() {
+            lock(&self.settings).credentials.clone_from(&credentials);
+            self.client.set_credentials(credentials);
+            self.desk.pilot.credentials_changed();
+        }
+    }
+
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
     async fn perform(&mut self, job: Job) {
         let Self { client, desk, .. } = self;
         let inbox = desk.inbox.clone();
         let sent = inbox.now();
         desk.pilot.sending(&job, sent);
-        lock(&desk.statistics).stop = Some(desk.pilot.stop());
+        let stop = desk.pilot.stop();
+        lock(&desk.statistics).stop = Some(stop);
         let mut exchange = pin!(exchange(client, &job));
         let mut give_up_at = None;
         loop {
             let now = inbox.now();
-            if desk.stop_waits_behind(&job, now) {
-                give_up_at.get_or_insert(now + STOP_GRACE);
-            }
+            give_up_at = desk.give_up_at(&job, give_up_at, now);
             if desk.is_in_vain(&job, now) || give_up_at.is_some_and(|at| at <= now) {
                 return desk.abandoned(&job, sent);
             }
@@ -330,6 +342,19 @@ mod tests {
         assert!(camera.wait_for(PATIENCE, |status| status.moving));
         drop(worker);
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    }
+
+    /// Whoever comes next stops the camera again.
+    #[test]
+    fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
+        let camera = (Location::parse("http://192.168.0.90").unwrap().0, 1);
+        for may_yet_move in [true, false] {
+            let stop = Some(Command::Halt);
+            let statistics = Arc::new(Mutex::new(Statistics { stop, may_yet_move, ..Statistics::default() }));
+            let legacy = Legacy { camera: camera.clone(), inbox: Weak::new(), statistics };
+            assert_eq!(legacy.unconfirmed_stop().is_some(), may_yet_move);
+            assert_eq!(legacy.is_void(), !may_yet_move);
+        }
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::Pilot;
 use crate::servo::{
-    Answer, Commands, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, Steps,
+    Answer, Commands, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, SpeedMap, Steps,
 };
 use crate::vapix::{Command, Error, Position};
 
@@ -105,7 +105,7 @@ impl Pilot {
                 if let Some(zoom) = zoom {
                     self.zoom.commanded(sent, *zoom);
                 }
-                if *zoom == Some(0) && self.stop == Command::REST {
+                if *zoom == Some(0) && self.stop == Command::REST && !self.scheduler.in_doubt() {
                     self.stop = Command::Halt;
                 }
             }
@@ -155,6 +155,7 @@ impl Pilot {
     }
 
     fn told(&mut self, query: Query, answer: Answer, sent: Duration, now: Duration) {
+        let assumed = self.assumptions();
         match answer {
             Answer::Position(position) => {
                 let before = mem::replace(&mut self.camera.position, position);
@@ -186,19 +187,33 @@ impl Pilot {
                     self.authority.queue.answered(request, place, now);
                 }
             }
-            Answer::Attributes(attributes) => {
-                self.camera.attributes = attributes;
-                self.assume_speeds();
-            }
+            Answer::Attributes(attributes) => self.camera.attributes = attributes,
             Answer::MoveSpeed(step) => {
                 self.camera.move_speed = Some(step);
                 self.homing.told_move_speed(step);
             }
             Answer::Accepted => {}
         }
+        self.assumed_before(assumed);
         self.revise();
         self.succeeded(false);
         self.asked(query, now);
+    }
+
+    /// What is assumed of speeds and field of view before anything is learned.
+    fn assumptions(&self) -> (Option<SpeedMap>, f64) {
+        (self.camera.told_speeds(), self.camera.fov_zoomed_out_deg(self.settings.fov_deg))
+    }
+
+    /// What was learned by other assumptions is void; what is told once more is no other.
+    fn assumed_before(&mut self, before: (Option<SpeedMap>, f64)) {
+        let (speeds, wide_deg) = self.assumptions();
+        if speeds != before.0 {
+            self.assume_speeds();
+        }
+        if wide_deg != before.1 {
+            self.calibration.assume_field();
+        }
     }
 
     fn not_told(&mut self, query: Query, err: &Error, now: Duration) {
@@ -237,7 +252,7 @@ impl Pilot {
         let forbidden = matches!(err, Error::NotPermitted { .. } | Error::CredentialsMissing);
         match query {
             Query::Queue(_) if forbidden => self.authority.queue.forbidden(),
-            Query::Queue(_) => self.authority.queue.failed(now),
+            Query::Queue(_) => self.authority.queue.turned_away(now),
             Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
             _ => self.asked(query, now),
         }
@@ -273,10 +288,14 @@ impl Pilot {
         }
     }
 
-    /// After the last question it is known whom we met.
+    /// After the last question it is known whom we met; if it is the same as before, that is no news.
     fn met(&mut self, now: Duration) {
-        self.reports.push(Report::Met(self.camera.to_string()));
-        self.judge_limits();
+        let met = Some(self.camera.to_string());
+        if self.met_as != met {
+            self.reports.extend(met.clone().map(Report::Met));
+            self.met_as = met;
+            self.judge_limits();
+        }
         if !self.link.connected() {
             // It told nothing: that is a fault after all.
             self.next_poll = now;
@@ -346,7 +365,13 @@ impl Pilot {
     fn succeeded(&mut self, of_command: bool) {
         self.ways.obeyed();
         let idle = self.target.is_none() && !self.scheduler.may_move();
-        self.reports.extend(self.link.succeeded(of_command, idle).map(Report::Link));
+        let was_faulty = self.link.faulty();
+        let Some(change) = self.link.succeeded(of_command, idle) else { return };
+        if was_faulty {
+            // It may not have told all as it started, or be another.
+            self.introduction.renew();
+        }
+        self.reports.push(Report::Link(change));
     }
 
     /// A camera that somebody may be about to move, or that may be, is asked more often.

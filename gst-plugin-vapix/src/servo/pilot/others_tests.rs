@@ -1,6 +1,7 @@
 //! The camera in others' hands, or perhaps in others' hands.
 
 use super::*;
+use crate::servo::Holder;
 use crate::vapix::{Parameters, QueuePlace};
 
 type Said = Option<Result<Answer, Error>>;
@@ -90,7 +91,31 @@ fn who_finds_the_queue_full_after_an_outage_stops_the_camera() {
         assert_eq!(rig.pilot.is_at_rest(), takes_stops);
         let sent = rig.aside(ms(20_000), queued(None, takes_stops));
         assert!(sent.len() <= 5 && sent.iter().all(Command::is_stop), "{sent:?}");
+        let taken = Report::TakenOver(Holder::Queue);
+        assert_eq!(rig.reports().iter().filter(|report| **report == taken).count(), 1);
+        assert!(rig.pilot.status(rig.now).taken_over);
+        let sent = rig.aside(ms(6000), queued(Some(1), true));
+        assert!(sent.iter().any(|command| !command.is_stop()), "{sent:?}");
+        assert!(rig.reports().contains(&Report::Resumed) && !rig.pilot.status(rig.now).taken_over);
     }
+}
+
+#[test]
+fn the_place_is_kept_for_the_second_stop_of_an_unanswered_move() {
+    let mut rig = Rig::turning_in_turn();
+    let in_turn = |job: &Job| queued(Some(1), true)(job);
+    rig.aside(ms(2500), |job| match job {
+        Job::Command(_) => Some(Err(Error::Timeout(ms(1)))),
+        Job::Query(_) => in_turn(job),
+    });
+    rig.pilot.rest();
+    rig.pilot.leave();
+    rig.now += ms(1000);
+    rig.run_jobs(in_turn);
+    assert!(rig.pilot.is_at_rest() && rig.pilot.is_queued());
+    rig.now += ms(6000);
+    rig.run_jobs(in_turn);
+    assert!(rig.pilot.stays_at_rest() && !rig.pilot.is_queued());
 }
 
 fn at(pan_deg: f64) -> Said {
