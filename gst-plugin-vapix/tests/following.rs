@@ -7,8 +7,8 @@ use std::time::Duration;
 
 use common::stage::{FRAME, Shown, Stage};
 use common::{Heard, target};
-use ptztrack_contract::{Rect, TargetMeta, TargetState};
-use virtual_camera::{Settings, SyntheticSettings, Waypoint, World};
+use ptztrack_contract::{CameraChange, Rect, TargetMeta, TargetState, Vector};
+use virtual_camera::{Kinematics, Pose, Settings, SyntheticSettings, Waypoint, World};
 
 fn before(path: &[(f64, f64)]) -> Stage {
     let point = |(seconds, pan_deg): &(f64, f64)| Waypoint {
@@ -59,10 +59,13 @@ fn departing(time: Duration) -> (f64, f64) {
     (far.hypot(aside), aside.atan2(far).to_degrees())
 }
 
-/// What a tracker says of them, where their middle is in the picture.
-fn departing_seen(stage: &Stage, exposure: Duration) -> Option<TargetMeta> {
+/// What a tracker says of somebody 1.75 m tall who is so far away and in that direction, where their middle is in the
+/// picture.
+fn seen(stage: &Stage, exposure: Duration, (distance_m, pan_deg): (f64, f64)) -> Option<TargetMeta> {
     let pose = stage.camera.pose_at(exposure);
-    let (distance_m, pan_deg) = departing(exposure);
+    if (pan_deg - pose.pan_deg).to_radians().cos() <= 0.0 {
+        return None;
+    }
     let wide = (stage.camera.optics().fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
     let (right, down) = ((pan_deg - pose.pan_deg).to_radians().tan(), pose.tilt_deg.to_radians().tan());
     let tall = wide * 240.0 / 320.0;
@@ -86,7 +89,7 @@ fn somebody_who_walks_away_stays_as_tall_by_auto_zoom() {
         while stage.now < Duration::from_secs(30) {
             let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
             stage.camera.advance_to(stage.now + FRAME);
-            let meta = departing_seen(&stage, exposure);
+            let meta = seen(&stage, exposure, departing(exposure));
             let meta = meta.unwrap_or_else(|| panic!("{mode}: lost after {:?}", stage.now));
             stage.picture(Some(&meta));
             if stage.now > Duration::from_secs(6) {
@@ -98,5 +101,53 @@ fn somebody_who_walks_away_stays_as_tall_by_auto_zoom() {
         assert!(parts.0 > 0.8 && parts.1 < 1.2, "{mode}: {parts:?}");
         assert!((0.02..0.45).contains(&farthest), "{mode}: {farthest}");
         assert!(!stage.heard.iter().any(Heard::is_warning), "{mode}: {:?}", stage.heard);
+    }
+}
+
+/// To the right past 180 degrees, and after a rest back again.
+fn round_the_back(time: Duration) -> f64 {
+    let time_s = time.as_secs_f64();
+    160.0 + 5.0 * ((time_s - 3.0).clamp(0.0, 10.0) - (time_s - 16.0).clamp(0.0, 10.0))
+}
+
+#[test]
+fn who_walks_past_the_end_of_the_circle_is_followed_the_short_way() {
+    for mode in ["velocity", "absolute", "centre"] {
+        let world = SyntheticSettings { wide_fov_deg: 55.2, ..SyntheticSettings::default() };
+        let settings = Settings {
+            world: World::Synthetic(world),
+            home: Some(Pose { pan_deg: 155.0, ..Pose::default() }),
+            kinematics: Kinematics { endless_pan: true, ..Kinematics::default() },
+            ..Settings::default()
+        };
+        let mut stage = Stage::new(settings, |rig| rig.with_str("mode", mode));
+        let (mut farthest, mut beyond) = (0.0f64, false);
+        while stage.now < Duration::from_secs(30) {
+            let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
+            stage.camera.advance_to(stage.now + FRAME);
+            let here = |at| (5.0, round_the_back(at));
+            let meta = seen(&stage, exposure, here(exposure));
+            let meta = meta.unwrap_or_else(|| panic!("{mode}: lost after {:?}", stage.now));
+            // What stood where the person was moved by what the camera turned.
+            let before = exposure.saturating_sub(FRAME);
+            let was = seen(&stage, before, here(before)).unwrap_or(meta.clone());
+            let turned = seen(&stage, exposure, here(before)).unwrap_or(meta.clone());
+            let per_s = |to: &TargetMeta| Vector {
+                x: (to.centroid.x - was.centroid.x) / FRAME.as_secs_f64(),
+                y: (to.centroid.y - was.centroid.y) / FRAME.as_secs_f64(),
+            };
+            let meta = TargetMeta { velocity: per_s(&meta), ego_velocity: Some(per_s(&turned)), ..meta };
+            stage.picture(Some(&meta));
+            beyond |= (-155.0..-140.0).contains(&stage.camera.status().pan_deg);
+            if stage.now > Duration::from_secs(3) {
+                farthest = farthest.max((meta.centroid.x - 0.5).abs());
+            }
+        }
+        assert!(beyond, "{mode}: it never looked there");
+        assert!((0.01..0.3).contains(&farthest), "{mode}: {farthest}");
+        let pan = stage.camera.status().pan_deg;
+        assert!((pan - 160.0).abs() < 2.5, "{mode}: {pan}");
+        assert!(!stage.heard.iter().any(Heard::is_warning), "{mode}: {:?}", stage.heard);
+        assert_eq!(stage.times(&Heard::Camera(CameraChange::AtLimit)), 0, "{mode}");
     }
 }

@@ -31,6 +31,17 @@ fn a_location_that_is_none_is_refused_and_the_old_one_stays() {
     }
 }
 
+/// Beyond there is digital zoom, which the servo does not use.
+#[test]
+fn zoom_limits_are_those_of_the_lens() {
+    let rig = Rig::ready("http://192.168.0.90");
+    for name in ["zoom-min", "zoom-max"] {
+        let limit = rig.sink.find_property(name).unwrap();
+        let limit = limit.downcast_ref::<glib::ParamSpecUInt>().unwrap();
+        assert_eq!((limit.minimum(), limit.maximum()), (1, 9999));
+    }
+}
+
 #[test]
 fn crossed_limits_are_refused_with_both_values_and_the_old_ones_stay() {
     let limits = |rig: &Rig| {

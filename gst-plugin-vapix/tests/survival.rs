@@ -72,6 +72,20 @@ survives! {
     segment: "the stream's segment jumps by an hour, and back";
 }
 
+/// Long enough for pauses that doubled without end to be longer than what control may take to be back: attempts 7.9 s
+/// and 15.9 s after the first.
+#[test]
+fn after_a_longer_fault_too_control_is_back_at_once() {
+    let longer = Duration::from_millis(8500);
+    let cases = cases();
+    let lasting = ["connection refused", "403", "503", "200 with `Error:`"];
+    std::thread::scope(|scope| {
+        for case in cases.iter().filter(|case| lasting.contains(&case.name)) {
+            scope.spawn(move || survive(case, TIMEOUT, longer));
+        }
+    });
+}
+
 #[test]
 fn a_name_that_nobody_has_can_be_corrected() {
     surviving::unknown_name(TIMEOUT);

@@ -9,7 +9,7 @@ use common::stage::{Shown, Stage, mean_distance};
 use common::{Heard, Rig};
 use gst::prelude::*;
 use ptztrack_contract::CameraChange;
-use virtual_camera::{Moves, Settings, SyntheticSettings, Waypoint, World};
+use virtual_camera::{Moves, Settings, Status, SyntheticSettings, Waypoint, World};
 
 const CONTINUOUS: Moves = Moves { continuous: true, ..Moves::NONE };
 const ABSOLUTE: Moves = Moves { absolute: true, ..Moves::NONE };
@@ -17,9 +17,19 @@ const CENTRE: Moves = Moves { centre: true, ..Moves::NONE };
 
 /// Somebody who stands at the left, walks to the right at 3 degrees a second and stands there.
 fn before_a_walk(moves: Moves, to_deg: f64) -> Settings {
-    let point =
-        |seconds: f64, pan_deg| Waypoint { time: Duration::from_secs_f64(seconds), pan_deg, tilt_deg: -2.0 };
-    let path = vec![point(0.0, -8.0), point(5.0, -8.0), point(5.0 + (to_deg + 8.0) / 3.0, to_deg)];
+    before_a_climb(moves, to_deg, (-2.0, -2.0))
+}
+
+/// The same from one tilt to another.
+fn before_a_climb(moves: Moves, to_deg: f64, tilts: (f64, f64)) -> Settings {
+    let point = |seconds: f64, pan_deg, tilt_deg| Waypoint {
+        time: Duration::from_secs_f64(seconds),
+        pan_deg,
+        tilt_deg,
+    };
+    let (start, end) = ((-8.0, tilts.0), (to_deg, tilts.1));
+    let arrives = 5.0 + (to_deg + 8.0) / 3.0;
+    let path = vec![point(0.0, start.0, start.1), point(5.0, start.0, start.1), point(arrives, end.0, end.1)];
     let world = SyntheticSettings { path, stays: true, ..SyntheticSettings::default() };
     Settings { moves, world: World::Synthetic(world), ..Settings::default() }
 }
@@ -103,16 +113,27 @@ fn a_camera_that_cannot_be_moved_at_all_is_one_warning() {
 #[test]
 fn limits_hold_in_every_mode() {
     for mode in ["velocity", "absolute", "centre"] {
-        let limited = |rig: Rig| rig.with_str("mode", mode).with("pan-max", 5.0).with("pan-min", -6.0);
-        let mut stage = Stage::new(before_a_walk(Moves::default(), 14.0), limited);
-        let (mut least, mut most) = (0.0f64, 0.0f64);
+        let limited = |rig: Rig| {
+            let rig = rig.with_str("mode", mode).with("pan-max", 5.0).with("pan-min", -6.0);
+            rig.with("tilt-max", 2.0).with("tilt-min", -3.0)
+        };
+        let mut stage = Stage::new(before_a_climb(Moves::default(), 14.0, (-6.0, 5.0)), limited);
+        let (mut least, mut most) = ((0.0f64, 0.0f64), (0.0f64, 0.0f64));
         for _ in 0..500 {
             stage.follow(0.04);
-            let pan = stage.camera.status().pan_deg;
-            (least, most) = (least.min(pan), most.max(pan));
+            let Status { pan_deg, tilt_deg, .. } = stage.camera.status();
+            least = (least.0.min(pan_deg), least.1.min(tilt_deg));
+            most = (most.0.max(pan_deg), most.1.max(tilt_deg));
         }
         // Half a degree for what the head does after it was told to stop.
-        assert!((-6.5..-5.5).contains(&least) && (4.5..5.5).contains(&most), "{mode}: {least} to {most}");
+        assert!(
+            (-6.5..-5.5).contains(&least.0) && (4.5..5.5).contains(&most.0),
+            "{mode}: {least:?} to {most:?}"
+        );
+        assert!(
+            (-3.5..-2.5).contains(&least.1) && (1.5..2.5).contains(&most.1),
+            "{mode}: {least:?} to {most:?}"
+        );
         assert!(stage.times(&Heard::Camera(CameraChange::AtLimit)) >= 1, "{mode}");
         // With nothing more to do it does nothing.
         let before = stage.moves().len();

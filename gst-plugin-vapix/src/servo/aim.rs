@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use ptztrack_contract::{Point, Rect, TargetState, Vector};
 
-use super::{CommandHistory, Offset, PanTilt, RateAverage, View};
+use super::{CommandHistory, Offset, PanTilt, RateAverage, View, rise_deg};
 
 /// How the target's motion is carried forward over the latency.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -72,9 +72,12 @@ pub struct Sight {
 #[derive(Debug)]
 pub struct Aim {
     prediction: Prediction,
+    /// Of pan what is seen of it, as below the camera it changes fastest where least is seen.
     target_rate: RateAverage,
     id: u64,
     error: PanTilt,
+    /// Where the target is, degrees above the horizon.
+    elevation_deg: f64,
     taken_at: Duration,
 }
 
@@ -86,6 +89,7 @@ impl Aim {
             target_rate: RateAverage::new(prediction.window()),
             id: 0,
             error: PanTilt::default(),
+            elevation_deg: 0.0,
             taken_at: Duration::ZERO,
         }
     }
@@ -112,8 +116,7 @@ impl Aim {
         if sight.visibility == Visibility::Predicted {
             return self.foresee(sight, view);
         }
-        self.error = view.error(sight.centroid);
-        self.taken_at = sight.taken_at;
+        self.place(sight, view);
         // The target's own motion is what is left of its motion in the picture without the camera's:
         // seen in the background, or else known from the commands.
         let rate = match sight.ego_velocity {
@@ -126,7 +129,21 @@ impl Aim {
                 self.likeliest(view.rate(sight.centroid, sight.velocity), commanded)
             }
         };
-        self.target_rate.push(sight.taken_at, rate);
+        let seen = self.seen_of_pan();
+        self.target_rate.push(sight.taken_at, PanTilt::new(rate.pan * seen, rate.tilt));
+    }
+
+    fn place(&mut self, sight: &Sight, view: &View) {
+        self.error = view.error(sight.centroid);
+        self.elevation_deg = view.tilt_deg + self.error.tilt;
+        self.taken_at = sight.taken_at;
+    }
+
+    /// How far the target moves through the picture when it goes round the camera by a degree, in degrees.
+    fn seen_of_pan(&self) -> f64 {
+        // At the nadir itself nobody can tell.
+        const LEAST: f64 = 0.01;
+        self.elevation_deg.to_radians().cos().max(LEAST)
     }
 
     /// The target's own rate where it is seen to turn like this against a camera that turns at one of these rates: of what
@@ -142,12 +159,11 @@ impl Aim {
 
     /// Takes a picture that hides the target: it goes on as it did, but whether faster and faster nobody knows.
     fn foresee(&mut self, sight: &Sight, view: &View) {
-        self.target_rate.coast(sight.taken_at, self.target_rate(Duration::ZERO));
+        self.target_rate.coast(sight.taken_at, self.expected_rate(Duration::ZERO));
         // Who does not see the background cannot tell how the camera's turns move a hidden target in the
         // picture: there the last sight and the commands since know better.
         if sight.ego_velocity.is_some() {
-            self.error = view.error(sight.centroid);
-            self.taken_at = sight.taken_at;
+            self.place(sight, view);
         }
     }
 
@@ -164,16 +180,42 @@ impl Aim {
         let horizon = self.horizon(now, latency);
         let under_way = history.rotation(shown, now);
         // The rate grows evenly: on the way it is what it is half way.
-        self.error + self.target_rate(horizon / 2) * horizon.as_secs_f64() - under_way
+        let walked = self.walked(self.target_rate(horizon / 2) * horizon.as_secs_f64());
+        self.round(under_way.pan) + walked - under_way
+    }
+
+    /// The error, the way round on which the camera is by so many degrees: half round from the target it would else turn
+    /// back at each tremble.
+    fn round(&self, under_way_deg: f64) -> PanTilt {
+        const HALF_ROUND_DEG: f64 = 150.0;
+        let turns_back = self.error.pan.abs() > HALF_ROUND_DEG && self.error.pan * under_way_deg < 0.0;
+        let round_deg = if turns_back { 360f64.copysign(under_way_deg) } else { 0.0 };
+        self.error + PanTilt::new(round_deg, 0.0)
+    }
+
+    /// By what the target's direction changes as it goes so far, on a great circle: where it passes below, at its rate
+    /// it would go round the camera again and again.
+    fn walked(&self, way_deg: PanTilt) -> PanTilt {
+        let across = (way_deg.pan * self.seen_of_pan()).to_radians();
+        let elevation = (self.elevation_deg + way_deg.tilt).to_radians();
+        let pan = across.sin().atan2(across.cos() * elevation.cos());
+        let height = (across.cos() * elevation.sin()).asin();
+        PanTilt::new(pan.to_degrees(), height.to_degrees() - self.elevation_deg)
     }
 
     /// Where the target is off the middle, and how it goes on.
     pub fn offset(&self, now: Duration, history: &CommandHistory, latency: Duration) -> Offset {
-        Offset {
-            seen: self.error,
-            expected: self.error_at_effect(now, history, latency),
-            target: self.target_rate(self.horizon(now, latency)),
-        }
+        let expected = self.error_at_effect(now, history, latency);
+        let target = self.target_rate(self.horizon(now, latency));
+        // Half round the camera, what goes up goes down in the picture.
+        let target = PanTilt::new(target.pan, target.tilt * expected.pan.to_radians().cos());
+        Offset { seen: self.in_picture(self.error), expected: self.in_picture(expected), target }
+    }
+
+    /// The same error with what tilt alone is to do about it: while pan is under way, to look already as high as the target
+    /// is would lose who passed below out of the picture.
+    fn in_picture(&self, error: PanTilt) -> PanTilt {
+        PanTilt::new(error.pan, rise_deg(self.elevation_deg - error.tilt, error))
     }
 
     /// From the picture until a command sent `now` shows.
@@ -183,6 +225,14 @@ impl Aim {
 
     /// The target's own angular rate so long after the picture.
     fn target_rate(&self, lead: Duration) -> PanTilt {
+        self.as_pan(self.expected_rate(lead))
+    }
+
+    fn as_pan(&self, seen: PanTilt) -> PanTilt {
+        PanTilt::new(seen.pan / self.seen_of_pan(), seen.tilt)
+    }
+
+    fn expected_rate(&self, lead: Duration) -> PanTilt {
         match self.prediction {
             Prediction::Average => self.target_rate.mean(),
             Prediction::Lead => self.target_rate.ahead(lead),
@@ -191,7 +241,7 @@ impl Aim {
 
     /// The target's own angular rate over the last moments.
     pub fn pace(&self) -> PanTilt {
-        self.target_rate.mean()
+        self.as_pan(self.target_rate.mean())
     }
 
     /// Off the middle, as the last picture has it.

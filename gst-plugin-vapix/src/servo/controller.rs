@@ -7,8 +7,8 @@ pub struct ControlLaw {
     pub gain: f64,
     /// What part of that gain is wanted, up to 1; what the target does by itself is followed all the same.
     pub trust: f64,
-    /// The error in degrees that an axis at rest tolerates.
-    pub dead_zone_deg: f64,
+    /// The error in degrees that each axis tolerates at rest.
+    pub dead_zone_deg: PanTilt,
     /// Degrees per second that neither axis exceeds.
     pub max_deg_s: f64,
     /// Degrees per second by which an axis' rate changes at most, from one command to the next.
@@ -37,9 +37,10 @@ impl Controller {
     /// The rate that brings the error to zero within about 1/gain while the target moves on.
     pub fn rate(&mut self, offset: &Offset, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
         let Offset { seen, expected, target } = *offset;
+        let zone_deg = law.dead_zone_deg;
         PanTilt {
-            pan: self.pan.rate((seen.pan, expected.pan), target.pan, in_force.pan, law),
-            tilt: self.tilt.rate((seen.tilt, expected.tilt), target.tilt, in_force.tilt, law),
+            pan: self.pan.rate((seen.pan, expected.pan, zone_deg.pan), target.pan, in_force.pan, law),
+            tilt: self.tilt.rate((seen.tilt, expected.tilt, zone_deg.tilt), target.tilt, in_force.tilt, law),
         }
     }
 
@@ -60,18 +61,18 @@ impl Axis {
 
     fn rate(
         &mut self,
-        (seen_deg, error_deg): (f64, f64),
+        (seen_deg, error_deg, dead_zone_deg): (f64, f64, f64),
         target_deg_s: f64,
         in_force_deg_s: f64,
         law: &ControlLaw,
     ) -> f64 {
-        let rest_deg = Self::REST * law.dead_zone_deg;
+        let rest_deg = Self::REST * dead_zone_deg;
         self.moving = if self.moving {
             // Rests only for a target that would not leave the zone within a second.
             error_deg.abs() > rest_deg || target_deg_s.abs() > rest_deg
         } else {
             // Starts for nothing that is foreseen only: once in a while a tremble looks like a start.
-            error_deg.abs() > law.dead_zone_deg && seen_deg * error_deg.signum() > rest_deg
+            error_deg.abs() > dead_zone_deg && seen_deg * error_deg.signum() > rest_deg
         };
         let wanted = if self.moving { law.trust * law.gain * error_deg + target_deg_s } else { 0.0 };
         let slewed =
@@ -85,8 +86,13 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const LAW: ControlLaw =
-        ControlLaw { gain: 1.0, trust: 1.0, dead_zone_deg: 1.0, max_deg_s: 100.0, max_change_deg_s: 1000.0 };
+    const LAW: ControlLaw = ControlLaw {
+        gain: 1.0,
+        trust: 1.0,
+        dead_zone_deg: PanTilt { pan: 1.0, tilt: 1.0 },
+        max_deg_s: 100.0,
+        max_change_deg_s: 1000.0,
+    };
 
     fn still() -> PanTilt {
         PanTilt::default()

@@ -212,4 +212,23 @@ mod tests {
             prop_assert!((-170.0..=170.0).contains(&(pan + 0.5 * held)) && held * rate >= 0.0);
         }
     }
+
+    #[test]
+    fn tilt_has_its_own_ends() {
+        let hard = Limits { tilt_deg: Some(Range { min: -90.0, max: 20.0 }), ..Limits::default() };
+        let soft = SoftLimits { tilt_deg: Range { min: -30.0, max: 10.0 }, ..SoftLimits::default() };
+        let apply = |rate: f64, tilt: f64, soft: &SoftLimits| {
+            let mut guard = LimitGuard::default();
+            let position = Some(PanTilt::new(0.0, tilt));
+            let rate = guard.apply(PanTilt::new(3.0, rate), position, (&hard, soft), 0.5);
+            assert_eq!(rate.pan, 3.0);
+            (rate.tilt, guard.at_limit())
+        };
+        let none = SoftLimits::default();
+        assert_eq!((apply(10.0, 20.0, &none), apply(-10.0, 20.0, &none)), ((0.0, true), (-10.0, false)));
+        assert_eq!((apply(-10.0, -90.0, &none), apply(10.0, -90.0, &none)), ((0.0, true), (10.0, false)));
+        assert_eq!((apply(10.0, 8.0, &soft), apply(10.0, 10.0, &soft)), ((4.0, false), (0.0, true)));
+        assert_eq!((apply(-10.0, -28.0, &soft), apply(-10.0, -30.0, &soft)), ((-4.0, false), (0.0, true)));
+        assert_eq!((apply(-10.0, 15.0, &soft), apply(10.0, -50.0, &soft)), ((-10.0, false), (10.0, false)));
+    }
 }

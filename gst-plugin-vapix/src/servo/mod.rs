@@ -56,7 +56,7 @@ pub use learning::{Calibration, Turn};
 pub use limits::{LimitGuard, SoftLimits, is_endless, narrower};
 pub use link::{Link, LinkChange};
 pub use operator::{Commands, OperatorWatch, Verdict};
-pub use optics::{Lens, View, magnified};
+pub use optics::{Lens, View, magnified, rise_deg};
 pub use oscillation::OscillationGuard;
 pub use pan_tilt::{PanTilt, around_deg};
 pub use pilot::Pilot;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::simulation::{Run, Setup};
+use super::simulation::{ASPECT, Run, Setup};
 use super::{PanTilt, Report};
 
 /// Delay in milliseconds, and magnification.
@@ -162,4 +162,76 @@ fn a_loop_that_swings_is_calmed_and_said_so() {
         "{}",
         run.farthest(-1.0, 30.0, 60.0)
     );
+}
+
+/// Steeply below the camera, and all but below it.
+const STEEP_DEG: [f64; 2] = [-75.0, -88.0];
+
+/// How often the camera turns to the other side, by pan so fast that nobody overlooks it.
+fn swings(run: &Run) -> usize {
+    let sides: Vec<f64> = run
+        .frames
+        .iter()
+        .map(|frame| frame.rate.pan)
+        .filter(|rate| rate.abs() > 10.0)
+        .map(f64::signum)
+        .collect();
+    sides.windows(2).filter(|pair| pair[0] != pair[1]).count()
+}
+
+#[test]
+fn a_person_who_stands_below_is_let_be_too() {
+    for tilt in STEEP_DEG {
+        for (delay, zoom) in CASES {
+            for noisy_velocity in [false, true] {
+                let pose = PanTilt::new(3.0, tilt + 5.0 / zoom);
+                let setup = Setup { jitter: 0.01, noisy_velocity, pose, ..Setup::new(delay, zoom) };
+                let run = setup.run(70.0, |_| (PanTilt::new(0.0, tilt), 20.0));
+                assert_eq!(run.commands_between(10.0, 70.0), 0, "{tilt} degrees, {delay} ms, {zoom}x");
+                assert!(run.mean_offset(10.0, 70.0) < 0.03, "{tilt} degrees, {delay} ms, {zoom}x");
+            }
+        }
+    }
+}
+
+/// Who stands beyond the nadir is as far away to the left as to the right, and by the tremble now here, now there.
+#[test]
+fn to_who_stands_beyond_the_nadir_it_turns_one_way_round() {
+    for delay in [100, 300] {
+        for seed in 1..=8 {
+            let pose = PanTilt::new(0.0, -82.0);
+            let setup = Setup { jitter: 0.01, seed, pose, ..Setup::new(delay, 1.0) };
+            let run = setup.run(20.0, |_| (PanTilt::new(180.0, -80.0), 20.0));
+            assert!(swings(&run) <= 1, "{delay} ms, run {seed}: {}", swings(&run));
+            assert!(run.mean_offset(8.0, 20.0) < 0.03, "{delay} ms, run {seed}");
+        }
+    }
+}
+
+/// Somebody who walks past 3 m below the camera, when nearest in a direction so steep.
+fn past(nearest_deg: f64) -> impl Fn(f64) -> PanTilt {
+    move |time| {
+        let (height, aside) = (3.0f64, 3.0 / nearest_deg.abs().to_radians().tan());
+        let along = 1.2 * (time - 5.0);
+        PanTilt::new(along.atan2(aside).to_degrees(), -height.atan2(along.hypot(aside)).to_degrees())
+    }
+}
+
+/// In view even where no head turns as fast as pan would have to: there it may go too far once, and back.
+#[test]
+fn a_person_who_walks_past_below_is_followed_without_a_swing() {
+    for (tilt, (farthest, most_swings)) in STEEP_DEG.into_iter().zip([(0.12, 0), (0.4, 3)]) {
+        for delay in [100, 300] {
+            let path = past(tilt);
+            let setup = Setup { jitter: 0.005, pose: path(0.0), ..Setup::new(delay, 1.0) };
+            let run = setup.run(12.0, |time| (path(time), 20.0));
+            let offsets = run.frames.iter().map(|frame| frame.offset.x.hypot(frame.offset.y / ASPECT));
+            let far = offsets.fold(0.0, f64::max);
+            assert!(far < farthest, "{tilt} degrees, {delay} ms: {far}");
+            assert!(swings(&run) <= most_swings, "{tilt} degrees, {delay} ms: {}", swings(&run));
+            assert!(!run.reports.iter().any(|report| matches!(report, Report::Swinging(_))));
+            let after = run.mean_offset(9.0, 12.0);
+            assert!(after < 0.04, "{tilt} degrees, {delay} ms: {after}");
+        }
+    }
 }

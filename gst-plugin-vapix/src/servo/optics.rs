@@ -68,10 +68,7 @@ impl View {
 
     /// Where the middle after the turn is from the camera: to the right, up and ahead.
     fn ray(&self, turn: PanTilt) -> [f64; 3] {
-        let (pan, elevation) = (turn.pan.to_radians(), (self.tilt_deg + turn.tilt).to_radians());
-        let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
-        let (sin, cos) = self.tilt_deg.to_radians().sin_cos();
-        [right, high * cos - far * sin, far * cos + high * sin]
+        ray(self.tilt_deg, turn)
     }
 
     /// Degrees per second of a point that moves through the picture with `velocity` (frames per second).
@@ -79,7 +76,19 @@ impl View {
         // Short enough to be the derivative, long enough for the difference to be exact.
         const STEP_S: f64 = 1e-3;
         let ahead = Point { x: point.x + velocity.x * STEP_S, y: point.y + velocity.y * STEP_S };
-        (self.error(ahead) - self.error(point)) / STEP_S
+        let turned = self.error(ahead) - self.error(point);
+        // Beyond the nadir pan may pass 180 degrees meanwhile.
+        PanTilt::new((turned.pan + 180.0).rem_euclid(360.0) - 180.0, turned.tilt) / STEP_S
+    }
+
+    /// How far each axis turns to move the picture by an angle, in degrees, at a target that is off by `error`.
+    ///
+    /// The steeper it is below (or above) the camera, the less is moved by pan; where it is no farther than that angle
+    /// from the nadir, nobody can tell its pan, and no turn is enough.
+    pub fn turns(&self, angle_deg: f64, error: PanTilt) -> PanTilt {
+        let cos = (self.tilt_deg + error.tilt).to_radians().cos();
+        let pan_deg = if cos > angle_deg.to_radians().sin() { angle_deg / cos } else { f64::INFINITY };
+        PanTilt::new(pan_deg, angle_deg)
     }
 
     /// Half the picture's width at distance 1.
@@ -146,6 +155,20 @@ impl Lens {
     }
 }
 
+/// Where what a camera tilted by `tilt_deg` would look at after a turn is from it: to the right, up and ahead.
+fn ray(tilt_deg: f64, turn: PanTilt) -> [f64; 3] {
+    let (pan, elevation) = (turn.pan.to_radians(), (tilt_deg + turn.tilt).to_radians());
+    let (right, high, far) = (pan.sin() * elevation.cos(), elevation.sin(), pan.cos() * elevation.cos());
+    let (sin, cos) = tilt_deg.to_radians().sin_cos();
+    [right, high * cos - far * sin, far * cos + high * sin]
+}
+
+/// By how many degrees that is above the middle of the picture, before the turn.
+pub fn rise_deg(tilt_deg: f64, turn: PanTilt) -> f64 {
+    let [right, up, ahead] = ray(tilt_deg, turn);
+    up.atan2(right.hypot(ahead)).to_degrees()
+}
+
 /// The field of view in degrees of a picture magnified so much.
 pub fn magnified(fov_deg: f64, magnification: f64) -> f64 {
     2.0 * (half_tangent(fov_deg) / magnification).atan().to_degrees()
@@ -197,11 +220,25 @@ mod tests {
     }
 
     #[test]
+    fn steeply_below_pan_moves_little_and_at_the_nadir_nothing() {
+        let down = |tilt_deg: f64| View { tilt_deg, ..LEVEL }.turns(1.5, PanTilt::new(40.0, -5.0));
+        near(down(5.0).pan, 1.5, 1e-9);
+        near(down(-55.0).pan, 3.0, 1e-9);
+        assert_eq!((down(-55.0).tilt, down(-84.0).pan), (1.5, f64::INFINITY));
+        near(rise_deg(-80.0, PanTilt::new(0.0, -5.0)), -5.0, 1e-9);
+        near(rise_deg(-80.0, PanTilt::new(180.0, 0.0)), -20.0, 1e-9);
+    }
+
+    #[test]
     fn image_velocity_becomes_degrees_per_second() {
         // In the middle a frame is 2 tan(30 deg) wide.
         let rate = LEVEL.rate(Point { x: 0.5, y: 0.5 }, Vector { x: 0.1, y: 0.1 });
         near(rate.pan, (0.2 * 30f64.to_radians().tan()).to_degrees(), 1e-3);
         near(rate.tilt, -(0.2 * 30f64.to_radians().tan() * 9.0 / 16.0).to_degrees(), 1e-3);
+        // From the one side of the camera's back to the other, beyond the nadir.
+        let beyond = View { tilt_deg: -80.0, ..LEVEL };
+        let rate = beyond.rate(Point { x: 0.499_95, y: 0.99 }, Vector { x: 0.1, y: 0.0 });
+        assert!(rate.pan.abs() < 90.0, "{rate:?}");
     }
 
     #[test]

@@ -26,12 +26,12 @@ impl OscillationGuard {
     /// After so long without a swing a little more is dared.
     const CALM: Duration = Duration::from_secs(30);
 
-    /// Takes the error of a picture, and the target's own rate, where the background tells that; `tolerated_deg` is no
-    /// swing. Returns whether the gain was lowered by this.
-    pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: f64, at: Duration) -> bool {
+    /// Takes the error of a picture, and the target's own rate, where the background tells that; what each axis
+    /// is `tolerated_deg` is no swing. Returns whether the gain was lowered by this.
+    pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: PanTilt, at: Duration) -> bool {
         let swings = [
-            self.pan.see(error.pan, target.pan, tolerated_deg, at),
-            self.tilt.see(error.tilt, target.tilt, tolerated_deg, at),
+            self.pan.see(error.pan, target.pan, tolerated_deg.pan, at),
+            self.tilt.see(error.tilt, target.tilt, tolerated_deg.tilt, at),
         ];
         if swings.contains(&true) {
             let before = self.trust;
@@ -122,7 +122,7 @@ mod tests {
     ) -> usize {
         let mut see = |time: f64| {
             let [error, target] = [error(time), target(time)].map(|pan| PanTilt::new(pan, 0.0));
-            guard.see(error, target, 1.0, Duration::from_secs_f64(time))
+            guard.see(error, target, PanTilt::new(1.0, 1.0), Duration::from_secs_f64(time))
         };
         (0..500).filter(|frame| see(f64::from(*frame) / 25.0)).count()
     }
@@ -162,7 +162,12 @@ mod tests {
         let mut guard = OscillationGuard::default();
         lowered(&mut guard, |t| 5.0 * (4.0 * t).sin());
         for second in 20..600 {
-            assert!(!guard.see(PanTilt::default(), PanTilt::default(), 1.0, Duration::from_secs(second)));
+            assert!(!guard.see(
+                PanTilt::default(),
+                PanTilt::default(),
+                PanTilt::new(1.0, 1.0),
+                Duration::from_secs(second)
+            ));
         }
         assert_eq!(guard.trust(), 1.0);
     }
@@ -172,7 +177,7 @@ mod tests {
         fn trust_stays_in_range(errors in prop::collection::vec(-90.0..90.0f64, 0..400)) {
             let mut guard = OscillationGuard::default();
             for (frame, error) in (0..).zip(errors) {
-                guard.see(PanTilt::new(error, -error), PanTilt::default(), 0.5, Duration::from_millis(40 * frame));
+                guard.see(PanTilt::new(error, -error), PanTilt::default(), PanTilt::new(0.5, 0.5), Duration::from_millis(40 * frame));
                 prop_assert!((OscillationGuard::LOWEST..=1.0).contains(&guard.trust()));
             }
         }

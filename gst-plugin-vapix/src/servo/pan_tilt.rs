@@ -20,6 +20,11 @@ impl PanTilt {
         Self::new(f(self.pan, other.pan), f(self.tilt, other.tilt))
     }
 
+    /// The scalar product.
+    pub fn dot(self, other: Self) -> f64 {
+        self.pan * other.pan + self.tilt * other.tilt
+    }
+
     /// The larger of both sizes.
     pub fn largest(&self) -> f64 {
         self.pan.abs().max(self.tilt.abs())

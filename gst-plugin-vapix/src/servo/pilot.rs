@@ -199,8 +199,8 @@ impl Pilot {
         if self.target.as_ref().is_some_and(|target| target.sight.id != sight.id) {
             self.oscillation.clear();
         }
-        let tolerated_deg =
-            (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST) * view.horizontal_fov_deg;
+        let tolerated = (Self::SWING * self.settings.dead_zone).max(Self::SWING_LEAST);
+        let tolerated_deg = self.zone_deg(&view, tolerated);
         // Told by the commands it would be no witness against them.
         let by_itself = sight.ego_velocity.map_or(PanTilt::default(), |_| self.aim.pace());
         if self.oscillation.see(self.aim.error(), by_itself, tolerated_deg, sight.taken_at) {
@@ -426,12 +426,22 @@ impl Pilot {
     }
 
     fn view(&self, sight: &Sight) -> View {
+        let latency = self.calibration.latency();
+        // Since it told where it looks it has turned on; steep downwards a few degrees of tilt make much of pan.
+        let position =
+            self.guard.position(&self.history, latency / 2, sight.taken_at.saturating_sub(latency));
         View {
-            horizontal_fov_deg: self
-                .fov_deg(self.zoom.step_shown(sight.taken_at, self.calibration.latency())),
+            horizontal_fov_deg: self.fov_deg(self.zoom.step_shown(sight.taken_at, latency)),
             aspect: sight.aspect,
-            tilt_deg: self.camera.position.tilt_deg.unwrap_or(0.0),
+            tilt_deg: position
+                .map_or(self.camera.position.tilt_deg, |position| Some(position.tilt))
+                .unwrap_or(0.0),
         }
+    }
+
+    /// How far off each axis may be for the target to be off the middle by a part of the picture's width.
+    fn zone_deg(&self, view: &View, part: f64) -> PanTilt {
+        view.turns(part * view.horizontal_fov_deg, self.aim.error())
     }
 
     /// The field of view at a zoom step, or at the last told one.

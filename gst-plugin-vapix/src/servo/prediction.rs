@@ -68,8 +68,11 @@ impl CommandHistory {
         })
     }
 
-    /// The rotation commanded between two times, degrees.
+    /// The rotation commanded between two times, degrees; from a later to an earlier it is the way back.
     pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
+        if to < from {
+            return PanTilt::default() - self.rotation(to, from);
+        }
         let mut rotation = PanTilt::default();
         let mut end = to;
         for entry in self.0.iter().rev() {
@@ -105,6 +108,7 @@ mod tests {
         history.push(ms(100), PanTilt::new(10.0, 0.0));
         history.push(ms(300), PanTilt::new(-20.0, 5.0));
         let rotation = history.rotation(ms(0), ms(400));
+        assert_eq!(history.rotation(ms(400), ms(0)), rotation * -1.0);
         assert!(
             (rotation.pan - (2.0 - 2.0)).abs() < 1e-9 && (rotation.tilt - 0.5).abs() < 1e-9,
             "{rotation:?}"

@@ -16,6 +16,7 @@ const PICTURE: Duration = Duration::from_millis(40);
 pub const ASPECT: f64 = 4.0 / 3.0;
 pub const WIDE_FOV_DEG: f64 = 55.2;
 const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+const TILT_LIMITS: Range = Range { min: -90.0, max: 20.0 };
 
 /// What the world is, whatever the servo believes.
 pub struct Setup {
@@ -29,6 +30,8 @@ pub struct Setup {
     pub zoom_speed: f64,
     pub zoom_step: f64,
     pub pan_limits: Range,
+    /// Where it looks at first.
+    pub pose: PanTilt,
     /// Half the width of the noise in the target's place and height, parts of the picture.
     pub jitter: f64,
     /// Whether the tracker's velocity is the difference of its noisy places; else it is the true one.
@@ -64,6 +67,7 @@ impl Setup {
             zoom_speed: 3000.0,
             zoom_step: ZOOM_STEPS.min + (magnification - 1.0) / 17.0 * (ZOOM_STEPS.max - ZOOM_STEPS.min),
             pan_limits: Range { min: -180.0, max: 180.0 },
+            pose: PanTilt::default(),
             jitter: 0.0,
             noisy_velocity: false,
             sees_ground: true,
@@ -168,7 +172,7 @@ impl Simulation {
         Self {
             pilot: Pilot::new(setup.settings.clone()),
             now: Duration::from_secs(1),
-            pose: PanTilt::default(),
+            pose: setup.pose,
             rate: PanTilt::default(),
             wanted: PanTilt::default(),
             goal: None,
@@ -250,6 +254,7 @@ impl Simulation {
         self.rate =
             PanTilt::new(towards(self.rate.pan, self.wanted.pan), towards(self.rate.tilt, self.wanted.tilt));
         self.pose = self.pose + self.rate * dt;
+        self.pose.tilt = self.pose.tilt.clamp(TILT_LIMITS.min, TILT_LIMITS.max);
         let limits = self.setup.pan_limits;
         if limits.max - limits.min < 360.0 {
             self.pose.pan = self.pose.pan.clamp(limits.min, limits.max);
@@ -355,7 +360,7 @@ impl Simulation {
             }),
             Job::Query(Query::Limits) => Answer::Limits(Limits {
                 pan_deg: Some(self.setup.pan_limits),
-                tilt_deg: Some(Range { min: -90.0, max: 20.0 }),
+                tilt_deg: Some(TILT_LIMITS),
                 zoom_steps: Some(ZOOM_STEPS),
                 field_angle_deg: Some(Range {
                     min: self.lens.fov_deg(ZOOM_STEPS.max),

@@ -129,6 +129,7 @@ impl SpeedMap {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vapix::Attributes;
     use proptest::prelude::*;
 
     fn axis_example() -> SpeedMap {
@@ -162,6 +163,17 @@ mod tests {
         assert_eq!(cubic.deg_s(5), 0.15);
         assert_eq!(SpeedMap::through(&[]), None);
         assert_eq!(SpeedMap::through(&rows(&[(0.0, 0.0)])), None);
+    }
+
+    #[test]
+    fn axis_table_is_the_curve_it_was_printed_from() {
+        let table = "speeds=value=1 | speed=0.05,value=9 | speed=0.16,value=14 | speed=2,value=24 | speed=2.1,\
+                     value=40 | speed=9,value=58 | speed=28,value=80 | speed=74,value=100 | speed=150";
+        let map = SpeedMap::through(&Attributes::parse(table).unwrap().speeds).unwrap();
+        for step in [9, 11, 14, 18, 24, 32, 40, 50, 58, 70, 80, 90, 100] {
+            let (found, true_deg_s) = (map.deg_s(step), axis_example().deg_s(step));
+            assert!((found / true_deg_s).ln().abs() < 1.5f64.ln(), "{step}: {found} instead of {true_deg_s}");
+        }
     }
 
     #[test]

@@ -44,7 +44,7 @@ impl Attributes {
     }
 }
 
-/// The rows that grow in both columns; a misprint (real ones exist) is left out.
+/// The rows that grow in both columns, without misprints (the documented example has one).
 fn table(text: &str) -> Vec<StepMeaning> {
     let mut rows: Vec<StepMeaning> = text.split(',').filter_map(row).collect();
     rows.sort_by(|a, b| a.step.total_cmp(&b.step));
@@ -56,7 +56,38 @@ fn table(text: &str) -> Vec<StepMeaning> {
         }
         grows
     });
+    while let Some(misprint) = misprint(&rows) {
+        rows.remove(misprint);
+    }
     rows
+}
+
+/// A row this many times larger or smaller than its neighbours let expect may be a misprint.
+const MISPRINT: f64 = 2.0;
+
+/// Which row is a misprint most likely.
+///
+/// On paper with logarithmic axes speeds are a straight line, or bend one way where they begin at a floor, and the
+/// other where they end at a ceiling. A wrong row is a spike instead: the curve bends there and back, so at
+/// the rows on either side the other way.
+fn misprint(rows: &[StepMeaning]) -> Option<usize> {
+    let bends: Vec<f64> = rows.windows(3).map(bend).collect();
+    let spikes = bends.windows(3).enumerate().filter(|(_, around)| {
+        around[1].abs() > MISPRINT.ln() && around[0] * around[1] < 0.0 && around[1] * around[2] < 0.0
+    });
+    // The first bend is that of the second row, and a spike is in the middle of three bends.
+    spikes.max_by(|(_, a), (_, b)| a[1].abs().total_cmp(&b[1].abs())).map(|(first, _)| first + 2)
+}
+
+/// By how much the middle of three rows is above the straight line through the others, on logarithmic axes; 0 where
+/// there is nothing to compare.
+fn bend(rows: &[StepMeaning]) -> f64 {
+    let [low, row, high] = rows else { return 0.0 };
+    if low.step <= 0.0 || low.value <= 0.0 {
+        return 0.0;
+    }
+    let share = (row.step / low.step).ln() / (high.step / low.step).ln();
+    (row.value / low.value).ln() - share * (high.value / low.value).ln()
 }
 
 /// `value=1 | speed=0.05`
@@ -81,9 +112,11 @@ mod tests {
     #[test]
     fn the_documented_table_is_read() {
         let attributes = Attributes::parse(DOCUMENTED).unwrap();
-        assert_eq!(attributes.speeds.len(), 8);
-        assert_eq!(attributes.speeds[0], StepMeaning { step: 1.0, value: 0.05 });
-        assert_eq!(attributes.speeds[7], StepMeaning { step: 100.0, value: 150.0 });
+        let speeds: Vec<(f64, f64)> = attributes.speeds.iter().map(|row| (row.step, row.value)).collect();
+        // Without 14, of which it says 2: as fast as 24, and five times what the others let expect.
+        let expected =
+            [(1.0, 0.05), (9.0, 0.16), (24.0, 2.1), (40.0, 9.0), (58.0, 28.0), (80.0, 74.0), (100.0, 150.0)];
+        assert_eq!(speeds, expected);
         assert_eq!(attributes.max_optical_magnification, Some(30.0));
         assert_eq!(Attributes::parse(&DOCUMENTED.replace("\r\n", "\n")).unwrap(), attributes);
     }
@@ -111,13 +144,32 @@ mod tests {
         }
 
         #[test]
-        fn a_table_is_read_back(speeds in prop::collection::btree_map(0u32..=100, 1u32..1000, 1..20)) {
-            let mut value = 0;
-            let rows: Vec<(u32, u32)> = speeds.into_iter().map(|(step, more)| { value += more; (step, value) }).collect();
-            let text: Vec<String> = rows.iter().map(|(step, value)| format!("value={step} | speed={value}")).collect();
-            let read = Attributes::parse(&format!("speeds={}\r\n", text.join(","))).unwrap().speeds;
-            let read: Vec<(u32, u32)> = read.iter().map(|row| (row.step as u32, row.value as u32)).collect();
-            prop_assert_eq!(read, rows);
+        fn a_table_of_an_even_curve_is_read_back_whole(
+            steps in prop::collection::btree_set(1u32..=100, 1..30), power in 0.5..4.0f64,
+            floor in 0.01..5.0f64, ceiling in 20.0..500.0f64,
+        ) {
+            let speed = |step: u32| (500.0 * (f64::from(step) / 100.0).powf(power)).clamp(floor, ceiling);
+            // As they are printed, to two digits.
+            let rows: Vec<String> =
+                steps.iter().map(|step| format!("value={step} | speed={:.1e}", speed(*step))).collect();
+            let read = Attributes::parse(&format!("speeds={}\r\n", rows.join(","))).unwrap().speeds;
+            let read: Vec<u32> = read.iter().map(|row| row.step as u32).collect();
+            prop_assert_eq!(read, steps.into_iter().collect::<Vec<_>>());
+        }
+
+        #[test]
+        fn a_misprint_within_a_table_is_left_out(
+            wrong in 2usize..8, factor in prop_oneof![0.1..0.3f64, 3.5..10.0f64], power in 1.0..4.0f64,
+        ) {
+            let speed = |row: usize| 400.0 * (0.1 * (row + 1) as f64).powf(power);
+            let value = (speed(wrong) * factor).clamp(speed(wrong - 1), speed(wrong + 1));
+            prop_assume!((value / speed(wrong)).ln().abs() > 2.0f64.ln());
+            let rows: Vec<String> = (0..10)
+                .map(|row| format!("value={} | speed={}", 10 * (row + 1), if row == wrong { value } else { speed(row) }))
+                .collect();
+            let read = Attributes::parse(&format!("speeds={}\r\n", rows.join(","))).unwrap().speeds;
+            let read: Vec<usize> = read.iter().map(|row| row.step as usize / 10 - 1).collect();
+            prop_assert_eq!(read, (0..10).filter(|row| *row != wrong).collect::<Vec<_>>());
         }
     }
 }

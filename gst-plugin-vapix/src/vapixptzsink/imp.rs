@@ -170,13 +170,13 @@ pub struct VapixPtzSink {
     )]
     #[property(
         name = "zoom-min", get, set = Self::set_zoom_min, type = u32, member = zoom_min, mutable_playing,
-        default = Settings::default().zoom_min, minimum = 1, maximum = 19_999,
-        blurb = "`auto-zoom` zooms out no farther than this, in zoom steps"
+        default = Settings::default().zoom_min, minimum = 1, maximum = 9999,
+        blurb = "`auto-zoom` zooms out no farther than this, in steps of the optical zoom"
     )]
     #[property(
         name = "zoom-max", get, set = Self::set_zoom_max, type = u32, member = zoom_max, mutable_playing,
-        default = Settings::default().zoom_max, minimum = 1, maximum = 19_999,
-        blurb = "`auto-zoom` zooms in no farther than this, in zoom steps"
+        default = Settings::default().zoom_max, minimum = 1, maximum = 9999,
+        blurb = "`auto-zoom` zooms in no farther than this, in steps of the optical zoom"
     )]
     #[property(
         name = "home", get = Self::home, set = Self::set_home, type = Option<String>, mutable_playing,

@@ -39,7 +39,9 @@
 //! ## Zoom and limits
 //! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
 //! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does,
-//! within what the camera can; an operator may go beyond them. In `mode=centre` the place in the picture is chosen
+//! within what the camera can; an operator may go beyond them. Zoom steps are those of the lens, 1 to 9999: digital
+//! zoom, beyond, shows no more, and is not used. As no camera tells how much it magnifies, the view is taken to be as wide
+//! as at the lens' end where an operator uses it. In `mode=centre` the place in the picture is chosen
 //! within them, as well as field of view and position are known. A pair of which the lower is the higher is refused
 //! with a warning, from READY to PAUSED and while playing, and stays as it was.
 //!

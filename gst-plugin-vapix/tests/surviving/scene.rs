@@ -15,6 +15,12 @@ use crate::common::{Heard, PATIENCE, Rig, Stamps, camera, target};
 const REQUESTS_AT_ONCE: u64 = 16;
 const REQUESTS_EACH_SECOND: u64 = 5;
 
+/// How long control may take to be back when the camera is.
+const BACK_WITHIN: Duration = Duration::from_secs(2);
+
+/// What a busy machine needs more, which cannot hide pauses that went on to double.
+const SLACK: Duration = Duration::from_secs(4);
+
 /// By how much clocks and timestamps jump.
 const JUMP: Duration = Duration::from_secs(3600);
 
@@ -97,6 +103,7 @@ impl Scene {
         let over = self.camera.status().time;
         self.end(trouble);
         let back_after = self.steered_again(over).saturating_sub(over);
+        assert!(!noticed || back_after < BACK_WITHIN + SLACK, "{}: back after {back_after:?}", self.title);
         if noticed && !heard.contains(&CONNECTED) {
             heard.extend(self.rig.push_until_message(&sides()[0], |heard| *heard == CONNECTED));
         }

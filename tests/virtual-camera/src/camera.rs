@@ -15,7 +15,7 @@ use crate::{
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
-    kinematics::{Head, Limits, Optics, Pose},
+    kinematics::{Head, Limits, Optics, Pose, within_a_turn},
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
@@ -74,7 +74,7 @@ impl Camera {
         let world = world::open(&settings)?;
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
-        let limits = settings.kinematics.limits.unwrap_or_else(|| world.limits());
+        let limits = settings.kinematics.limits_in(world.limits());
         let head =
             Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
         let device = Device::new(&settings, head, limits, world.view_size());
@@ -220,7 +220,7 @@ impl Camera {
         let optics = head.optics();
         Status {
             time: now,
-            pan_deg: snapshot.pose.pan_deg,
+            pan_deg: within_a_turn(snapshot.pose.pan_deg),
             tilt_deg: snapshot.pose.tilt_deg,
             zoom_step: snapshot.pose.zoom_step,
             magnification: optics.magnification(snapshot.pose.zoom_step),
@@ -449,7 +449,7 @@ impl VirtualCamera {
 
     /// How far it turns.
     pub fn limits(&self) -> Limits {
-        self.camera.settings.kinematics.limits.unwrap_or_else(|| self.camera.world.limits())
+        self.camera.settings.kinematics.limits_in(self.camera.world.limits())
     }
 
     /// Width and height in pixels that it sends unless asked for others.

@@ -91,6 +91,9 @@ pub struct Options {
     /// Degrees per second squared
     #[arg(long, default_value_t = 400.0, value_name = "DEG/S2", value_parser = positive)]
     acceleration: f64,
+    /// Pan turns round and round, beyond what of the world can be seen too
+    #[arg(long)]
+    endless_pan: bool,
     /// Do not limit the speed by the field of view (PTZ.Various.V1.ProportionalSpeedEnabled=false)
     #[arg(long)]
     no_proportional_speed: bool,
@@ -259,6 +262,7 @@ impl Options {
             },
             acceleration_deg_s2: self.acceleration,
             command_delay: milliseconds(self.command_delay),
+            endless_pan: self.endless_pan,
             ..Kinematics::default()
         };
         kinematics.proportional_speed.enabled = !self.no_proportional_speed;
@@ -329,12 +333,13 @@ mod tests {
 
     #[test]
     fn options_become_settings() {
-        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250 --moves absolute,centre --ground-truth gt.txt";
+        let line = "virtual-camera --footage a.avi --start 12.5 --auth digest-no-qop --size 320x240 --pan -5 --video-delay 250 --moves absolute,centre --endless-pan --ground-truth gt.txt";
         let settings = Settings::try_from(Options::parse_from(line.split(' '))).unwrap();
         assert_eq!(settings.auth, Auth::Digest { qop: false });
         assert_eq!(settings.video.size, Some((320, 240)));
         assert_eq!(settings.video.delay, Duration::from_millis(250));
         assert_eq!(settings.home.unwrap().pan_deg, -5.0);
+        assert!(settings.kinematics.endless_pan);
         assert_eq!(settings.moves, Moves { continuous: false, ..Moves::default() });
         let World::Footage(footage) = settings.world else { panic!("no footage") };
         assert_eq!((footage.start, footage.looped), (Duration::from_millis(12_500), true));

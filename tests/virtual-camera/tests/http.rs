@@ -7,7 +7,9 @@ use std::time::Duration;
 
 use common::{PATIENCE, client, get, settings};
 use digest_auth::{AuthContext, WwwAuthenticateHeader};
-use virtual_camera::{Auth, Clock, Kinematics, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
+use virtual_camera::{
+    Auth, Clock, Kinematics, Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World,
+};
 
 #[tokio::test]
 async fn a_continuous_move_runs_until_it_is_stopped() {
@@ -63,6 +65,28 @@ async fn forms_and_queries_do_the_same() {
         .unwrap();
     assert_eq!(posted.status(), 204);
     assert!(camera.wait_for(PATIENCE, |status| status.pan_deg == 3.0 && status.tilt_deg == -2.0));
+}
+
+#[tokio::test]
+async fn endless_pan_is_told_from_end_to_end_and_passes_there() {
+    let kinematics = Kinematics { endless_pan: true, ..Kinematics::default() };
+    let home = Some(Pose { pan_deg: 170.0, ..Pose::default() });
+    let settings = Settings { kinematics, home, clock: Clock::Stepped, ..settings() };
+    let camera = VirtualCamera::start(settings).unwrap();
+    let client = client();
+    let ask = async |path: &str| get(&client, &camera, path).await.1;
+    let limits = ask("/axis-cgi/com/ptz.cgi?query=limits").await;
+    assert!(limits.starts_with("MinPan=-180\r\nMaxPan=180\r\n"), "{limits}");
+    let limits = ask("/axis-cgi/param.cgi?action=list&group=PTZ.Limit").await;
+    assert!(limits.contains("MaxPan=180\n") && limits.contains("MinPan=-180\n"), "{limits}");
+    ask("/axis-cgi/com/ptz.cgi?pan=-170").await;
+    let mut seen = Vec::new();
+    for step in 1..200 {
+        camera.advance_to(Duration::from_millis(10) * step);
+        seen.push(camera.status().pan_deg);
+    }
+    assert!(seen.iter().all(|pan| (170.0..=180.0).contains(&pan.abs())), "{seen:?}");
+    assert!(ask("/axis-cgi/com/ptz.cgi?query=position").await.starts_with("pan=-170.0000\r\n"));
 }
 
 #[tokio::test]

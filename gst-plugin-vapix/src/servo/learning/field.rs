@@ -103,7 +103,7 @@ impl FieldLearner {
     }
 
     fn find(&mut self, moved: PanTilt, seen: PanTilt, doubt_deg: f64) {
-        let (square, along) = (dot(moved, moved), dot(moved, seen));
+        let (square, along) = (moved.dot(moved), moved.dot(seen));
         let vagueness = (Self::NOISE_DEG + doubt_deg) / square.sqrt() + 0.02;
         let factor = square / along;
         // What is no number compares with nothing.
@@ -136,8 +136,4 @@ impl FieldLearner {
 fn turn_between(from: PanTilt, to: PanTilt) -> PanTilt {
     let turn = to - from;
     PanTilt::new(around_deg(0.0, turn.pan), turn.tilt)
-}
-
-fn dot(a: PanTilt, b: PanTilt) -> f64 {
-    a.pan * b.pan + a.tilt * b.tilt
 }

@@ -93,12 +93,12 @@ impl LatencyLearner {
         };
         let unit = 1.0 / fov_deg;
         let change = (turn.rate - earlier.rate) * unit;
-        self.seen += dot(change, change);
+        self.seen += change.dot(change);
         for (index, (square, product)) in self.commanded.iter_mut().zip(&mut self.product).enumerate() {
             let delay = STEP * index as u32;
             let commanded = (rate(turn, delay, history) - rate(earlier, delay, history)) * unit;
-            *square += dot(commanded, commanded);
-            *product += dot(commanded, change);
+            *square += commanded.dot(commanded);
+            *product += commanded.dot(change);
         }
         self.keep((PLENTY / self.seen).min((-turn.seconds() / MEMORY_S).exp()));
         self.approach(turn.seconds());
@@ -157,8 +157,4 @@ impl LatencyLearner {
 /// The rate commanded for a turn, if it shows after this delay.
 fn rate(turn: &Turn, delay: Duration, history: &CommandHistory) -> PanTilt {
     history.rotation(turn.from.saturating_sub(delay), turn.to.saturating_sub(delay)) / turn.seconds()
-}
-
-fn dot(a: PanTilt, b: PanTilt) -> f64 {
-    a.pan * b.pan + a.tilt * b.tilt
 }

@@ -55,11 +55,12 @@ impl Pilot {
         let settings = &self.settings;
         let interval_s = self.interval().as_secs_f64();
         // No error is worth a move that would leave nearly as large a one on the other side.
-        let shortest_move_deg = self.map.deg_s(1) * interval_s;
+        let least_deg = 0.75 * self.map.deg_s(1) * interval_s;
+        let zone_deg = self.zone_deg(view, settings.dead_zone);
         ControlLaw {
             gain: settings.gain,
             trust: self.oscillation.trust(),
-            dead_zone_deg: (settings.dead_zone * view.horizontal_fov_deg).max(0.75 * shortest_move_deg),
+            dead_zone_deg: PanTilt::new(zone_deg.pan.max(least_deg), zone_deg.tilt.max(least_deg)),
             max_deg_s: settings.max_speed_deg_s,
             max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
         }
@@ -78,15 +79,16 @@ impl Pilot {
         let error = self.aim.error_at_effect(now, &self.history, self.calibration.latency());
         let jump = self.jump(sight, now);
         let zooms = jump.is_some_and(|jump| jump.pressing);
-        let dead_zone_deg = self.settings.dead_zone * view.horizontal_fov_deg;
-        if error.largest() <= dead_zone_deg && !zooms {
+        let zone_deg = self.zone_deg(&view, self.settings.dead_zone);
+        let matters = |error: PanTilt| error.pan.abs() > zone_deg.pan || error.tilt.abs() > zone_deg.tilt;
+        if !matters(error) && !zooms {
             return Wish::AsIs;
         }
         let position = self.camera.pan_tilt();
         let turn = self.limited(error, position, 1.0);
         // An axis that is at its end is no reason to correct the other by next to nothing.
-        let worth = |error: f64, turn: f64| error.abs() > dead_zone_deg && turn != 0.0;
-        if !worth(error.pan, turn.pan) && !worth(error.tilt, turn.tilt) && !zooms {
+        let mendable = error.each(turn, |error, turn| if turn == 0.0 { 0.0 } else { error });
+        if !matters(mendable) && !zooms {
             return Wish::AsIs;
         }
         match mode {

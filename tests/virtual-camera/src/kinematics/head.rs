@@ -5,6 +5,7 @@ use std::{collections::VecDeque, time::Duration};
 use super::{
     Kinematics, Limits, Optics, Pose, ZOOM_RANGE,
     motor::{Drive, Motor},
+    within_a_turn,
 };
 use crate::geometry;
 
@@ -106,8 +107,10 @@ impl Head {
     /// A head at rest at `home`, which remembers its poses for `memory`.
     pub fn new(kinematics: Kinematics, optics: Optics, limits: Limits, home: Pose, memory: Duration) -> Self {
         let acceleration = kinematics.acceleration_deg_s2;
+        let pan_deg =
+            if kinematics.endless_pan { (f64::NEG_INFINITY, f64::INFINITY) } else { limits.pan_deg };
         let mut head = Self {
-            pan: Motor::at(home.pan_deg, limits.pan_deg, acceleration),
+            pan: Motor::at(home.pan_deg, pan_deg, acceleration),
             tilt: Motor::at(home.tilt_deg, limits.tilt_deg, acceleration),
             zoom: Motor::at(home.zoom_step, ZOOM_RANGE, ZOOM_ACCELERATION_STEP_S2),
             kinematics,
@@ -181,7 +184,7 @@ impl Head {
             Motion::Absolute { pan_deg, tilt_deg, zoom_step } => {
                 let pose = self.pose();
                 self.go_to(Pose {
-                    pan_deg: pan_deg.unwrap_or(pose.pan_deg),
+                    pan_deg: pan_deg.map_or(pose.pan_deg, |pan_deg| self.nearest(pan_deg)),
                     tilt_deg: tilt_deg.unwrap_or(pose.tilt_deg),
                     zoom_step: zoom_step.unwrap_or(pose.zoom_step),
                 });
@@ -217,7 +220,14 @@ impl Head {
         let width = 2.0 * (self.optics.fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
         let (pan_deg, tilt_deg) = geometry::aim(&pose, x * width, y * width);
         let magnification = self.optics.magnification(pose.zoom_step) * magnify;
+        let pan_deg = self.nearest(pan_deg);
         self.go_to(Pose { pan_deg, tilt_deg, zoom_step: self.optics.zoom_step(magnification) });
+    }
+
+    /// The same direction by the shorter way round, where both lead there.
+    fn nearest(&self, pan_deg: f64) -> f64 {
+        let pan = self.pan.position;
+        if self.kinematics.endless_pan { pan + within_a_turn(pan_deg - pan) } else { pan_deg }
     }
 
     fn go_to(&mut self, target: Pose) {
@@ -366,6 +376,45 @@ mod tests {
         head.command(ms(20_000), Motion::Stop);
         head.advance(ms(21_000));
         assert!(head.is_at_rest());
+    }
+
+    fn endless(pan_deg: f64) -> Head {
+        let optics = Optics { wide_fov_deg: 55.2, max_magnification: 18.0 };
+        let kinematics = Kinematics { endless_pan: true, ..Kinematics::default() };
+        let world = Limits { pan_deg: (-20.0, 20.0), tilt_deg: (-90.0, 20.0) };
+        let limits = kinematics.limits_in(world);
+        assert_eq!(limits, Limits { pan_deg: (-180.0, 180.0), ..world });
+        Head::new(kinematics, optics, limits, Pose { pan_deg, ..Pose::default() }, Duration::from_secs(2))
+    }
+
+    #[test]
+    fn endless_pan_goes_round_and_round() {
+        let mut head = endless(175.0);
+        head.command(ms(0), Motion::PanTilt { pan: 60.0, tilt: 0.0 });
+        head.advance(ms(20_000));
+        assert!((head.now().pan_rate_deg_s - 97.2).abs() < 1e-6, "{:?}", head.now());
+        assert!(head.now().pose.pan_deg > 175.0 + 19.0 * 97.2);
+        head.command(ms(20_000), Motion::Stop);
+        head.advance(ms(21_000));
+        assert!(head.is_at_rest());
+    }
+
+    #[test]
+    fn endless_pan_takes_the_shorter_way_to_a_position_and_the_named_one_by_an_angle() {
+        for (from, to, way) in [(170.0, -170.0, 20.0), (-170.0, 170.0, -20.0), (-100.0, 60.0, 160.0)] {
+            let mut head = endless(from);
+            head.command(ms(0), Motion::Absolute { pan_deg: Some(to), tilt_deg: None, zoom_step: None });
+            head.advance(ms(4000));
+            assert!((head.now().pose.pan_deg - from - way).abs() < 1e-9, "{:?}", head.now());
+            assert_eq!(within_a_turn(head.now().pose.pan_deg), to);
+        }
+        let mut head = endless(170.0);
+        head.command(ms(0), Motion::Relative { pan_deg: 270.0, tilt_deg: 0.0, zoom_step: 0.0 });
+        head.advance(ms(4000));
+        assert_eq!(head.now().pose.pan_deg, 440.0);
+        head.command(ms(4000), Motion::Centre { x: 0.5, y: 0.0, magnify: 1.0 });
+        head.advance(ms(8000));
+        assert!((head.now().pose.pan_deg - 467.6).abs() < 1e-6, "{:?}", head.now());
     }
 
     #[test]

@@ -9,7 +9,7 @@ use std::time::Duration;
 pub use head::{Head, Motion};
 pub use speed::{ProportionalRule, ProportionalSpeed, SpeedMap};
 
-/// Where a camera looks. Pan grows to the right, tilt upwards, zoom (1 to 9999) inwards.
+/// Where a camera looks. Endless pan counts its turns. Pan grows to the right, tilt upwards, zoom (1 to 9999) inwards.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
     /// Degrees.
@@ -80,10 +80,25 @@ pub struct Kinematics {
     pub command_delay: Duration,
     /// How far it turns; `None` is as far as there is a world to see.
     pub limits: Option<Limits>,
+    /// Pan turns round and round; its limits are told as -180 and 180 degrees, which are no ends then.
+    pub endless_pan: bool,
     /// Magnification at the narrowest view; `None` is the world's own.
     pub max_magnification: Option<f64>,
     /// Zoom steps per second at zoom speed 100. Undocumented.
     pub zoom_speed_step_s: f64,
+}
+
+impl Kinematics {
+    /// How far it turns before a world that can be seen so far, as it is told.
+    pub(crate) fn limits_in(&self, world: Limits) -> Limits {
+        let limits = self.limits.unwrap_or(world);
+        if self.endless_pan { Limits { pan_deg: (-180.0, 180.0), ..limits } } else { limits }
+    }
+}
+
+/// The same direction from -180 to 180 degrees, as cameras tell it.
+pub(crate) fn within_a_turn(pan_deg: f64) -> f64 {
+    if pan_deg.abs() <= 180.0 { pan_deg } else { (pan_deg + 180.0).rem_euclid(360.0) - 180.0 }
 }
 
 impl Default for Kinematics {
@@ -98,6 +113,7 @@ impl Default for Kinematics {
             acceleration_deg_s2: 400.0,
             command_delay: Duration::from_millis(60),
             limits: None,
+            endless_pan: false,
             max_magnification: None,
             zoom_speed_step_s: 3000.0,
         }

@@ -9,7 +9,7 @@ use super::{
     queue::Queue,
 };
 use crate::{
-    kinematics::{Head, Limits, Motion, Pose, ZOOM_RANGE},
+    kinematics::{Head, Limits, Motion, Pose, ZOOM_RANGE, within_a_turn},
     settings::{Moves, PtzApi, Settings},
 };
 
@@ -144,7 +144,7 @@ impl Device {
         let step = |name: &str| self.lens.get(name).copied().unwrap_or_default();
         let switch = |name: &str| if self.switches.get(name) == Some(&true) { "on" } else { "off" };
         for (name, value) in [
-            ("pan", format!("{:.4}", pose.pan_deg)),
+            ("pan", format!("{:.4}", within_a_turn(pose.pan_deg))),
             ("tilt", format!("{:.4}", pose.tilt_deg)),
             ("zoom", format!("{:.0}", pose.zoom_step)),
             ("iris", format!("{:.0}", step("iris"))),
