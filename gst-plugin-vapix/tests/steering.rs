@@ -218,7 +218,7 @@ fn paused_commands_nothing() {
     // Its next look at the position comes after all there was to command.
     let requests = camera.status().requests;
     assert!(camera.wait_for(PATIENCE, |status| status.requests > requests));
-    assert_eq!(moves(&camera).len(), commanded);
+    assert_eq!(moves(&camera).len(), commanded, "{:?}", camera.commands());
     pipeline.set_state(gst::State::Null).unwrap();
 }
 
