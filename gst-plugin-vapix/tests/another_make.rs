@@ -13,6 +13,9 @@ use virtual_camera::{
     VirtualCamera,
 };
 
+/// How late the slow camera's answers are.
+const LATE: Duration = Duration::from_millis(900);
+
 /// Digest without `qop`, no attributes, lines that end in LF, speed steps in proportion, ends of pan and tilt; before
 /// somebody who paces.
 fn settings(stands_s: u64, stretch_s: u64, wide_fov_deg: f64) -> Settings {
@@ -55,12 +58,12 @@ fn it_is_followed_with_nothing_set_but_location_and_credentials() {
     assert!(!stage.heard.iter().any(Heard::is_warning), "{:?}", stage.heard);
 }
 
-/// The same camera answers a second late, whatever it is told or asked. By the clock: in stepped time nobody would step
-/// on before the answer has come.
+/// The same camera answers nearly a second late, whatever it is told or asked; not more, as what a busy machine adds must
+/// not make it later than the sink waits. By the clock: in stepped time nobody would step on before the answer has come.
 #[test]
 fn so_it_is_when_it_takes_one_command_a_second() {
     let camera = VirtualCamera::start(settings(8, 8, 55.2)).unwrap();
-    camera.set_fault(Fault::Delay(Duration::from_secs(1)));
+    camera.set_fault(Fault::Delay(LATE));
     let mut stage = Stage::by_the_clock(camera, as_user);
     let shown = stage.follow(36.0);
     let settled = shown.partition_point(|shown| shown.at < Duration::from_secs(15));
@@ -72,7 +75,8 @@ fn so_it_is_when_it_takes_one_command_a_second() {
         "{:?}",
         stage.heard
     );
-    let commands = stage.camera.status().requests as f64;
-    assert!(commands <= 1.0 + stage.now.as_secs_f64(), "{commands} in {:?}", stage.now);
+    let requests = stage.camera.status().requests as f64;
+    let (now, late) = (stage.camera.now().as_secs_f64(), LATE.as_secs_f64());
+    assert!(requests <= 1.0 + now / late, "{requests} in {now} s");
     assert_eq!(stage.camera.status().most_in_flight, 1);
 }

@@ -25,7 +25,7 @@ fn every_kind_of_authentication() {
 fn a_nonce_that_expires_is_no_fault() {
     let settings = Settings {
         auth: Auth::Digest { qop: true },
-        nonce_lifetime: Duration::from_millis(50),
+        nonce_lifetime: Duration::from_millis(300),
         ..Settings::default()
     };
     let camera = VirtualCamera::start(settings).unwrap();

@@ -127,35 +127,50 @@ fn zooming_by_hand_against_auto_zoom_is_an_override() {
 }
 
 /// The camera's delays, speeds and ends differ from all that is assumed, and nobody else is there.
-#[test]
-fn our_own_moves_are_nobody_elses() {
-    let slow = Kinematics { command_delay: Duration::from_millis(900), ..Kinematics::default() };
-    let lazy = Kinematics { acceleration_deg_s2: 20.0, ..Kinematics::default() };
-    let linear = Kinematics { speed_map: SpeedMap::Linear { max_deg_s: 200.0 }, ..Kinematics::default() };
-    for (name, kinematics) in
-        [("plain", Kinematics::default()), ("slow", slow), ("lazy", lazy), ("linear", linear)]
-    {
-        for mode in ["velocity", "absolute", "centre"] {
-            let settings = Settings { kinematics: kinematics.clone(), ..Settings::default() };
-            let mut stage = Stage::new(settings, |rig| rig.with_str("mode", mode));
-            let end = stage.camera.limits().pan_deg.1;
-            // To and fro, and on beyond the end of the range.
-            for second in 0..40 {
-                for _ in 0..25 {
-                    let phase = stage.now.as_secs_f64() * 0.5;
-                    let meta = person_at(&stage, (end + 3.0) * phase.sin());
-                    stage.picture(Some(&meta));
-                }
-                assert_eq!(stage.times(&TAKEN_OVER), 0, "{name}, {mode}, second {second}");
+#[track_caller]
+fn our_own_moves_are_nobody_elses(kinematics: Kinematics) {
+    for mode in ["velocity", "absolute", "centre"] {
+        let settings = Settings { kinematics: kinematics.clone(), ..Settings::default() };
+        let mut stage = Stage::new(settings, |rig| rig.with_str("mode", mode));
+        let end = stage.camera.limits().pan_deg.1;
+        // To and fro, and on beyond the end of the range.
+        for second in 0..40 {
+            for _ in 0..25 {
+                let phase = stage.now.as_secs_f64() * 0.5;
+                let meta = person_at(&stage, (end + 3.0) * phase.sin());
+                stage.picture(Some(&meta));
             }
-            assert!(!stage.moves().is_empty());
+            assert_eq!(stage.times(&TAKEN_OVER), 0, "{mode}, second {second}");
         }
+        assert!(!stage.moves().is_empty());
     }
 }
 
 #[test]
+fn our_own_moves_are_nobody_elses_on_a_camera_as_assumed() {
+    our_own_moves_are_nobody_elses(Kinematics::default());
+}
+
+#[test]
+fn our_own_moves_are_nobody_elses_on_a_late_camera() {
+    let command_delay = Duration::from_millis(900);
+    our_own_moves_are_nobody_elses(Kinematics { command_delay, ..Kinematics::default() });
+}
+
+#[test]
+fn our_own_moves_are_nobody_elses_on_a_lazy_camera() {
+    our_own_moves_are_nobody_elses(Kinematics { acceleration_deg_s2: 20.0, ..Kinematics::default() });
+}
+
+#[test]
+fn our_own_moves_are_nobody_elses_on_a_camera_of_linear_speeds() {
+    let speed_map = SpeedMap::Linear { max_deg_s: 200.0 };
+    our_own_moves_are_nobody_elses(Kinematics { speed_map, ..Kinematics::default() });
+}
+
+#[test]
 fn a_camera_that_comes_back_from_a_reboot_elsewhere_was_not_moved_by_anybody() {
-    let mut stage = Stage::new(Settings::default(), |rig| rig.with("timeout", 300u32));
+    let mut stage = Stage::new(Settings::default(), |rig| rig);
     stage.run(12.0, &centred());
     stage.camera.set_fault(Fault::Reboot);
     stage.run(8.0, &centred());
@@ -331,7 +346,7 @@ fn who_loses_its_turn_while_the_camera_turns_stops_it() {
 #[test]
 fn a_stop_that_the_network_swallows_is_repeated_when_it_is_back() {
     let camera = common::camera(virtual_camera::Auth::None);
-    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    let mut rig = Rig::playing(&camera.url());
     rig.set_going(&camera);
     camera.set_fault(Fault::Refuse);
     let nobody = nobody();
@@ -344,7 +359,7 @@ fn a_stop_that_the_network_swallows_is_repeated_when_it_is_back() {
 #[test]
 fn a_stop_outlives_the_element_that_could_not_send_it() {
     let camera = common::camera(virtual_camera::Auth::None);
-    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    let mut rig = Rig::playing(&camera.url());
     rig.set_going(&camera);
     camera.set_fault(Fault::Refuse);
     drop(rig);
@@ -359,7 +374,7 @@ fn a_stop_outlives_what_the_element_turns_to_next() {
     let next = common::camera(virtual_camera::Auth::None);
     for (location, starts) in [(next.url(), true), ("https://127.0.0.1".to_owned(), false)] {
         let left = common::camera(virtual_camera::Auth::None);
-        let mut rig = Rig::ready(&left.url()).with("timeout", 200u32).play();
+        let mut rig = Rig::playing(&left.url());
         rig.set_going(&left);
         left.set_fault(Fault::Refuse);
         rig.sink.set_state(gst::State::Null).unwrap();
@@ -375,7 +390,7 @@ fn a_stop_outlives_what_the_element_turns_to_next() {
 #[test]
 fn a_stop_is_handed_over_to_who_comes_next() {
     let camera = common::camera(virtual_camera::Auth::None);
-    let mut rig = Rig::ready(&camera.url()).with("timeout", 200u32).play();
+    let mut rig = Rig::playing(&camera.url());
     rig.set_going(&camera);
     camera.set_fault(Fault::Refuse);
     rig.sink.set_state(gst::State::Null).unwrap();

@@ -15,11 +15,11 @@ const SERVICE: Duration = Duration::from_millis(400);
 /// From one picture to the next, on a machine that has nothing else to do.
 const FRAME: Duration = Duration::from_micros(16_667);
 
-const LASTS: Duration = Duration::from_secs(16);
-
 /// For so many pictures the target stays on one side: for some requests, and never the same part of them; and too
 /// long to be taken for a camera that swings about its target.
 const STAYS: u64 = 151;
+
+const SIDES: u64 = 7;
 
 /// A picture that was taken by the sink, by the camera's clock.
 struct Picture {
@@ -48,20 +48,19 @@ fn turns_right(command: &ReceivedCommand) -> Option<bool> {
 #[test]
 fn under_load_there_is_one_request_and_each_is_of_the_newest_picture() {
     let camera = VirtualCamera::start(Settings { service_time: SERVICE, ..Settings::default() }).unwrap();
+    let (begin, mut pictures) = (Instant::now(), Vec::new());
     // So slow that it never comes to the end of its range.
     let mut rig =
         Rig::ready(&camera.url()).with("latency", 0u32).with("learn", false).with("gain", 0.3).play();
-    let (begin, mut pictures) = (Instant::now(), Vec::new());
-    while begin.elapsed() < LASTS {
-        let meta = side(pictures.len() as u64);
+    for picture in 0..SIDES * STAYS {
+        let meta = side(picture);
         rig.push(&meta);
         pictures.push(Picture { taken: camera.now(), right: meta.centroid.x > 0.5 });
         camera.wait_for(FRAME, |_| false);
     }
-    let (elapsed, status, heard, commands) =
-        (begin.elapsed(), camera.status(), rig.heard(), camera.commands());
-    drop(rig);
-    assert_eq!(camera.status().most_in_flight, 1);
+    let (status, elapsed, heard, commands) =
+        (camera.status(), begin.elapsed(), rig.heard(), camera.commands());
+    assert_eq!(status.most_in_flight, 1);
     // Never more than the camera has time for: nothing is left over for later.
     assert!(u128::from(status.requests) <= elapsed.as_millis() / SERVICE.as_millis() + 1, "{status:?}");
     assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");

@@ -206,8 +206,13 @@ fn a_dead_network_ends_with_a_warning_within_bounds() {
     rig.set_going(&camera);
     camera.set_fault(Fault::Hang);
     rig.sink.set_state(gst::State::Null).unwrap();
-    let heard = rig.heard();
     let gave_up =
         |heard: &Heard| matches!(heard, Heard::Warning(text) if text.contains("may still be moving"));
+    // On a busy machine it is said after the wait for it is over.
+    let mut heard = Vec::new();
+    while !heard.iter().any(gave_up) {
+        heard.push(rig.hear(PATIENCE).expect("it is never said"));
+    }
+    heard.extend(rig.heard());
     assert_eq!(heard.iter().filter(|heard| gave_up(heard)).count(), 1, "{heard:?}");
 }

@@ -46,7 +46,7 @@ class VirtualCamera:
 
     def report(self):
         """Status (position, motion, counters) and limits, as the camera knows them."""
-        with urllib.request.urlopen(f"{self.http}/api/status", timeout=5) as answer:
+        with urllib.request.urlopen(f"{self.http}/api/status", timeout=30) as answer:
             report = json.load(answer)
         return report["status"], report["limits"]
 

@@ -40,6 +40,8 @@ RECORD = (
     "drawn. ! queue ! x264enc tune=zerolatency speed-preset=superfast key-int-max=50 ! h264parse "
     "! matroskamux ! filesink location={out}/followed.mkv"
 )
+# How many seconds the first picture may take: where GStreamer was never run before, it looks through its plugins first.
+PATIENCE = 60.0
 SHOW = "drawn. ! queue leaky=downstream ! videoconvert ! autovideosink sync=false"
 
 
@@ -62,8 +64,9 @@ def pipeline(camera, codec, out):
 
 
 def follow(camera, command, duration):
-    """Runs the pipeline for `duration` seconds and returns what happened."""
+    """Runs the pipeline, for `duration` seconds from its first pictures on, and returns what happened."""
     progress = Progress()
+    give_up = time.monotonic() + PATIENCE
     launch = subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, errors="replace"
     )
@@ -71,6 +74,9 @@ def follow(camera, command, duration):
         reader = threading.Thread(target=read_messages, args=(launch.stdout, progress), daemon=True)
         reader.start()
         while launch.poll() is None and progress.seconds() < duration:
+            if progress.started is None and time.monotonic() > give_up:
+                print(f"no picture came within {PATIENCE:.0f} s", file=sys.stderr)
+                break
             progress.sample(*camera.report())
             time.sleep(0.1)
         # Ctrl-C ends the stream (-e): the recording is completed and the camera told to stop.

@@ -31,7 +31,8 @@ class Progress:
     """Collects what happened, second by second."""
 
     def __init__(self):
-        self.started = time.monotonic()
+        # When the pictures began to come: getting there takes as long as it takes, and is no part of the run.
+        self.started = None
         self.samples = []
         self.events = []
         self.state = "searching"
@@ -42,11 +43,13 @@ class Progress:
         self.exit_code = None
 
     def seconds(self):
-        return time.monotonic() - self.started
+        return 0.0 if self.started is None else time.monotonic() - self.started
 
     def sample(self, camera, limits):
         """Notes the present together with the camera's status and the limits of its pan and tilt."""
         self.camera = camera
+        if self.started is None:
+            return
         angles = {"pan_deg": camera["pan_deg"], "tilt_deg": camera["tilt_deg"]}
         at_limit = any(abs(angle - end) < 0.1 for key, angle in angles.items() for end in limits[key])
         self.samples.append(
@@ -93,6 +96,8 @@ class Progress:
         return None if usual else f"{self.seconds():6.1f} s  {text}"
 
     def _second(self, frames):
+        if self.started is None:
+            self.started = time.monotonic()
         rate, self.frames = frames - self.frames, frames
         if self.camera is None:
             return None

@@ -12,6 +12,9 @@ use super::{Heard, Rig, moves, target};
 /// From one picture to the next.
 pub const FRAME: Duration = Duration::from_millis(40);
 
+/// Answers are waited for by the clock, in stepped time too: a busy machine is not to be taken for a fault.
+pub const PATIENT_MS: u32 = 60_000;
+
 /// Width and height of the pictures.
 const SIZE: (u32, u32) = (320, 240);
 
@@ -78,7 +81,7 @@ impl Stage {
     }
 
     pub fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let rig = set(Rig::ready(&camera.url()).with("lockstep", true)).play();
+        let rig = set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_MS)).play();
         let now = camera.status().time;
         Self { camera, rig, now, heard: Vec::new(), stepped: true }
     }

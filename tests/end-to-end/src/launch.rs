@@ -89,13 +89,13 @@ impl GstLaunch {
         assert!(status.success());
     }
 
-    /// Waits until it has ended by itself; gives the exit status and everything it printed.
+    /// Waits until it has ended by itself, as long as it has something to say; gives the exit status and everything it
+    /// printed.
     #[track_caller]
     pub fn finish(mut self) -> (ExitStatus, String) {
-        let deadline = Instant::now() + crate::PATIENCE;
         // The channel closes when both streams do, which is when the process and its children end.
         loop {
-            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+            match self.lines.recv_timeout(crate::PATIENCE) {
                 Ok(line) => self.seen.push(line),
                 Err(mpsc::RecvTimeoutError::Disconnected) => break,
                 Err(mpsc::RecvTimeoutError::Timeout) => {

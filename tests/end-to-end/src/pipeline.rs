@@ -97,6 +97,11 @@ impl Running {
         }
         &self.warnings
     }
+
+    /// The same, of what is amiss with others: where a busy machine is late, the loop itself may swing and say so.
+    pub fn complaints(&mut self) -> Vec<String> {
+        self.warnings().iter().filter(|warning| !warning.contains("swings to and fro")).cloned().collect()
+    }
 }
 
 impl Drop for Running {

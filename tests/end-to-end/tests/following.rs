@@ -32,7 +32,7 @@ fn follows(settings: Settings, source: impl Fn(&VirtualCamera) -> String) {
     running.pipeline().send_event(gst::event::Eos::new());
     running.wait_for("the end", |message| (message.type_() == gst::MessageType::Eos).then_some(()));
     assert!(camera.wait_for(PATIENCE, |status| !status.moving), "the camera was left moving");
-    assert_eq!(running.warnings(), [] as [String; 0]);
+    assert_eq!(running.complaints(), [] as [String; 0]);
 }
 
 #[test]

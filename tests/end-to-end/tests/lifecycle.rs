@@ -9,8 +9,18 @@ use virtual_camera::VirtualCamera;
 #[test]
 fn two_hundred_cycles_leak_nothing() {
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
+    std::thread::scope(|scope| {
+        for _ in 0..2 {
+            scope.spawn(|| cycles_leak_nothing(&camera, "100"));
+        }
+    });
+}
+
+/// In a process of their own.
+#[track_caller]
+fn cycles_leak_nothing(camera: &VirtualCamera, cycles: &str) {
     let output = tool(env!("CARGO_BIN_EXE_application"))
-        .args(["cycle", &camera.url(), scene::USER, "200"])
+        .args(["cycle", &camera.url(), scene::USER, cycles])
         .env("CAMERA_PASSWORD", scene::PASSWORD)
         .env("GST_TRACERS", "leaks(name=all-objects,stack-traces-flags=none)")
         .env("GST_DEBUG", "GST_TRACER:7")

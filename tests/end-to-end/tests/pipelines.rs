@@ -70,8 +70,10 @@ fn recording_is_complete_and_playable() {
     let mut command = against(&camera, pipelines().join("record-overlay.sh"));
     command.env("OUT", &recording);
     follows_until_interrupted(&camera, command);
-    let probe = Command::new("ffprobe")
+    let probe = Command::new("timeout")
         .args([
+            "120",
+            "ffprobe",
             "-v",
             "error",
             "-count_frames",

@@ -13,8 +13,11 @@ use virtual_camera::{SyntheticSettings, World};
 fn run(codec: Codec) -> Run {
     evaluation::init().unwrap();
     let path = SyntheticSettings::walk((-14.0, -2.0), (10.0, -2.0), 8.0, Duration::from_secs(1));
-    let duration = path.last().unwrap().time;
-    let settings = SyntheticSettings { path, frame_rate: 25.0, wide_fov_deg: 36.0, ..Default::default() };
+    // Whoever has walked stays there, off the middle: until the streams have come about, on a busy machine, the walk may
+    // be over.
+    let duration = path.last().unwrap().time + Duration::from_secs(6);
+    let settings =
+        SyntheticSettings { path, stays: true, frame_rate: 25.0, wide_fov_deg: 36.0, ..Default::default() };
     let place = Place::World(World::Synthetic(settings));
     let scene = Scene { test: None, title: "walk".into(), place, duration, person: None };
     let experiment = Experiment::new(scene, TrackerName::Oracle, 1);

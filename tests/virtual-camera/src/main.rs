@@ -24,12 +24,13 @@ fn main() -> ExitCode {
 fn run(options: Options) -> Result<(), Box<dyn std::error::Error>> {
     let log_file = options.log.clone();
     let camera = VirtualCamera::start(Settings::try_from(options)?)?;
-    println!("ready http={} rtsp={}", camera.url(), camera.rtsp_url());
-    std::io::stdout().flush()?;
     let mut log = log_file.map(|path| Log::create(&path, &camera)).transpose()?;
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
     runtime.block_on(async {
         let mut signals = Signals::new()?;
+        // Whoever reads this may send a signal at once.
+        println!("ready http={} rtsp={}", camera.url(), camera.rtsp_url());
+        std::io::stdout().flush()?;
         loop {
             let tick = async {
                 match &log {

@@ -6,7 +6,8 @@ mod common;
 use std::{
     io::{BufRead, BufReader, Write},
     path::{Path, PathBuf},
-    process::{Child, ChildStdin, ChildStdout, Command, Stdio},
+    process::{Child, ChildStdin, Command, Stdio},
+    sync::mpsc,
     time::Duration,
 };
 
@@ -18,7 +19,7 @@ use virtual_camera::{Clock, RoomSettings, Settings, SyntheticSettings, VirtualCa
 struct Browser {
     child: Child,
     commands: ChildStdin,
-    answers: BufReader<ChildStdout>,
+    answers: mpsc::Receiver<Vec<u8>>,
     profile: PathBuf,
     page: Option<String>,
     sent: u64,
@@ -46,7 +47,11 @@ impl Browser {
             .spawn()
             .unwrap();
         let commands = child.stdin.take().unwrap();
-        let answers = BufReader::new(child.stdout.take().unwrap());
+        let (sender, answers) = mpsc::channel();
+        let messages = BufReader::new(child.stdout.take().unwrap()).split(0);
+        std::thread::spawn(move || {
+            messages.map_while(Result::ok).try_for_each(|message| sender.send(message))
+        });
         Some(Self { child, commands, answers, profile, page: None, sent: 0 })
     }
 
@@ -58,10 +63,10 @@ impl Browser {
         }
         self.commands.write_all(format!("{command}\0").as_bytes()).unwrap();
         loop {
-            let mut message = Vec::new();
-            self.answers.read_until(0, &mut message).unwrap();
-            assert!(!message.is_empty(), "the browser is gone");
-            let message: Value = serde_json::from_slice(message.strip_suffix(&[0]).unwrap()).unwrap();
+            // What is waited for within the page has its own limit, which is to come first.
+            let message = self.answers.recv_timeout(2 * PATIENCE);
+            let message = message.unwrap_or_else(|error| panic!("the browser answers no {method}: {error}"));
+            let message: Value = serde_json::from_slice(&message).unwrap();
             if message["id"] == json!(self.sent) {
                 assert!(message["error"].is_null(), "{method}: {message}");
                 return message["result"].clone();

@@ -7,6 +7,7 @@ use std::{
     pin::Pin,
     sync::{Arc, Mutex},
     task::{Context, Poll, ready},
+    time::Duration,
 };
 
 use axum::{
@@ -23,6 +24,9 @@ use super::reserve;
 use crate::{Fault, sync::lock};
 
 const BACKLOG: u32 = 64;
+
+/// Between two attempts to have a lost port again.
+const LOST: Duration = Duration::from_millis(50);
 
 /// How a connection is to end.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -134,8 +138,9 @@ impl Door {
             }
         } else {
             // A socket that does not listen refuses.
-            let _reserved = reserve(self.address);
+            let reserved = reserve(self.address);
             self.fault_over().await;
+            self.listener = reserved.and_then(|socket| socket.listen(BACKLOG)).ok();
         }
     }
 
@@ -178,9 +183,11 @@ impl Listener for Door {
                 return (Wire { stream, connection: Connection::default(), answered: false }, address);
             }
             if self.listener.is_none() {
-                // Unless the port was lost to somebody else meanwhile, this works at once.
                 self.listener = reserve(self.address).and_then(|socket| socket.listen(BACKLOG)).ok();
-                tokio::task::yield_now().await;
+            }
+            if self.listener.is_none() {
+                // The port was lost to somebody else meanwhile, who may let go of it again.
+                tokio::time::sleep(LOST).await;
             }
         }
     }

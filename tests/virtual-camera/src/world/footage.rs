@@ -19,7 +19,8 @@ use crate::{picture::Picture, settings::FootageSettings};
 const KEPT: usize = 8;
 /// A longer way ahead is sought, a shorter one decoded.
 const SEEK_BEYOND: u64 = 100;
-const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(10);
+/// For decoders that come from a cold disk, on a busy machine.
+const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
 
 /// Why there is nothing to see.
 #[derive(Debug, thiserror::Error)]

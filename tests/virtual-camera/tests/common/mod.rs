@@ -8,7 +8,7 @@ use reqwest::Client;
 use virtual_camera::{Settings, SyntheticSettings, Video, VirtualCamera, World};
 
 /// Longer than anything takes here, however busy the machine.
-pub const PATIENCE: Duration = Duration::from_secs(30);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 
 /// A camera with small pictures of a small world.
 pub fn settings() -> Settings {
