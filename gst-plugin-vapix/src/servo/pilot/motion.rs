@@ -81,12 +81,14 @@ impl Pilot {
             .zoom_goal()
             .and_then(|goal| self.zoom.jump(&goal, &self.camera.lens()?, now, self.calibration.latency()));
         let zone_deg = self.zone_deg(&view, self.settings.dead_zone);
+        let (pans, tilts) = (error.pan.abs() > zone_deg.pan, error.tilt.abs() > zone_deg.tilt);
+        if !pans && !tilts && jump.is_none() {
+            return Wish::AsIs;
+        }
         let position = self.camera.pan_tilt();
         let turn = self.limited(error, position, 1.0);
         // An axis that is at its end is no reason to correct the other by next to nothing.
-        let worth = |error: f64, turn: f64, zone_deg: f64| error.abs() > zone_deg && turn != 0.0;
-        let worth_it =
-            worth(error.pan, turn.pan, zone_deg.pan) || worth(error.tilt, turn.tilt, zone_deg.tilt);
+        let worth_it = pans && turn.pan != 0.0 || tilts && turn.tilt != 0.0;
         if !worth_it && jump.is_none() {
             return Wish::AsIs;
         }
