@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::simulation::{ASPECT, Run, Setup};
-use super::{PanTilt, Report};
+use super::{Mode, PanTilt, Report};
 
 /// Delay in milliseconds, and magnification.
 const CASES: [(u64, f64); 4] = [(100, 1.0), (300, 1.0), (100, 10.0), (300, 10.0)];
@@ -190,6 +190,20 @@ fn a_person_who_stands_below_is_let_be_too() {
                 assert_eq!(run.commands_between(10.0, 70.0), 0, "{tilt} degrees, {delay} ms, {zoom}x");
                 assert!(run.mean_offset(10.0, 70.0) < 0.03, "{tilt} degrees, {delay} ms, {zoom}x");
             }
+        }
+    }
+}
+
+#[test]
+fn by_steps_too_a_person_who_stands_below_is_let_be() {
+    for mode in [Mode::Absolute, Mode::Centre] {
+        for tilt in STEEP_DEG {
+            let pose = PanTilt::new(3.0, tilt + 5.0);
+            let mut setup = Setup { jitter: 0.01, pose, ..Setup::new(300, 1.0) };
+            setup.settings.mode = mode;
+            let run = setup.run(70.0, |_| (PanTilt::new(0.0, tilt), 20.0));
+            assert_eq!(run.commands_between(10.0, 70.0), 0, "{mode:?}, {tilt} degrees");
+            assert!(run.mean_offset(10.0, 70.0) < 0.03, "{mode:?}, {tilt} degrees");
         }
     }
 }

@@ -80,15 +80,15 @@ impl Pilot {
         let jump = self.jump(sight, now);
         let zooms = jump.is_some_and(|jump| jump.pressing);
         let zone_deg = self.zone_deg(&view, self.settings.dead_zone);
-        let matters = |error: PanTilt| error.pan.abs() > zone_deg.pan || error.tilt.abs() > zone_deg.tilt;
-        if !matters(error) && !zooms {
+        let (pans, tilts) = (error.pan.abs() > zone_deg.pan, error.tilt.abs() > zone_deg.tilt);
+        if !pans && !tilts && !zooms {
             return Wish::AsIs;
         }
         let position = self.camera.pan_tilt();
         let turn = self.limited(error, position, 1.0);
         // An axis that is at its end is no reason to correct the other by next to nothing.
-        let mendable = error.each(turn, |error, turn| if turn == 0.0 { 0.0 } else { error });
-        if !matters(mendable) && !zooms {
+        let worth_it = pans && turn.pan != 0.0 || tilts && turn.tilt != 0.0;
+        if !worth_it && !zooms {
             return Wish::AsIs;
         }
         match mode {
