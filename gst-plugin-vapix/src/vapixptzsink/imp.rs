@@ -291,10 +291,17 @@ impl ElementImpl for VapixPtzSink {
         if transition == gst::StateChange::ReadyToPaused {
             self.start_worker()?;
         }
+        if transition == gst::StateChange::PausedToPlaying {
+            self.with_worker(|worker| worker.inbox().heed(true));
+        }
         let result = self.parent_change_state(transition);
         match transition {
-            // After the parent: from here on no buffer is rendered that could set the camera going again.
-            gst::StateChange::PlayingToPaused => self.rest(),
+            gst::StateChange::PlayingToPaused => {
+                // The base class may go on rendering: where it was PLAYING for so short a time that the streaming
+                // thread did not wake from its preroll, it takes the preroll for done and waits for none.
+                self.with_worker(|worker| worker.inbox().heed(false));
+                self.rest();
+            }
             gst::StateChange::PausedToReady => self.finish_worker(),
             gst::StateChange::ReadyToPaused if result.is_err() => self.finish_worker(),
             _ => {}

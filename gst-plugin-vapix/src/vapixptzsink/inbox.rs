@@ -38,6 +38,8 @@ pub struct Inbox {
     mail: Mutex<Mail>,
     /// Whether nobody is there any more to answer; who waits then is not kept waiting.
     closed: AtomicBool,
+    /// Whether nobody is to be followed, as the element is not PLAYING.
+    blind: AtomicBool,
     arrived: Notify,
     clock: Clock,
     overtaken: AtomicU64,
@@ -49,6 +51,7 @@ impl Inbox {
         Self {
             mail: Mutex::default(),
             closed: AtomicBool::new(false),
+            blind: AtomicBool::new(false),
             arrived: Notify::new(),
             clock,
             overtaken: AtomicU64::new(0),
@@ -75,10 +78,22 @@ impl Inbox {
 
     /// Leaves the newest picture of the target, in place of one not looked at yet.
     pub fn see(&self, sight: Sight) {
-        if self.mail().sight.replace(sight).is_some() {
+        let mut mail = self.mail();
+        // Read under the lock, so that no picture is left behind those that `rest` makes void.
+        if self.blind.load(Ordering::Relaxed) {
+            return;
+        }
+        if mail.sight.replace(sight).is_some() {
             self.overtaken.fetch_add(1, Ordering::Relaxed);
         }
+        drop(mail);
         self.arrived.notify_one();
+    }
+
+    /// Whether pictures are heeded from here on; at first they are.
+    pub fn heed(&self, pictures: bool) {
+        let _mail = self.mail();
+        self.blind.store(!pictures, Ordering::Relaxed);
     }
 
     /// Asks for rest; what was seen before is void. The receiver hears when the camera is at rest.
