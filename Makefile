@@ -19,7 +19,6 @@ TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium python3 python3-gi python3
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
-# Plain HTTP is what the tests speak with cameras on this machine: no proxy has a way to these.
 TEST_TIMEOUT ?= 25m
 
 CODEC ?= mjpeg
@@ -41,6 +40,7 @@ build: packages-build
 ## test: check formatting, lint, build, run all tests
 test: packages-test lint
 	$(CARGO) build --workspace --examples --lib --bins
+	@# With cameras on this machine the tests speak plain HTTP: no proxy has a way to these.
 	env -u http_proxy -u HTTP_PROXY G_DEBUG=fatal-criticals scripts/with-plugins debug timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
 
 ## lint: check formatting, run clippy and shell syntax checks, warnings denied

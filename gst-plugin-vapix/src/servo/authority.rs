@@ -81,7 +81,7 @@ impl Authority {
         };
         let zoomed = found.zoom_steps.zip(zoom_steps).map_or(0.0, |(before, now)| (now - before).abs());
         let zooms = zoomed > Self::DRIFT_ZOOM_STEPS;
-        let moves = (position - found.position).largest() > Self::DRIFT_DEG;
+        let moves = found.position.turn_to(position).largest() > Self::DRIFT_DEG;
         if moves || zooms {
             self.found = None;
         }
@@ -216,6 +216,13 @@ mod tests {
         tell(&mut authority, 0.0, s(1));
         let zoomed = (PanTilt::default(), Some(100.0));
         assert_eq!(tell_place(&mut authority, zoomed, s(2), GIVE_WAY), Finding::Orphan);
+    }
+
+    #[test]
+    fn a_camera_at_the_seam_is_no_orphan() {
+        let mut authority = Authority::default();
+        tell(&mut authority, 179.99, s(1));
+        assert_eq!(tell(&mut authority, -179.99, s(2)), Finding::Nothing);
     }
 
     #[test]

@@ -121,7 +121,7 @@ impl ControlQueue {
 
     /// We may not ask.
     pub fn forbidden(&mut self) {
-        (self.state, self.held) = (State::Forbidden, false);
+        (self.state, self.held, self.deaf) = (State::Forbidden, false, false);
     }
 
     /// Now we may perhaps.

@@ -80,8 +80,12 @@ impl LimitGuard {
         };
         let pan = Some(narrower(hard.pan_deg, soft.pan_deg)).filter(|range| !is_endless(*range));
         let tilt = Some(narrower(hard.tilt_deg, soft.tilt_deg));
-        // The same place has many angles: that within the range counts, or the nearest to it.
-        let pan_deg = around_deg(pan.map_or(0.0, |range| (range.min + range.max) / 2.0), position.pan);
+        // Without ends of its own the camera gets to a place either way round: by the angle nearest to the range.
+        let ends = hard.pan_deg.is_some_and(|range| !is_endless(range));
+        let pan_deg = match pan {
+            Some(range) if !ends => around_deg((range.min + range.max) / 2.0, position.pan),
+            _ => position.pan,
+        };
         let near_deg = if self.at_limit { Self::LEFT_DEG } else { Self::NEAR_DEG };
         let (pan, pan_held) = held(rate.pan, pan_deg, pan, lasting_s, near_deg);
         let (tilt, tilt_held) = held(rate.tilt, position.tilt, tilt, lasting_s, near_deg);
@@ -174,6 +178,14 @@ mod tests {
             assert_eq!(apply(-10.0, pan, &limits(None), &soft), (-10.0, false), "{pan}: back in");
         }
         assert_eq!(apply(-10.0, -60.0, &limits(None), &soft), (0.0, true));
+    }
+
+    #[test]
+    fn a_camera_with_ends_comes_back_the_way_it_went() {
+        let soft = SoftLimits { pan_deg: Range { min: -60.0, max: 180.0 }, ..SoftLimits::default() };
+        let hard = limits(Some((-170.0, 170.0)));
+        assert_eq!(apply(10.0, -130.0, &hard, &soft), (10.0, false));
+        assert_eq!(apply(-10.0, -130.0, &hard, &soft), (0.0, true));
     }
 
     #[test]

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{CommandHistory, PanTilt, around_deg};
+use super::{CommandHistory, PanTilt};
 
 /// What was commanded.
 #[derive(Debug, Clone, Copy)]
@@ -14,11 +14,11 @@ pub struct Commands<'a> {
 /// Tells from the positions a camera reports whether somebody else moves it.
 ///
 /// A hand that is taken for the camera's own noise costs a moment of quarrel; one that is seen where there is none
-/// costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn
+/// costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn or zoom
 /// of an axis in a direction that it was not told, of more than any noise, and still there when asked again.
 #[derive(Debug, Default)]
 pub struct OperatorWatch {
-    /// Where the camera was when last nothing was amiss.
+    /// Where the camera has stood since it last moved at our word, and when it was last asked.
     place: Option<Place>,
     /// One turn of the camera was seen that is ours, or none: what follows is not its way of starting up.
     armed: bool,
@@ -87,7 +87,7 @@ impl OperatorWatch {
             return Verdict::Ours;
         };
         if self.explains(&before, &place, answered, commands) {
-            let alone = asked > self.excused_until && is_still(&before, answered, commands);
+            let alone = before.asked > self.excused_until && is_still(&before, answered, commands);
             // What turns slowly by somebody's hand turns far in time.
             let place = if alone { place.seen_from(&before) } else { place };
             *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
@@ -149,7 +149,7 @@ fn explains_turn(
     (since, answered): (Duration, Duration),
     commands: &CommandHistory,
 ) -> bool {
-    let turn = place.position - before.position;
+    let turn = before.position.turn_to(place.position);
     let rates: Vec<PanTilt> = commands.rates_between(since, answered).collect();
     let still = rates.iter().all(|rate| rate.largest() == 0.0);
     if !still {
@@ -160,10 +160,9 @@ fn explains_turn(
         }
     }
     let commanded = commands.rotation(since, answered);
-    let pan = around_deg(0.0, turn.pan);
-    let unclear = !still && pan.abs().max(commanded.pan.abs()) > OperatorWatch::CLEAR_DEG;
+    let unclear = !still && turn.pan.abs().max(commanded.pan.abs()) > OperatorWatch::CLEAR_DEG;
     let tolerance = OperatorWatch::TOLERANCE_DEG;
-    (unclear || told(pan, tolerance, rates.iter().map(|rate| rate.pan)))
+    (unclear || told(turn.pan, tolerance, rates.iter().map(|rate| rate.pan)))
         && told(turn.tilt, tolerance, rates.iter().map(|rate| rate.tilt))
 }
 
@@ -186,6 +185,7 @@ fn told(moved: f64, tolerance: f64, mut rates: impl Iterator<Item = f64>) -> boo
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::servo::around_deg;
     use proptest::prelude::*;
 
     fn ms(ms: u64) -> Duration {
@@ -350,6 +350,17 @@ mod tests {
         rig.tell(60.0, 5.0);
         rig.tell(60.0, 5.0);
         assert_eq!(rig.tell(20.0, 5.0), Verdict::Suspicious);
+    }
+
+    #[test]
+    fn where_an_excused_move_began_is_no_place_to_stand() {
+        let mut rig = Rig::armed();
+        rig.watch.excuse(rig.now + ms(6000));
+        assert_eq!(rig.tell_after(ms(5000), 0.0, 0.0), Verdict::Ours);
+        // It acted late.
+        for _ in 0..5 {
+            assert_eq!(rig.tell_after(ms(5000), 12.0, 0.0), Verdict::Ours);
+        }
     }
 
     #[test]

@@ -76,9 +76,8 @@ impl View {
         // Short enough to be the derivative, long enough for the difference to be exact.
         const STEP_S: f64 = 1e-3;
         let ahead = Point { x: point.x + velocity.x * STEP_S, y: point.y + velocity.y * STEP_S };
-        let turned = self.error(ahead) - self.error(point);
         // Beyond the nadir pan may pass 180 degrees meanwhile.
-        PanTilt::new((turned.pan + 180.0).rem_euclid(360.0) - 180.0, turned.tilt) / STEP_S
+        self.error(point).turn_to(self.error(ahead)) / STEP_S
     }
 
     /// How far each axis turns to move the picture by an angle, in degrees, at a target that is off by `error`.

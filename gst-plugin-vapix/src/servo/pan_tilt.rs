@@ -25,6 +25,12 @@ impl PanTilt {
         self.pan * other.pan + self.tilt * other.tilt
     }
 
+    /// The turn from here to there, pan the short way round.
+    pub fn turn_to(self, there: Self) -> Self {
+        let turn = there - self;
+        Self::new(around_deg(0.0, turn.pan), turn.tilt)
+    }
+
     /// The larger of both sizes.
     pub fn largest(&self) -> f64 {
         self.pan.abs().max(self.tilt.abs())

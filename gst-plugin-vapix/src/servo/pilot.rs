@@ -48,6 +48,8 @@ pub struct Pilot {
     /// The words that end the last move, whatever the mode is by now.
     stop: Command,
     at_limit: bool,
+    /// It was told that the limits cannot be kept.
+    limits_unkept: bool,
     /// Since when there is a target and it is not known whether the camera is ours to follow it.
     unsteered_since: Option<Duration>,
     overtaken: u64,
@@ -125,6 +127,7 @@ impl Pilot {
             speed_steps: (0, 0),
             stop: Command::Halt,
             at_limit: false,
+            limits_unkept: false,
             unsteered_since: None,
             overtaken: 0,
             reports: Vec::new(),
@@ -263,7 +266,7 @@ impl Pilot {
         };
         let (query, query_due) = self.question(now);
         let query_due = query_due.max(retry_at);
-        let overdue = query_due.max(self.asked_at) + self.interval() * Self::PATIENCE <= now;
+        let overdue = query_due.max(self.asked_at) + self.patience(&query) <= now;
         if due.is_some_and(|due| due <= now) && (command.is_stop() || !overdue) {
             return Next::Do(Job::Command(command));
         }
@@ -275,6 +278,15 @@ impl Pilot {
         let unsteered_until = unsteered_until.filter(|until| now < *until);
         let reasons = [due, Some(query_due), self.stale_at(), operator_until, unsteered_until];
         Next::Wait(reasons.into_iter().flatten().min())
+    }
+
+    /// For how long moves come before a question.
+    fn patience(&self, query: &Query) -> Duration {
+        match query {
+            // Our place in it is lost to who is late.
+            Query::Queue(_) => Duration::ZERO,
+            _ => self.interval() * Self::PATIENCE,
+        }
     }
 
     /// What to ask next, and when.
@@ -335,7 +347,7 @@ impl Pilot {
             // A stop would not be heard; the answer under way may make it so.
             return true;
         }
-        let going_home = self.steps.under_way() && self.homing.is_settled() || self.homing.due(now).is_some();
+        let going_home = self.steps.under_way() && self.homing.is_settled() || self.way_home(now).is_some();
         self.authority.holder(now).is_none() && (self.has_target(now) || going_home)
     }
 
@@ -419,10 +431,14 @@ impl Pilot {
         if self.steps.under_way() && self.homing.is_settled() {
             return Wish::AsIs;
         }
-        // A zoom at its own speed is no part of the move home, and would go on.
-        let free = self.authority.is_ours(now) && !self.zoom.is_moving(now);
-        let home = self.homing.due(now).filter(|_| free);
-        home.map_or(Wish::Rest, Wish::Move)
+        self.way_home(now).map_or(Wish::Rest, Wish::Move)
+    }
+
+    /// The move home, where it is time. A zoom that goes on at its own speed, or may yet begin to, is no part of that
+    /// move, and has to be ended first.
+    fn way_home(&self, now: Duration) -> Option<Command> {
+        let zooms = self.zoom.is_moving(now) || self.scheduler.in_doubt();
+        self.homing.due(now).filter(|_| self.authority.is_ours(now) && !zooms)
     }
 
     fn view(&self, sight: &Sight) -> View {

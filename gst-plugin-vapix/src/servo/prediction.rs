@@ -17,8 +17,8 @@ struct Entry {
 }
 
 impl CommandHistory {
-    /// Longer than any latency that is allowed for.
-    pub const SPAN: Duration = Duration::from_secs(10);
+    /// Longer than any latency that is allowed for, and than a slow camera goes without telling its position.
+    pub const SPAN: Duration = Duration::from_secs(20);
 
     /// From `at` on the camera turns with `rate`.
     pub fn push(&mut self, at: Duration, rate: PanTilt) {

@@ -106,7 +106,7 @@ impl Steps {
 
 fn same(before: &Position, now: &Position, tolerance_deg: f64) -> bool {
     let angles = |position: &Position| Some(PanTilt::new(position.pan_deg?, position.tilt_deg?));
-    let turned = angles(before).zip(angles(now)).map(|(before, now)| (now - before).largest());
+    let turned = angles(before).zip(angles(now)).map(|(before, now)| before.turn_to(now).largest());
     let zoomed = before.zoom_steps.zip(now.zoom_steps).map(|(before, now)| (now - before).abs());
     turned.is_some_and(|turned| turned < tolerance_deg)
         && zoomed.is_none_or(|zoomed| zoomed < Steps::SAME_ZOOM)

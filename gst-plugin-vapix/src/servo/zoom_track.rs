@@ -69,8 +69,7 @@ impl ZoomTrack {
     }
 
     fn moved(&self, from: Duration, to: Duration) -> f64 {
-        let forth = self.commanded.rotation(from.min(to), from.max(to)).pan / 100.0 * self.full_step_s;
-        if from <= to { forth } else { -forth }
+        self.commanded.rotation(from, to).pan / 100.0 * self.full_step_s
     }
 }
 

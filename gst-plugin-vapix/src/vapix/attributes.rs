@@ -67,7 +67,7 @@ const MISPRINT: f64 = 2.0;
 
 /// Which row is a misprint most likely.
 ///
-/// On paper with logarithmic axes speeds are a straight line, or bend one way where they begin at a floor, and the
+/// On paper with logarithmic axes such tables are a straight line, or bend one way where they begin at a floor, and the
 /// other where they end at a ceiling. A wrong row is a spike instead: the curve bends there and back, so at
 /// the rows on either side the other way.
 fn misprint(rows: &[StepMeaning]) -> Option<usize> {

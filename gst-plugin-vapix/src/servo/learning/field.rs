@@ -2,7 +2,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::Turn;
-use crate::servo::{PanTilt, around_deg};
+use crate::servo::PanTilt;
 
 /// Learns how wide the picture is: how far the camera turned, by its own word, against how far it seemed to.
 #[derive(Debug, Default)]
@@ -78,7 +78,7 @@ impl FieldLearner {
         }
         self.positions.pop_front();
         if let Some((seen, doubt)) = self.turned(start, end, latency) {
-            self.find(turn_between(from, to), seen, doubt);
+            self.find(from.turn_to(to), seen, doubt);
         }
     }
 
@@ -131,9 +131,4 @@ impl FieldLearner {
         });
         middle.map_or(0.0, |(logarithm, _)| *logarithm)
     }
-}
-
-fn turn_between(from: PanTilt, to: PanTilt) -> PanTilt {
-    let turn = to - from;
-    PanTilt::new(around_deg(0.0, turn.pan), turn.tilt)
 }

@@ -7,7 +7,7 @@ use super::Pilot;
 use crate::servo::{
     Answer, Commands, Finding, Job, Link, Mode, PanTilt, Query, Refusal, Report, Scheduler, SpeedMap, Steps,
 };
-use crate::vapix::{Command, Error, Position};
+use crate::vapix::{Command, Error, Position, QueueRequest};
 
 impl Pilot {
     /// The camera answered what was sent then, or did not.
@@ -252,7 +252,8 @@ impl Pilot {
         let forbidden = matches!(err, Error::NotPermitted { .. } | Error::CredentialsMissing);
         match query {
             Query::Queue(_) if forbidden => self.authority.queue.forbidden(),
-            Query::Queue(_) => self.authority.queue.turned_away(now),
+            Query::Queue(QueueRequest::Request) => self.authority.queue.turned_away(now),
+            Query::Queue(_) => self.authority.queue.failed(now),
             Query::Presets => self.reports.extend(self.homing.no_presets().map(Report::NoSuchPreset)),
             _ => self.asked(query, now),
         }
@@ -294,8 +295,8 @@ impl Pilot {
         if self.met_as != met {
             self.reports.extend(met.clone().map(Report::Met));
             self.met_as = met;
-            self.judge_limits();
         }
+        self.judge_limits();
         if !self.link.connected() {
             // It told nothing: that is a fault after all.
             self.next_poll = now;
@@ -304,8 +305,12 @@ impl Pilot {
 
     /// Whether the limits can be kept is known after the last question.
     pub(super) fn judge_limits(&mut self) {
-        let blind = self.introduction.next().is_none() && self.camera.pan_tilt().is_none();
-        if blind && self.settings.limits.bound_turns() {
+        if self.introduction.next().is_some() {
+            return;
+        }
+        let unkept = self.camera.pan_tilt().is_none() && self.settings.limits.bound_turns();
+        let known = mem::replace(&mut self.limits_unkept, unkept);
+        if unkept && !known {
             self.reports.push(Report::LimitsUnkept);
         }
     }

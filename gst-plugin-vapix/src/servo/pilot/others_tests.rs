@@ -171,3 +171,21 @@ fn a_camera_that_may_not_be_steered_for_a_while_is_stopped() {
     rig.aside(ms(1500), silent);
     assert!(rig.pilot.is_at_rest());
 }
+
+#[test]
+fn a_queue_that_may_not_be_asked_any_more_does_not_keep_the_stop() {
+    let mut rig = Rig::turning_in_turn();
+    // Somebody pushed in, and the stop is refused.
+    rig.aside(ms(6000), queued(Some(2), false));
+    rig.pilot.rest();
+    rig.aside(ms(100), queued(Some(2), false));
+    assert!(!rig.pilot.is_at_rest());
+    let not_permitted = |job: &Job| match job {
+        Job::Query(Query::Queue(_)) => Some(Err(Error::CredentialsMissing)),
+        _ => None,
+    };
+    rig.aside(ms(12_000), not_permitted);
+    rig.pilot.rest();
+    rig.run_jobs(not_permitted);
+    assert!(rig.pilot.is_at_rest());
+}
