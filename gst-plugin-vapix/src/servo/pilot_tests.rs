@@ -8,9 +8,8 @@ mod words;
 use std::collections::VecDeque;
 
 use super::*;
-use crate::servo::Answer;
-use crate::servo::LinkChange;
 use crate::servo::aim::tests::sight;
+use crate::servo::{Answer, LinkChange, Next, Query};
 use crate::vapix::{Attributes, Error, Limits, Position, Range, StepMeaning};
 use proptest::prelude::*;
 

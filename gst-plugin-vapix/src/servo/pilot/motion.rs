@@ -4,7 +4,8 @@ use std::time::Duration;
 
 use ptztrack_contract::Point;
 
-use super::{Pilot, Wish};
+use super::Pilot;
+use super::turns::Wish;
 use crate::servo::{ControlLaw, Jump, Mode, PanTilt, Report, Sight, View, ZoomGoal, around_deg, narrower};
 use crate::vapix::Command;
 
