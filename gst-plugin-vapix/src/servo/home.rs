@@ -194,7 +194,6 @@ impl Homing {
 
     fn go_to(&self, position: Position) -> Option<Command> {
         let place = self.limits.nearest(PanTilt::new(position.pan_deg?, position.tilt_deg?));
-        let zooms = self.limits.zoom_steps;
         Some(Command::Absolute {
             pan_deg: place.pan,
             tilt_deg: place.tilt,
@@ -202,7 +201,7 @@ impl Homing {
             // Within 1 to 9999.
             zoom: position
                 .zoom_steps
-                .map(|zoom| zoom.min(zooms.max).max(zooms.min).clamp(1.0, 9999.0) as u16),
+                .map(|zoom| self.limits.zoom_steps.nearest(zoom).clamp(1.0, 9999.0) as u16),
         })
     }
 }

@@ -35,9 +35,7 @@ impl SoftLimits {
     pub fn nearest(&self, position: PanTilt) -> PanTilt {
         let Range { min, max } = self.pan_deg;
         let pan = around_deg((min + max) / 2.0, position.pan);
-        // Crossed, in the moment between the setting of two: as it is.
-        let within = |angle: f64, range: Range| angle.min(range.max).max(range.min);
-        PanTilt::new(within(pan, self.pan_deg), within(position.tilt, self.tilt_deg))
+        PanTilt::new(self.pan_deg.nearest(pan), self.tilt_deg.nearest(position.tilt))
     }
 }
 

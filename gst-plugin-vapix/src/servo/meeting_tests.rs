@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::aim::tests::sight;
+use super::sight;
 use super::{Answer, Home, Job, LinkChange, Next, Pilot, Query, Report, ServoSettings, Sight, Visibility};
 use crate::vapix::{Command, Error, Limits, Parameters, Position, Presets, QueueRequest, Range};
 

@@ -45,6 +45,8 @@ mod zoom_drive;
 mod zoom_tests;
 mod zoom_track;
 
+#[cfg(test)]
+pub(crate) use aim::tests::sight;
 pub use aim::{Aim, Prediction, Sight, Visibility};
 pub use authority::{Authority, Finding, Holder};
 pub use camera::CameraModel;

@@ -311,9 +311,7 @@ impl Pilot {
         View {
             horizontal_fov_deg: self.fov_deg(self.zoom.step_shown(sight.taken_at, latency)),
             aspect: sight.aspect,
-            tilt_deg: position
-                .map_or(self.camera.position.tilt_deg, |position| Some(position.tilt))
-                .unwrap_or(0.0),
+            tilt_deg: position.map(|position| position.tilt).or(self.camera.position.tilt_deg).unwrap_or(0.0),
         }
     }
 

@@ -8,7 +8,7 @@ mod words;
 use std::collections::VecDeque;
 
 use super::*;
-use crate::servo::aim::tests::sight;
+use crate::servo::sight;
 use crate::servo::{Answer, LinkChange, Next, Query};
 use crate::vapix::{Attributes, Error, Limits, Position, Range, StepMeaning};
 use proptest::prelude::*;

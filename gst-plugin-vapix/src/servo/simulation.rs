@@ -241,8 +241,7 @@ impl Simulation {
         let dt = TICK.as_secs_f64();
         if let Some((goal, zoom)) = self.goal {
             // Fast, and slower near the end.
-            let way = goal - self.pose;
-            let way = PanTilt::new(around_deg(0.0, way.pan), way.tilt);
+            let way = self.pose.turn_to(goal);
             let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
             self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
             self.zoom_rate = zoom.map_or(0.0, |zoom| {

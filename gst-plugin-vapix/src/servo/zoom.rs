@@ -164,7 +164,7 @@ fn outlook(sight: &Sight) -> Outlook {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::aim::tests::sight;
+    use crate::servo::sight;
     use proptest::prelude::*;
 
     fn target(height: f64, milliseconds: u64) -> Sight {

@@ -91,7 +91,7 @@ impl ZoomDrive {
         let lead = now.saturating_sub(sight.taken_at) + latency;
         let rate = self.controller.rate(goal.target_height, lens.magnification(step), lead);
         let there = lens.step_magnified(step, (rate * Self::AHEAD_S).exp())?;
-        let steps_s = (within(there, goal.steps) - step) / Self::AHEAD_S;
+        let steps_s = (goal.steps.nearest(there) - step) / Self::AHEAD_S;
         // Saturates.
         Some((steps_s / self.track.full_step_s() * 100.0).round().clamp(-100.0, 100.0) as i8)
     }
@@ -108,7 +108,7 @@ impl ZoomDrive {
         let step = self.track.step(now, delay(latency))?;
         let (factor, pressing) =
             self.controller.factor(goal.target_height, lens.magnification(step), lead)?;
-        let there = within(lens.step_magnified(step, factor)?, goal.steps).round();
+        let there = goal.steps.nearest(lens.step_magnified(step, factor)?).round();
         let factor = lens.magnification(there) / lens.magnification(step);
         // Less than a hundredth is what rounding leaves at the lens' ends.
         ((factor - 1.0).abs() > 0.01).then_some(Jump { step: there as u16, factor, pressing })
@@ -120,14 +120,10 @@ fn delay(latency: Duration) -> Duration {
     latency / 2
 }
 
-fn within(step: f64, steps: Range) -> f64 {
-    step.min(steps.max).max(steps.min)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::aim::tests::sight;
+    use crate::servo::sight;
     use ptztrack_contract::Rect;
 
     const STEPS: Range = Range { min: 1.0, max: 9999.0 };

@@ -23,6 +23,13 @@ pub struct Range {
     pub max: f64,
 }
 
+impl Range {
+    /// A value, or the nearest to it within; where smallest and largest are crossed, the smallest.
+    pub fn nearest(&self, value: f64) -> f64 {
+        value.min(self.max).max(self.min)
+    }
+}
+
 /// Answer to `query=position`.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Position {

@@ -193,10 +193,9 @@ impl<O: Fn(Event)> Desk<O> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::{Next, Query, ServoSettings, Sight, Visibility};
+    use crate::servo::{Next, Query, ServoSettings, Sight, Visibility, sight};
     use crate::vapix::{Command, Position};
     use crate::vapixptzsink::clock::Clock;
-    use ptztrack_contract::{Point, Rect, Vector};
     use std::sync::mpsc::Receiver;
 
     const MOVE: Job = Job::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
@@ -223,17 +222,7 @@ mod tests {
 
     impl<O: Fn(Event)> Desk<O> {
         fn see(&mut self, visibility: Visibility) {
-            self.inbox.see(Sight {
-                visibility,
-                id: 1,
-                centroid: Point { x: 0.9, y: 0.5 },
-                bounds: Rect::default(),
-                velocity: Vector::default(),
-                ego_velocity: None,
-                size: (320, 240),
-                aspect: 4.0 / 3.0,
-                taken_at: self.inbox.now(),
-            });
+            self.inbox.see(Sight { visibility, ..sight(0.9, 0.5, self.inbox.now()) });
             self.take_mail();
         }
 

@@ -295,9 +295,8 @@ async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::{Sight, Visibility};
+    use crate::servo::sight;
     use crate::vapix::{Location, Trust};
-    use ptztrack_contract::{Point, Rect, Vector};
     use std::sync::mpsc::RecvTimeoutError;
     use virtual_camera::VirtualCamera;
 
@@ -316,17 +315,7 @@ mod tests {
     }
 
     fn see(worker: &Worker) {
-        worker.inbox().see(Sight {
-            visibility: Visibility::Seen,
-            id: 1,
-            centroid: Point { x: 0.9, y: 0.5 },
-            bounds: Rect::default(),
-            velocity: Vector::default(),
-            ego_velocity: None,
-            size: (320, 240),
-            aspect: 4.0 / 3.0,
-            taken_at: worker.inbox().now(),
-        });
+        worker.inbox().see(sight(0.9, 0.5, worker.inbox().now()));
     }
 
     fn camera() -> VirtualCamera {

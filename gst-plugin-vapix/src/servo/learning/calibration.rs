@@ -137,7 +137,7 @@ impl Calibration {
 mod tests {
     use super::*;
     use crate::servo::SpeedCurve;
-    use crate::servo::aim::tests::sight;
+    use crate::servo::sight;
     use proptest::prelude::*;
 
     const VIEW: View = View { horizontal_fov_deg: 60.0, aspect: 4.0 / 3.0, tilt_deg: 0.0 };
