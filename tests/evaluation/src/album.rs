@@ -105,7 +105,10 @@ impl Encoder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Bounds, Estimate, GroundTruth};
+    use crate::{
+        record::{Bounds, Estimate, GroundTruth},
+        report::made_up,
+    };
 
     const SIZE: (u32, u32) = (64, 48);
 
@@ -121,17 +124,12 @@ mod tests {
             position_m: None,
             direction_deg: None,
         };
-        FrameRecord {
+        made_up::judged_by_boxes(FrameRecord {
             time_s,
             truth: Some(truth),
-            others: Vec::new(),
             estimate: Some(Estimate { state, centroid: bounds.centre(), bounds, id: 1, features: 9 }),
-            size: SIZE,
-            pan_deg: 0.0,
-            tilt_deg: 0.0,
-            zoom: 1.0,
-            commands: 0,
-        }
+            ..made_up::frame(SIZE)
+        })
     }
 
     fn look(album: &mut Album, frame: usize, record: &FrameRecord) {
@@ -147,7 +145,7 @@ mod tests {
     /// As a tracker that stays behind while the person goes on.
     fn wrong(mut record: FrameRecord) -> FrameRecord {
         record.estimate.as_mut().unwrap().centroid = (32.0, 45.0);
-        record
+        made_up::judged_by_boxes(record)
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, VirtualCamera, World};
+use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, Sighting, VirtualCamera, World};
 
 use crate::{
     record::{Codec, Delays, FirstBox, FrameRecord, Run, TestId, TrackerName},
@@ -128,23 +128,33 @@ impl Experiment {
         self.pictures(period).find(whole)
     }
 
-    /// What can be said of picture `number` before anybody tracked in it; `first` is the first that counts.
-    pub(crate) fn witness(&self, camera: &VirtualCamera, number: u32, first: u32) -> FrameRecord {
+    /// What can be said of picture `number` before anybody tracked in it, and who is there; `first` is the first that
+    /// counts.
+    pub(crate) fn witness(
+        &self,
+        camera: &VirtualCamera,
+        number: u32,
+        first: u32,
+    ) -> (FrameRecord, Vec<Sighting>) {
         let period = camera.frame_period();
         let exposure = exposure(number, period);
-        let (truth, others) = self.scene.split(camera.ground_truth(exposure, self.size));
+        let people = camera.people(exposure, self.size);
+        let (truth, others) = self.scene.split(people.iter().map(|one| one.truth.clone()).collect());
         let pose = camera.pose_at(exposure);
-        FrameRecord {
+        let record = FrameRecord {
             time_s: number.saturating_sub(first) as f64 * period.as_secs_f64(),
             truth,
             others,
             estimate: None,
+            coverage: Vec::new(),
             size: self.size,
+            focal_px: camera.focal_px(&pose, self.size),
             pan_deg: pose.pan_deg,
             tilt_deg: pose.tilt_deg,
             zoom: pose.zoom_step,
             commands: 0,
-        }
+        };
+        (record, people)
     }
 
     /// What it will be recorded as.

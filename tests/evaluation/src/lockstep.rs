@@ -115,17 +115,14 @@ impl<'a> Stage<'a> {
         let exposure = experiment::exposure(number, period);
         let arrival = exposure + self.experiment.delays.video;
         self.camera.advance_to(arrival);
-        let witnessed = self.experiment.witness(&self.camera, number, first);
+        let (witnessed, people) = self.experiment.witness(&self.camera, number, first);
         let phase = Phase::of(number >= first, number > first);
         let cue = Cue { phase, truth: witnessed.truth.clone(), size };
         self.tracker.next(self.pipeline.bin(), cue)?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
-        let record = FrameRecord {
-            estimate: target.map(|target| estimate(&target, size)),
-            commands: count_commands(&self.camera, &mut self.counted),
-            ..witnessed
-        };
+        let record = FrameRecord { commands: count_commands(&self.camera, &mut self.counted), ..witnessed };
+        let record = record.judged(target.map(|target| estimate(&target, size)), &people);
         Ok((record, picture))
     }
 

@@ -4,7 +4,7 @@
 //! inside the view. That depends on nothing that a tracker does, so every tracker is counted over the same time.
 //! A value that cannot be computed (no frame to compute it from) is `None`, never a number.
 
-use crate::record::{Bounds, FrameRecord, GroundTruth, Run, TargetState};
+use crate::record::{FrameRecord, GroundTruth, Run, TargetState};
 
 mod boxes;
 mod identity;
@@ -81,11 +81,17 @@ impl Metrics {
     }
 }
 
-/// TP: the tracker says that it tracks, and the mean of its features lies inside the true box of the person, of whom
-/// more than a [`SPECK`] is visible.
+/// A hit: the tracker says that it tracks or where it holds the target to be hidden, and the mean of its features lies
+/// inside the whole silhouette of the person, hidden parts included.
+pub fn is_hit(frame: &FrameRecord) -> bool {
+    frame.on_target().is_some_and(|coverage| coverage.hit)
+}
+
+/// TP: the tracker says that it tracks, and that is a hit on a person of whom more than a [`SPECK`] is visible.
 pub fn is_true_positive(frame: &FrameRecord) -> bool {
-    let Some((truth, estimate)) = frame.truth.as_ref().zip(tracked(frame)) else { return false };
-    truth.visible >= SPECK && is_inside(&truth.bounds, estimate)
+    tracked(frame).is_some()
+        && frame.truth.as_ref().is_some_and(|truth| truth.visible >= SPECK)
+        && is_hit(frame)
 }
 
 /// FP: the tracker says that it tracks, and it is wrong. One that says it is searching, or that the target is
@@ -178,11 +184,6 @@ pub fn variance(values: &[f64]) -> Option<f64> {
 fn tracked(frame: &FrameRecord) -> Option<(f64, f64)> {
     let estimate = frame.estimate.as_ref().filter(|estimate| estimate.state == TargetState::Tracking)?;
     Some(estimate.centroid)
-}
-
-fn is_inside(bounds: &Bounds, (x, y): (f64, f64)) -> bool {
-    let within = |from: f64, length: f64, at: f64| from <= at && at <= from + length;
-    within(bounds.left, bounds.width, x) && within(bounds.top, bounds.height, y)
 }
 
 fn count(frames: &[FrameRecord], is: impl Fn(&FrameRecord) -> bool) -> usize {

@@ -135,11 +135,10 @@ impl Watch {
         };
         let target = TargetMeta::of(buffer).and_then(Result::ok);
         let size = self.experiment.size;
-        let record = FrameRecord {
-            estimate: target.map(|target| estimate(&target, size)),
-            commands: count_commands(&self.camera, &mut journal.counted),
-            ..self.experiment.witness(&self.camera, number, self.first)
-        };
+        let (witnessed, people) = self.experiment.witness(&self.camera, number, self.first);
+        let commands = count_commands(&self.camera, &mut journal.counted);
+        let said = target.map(|target| estimate(&target, size));
+        let record = FrameRecord { commands, ..witnessed }.judged(said, &people);
         if let Some((picture, info)) =
             info.and_then(|info| Some((Picture::from_buffer(buffer, &info)?, info)))
         {

@@ -3,7 +3,7 @@
 use std::{fmt, str::FromStr, time::Duration};
 
 pub use ptztrack_contract::TargetState;
-pub use virtual_camera::{Bounds, GroundTruth};
+pub use virtual_camera::{Bounds, GroundTruth, Sighting, Silhouette};
 
 /// Number of a test in the order of the thesis' table 5.2, from 1.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -143,6 +143,33 @@ pub struct Estimate {
     pub features: usize,
 }
 
+impl Estimate {
+    /// Whether its geometry says anything.
+    pub fn has_place(&self) -> bool {
+        matches!(self.state, TargetState::Tracking | TargetState::Occluded)
+    }
+}
+
+/// What an estimate holds of somebody.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Coverage {
+    /// Number of the person.
+    pub id: u32,
+    /// Whether the centroid lies inside of their whole silhouette, hidden parts included: a hit.
+    pub hit: bool,
+    /// Part of their whole silhouette, 0 to 1, that lies in the box.
+    pub covered: f64,
+}
+
+impl Coverage {
+    /// What `estimate` holds of a person; `None` where it is nothing.
+    pub fn of(estimate: &Estimate, person: &Sighting) -> Option<Self> {
+        let (hit, covered) =
+            (person.silhouette.contains(estimate.centroid), person.silhouette.part_in(&estimate.bounds));
+        (hit || covered > 0.0).then_some(Self { id: person.truth.id, hit, covered })
+    }
+}
+
 /// One counted picture.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameRecord {
@@ -154,8 +181,12 @@ pub struct FrameRecord {
     pub others: Vec<GroundTruth>,
     /// What the tracker said; `None` where it said nothing.
     pub estimate: Option<Estimate>,
+    /// What the estimate holds of anybody, judged by their silhouettes; nothing where it holds no place at all.
+    pub coverage: Vec<Coverage>,
     /// Width and height of the picture in pixels.
     pub size: (u32, u32),
+    /// Focal length of the view, in pixels.
+    pub focal_px: f64,
     /// Where the camera looked during the exposure, degrees, positive to the right.
     pub pan_deg: f64,
     /// Degrees, positive up.
@@ -164,6 +195,22 @@ pub struct FrameRecord {
     pub zoom: f64,
     /// Commands that the camera received since the previous picture.
     pub commands: u32,
+}
+
+impl FrameRecord {
+    /// What the estimate holds of the person to be followed.
+    pub fn on_target(&self) -> Option<&Coverage> {
+        let id = self.truth.as_ref()?.id;
+        self.coverage.iter().find(|coverage| coverage.id == id)
+    }
+
+    /// Takes what the tracker said of this picture, with `people` in it.
+    pub(crate) fn judged(self, estimate: Option<Estimate>, people: &[Sighting]) -> Self {
+        let placed = estimate.as_ref().filter(|estimate| estimate.has_place());
+        let coverage =
+            placed.map(|estimate| people.iter().filter_map(|one| Coverage::of(estimate, one)).collect());
+        Self { coverage: coverage.unwrap_or_default(), estimate, ..self }
+    }
 }
 
 named! {

@@ -7,7 +7,7 @@ use std::{
 };
 
 use gst::prelude::*;
-use virtual_camera::{GroundTruth, People, Person, Picture};
+use virtual_camera::{GroundTruth, People, Person, Picture, Sighting, Silhouette};
 
 use crate::{
     album::Album,
@@ -105,8 +105,9 @@ impl<'a> Screening<'a> {
         people: &[Person],
     ) -> Result<(FrameRecord, Picture), RunError> {
         let size = self.size();
-        let people = people.iter().map(|person| truth(person, size)).collect();
-        let (truth, others) = self.experiment.scene.split(people);
+        let people: Vec<_> = people.iter().map(|person| sighting(person, size)).collect();
+        let (truth, others) =
+            self.experiment.scene.split(people.iter().map(|one| one.truth.clone()).collect());
         let begun = self.first.is_some();
         let phase = Phase::of(begun || truth.is_some(), begun);
         if phase == Phase::FirstBox {
@@ -120,21 +121,24 @@ impl<'a> Screening<'a> {
             time_s: (number - self.first.unwrap_or(number)) as f64 / self.frame_rate,
             truth,
             others,
-            estimate: target.map(|target| estimate(&target, size)),
+            estimate: None,
+            coverage: Vec::new(),
             size,
+            focal_px: f64::from(size.0),
             pan_deg: 0.0,
             tilt_deg: 0.0,
             zoom: 1.0,
             commands: 0,
         };
+        let record = record.judged(target.map(|target| estimate(&target, size)), &people);
         Ok((record, picture))
     }
 }
 
 /// A person of a recording, seen from where it was made.
-fn truth(person: &Person, size: (u32, u32)) -> GroundTruth {
+fn sighting(person: &Person, size: (u32, u32)) -> Sighting {
     let in_view = person.bounds.part_inside(size);
-    GroundTruth {
+    let truth = GroundTruth {
         id: person.id,
         bounds: person.bounds,
         centroid: person.bounds.centre(),
@@ -143,7 +147,8 @@ fn truth(person: &Person, size: (u32, u32)) -> GroundTruth {
         in_view,
         position_m: None,
         direction_deg: None,
-    }
+    };
+    Sighting { silhouette: Silhouette::of_box(&truth.bounds, size), truth }
 }
 
 fn info(sample: &gst::Sample) -> Option<gst_video::VideoInfo> {

@@ -19,7 +19,7 @@ use crate::{
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
-    truth::{GroundTruth, Mask},
+    truth::{GroundTruth, Mask, Sighting},
     vapix::{Answer, Args, device::Device, parse_args},
     world::{self, Exposure, FootageError, World},
 };
@@ -415,6 +415,16 @@ impl VirtualCamera {
     /// recording without a ground-truth file shows nobody that is known.
     pub fn ground_truth(&self, exposure: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
         self.camera.ground_truth(exposure, size)
+    }
+
+    /// The same, with the shape of each.
+    pub fn people(&self, exposure: Duration, size: (u32, u32)) -> Vec<Sighting> {
+        self.camera.world.people(&self.camera.opening(exposure), size)
+    }
+
+    /// Focal length of a view of that size along `pose`, in pixels.
+    pub fn focal_px(&self, pose: &Pose, size: (u32, u32)) -> f64 {
+        self.camera.world.pinhole(pose.zoom_step, size).focal
     }
 
     /// Who would be in a picture at any time, the future too, if the camera looked along `pose`.

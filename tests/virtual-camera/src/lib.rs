@@ -35,14 +35,14 @@ mod world;
 
 pub use camera::VirtualCamera;
 pub use encode::EncodeError;
-pub use geometry::{Matrix, project};
+pub use geometry::{Matrix, aim, project};
 pub use kinematics::{
     Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
 };
 pub use picture::{Picture, Plane};
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
-pub use truth::{Bounds, GroundTruth, Mask};
+pub use truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette};
 pub use world::{
     Change, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings, Subject,
     SyntheticSettings, Waypoint, read_mot,

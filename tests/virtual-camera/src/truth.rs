@@ -1,5 +1,7 @@
 //! What is really to be seen in a picture, for those who judge what was found in it.
 
+use std::ops::Range;
+
 use serde::Serialize;
 
 /// A box in pixels of the view: the edges of its pixels are at whole numbers, 0 to the width. It may lie outside.
@@ -79,9 +81,132 @@ pub struct Mask {
     pub data: Vec<u8>,
 }
 
+/// The whole shape of one person in a picture of the view, hidden parts and parts outside of the view included, and how
+/// much of it is seen.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Silhouette {
+    /// Left edge of the masks' first column and top edge of their first row, in pixels of the view.
+    origin: (f64, f64),
+    /// Width and height of a pixel of the masks, in pixels of the view.
+    pixel: (f64, f64),
+    /// The whole body.
+    whole: Mask,
+    /// What of it is inside the view and hidden by nothing.
+    visible: Mask,
+}
+
+/// A box whose silhouette is not known is cut into so many pixels across and down.
+const BOX_PIXELS: usize = 32;
+
+impl Silhouette {
+    /// Two masks of the same size, whose first pixel's corner is at `origin` in the view and each of whose pixels is as
+    /// large as `pixel`.
+    pub(crate) fn new(origin: (f64, f64), pixel: (f64, f64), whole: Mask, visible: Mask) -> Self {
+        Self { origin, pixel, whole, visible }
+    }
+
+    /// Of somebody of whom only the box is known, in a picture of `size`; nothing hides them.
+    pub fn of_box(bounds: &Bounds, size: (u32, u32)) -> Self {
+        let side = BOX_PIXELS as f64;
+        let filled = Mask { width: BOX_PIXELS, height: BOX_PIXELS, data: vec![255; BOX_PIXELS * BOX_PIXELS] };
+        let (origin, pixel) = ((bounds.left, bounds.top), (bounds.width / side, bounds.height / side));
+        let mut silhouette = Self { origin, pixel, visible: filled.clone(), whole: filled };
+        silhouette.cut_to(size);
+        silhouette
+    }
+
+    /// Leaves nothing visible outside of a picture of that size.
+    pub(crate) fn cut_to(&mut self, size: (u32, u32)) {
+        let view = Bounds { left: 0.0, top: 0.0, width: f64::from(size.0), height: f64::from(size.1) };
+        let ((columns, rows), width) = (self.inside(&view), self.visible.width.max(1));
+        for (row, line) in self.visible.data.chunks_exact_mut(width).enumerate() {
+            let seen = if rows.contains(&row) { columns.clone() } else { 0..0 };
+            line[..seen.start].fill(0);
+            line[seen.end..].fill(0);
+        }
+    }
+
+    /// Whether a place of the view, in pixels, lies on the person, hidden there or not.
+    pub fn contains(&self, (x, y): (f64, f64)) -> bool {
+        let column = ((x - self.origin.0) / self.pixel.0).floor();
+        let row = ((y - self.origin.1) / self.pixel.1).floor();
+        let inside = |index: f64, count: usize| (0.0..count as f64).contains(&index);
+        inside(column, self.whole.width)
+            && inside(row, self.whole.height)
+            && self.whole.data[row as usize * self.whole.width + column as usize] > 127
+    }
+
+    /// What part of the whole silhouette, 0 to 1, lies in a box of the view.
+    pub fn part_in(&self, bounds: &Bounds) -> f64 {
+        let (columns, rows) = self.inside(bounds);
+        let weight = |line: &[u8]| line.iter().map(|value| u64::from(*value)).sum::<u64>();
+        let whole = weight(&self.whole.data);
+        let lines = self.whole.data.chunks_exact(self.whole.width.max(1));
+        let part: u64 =
+            lines.skip(rows.start).take(rows.len()).map(|line| weight(&line[columns.clone()])).sum();
+        if whole > 0 { part as f64 / whole as f64 } else { 0.0 }
+    }
+
+    /// The whole body.
+    pub fn whole(&self) -> &Mask {
+        &self.whole
+    }
+
+    /// What of it is inside the view and hidden by nothing: as large as [`Self::whole`], and in the same place.
+    pub fn visible(&self) -> &Mask {
+        &self.visible
+    }
+
+    /// Columns and rows whose middles lie in a box of the view.
+    fn inside(&self, bounds: &Bounds) -> (Range<usize>, Range<usize>) {
+        let range = |start: f64, length: f64, origin: f64, pixel: f64, count: usize| {
+            let index = |edge: f64| ((edge - origin) / pixel - 0.5).ceil().clamp(0.0, count as f64) as usize;
+            index(start)..index(start + length).max(index(start))
+        };
+        let Mask { width, height, .. } = self.whole;
+        (
+            range(bounds.left, bounds.width, self.origin.0, self.pixel.0, width),
+            range(bounds.top, bounds.height, self.origin.1, self.pixel.1, height),
+        )
+    }
+}
+
+/// One person in a picture: where, and in what shape.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sighting {
+    /// Who and where.
+    pub truth: GroundTruth,
+    /// In what shape; the box where no more is known.
+    pub silhouette: Silhouette,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_silhouette_says_what_lies_on_it_and_what_part_a_box_holds() {
+        // An L: the left half, and the lower right quarter; each pixel of the mask is 2 x 4 of the view.
+        let whole = Mask { width: 4, height: 2, data: vec![255, 255, 0, 0, 255, 255, 255, 255] };
+        let mut shape = Silhouette::new((10.0, 20.0), (2.0, 4.0), whole.clone(), whole);
+        assert!(shape.contains((10.0, 20.0)) && shape.contains((17.9, 27.9)));
+        assert!(
+            !shape.contains((14.0, 23.9)) && !shape.contains((9.9, 20.0)) && !shape.contains((12.0, 28.0))
+        );
+        let bounds = |left, top, width, height| Bounds { left, top, width, height };
+        assert_eq!(shape.part_in(&bounds(0.0, 0.0, 100.0, 100.0)), 1.0);
+        assert_eq!(shape.part_in(&bounds(10.0, 20.0, 4.0, 4.0)), 2.0 / 6.0);
+        assert_eq!(shape.part_in(&bounds(14.0, 20.0, 4.0, 4.0)), 0.0);
+        assert_eq!(shape.part_in(&bounds(14.0, 20.0, -4.0, 4.0)), 0.0);
+        shape.cut_to((14, 24));
+        assert_eq!(shape.visible().data, [255, 255, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(shape.part_in(&bounds(0.0, 0.0, 100.0, 100.0)), 1.0);
+        let half_out = Silhouette::of_box(&bounds(-16.0, 0.0, 32.0, 64.0), (640, 480));
+        assert_eq!(half_out.visible().data.iter().filter(|value| **value > 0).count(), 32 * 32 / 2);
+        assert!(half_out.contains((-15.0, 63.0)));
+        let nothing = Silhouette::of_box(&bounds(5.0, 5.0, 0.0, 0.0), (640, 480));
+        assert!(!nothing.contains((6.0, 6.0)));
+    }
 
     #[test]
     fn boxes_know_their_middle_and_how_much_of_them_is_inside() {

@@ -1,6 +1,6 @@
 //! Whether it is still the same person.
 
-use super::{SPECK, distance, is_inside, is_true_positive, tracked};
+use super::{SPECK, distance, is_hit, is_true_positive, tracked};
 use crate::record::{FrameRecord, GroundTruth};
 
 /// The second that is looked at begins so long after the end of a full occlusion.
@@ -28,7 +28,7 @@ pub fn is_hidden(frame: &FrameRecord) -> bool {
     frame.truth.as_ref().is_some_and(|truth| truth.unhidden < SPECK)
 }
 
-/// How often the person on whom the tracked point lies became another one. Where boxes overlap, the point is on the
+/// How often the person on whom the tracked point lies became another one. Where silhouettes overlap, the point is on the
 /// target; otherwise it stays with whom it was on; otherwise it is on the nearest. On nobody is no switch.
 pub fn identity_switches(frames: &[FrameRecord]) -> Option<usize> {
     frames.iter().any(|frame| !frame.others.is_empty()).then(|| {
@@ -45,10 +45,10 @@ pub fn identity_switches(frames: &[FrameRecord]) -> Option<usize> {
 
 fn person_at_point(frame: &FrameRecord, before: Option<u32>) -> Option<u32> {
     let point = tracked(frame)?;
-    let here = |person: &&GroundTruth| is_inside(&person.bounds, point);
-    if let Some(target) = frame.truth.as_ref().filter(here) {
-        return Some(target.id);
+    if is_hit(frame) {
+        return frame.truth.as_ref().map(|truth| truth.id);
     }
+    let here = |person: &&GroundTruth| frame.coverage.iter().any(|one| one.hit && one.id == person.id);
     let mut others: Vec<_> = frame.others.iter().filter(here).collect();
     others.sort_by(|a, b| distance(a.centroid, point).total_cmp(&distance(b.centroid, point)));
     let same = others.iter().find(|person| Some(person.id) == before);

@@ -3,7 +3,10 @@
 use proptest::prelude::*;
 
 use super::*;
-use crate::record::{Estimate, TargetState::*};
+use crate::{
+    record::{Bounds, Estimate, TargetState::*},
+    report::made_up,
+};
 
 fn person(id: u32, centroid: (f64, f64)) -> GroundTruth {
     let bounds = Bounds { left: centroid.0 - 5.0, top: centroid.1 - 10.0, width: 10.0, height: 20.0 };
@@ -17,18 +20,8 @@ fn says(state: TargetState, centroid: (f64, f64)) -> Option<Estimate> {
 }
 
 fn frame(truth: Option<GroundTruth>, estimate: Option<Estimate>) -> FrameRecord {
-    let (pan_deg, tilt_deg, zoom) = (0.0, 0.0, 1.0);
-    FrameRecord {
-        time_s: 0.0,
-        truth,
-        others: vec![],
-        estimate,
-        size: (80, 60),
-        pan_deg,
-        tilt_deg,
-        zoom,
-        commands: 0,
-    }
+    let record = FrameRecord { truth, estimate, ..made_up::frame((80, 60)) };
+    made_up::judged_by_boxes(record)
 }
 
 fn at(centroid: (f64, f64), estimate: Option<Estimate>) -> FrameRecord {
@@ -195,9 +188,11 @@ fn identity_is_kept_when_right_in_half_of_the_second_after_a_second() {
 
 #[test]
 fn another_person_under_the_point_is_a_switch() {
-    let with_others = |tracked: (f64, f64)| FrameRecord {
-        others: vec![person(2, (48.0, 30.0)), person(3, (70.0, 30.0))],
-        ..at(MIDDLE, says(Tracking, tracked))
+    let with_others = |tracked: (f64, f64)| {
+        made_up::judged_by_boxes(FrameRecord {
+            others: vec![person(2, (48.0, 30.0)), person(3, (70.0, 30.0))],
+            ..at(MIDDLE, says(Tracking, tracked))
+        })
     };
     let [target, both, second, third, nobody] =
         [(36.0, 30.0), (44.0, 30.0), (50.0, 30.0), (70.0, 30.0), (10.0, 10.0)].map(with_others);
@@ -228,7 +223,7 @@ fn boxes_overlap() {
 }
 
 fn run(frames: Vec<FrameRecord>) -> Run {
-    crate::report::made_up::run(frames)
+    made_up::run(frames)
 }
 
 prop_compose! {

@@ -1,6 +1,6 @@
 //! Runs that nobody ran.
 
-use crate::record::{Codec, Delays, FirstBox, FrameRecord, Run, TestId, TrackerName};
+use crate::record::{Codec, Delays, FirstBox, FrameRecord, Run, Sighting, Silhouette, TestId, TrackerName};
 
 /// Test 7 with ours, at ten pictures a second.
 pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
@@ -20,4 +20,32 @@ pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
         frames,
         error: None,
     }
+}
+
+/// A picture of that size with nobody in it, of which nothing was said.
+pub(crate) fn frame(size: (u32, u32)) -> FrameRecord {
+    FrameRecord {
+        time_s: 0.0,
+        truth: None,
+        others: Vec::new(),
+        estimate: None,
+        coverage: Vec::new(),
+        size,
+        focal_px: f64::from(size.0),
+        pan_deg: 0.0,
+        tilt_deg: 0.0,
+        zoom: 1.0,
+        commands: 0,
+    }
+}
+
+/// As if everybody in it were as wide and high as their box all over.
+pub(crate) fn judged_by_boxes(frame: FrameRecord) -> FrameRecord {
+    let sighting = |truth: &crate::record::GroundTruth| Sighting {
+        silhouette: Silhouette::of_box(&truth.bounds, frame.size),
+        truth: truth.clone(),
+    };
+    let people: Vec<_> = frame.truth.iter().chain(&frame.others).map(sighting).collect();
+    let estimate = frame.estimate.clone();
+    frame.judged(estimate, &people)
 }

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use super::{judged::Judged, table::escape};
 use crate::{
     metrics::{d_gc, d_gp, is_true_positive},
-    record::{Bounds, Estimate, FrameRecord, Snapshot, TargetState},
+    record::{Bounds, FrameRecord, Snapshot, TargetState},
 };
 
 /// The moments of one run side by side; nothing where none were kept.
@@ -33,7 +33,7 @@ fn figure(snapshot: &Snapshot, frame: &FrameRecord) -> String {
     if let Some(truth) = &frame.truth {
         svg += &outline(&truth.bounds, "truth");
     }
-    if let Some(estimate) = frame.estimate.as_ref().filter(|estimate| has_place(estimate)) {
+    if let Some(estimate) = frame.estimate.as_ref().filter(|estimate| estimate.has_place()) {
         let class = match estimate.state {
             TargetState::Occluded => "predicted",
             _ if is_true_positive(frame) => "right",
@@ -51,11 +51,6 @@ fn figure(snapshot: &Snapshot, frame: &FrameRecord) -> String {
         "<figure>{svg}</svg><figcaption><b>{moment}</b> {}</figcaption></figure>\n",
         escape(&words(frame))
     )
-}
-
-/// In other states the geometry says nothing.
-fn has_place(estimate: &Estimate) -> bool {
-    matches!(estimate.state, TargetState::Tracking | TargetState::Occluded)
 }
 
 fn outline(bounds: &Bounds, class: &str) -> String {

@@ -60,17 +60,14 @@ fn frame(index: usize, tracked: bool) -> FrameRecord {
     };
     let estimate =
         Estimate { state: TargetState::Tracking, centroid: (43.0, 29.0), bounds, id: 3, features: 12 };
-    FrameRecord {
+    made_up::judged_by_boxes(FrameRecord {
         time_s: index as f64 / 10.0,
         truth: Some(truth),
-        others: vec![],
         estimate: tracked.then_some(estimate),
-        size: (80, 60),
         pan_deg: -1.5,
-        tilt_deg: 0.0,
-        zoom: 1.0,
         commands: 1,
-    }
+        ..made_up::frame((80, 60))
+    })
 }
 
 fn run(test: u32, tracker: TrackerName) -> Run {

@@ -23,7 +23,7 @@ use crate::{
     kinematics::{Limits, Optics, Pose},
     picture::Picture,
     settings::{self, Settings},
-    truth::{GroundTruth, Mask},
+    truth::{GroundTruth, Mask, Sighting},
 };
 
 /// One picture's worth of light.
@@ -51,8 +51,8 @@ pub(crate) trait World: Send + Sync {
     fn frame_at(&self, time: Duration) -> u64;
     /// What the sensor catches, at any `size`.
     fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError>;
-    /// Who is there as the shutter opens, wherever the camera looks.
-    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth>;
+    /// Who is there as the shutter opens, wherever the camera looks, and in what shape.
+    fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting>;
     /// Where people are seen as the shutter opens, if that is known to the pixel.
     fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask>;
     /// All of it, or a good part, in one wide still picture.
@@ -61,6 +61,11 @@ pub(crate) trait World: Send + Sync {
     fn overview_size(&self) -> (u32, u32);
     /// Where the overview looks, and through which pinhole.
     fn overview_view(&self) -> (Pose, Pinhole);
+
+    /// Who is there as the shutter opens, wherever the camera looks.
+    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+        self.people(exposure, size).into_iter().map(|person| person.truth).collect()
+    }
 
     /// The pinhole of a view of `size`. One relatively taller than the camera's own shows less at its sides, not more
     /// above.

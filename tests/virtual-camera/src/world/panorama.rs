@@ -12,7 +12,7 @@ use crate::{
     picture::Picture,
     settings::Settings,
     sync::lock,
-    truth::{Bounds, GroundTruth, Mask},
+    truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette},
 };
 
 /// A pinhole recording by a camera that stands still.
@@ -145,10 +145,11 @@ impl World for Panorama {
         Ok(picture)
     }
 
-    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+    fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
         let people = lock(&self.recording).people(self.timeline.frame_at(exposure.time));
         let to_view = self.overview_to_view(&exposure.opening, size);
-        people.iter().filter_map(|person| self.seen(person, &to_view, size)).collect()
+        let seen = people.iter().filter_map(|person| self.seen(person, &to_view, size));
+        seen.map(|truth| Sighting { silhouette: Silhouette::of_box(&truth.bounds, size), truth }).collect()
     }
 
     fn silhouette(&self, _: &Exposure, _: (u32, u32)) -> Option<Mask> {

@@ -15,7 +15,7 @@ use crate::{
     picture::{Picture, Plane},
     seeded::Seeded,
     settings::Settings,
-    truth::{Bounds, GroundTruth, Mask},
+    truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette},
     world::{Exposure, FootageError, World, blur::motion_blur},
 };
 
@@ -91,7 +91,7 @@ impl Room {
     }
 
     /// The person in a view, inside of it or not; `None` unless all of them is ahead of the camera.
-    fn person(&self, time: Duration, pose: &Pose, size: (u32, u32)) -> Option<GroundTruth> {
+    fn person(&self, time: Duration, pose: &Pose, size: (u32, u32)) -> Option<Sighting> {
         let (body, view) = (self.body_at(time), self.view(pose, size));
         let [left, top, right, bottom] = self.walker.bounds(&body, &view)?;
         let bounds = Bounds { left, top, width: right - left, height: bottom - top };
@@ -122,7 +122,7 @@ impl Room {
         };
         let ray = |place: f64, centre: f64| (place - 0.5 - centre) / view.pinhole.focal;
         let (x, y) = (ray(centroid.0, view.pinhole.centre_x), ray(centroid.1, view.pinhole.centre_y));
-        Some(GroundTruth {
+        let truth = GroundTruth {
             id: 1,
             bounds,
             centroid,
@@ -131,8 +131,21 @@ impl Room {
             in_view: share(Weight::of(&whole, inside)),
             position_m: Some(body.place),
             direction_deg: Some(aim(pose, x, y)),
-        })
+        };
+        let pixel = 1.0 / scale;
+        let [whole, visible] = [whole, unhidden].map(mask);
+        let mut silhouette = Silhouette::new((left - pixel, top - pixel), (pixel, pixel), whole, visible);
+        silhouette.cut_to(size);
+        Some(Sighting { truth, silhouette })
     }
+}
+
+/// Which pixels are more than half covered.
+fn mask(Plane { width, height, mut data }: Plane) -> Mask {
+    for pixel in &mut data {
+        *pixel = if *pixel > 127 { 255 } else { 0 };
+    }
+    Mask { width, height, data }
 }
 
 /// How much of a mask is set, and where.
@@ -186,17 +199,13 @@ impl World for Room {
         Ok(self.take(exposure.time, &self.view(&exposure.opening, size), sweep))
     }
 
-    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+    fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
         self.person(exposure.time, &exposure.opening, size).into_iter().collect()
     }
 
     fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask> {
-        let [_, Plane { width, height, mut data }] =
-            self.body(&self.body_at(exposure.time), &self.view(&exposure.opening, size));
-        for pixel in &mut data {
-            *pixel = if *pixel > 127 { 255 } else { 0 };
-        }
-        Some(Mask { width, height, data })
+        let [_, unhidden] = self.body(&self.body_at(exposure.time), &self.view(&exposure.opening, size));
+        Some(mask(unhidden))
     }
 
     fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
