@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, Sighting, VirtualCamera, World};
 
 use crate::{
-    record::{Codec, Delays, FirstBox, FrameRecord, Run, TestId, TrackerName},
+    record::{Codec, Delays, FirstBox, FrameRecord, Run, Suite, TestId, TrackerName},
     still::Recording,
 };
 
@@ -18,25 +18,48 @@ pub(crate) fn exposure(number: u32, period: Duration) -> Duration {
 /// What pictures are of.
 #[derive(Debug, Clone)]
 pub enum Place {
-    /// What a camera sees that the tracker steers.
-    World(World),
+    /// What a camera with these settings sees, which the tracker steers. Delays and size of the pictures are those of the
+    /// experiment.
+    Camera(Box<Settings>),
     /// A recording as it is: no camera, no codec, no delays.
     Recording(Recording),
 }
 
-/// A world with somebody to follow in it.
+impl Place {
+    /// A camera with default settings in `world`.
+    pub fn world(world: World) -> Self {
+        Self::Camera(Box::new(Settings { world, ..Settings::default() }))
+    }
+}
+
+/// Who is to be followed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Target {
+    /// The only one there is.
+    Only,
+    /// One of several, by number.
+    Person(u32),
+    /// Nobody: whoever follows something is wrong.
+    Nobody,
+}
+
+/// A world, and who is to be followed in it.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// Which test it is; `None` for a recording.
+    /// Which suite it is from.
+    pub suite: Suite,
+    /// Which of the 72 tests it is; `None` in any other suite.
     pub test: Option<TestId>,
-    /// For tables.
+    /// For tables; another in every test of a suite.
     pub title: String,
+    /// Tests of the same path and seed are not independent of each other.
+    pub path: String,
     /// What there is to see.
     pub place: Place,
     /// From the start of the world to the last picture that counts; a recording as it is has a number for that.
     pub duration: Duration,
-    /// Who is to be followed; `None` where there is only one.
-    pub person: Option<u32>,
+    /// Who is to be followed.
+    pub target: Target,
 }
 
 impl Scene {
@@ -44,18 +67,23 @@ impl Scene {
     pub fn room(test: TestId, seed: u64) -> Option<Self> {
         let room = RoomSettings::test(test.0, seed)?;
         Some(Self {
+            suite: Suite::Room,
             test: Some(test),
+            path: room.way().to_string(),
             title: format!("test {test}"),
             duration: room.duration(),
-            place: Place::World(World::Room(room)),
-            person: None,
+            place: Place::world(World::Room(room)),
+            target: Target::Only,
         })
     }
 
     /// Of those in a picture the one to follow, and the others.
     pub(crate) fn split(&self, people: Vec<GroundTruth>) -> (Option<GroundTruth>, Vec<GroundTruth>) {
-        let (mut person, others): (Vec<_>, _) =
-            people.into_iter().partition(|one| self.person.is_none_or(|person| one.id == person));
+        let (mut person, others): (Vec<_>, _) = people.into_iter().partition(|one| match self.target {
+            Target::Only => true,
+            Target::Person(id) => one.id == id,
+            Target::Nobody => false,
+        });
         (person.pop(), others)
     }
 }
@@ -102,9 +130,13 @@ impl Experiment {
         }
     }
 
-    /// The camera in `world`, at home at time zero.
-    pub(crate) fn camera(&self, world: &World, clock: Clock) -> Result<VirtualCamera, virtual_camera::Error> {
-        let mut settings = Settings { auth: Auth::None, world: world.clone(), clock, ..Settings::default() };
+    /// The camera with these settings, at home at time zero.
+    pub(crate) fn camera(
+        &self,
+        settings: &Settings,
+        clock: Clock,
+    ) -> Result<VirtualCamera, virtual_camera::Error> {
+        let mut settings = Settings { auth: Auth::None, clock, ..settings.clone() };
         settings.service_time = Duration::ZERO;
         settings.video.delay = self.delays.video;
         settings.video.size = Some(self.size);
@@ -118,8 +150,11 @@ impl Experiment {
     }
 
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
-    /// was never moved; `None` where there is none.
+    /// was never moved; `None` where there is none. With nobody to follow all pictures count.
     pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
+        if self.scene.target == Target::Nobody {
+            return Some(0);
+        }
         let (period, home) = (camera.frame_period(), camera.home());
         let whole = |number: &u32| {
             let people = camera.ground_truth_from(&home, exposure(*number, period), self.size);
@@ -160,7 +195,9 @@ impl Experiment {
     /// What it will be recorded as.
     pub(crate) fn blank(&self) -> Run {
         Run {
+            suite: self.scene.suite,
             test: self.scene.test,
+            path: self.scene.path.clone(),
             title: self.scene.title.clone(),
             tracker: self.tracker,
             codec: self.codec,

@@ -5,8 +5,9 @@ use std::{collections::BTreeMap, path::Path, sync::Arc, time::Duration};
 use virtual_camera::{Clock, FootageSettings, People, Settings, Video, VirtualCamera, World};
 
 use crate::{
-    experiment::{Place, Scene, exposure},
+    experiment::{Place, Scene, Target, exposure},
     people::{self, TruthError},
+    record::Suite,
     still::Recording,
 };
 
@@ -58,14 +59,8 @@ impl Scene {
             there.into_iter().filter(|one| one.bounds.part_inside(size) >= 1.0).map(|one| one.id).collect()
         };
         let (id, (_, last)) = choose(&stays(&people, in_view), person)?;
-        let place = Place::World(world);
-        Ok(Self {
-            test: None,
-            title: title(file, id),
-            place,
-            duration: exposure(last as u32, period),
-            person: Some(id),
-        })
+        let place = Place::world(world);
+        Ok(Self { duration: exposure(last as u32, period), ..Self::of_recording(file, id, place) })
     }
 
     /// The recording `file` as it is, and `person` of `truth` in it to their last box; without a number who stays longest.
@@ -77,13 +72,21 @@ impl Scene {
         let everybody = |picture| people[&picture].iter().map(|one| one.id).collect();
         let (id, (_, last)) = choose(&stays(&people, everybody), person)?;
         let place = Place::Recording(Recording { file: file.into(), people: Arc::new(people), last });
-        Ok(Self { test: None, title: title(file, id), place, duration: Duration::MAX, person: Some(id) })
+        Ok(Self::of_recording(file, id, place))
     }
-}
 
-fn title(file: &Path, person: u32) -> String {
-    let name = file.file_stem().unwrap_or_default().to_string_lossy();
-    format!("{name}, person {person}")
+    fn of_recording(file: &Path, person: u32, place: Place) -> Self {
+        let name = file.file_stem().unwrap_or_default().to_string_lossy();
+        Self {
+            suite: Suite::Recording,
+            test: None,
+            title: format!("{name}, person {person}"),
+            path: name.into(),
+            place,
+            duration: Duration::MAX,
+            target: Target::Person(person),
+        }
+    }
 }
 
 /// Of each person the first picture for which `there` tells of them, and the last that they have a box in.

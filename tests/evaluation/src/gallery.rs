@@ -38,8 +38,8 @@ pub fn write(like: &Experiment, folder: &Path) -> Result<usize, Box<dyn std::err
 
 /// One picture with the person in the middle of it, half hidden where they are ever hidden.
 fn shoot(experiment: &Experiment, fov_deg: f64) -> Result<Vec<u8>, RunError> {
-    let Place::World(world) = &experiment.scene.place else { return Err(RunError::Nobody) };
-    let camera = experiment.camera(world, Clock::Stepped)?;
+    let Place::Camera(settings) = &experiment.scene.place else { return Err(RunError::Nobody) };
+    let camera = experiment.camera(settings, Clock::Stepped)?;
     let (exposure, person) = moment(experiment, &camera).ok_or(RunError::Nobody)?;
     camera.advance_to(exposure.saturating_sub(AIMING));
     aim(&camera, &person, fov_deg)?;

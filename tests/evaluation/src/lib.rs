@@ -31,7 +31,7 @@ mod still;
 mod trackers;
 
 pub use batch::run_all;
-pub use experiment::{Experiment, Place, Scene};
+pub use experiment::{Experiment, Place, Scene, Target};
 pub use footage::SceneError;
 pub use lockstep::run;
 pub use people::TruthError;

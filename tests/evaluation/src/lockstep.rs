@@ -10,7 +10,7 @@ use std::{
 };
 
 use ptztrack_contract::{TargetMeta, TargetState};
-use virtual_camera::{Clock, Picture, VirtualCamera, World};
+use virtual_camera::{Clock, Picture, Settings, VirtualCamera};
 
 use crate::{
     album::Album,
@@ -48,8 +48,8 @@ pub(crate) enum RunError {
 pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
     let driven = match &experiment.scene.place {
-        Place::World(world) if experiment.real_time => realtime::drive(experiment, world, &mut run),
-        Place::World(world) => drive(experiment, world, &mut run),
+        Place::Camera(camera) if experiment.real_time => realtime::drive(experiment, camera, &mut run),
+        Place::Camera(camera) => drive(experiment, camera, &mut run),
         Place::Recording(recording) => still::drive(experiment, recording, &mut run),
     };
     if let Err(error) = driven {
@@ -58,9 +58,9 @@ pub fn run(experiment: &Experiment) -> Run {
     run
 }
 
-fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), RunError> {
+fn drive(experiment: &Experiment, camera: &Settings, run: &mut Run) -> Result<(), RunError> {
     let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
-    let mut stage = Stage::set(experiment, world, film.as_deref())?;
+    let mut stage = Stage::set(experiment, camera, film.as_deref())?;
     let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
     let period = stage.camera.frame_period();
     run.frame_rate = 1.0 / period.as_secs_f64();
@@ -92,8 +92,8 @@ struct Stage<'a> {
 }
 
 impl<'a> Stage<'a> {
-    fn set(experiment: &'a Experiment, world: &World, film: Option<&Path>) -> Result<Self, RunError> {
-        let camera = experiment.camera(world, Clock::Stepped)?;
+    fn set(experiment: &'a Experiment, settings: &Settings, film: Option<&Path>) -> Result<Self, RunError> {
+        let camera = experiment.camera(settings, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
         let sink = film::beside(&tracker.sink(&camera.url(), "lockstep=true timeout=60000"), film);

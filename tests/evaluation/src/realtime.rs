@@ -13,7 +13,7 @@ use std::{
 
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
-use virtual_camera::{Clock, Picture, VirtualCamera, World};
+use virtual_camera::{Clock, Picture, Settings, VirtualCamera};
 
 use crate::{
     album::Album,
@@ -28,14 +28,14 @@ const DECODER: &str = "decoder";
 const QUEUE: &str = "leaky";
 
 /// Runs it as long as its world lasts.
-pub(crate) fn drive(experiment: &Experiment, world: &World, run: &mut Run) -> Result<(), RunError> {
+pub(crate) fn drive(experiment: &Experiment, settings: &Settings, run: &mut Run) -> Result<(), RunError> {
     if experiment.codec == Codec::Raw {
         return Err(RunError::Raw);
     }
     // Found with time standing still: it takes a while.
     let first =
-        experiment.first_counted(&experiment.camera(world, Clock::Stepped)?).ok_or(RunError::Nobody)?;
-    let camera = experiment.camera(world, Clock::Real)?;
+        experiment.first_counted(&experiment.camera(settings, Clock::Stepped)?).ok_or(RunError::Nobody)?;
+    let camera = experiment.camera(settings, Clock::Real)?;
     run.frame_rate = 1.0 / camera.frame_period().as_secs_f64();
     let end = experiment.scene.duration + experiment.delays.video;
     let watch = Arc::new(Watch::new(experiment.clone(), camera, first));

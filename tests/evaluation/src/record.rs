@@ -2,11 +2,13 @@
 
 use std::{fmt, str::FromStr, time::Duration};
 
+use serde::{Deserialize, Serialize};
+
 pub use ptztrack_contract::TargetState;
 pub use virtual_camera::{Bounds, GroundTruth, Sighting, Silhouette};
 
 /// Number of a test in the order of the thesis' table 5.2, from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct TestId(pub u32);
 
 impl TestId {
@@ -29,7 +31,7 @@ impl fmt::Display for TestId {
 macro_rules! named {
     ($(#[$meta:meta])* $type:ident, $what:literal { $($(#[$variant_meta:meta])* $variant:ident = $name:literal),+ $(,)? }) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
         pub enum $type { $($(#[$variant_meta])* $variant),+ }
 
         impl $type {
@@ -85,6 +87,20 @@ named! {
 }
 
 named! {
+    /// A set of tests that are judged together.
+    Suite, "suite" {
+        /// The thesis' 72 tests in a made-up room.
+        Room = "room",
+        /// People cut out of film, in photographs of rooms.
+        Photo = "photo",
+        /// What is hard in reality: several people, nobody at all, cameras with faults.
+        Hard = "hard",
+        /// Recordings of real people.
+        Recording = "recording",
+    }
+}
+
+named! {
     /// What the pictures go through before the tracker sees them.
     Codec, "codec" {
         /// Motion JPEG.
@@ -107,7 +123,7 @@ named! {
 }
 
 /// How old things are when they arrive.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub struct Delays {
     /// From light on the sensor to the picture at the tracker.
     pub video: Duration,
@@ -129,9 +145,10 @@ impl Default for Delays {
 }
 
 /// What the tracker said of one picture. Pixels, edges of pixels at whole numbers.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// What it was doing. In any state but tracking and occluded the geometry says nothing.
+    #[serde(with = "state_name")]
     pub state: TargetState,
     /// Mean of its features (thesis 3.15), or the middle of its box where it has none.
     pub centroid: (f64, f64),
@@ -151,7 +168,7 @@ impl Estimate {
 }
 
 /// What an estimate holds of somebody.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Coverage {
     /// Number of the person.
     pub id: u32,
@@ -171,7 +188,7 @@ impl Coverage {
 }
 
 /// One counted picture.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameRecord {
     /// Its exposure, in seconds since that of the first counted picture.
     pub time_s: f64,
@@ -216,12 +233,11 @@ impl FrameRecord {
 named! {
     /// A telling moment of a run.
     Moment, "moment" {
-        /// The tracker has its target for the first time.
+        /// The tracker tracks something for the first time.
         Acquired = "acquired",
         /// It says for the first time that the target is hidden.
         Occluded = "occluded",
-        /// For the first time it says that it lost the target; or it is not right about a target that is to be seen, without
-        /// calling it occluded, after a true positive: some trackers never say so.
+        /// A loss begins: see [`crate::metrics::Loss`].
         Lost = "lost",
         /// The target was never farther from the middle while its own middle was in the picture.
         Worst = "worst",
@@ -229,7 +245,7 @@ named! {
 }
 
 /// A picture to look at.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Snapshot {
     /// Why it is kept.
     pub moment: Moment,
@@ -241,12 +257,16 @@ pub struct Snapshot {
 }
 
 /// One test with one tracker.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Run {
-    /// Which test; `None` for a recording.
+    /// Which suite it is from.
+    pub suite: Suite,
+    /// Which of the 72 tests; `None` in any other suite.
     pub test: Option<TestId>,
-    /// What was shown, in words for tables: `test 7`, or the recording's file name and person.
+    /// What was shown, in words for tables: `test 7`, or the recording's file name and person. Another in every test of a suite.
     pub title: String,
+    /// Tests of the same path and seed are not independent of each other.
+    pub path: String,
     /// What followed.
     pub tracker: TrackerName,
     /// What the pictures went through.
@@ -271,4 +291,24 @@ pub struct Run {
     pub snapshots: Vec<Snapshot>,
     /// When it failed, why; the pictures up to there are kept.
     pub error: Option<String>,
+}
+
+/// A state is kept by its name.
+mod state_name {
+    use serde::{Deserialize, Deserializer, Serializer, de::Error};
+
+    use super::TargetState;
+
+    const ALL: [TargetState; 4] =
+        [TargetState::Searching, TargetState::Tracking, TargetState::Occluded, TargetState::Lost];
+
+    pub fn serialize<S: Serializer>(state: &TargetState, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.serialize_str(state.name())
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<TargetState, D::Error> {
+        let name = String::deserialize(deserializer)?;
+        let known = ALL.into_iter().find(|state| state.name() == name);
+        known.ok_or_else(|| D::Error::custom(format!("there is no state `{name}`")))
+    }
 }

@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use evaluation::{
-    Experiment, Place, Scene,
+    Experiment, Place, Scene, Target,
     metrics::Metrics,
-    record::{Codec, FirstBox, Run, TargetState, TrackerName},
+    record::{Codec, FirstBox, Run, Suite, TargetState, TrackerName},
 };
 use virtual_camera::{SyntheticSettings, World};
 
@@ -26,7 +26,15 @@ fn scene() -> Scene {
         wide_fov_deg: FOV_DEG,
         ..Default::default()
     });
-    Scene { test: None, title: "walk".into(), place: Place::World(world), duration, person: None }
+    Scene {
+        suite: Suite::Recording,
+        test: None,
+        title: "walk".into(),
+        path: "walk".into(),
+        place: Place::world(world),
+        duration,
+        target: Target::Only,
+    }
 }
 
 fn experiment(tracker: TrackerName) -> Experiment {
@@ -105,7 +113,7 @@ fn a_scene_without_anybody_is_an_error_in_words() {
     evaluation::init().unwrap();
     let mut experiment = experiment(TrackerName::Oracle);
     let empty = SyntheticSettings { path: Vec::new(), ..Default::default() };
-    experiment.scene.place = Place::World(World::Synthetic(empty));
+    experiment.scene.place = Place::world(World::Synthetic(empty));
     let run = evaluation::run(&experiment);
     assert_eq!(run.error.as_deref(), Some("the person is never wholly in the first view"));
     assert!(run.frames.is_empty());

@@ -4,9 +4,9 @@
 use std::time::Duration;
 
 use evaluation::{
-    Experiment, Place, Scene,
+    Experiment, Place, Scene, Target,
     metrics::Metrics,
-    record::{Codec, Run, TrackerName},
+    record::{Codec, Run, Suite, TrackerName},
 };
 use virtual_camera::{SyntheticSettings, World};
 
@@ -18,8 +18,16 @@ fn run(codec: Codec) -> Run {
     let duration = path.last().unwrap().time + Duration::from_secs(6);
     let settings =
         SyntheticSettings { path, stays: true, frame_rate: 25.0, wide_fov_deg: 36.0, ..Default::default() };
-    let place = Place::World(World::Synthetic(settings));
-    let scene = Scene { test: None, title: "walk".into(), place, duration, person: None };
+    let place = Place::world(World::Synthetic(settings));
+    let scene = Scene {
+        suite: Suite::Recording,
+        test: None,
+        title: "walk".into(),
+        path: "walk".into(),
+        place,
+        duration,
+        target: Target::Only,
+    };
     let experiment = Experiment::new(scene, TrackerName::Oracle, 1);
     evaluation::run(&Experiment { size: (320, 240), real_time: true, codec, ..experiment })
 }

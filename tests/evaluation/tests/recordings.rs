@@ -4,7 +4,7 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use evaluation::{
-    Experiment, Scene, SceneError,
+    Experiment, Scene, SceneError, Target,
     metrics::Metrics,
     record::{Codec, Run, TrackerName},
     report,
@@ -102,7 +102,7 @@ fn run(scene: &Scene, tracker: TrackerName) -> Run {
 fn a_camera_follows_one_person_within_a_recording() {
     let (file, truth) = recording("closed-loop");
     let scene = Scene::footage(&file, &truth, None, (320, 240)).unwrap();
-    assert_eq!((scene.title.as_str(), scene.person), ("closed-loop, person 4", Some(4)));
+    assert_eq!((scene.title.as_str(), scene.target), ("closed-loop, person 4", Target::Person(4)));
 
     let oracle = run(&scene, TrackerName::Oracle);
     let metrics = Metrics::of(&oracle);

@@ -1,11 +1,15 @@
 //! Runs that nobody ran.
 
-use crate::record::{Codec, Delays, FirstBox, FrameRecord, Run, Sighting, Silhouette, TestId, TrackerName};
+use crate::record::{
+    Codec, Delays, FirstBox, FrameRecord, Run, Sighting, Silhouette, Suite, TestId, TrackerName,
+};
 
 /// Test 7 with ours, at ten pictures a second.
 pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
     Run {
+        suite: Suite::Room,
         test: Some(TestId(7)),
+        path: "1".into(),
         title: "test 7".into(),
         tracker: TrackerName::Ptztrack,
         codec: Codec::Mjpeg,

@@ -105,7 +105,7 @@ impl RoomSettings {
 
     /// The number of the way that is walked: tests that differ by light and occlusion alone share one, so that
     /// nothing else differs between them (thesis 5.1).
-    pub(super) fn way(&self) -> u64 {
+    pub fn way(&self) -> u64 {
         let plain = Self { lighting: Lighting::Optimal, occlusion: Occlusion::None, ..self.clone() };
         u64::from(plain.number())
     }
