@@ -24,7 +24,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn value_error(&self, field: &str, value: impl ToString) -> ContractError {
+    pub fn value_error(&self, field: &str, value: impl ToString) -> ContractError {
         ContractError::Value {
             structure: self.0.name().to_string(),
             field: field.to_owned(),
@@ -82,7 +82,7 @@ impl<'a> Reader<'a> {
     }
 
     /// Exactly `N` finite numbers.
-    fn numbers<const N: usize>(&self, field: &str) -> Result<[f64; N], ContractError> {
+    pub fn numbers<const N: usize>(&self, field: &str) -> Result<[f64; N], ContractError> {
         let tuples = self.tuples::<N>(field)?;
         match tuples.as_slice() {
             [tuple] => Ok(*tuple),

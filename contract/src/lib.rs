@@ -7,6 +7,7 @@
 //! | kind | struct | `GstStructure` name |
 //! |---|---|---|
 //! | meta | [`MotionMeta`] | `PtzMotionMeta` |
+//! | meta | [`SceneMeta`] | `PtzSceneMeta` |
 //! | meta | [`TargetMeta`] | `PtzTargetMeta` |
 //! | upstream event | [`TrackerEvent`] | `ptztrack-tracker` |
 //! | upstream event | [`CameraEvent`] | `ptztrack-camera-state` |
@@ -18,18 +19,22 @@ mod codec;
 mod error;
 mod events;
 mod geometry;
+mod homography;
 mod messages;
 mod meta;
 mod motion;
+mod scene;
 mod target;
 
 pub use error::ContractError;
 pub use events::{CameraEvent, TrackerEvent};
 pub use geometry::{Point, Rect, Vector};
+pub use homography::Homography;
 pub use messages::{
     CameraChange, CameraMessage, MotionChange, MotionMessage, ReleaseReason, TargetChange, TargetMessage,
     Times,
 };
 pub use meta::BufferMeta;
-pub use motion::{MOTION_ROI, MotionMeta, Region};
+pub use motion::{MOTION_ROI, MotionMeta, Region, RegionTrack};
+pub use scene::{CameraMotion, Plane, SceneMeta};
 pub use target::{Feature, TARGET_ROI, TargetMeta, TargetState};

@@ -22,6 +22,12 @@ prop_compose! {
     }
 }
 
+fn track() -> impl Strategy<Value = RegionTrack> {
+    (any::<u64>(), clock_time(), vector(), vector(), 0.0..=1.0f64).prop_map(
+        |(id, age, velocity, travelled, restless)| RegionTrack { id, age, velocity, travelled, restless },
+    )
+}
+
 prop_compose! {
     fn region()(
         bounds in rect(),
@@ -29,8 +35,9 @@ prop_compose! {
         perimeter in number(),
         area in number(),
         centroid in point(),
+        track in prop::option::of(track()),
     ) -> Region {
-        Region { bounds, contour, perimeter, area, centroid }
+        Region { bounds, contour, perimeter, area, centroid, track }
     }
 }
 
@@ -140,6 +147,48 @@ proptest! {
         let camera = CameraMessage { change: CameraChange::AtLimit, times, detail: "pan 180°".into() };
         prop_assert_eq!(CameraMessage::from_structure(&camera.to_structure()).unwrap(), camera);
     }
+}
+
+fn plane(width: u32, height: u32, value: u8) -> Plane {
+    Plane { width, height, pixels: glib::Bytes::from_owned(vec![value; (width * height) as usize]) }
+}
+
+fn scene() -> SceneMeta {
+    let homography = Homography([[1.0, 0.1, 0.2], [-0.1, 1.0, 0.3], [0.01, 0.02, 1.0]]);
+    SceneMeta {
+        from_pts: Some(gst::ClockTime::from_mseconds(40)),
+        camera_motion: Some(CameraMotion { homography, covariance: [0.1, 0.2, 0.3], inliers: 17 }),
+        luma: plane(4, 3, 1),
+        chroma: Some([plane(4, 3, 2), plane(4, 3, 3)]),
+        foreground: plane(4, 3, 4),
+        background: plane(4, 3, 5),
+    }
+}
+
+#[test]
+fn scenes_travel_and_their_pixels_are_shared() {
+    gst::init().unwrap();
+    let unknown = SceneMeta { from_pts: None, camera_motion: None, chroma: None, ..scene() };
+    for meta in [scene(), unknown] {
+        let mut buffer = gst::Buffer::new();
+        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        let read = SceneMeta::of(&buffer.copy()).unwrap().unwrap();
+        assert_eq!(read, meta);
+        assert_eq!(read.luma.pixels.as_ptr(), meta.luma.pixels.as_ptr());
+    }
+}
+
+#[test]
+fn planes_that_do_not_fit_are_refused() {
+    gst::init().unwrap();
+    let refused = |meta: SceneMeta| {
+        let mut buffer = gst::Buffer::new();
+        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        SceneMeta::of(&buffer).unwrap().unwrap_err().to_string()
+    };
+    assert!(refused(SceneMeta { background: plane(5, 3, 0), ..scene() }).contains("(5, 3)"));
+    let short = Plane { height: 4, ..plane(4, 3, 0) };
+    assert!(refused(SceneMeta { foreground: short, ..scene() }).contains("12 bytes"));
 }
 
 #[test]

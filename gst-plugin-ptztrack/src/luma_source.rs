@@ -6,7 +6,7 @@ use opencv::core::{self, Mat};
 use opencv::imgproc;
 use opencv::prelude::*;
 
-use crate::vision::{Luma, LumaError};
+use crate::vision::{Chroma, Luma, LumaError, Picture, Samples};
 
 /// Every format that [`LumaSource`] reads. Those that need no conversion stand first, as caps
 /// negotiation prefers what stands first.
@@ -125,6 +125,38 @@ impl LumaSource {
         bytes.with_mat(|bytes| convert(bytes, access, &mut self.converted))?;
         Ok(Luma::new(self.converted.data_bytes()?, width, height, width)?)
     }
+}
+
+/// Luma of `frame` (see [`LumaSource::luma`]) and its colours as they lie in memory.
+impl LumaSource {
+    /// The picture in `frame`, which must be of one of [`FORMATS`].
+    pub fn picture<'a>(
+        &'a mut self,
+        frame: &'a gst_video::VideoFrameRef<&gst::BufferRef>,
+    ) -> Result<Picture<'a>, LumaSourceError> {
+        let chroma = chroma(frame)?;
+        Ok(Picture { luma: self.luma(frame)?, chroma })
+    }
+}
+
+fn chroma<'a>(
+    frame: &'a gst_video::VideoFrameRef<&gst::BufferRef>,
+) -> Result<Option<Chroma<'a>>, LumaSourceError> {
+    let component = |index: u32| {
+        let stride = frame.comp_stride(index);
+        let stride = usize::try_from(stride).map_err(|_| LumaSourceError::Stride(stride))?;
+        let size = (frame.comp_width(index) as usize, frame.comp_height(index) as usize);
+        let (first, step) = (frame.comp_poffset(index) as usize, frame.comp_pstride(index) as usize);
+        Ok::<_, LumaSourceError>(Samples::new(frame.comp_data(index)?, size, stride, first, step)?)
+    };
+    let format = frame.format_info();
+    Ok(if format.is_rgb() {
+        Some(Chroma::Rgb([component(0)?, component(1)?, component(2)?]))
+    } else if format.is_yuv() {
+        Some(Chroma::Yuv([component(1)?, component(2)?]))
+    } else {
+        None
+    })
 }
 
 /// Writes the grey picture of `bytes` (interleaved pixels, one matrix column a byte) to `grey`.

@@ -10,8 +10,8 @@ use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Region, TargetState, Times,
-    TrackerEvent,
+    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Region, SceneMeta,
+    TargetState, Times, TrackerEvent,
 };
 
 use super::settings::{Settings, ZoneSetting};
@@ -281,8 +281,8 @@ impl BaseTransformImpl for BgAvgDetect {
     fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
         // Mapped for reading only: memory shared with others is then not copied.
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
-        let regions = self.look(&mut stream, buffer);
-        let attached = attach(buffer, regions.as_deref(), &stream.in_info);
+        let seen = self.look(&mut stream, buffer);
+        let attached = attach(buffer, &seen, &stream.in_info);
         *lock(&self.stream) = Some(stream);
         self.posted(attached)
     }
@@ -294,9 +294,9 @@ impl BaseTransformImpl for BgAvgDetect {
     ) -> Result<gst::FlowSuccess, gst::FlowError> {
         let output = *lock(&self.output);
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
-        let regions = self.look(&mut stream, inbuf);
-        let drawn = stream.draw(inbuf, outbuf, regions.as_deref().unwrap_or_default(), output);
-        let attached = attach(outbuf, regions.as_deref(), &stream.in_info);
+        let seen = self.look(&mut stream, inbuf);
+        let drawn = stream.draw(inbuf, outbuf, seen.regions.as_deref().unwrap_or_default(), output);
+        let attached = attach(outbuf, &seen, &stream.in_info);
         if let Err(error) = &drawn {
             self.warn_once(&mut stream, error);
         }
@@ -366,32 +366,32 @@ impl BgAvgDetect {
         lock(&self.duty).camera(moving, Duration::from_nanos(settle_time));
     }
 
-    /// The regions of a frame; `None` where it was not looked at or while it learns.
-    fn look(&self, stream: &mut Stream, buffer: &gst::BufferRef) -> Option<Vec<Region>> {
+    /// The regions of a frame, `None` where it was not looked at or while it learns, and the scene.
+    fn look(&self, stream: &mut Stream, buffer: &gst::BufferRef) -> Seen {
         let settings = lock(&self.settings).clone();
         if buffer.flags().contains(gst::BufferFlags::DISCONT) {
             stream.interrupt();
         }
         let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));
-        if !lock(&self.duty).looks(elapsed) {
+        let awake = lock(&self.duty).looks(elapsed);
+        if !awake {
             stream.skip();
-            return None;
         }
         if buffer.flags().contains(gst::BufferFlags::GAP) {
-            return None;
+            return Seen::default();
         }
-        match stream.look(buffer, elapsed, &settings) {
-            Ok(regions) => {
-                let regions = regions?;
-                let change = stream.change(&regions, elapsed, &settings);
-                self.post(change, buffer.pts(), &regions);
-                Some(regions)
-            }
-            Err(error) => {
-                self.warn_once(stream, &error);
-                None
-            }
+        let scene = stream.scene(buffer, elapsed);
+        let scene = scene.inspect_err(|error| self.warn_once(stream, error)).ok();
+        if !awake {
+            return Seen { regions: None, scene };
         }
+        let regions = stream.look(buffer, elapsed, &settings);
+        let regions = regions.inspect_err(|error| self.warn_once(stream, error)).ok().flatten();
+        if let Some(regions) = &regions {
+            let change = stream.change(regions, elapsed, &settings);
+            self.post(change, buffer.pts(), regions);
+        }
+        Seen { regions, scene }
     }
 
     fn post(&self, change: Option<MotionChange>, pts: Option<gst::ClockTime>, regions: &[Region]) {
@@ -428,17 +428,23 @@ impl BgAvgDetect {
     }
 }
 
+/// What there is to say of a frame.
+#[derive(Default)]
+struct Seen {
+    regions: Option<Vec<Region>>,
+    scene: Option<SceneMeta>,
+}
+
 /// Says on `buffer` what was seen; nothing where nobody looked.
-fn attach(
-    buffer: &mut gst::BufferRef,
-    regions: Option<&[Region]>,
-    info: &VideoInfo,
-) -> Result<(), glib::BoolError> {
-    let Some(regions) = regions else { return Ok(()) };
+fn attach(buffer: &mut gst::BufferRef, seen: &Seen, info: &VideoInfo) -> Result<(), glib::BoolError> {
+    if let Some(scene) = &seen.scene {
+        scene.attach(buffer)?;
+    }
+    let Some(regions) = &seen.regions else { return Ok(()) };
     remove_regions_of_interest(buffer, MOTION_ROI);
     for region in regions {
         let pixels = region.bounds.to_pixels(info.width(), info.height());
         VideoRegionOfInterestMeta::add(buffer, MOTION_ROI, pixels);
     }
-    MotionMeta { regions: regions.to_vec() }.attach(buffer)
+    MotionMeta { regions: regions.clone() }.attach(buffer)
 }

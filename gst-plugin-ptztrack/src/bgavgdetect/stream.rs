@@ -2,12 +2,12 @@ use std::time::Duration;
 
 use gst_video::prelude::*;
 use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{MotionChange, Region};
+use ptztrack_contract::{MotionChange, Plane, Region, SceneMeta};
 
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{Detector, DetectorError, Presence};
+use crate::vision::{Detector, DetectorError, Luma, Presence, SceneModel};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -21,10 +21,24 @@ pub(super) enum StreamError {
     Luma(#[from] LumaSourceError),
     #[error("detection failed: {0}")]
     Detector(#[from] DetectorError),
+    #[error("the scene cannot be told apart: {0}")]
+    Scene(opencv::Error),
     #[error("the output cannot be drawn: {0}")]
     Drawing(#[from] opencv::Error),
     #[error("the output cannot be converted: {0}")]
     Conversion(#[from] glib::BoolError),
+}
+
+/// Width of the scene's planes at most, pixels.
+const SCENE_WIDTH: usize = 400;
+
+fn plane(luma: Luma) -> Plane {
+    let pixels: Vec<u8> = (0..luma.height()).flat_map(|y| luma.row(y)).copied().collect();
+    Plane {
+        width: luma.width() as u32,
+        height: luma.height() as u32,
+        pixels: glib::Bytes::from_owned(pixels),
+    }
 }
 
 /// One stream of frames of the same caps.
@@ -33,6 +47,9 @@ pub(super) struct Stream {
     out_info: VideoInfo,
     source: LumaSource,
     detector: Detector,
+    scene: SceneModel,
+    /// Timestamp of the last picture that the scene was seen in.
+    scene_pts: Option<gst::ClockTime>,
     presence: Presence,
     converter: Option<VideoConverter>,
     last_pts: Option<gst::ClockTime>,
@@ -49,6 +66,8 @@ impl Stream {
             out_info,
             source: LumaSource::default(),
             detector: Detector::default(),
+            scene: SceneModel::default(),
+            scene_pts: None,
             presence: Presence::default(),
             converter: None,
             last_pts: None,
@@ -125,6 +144,23 @@ impl Stream {
             .map_err(|_| StreamError::Buffer)?;
         let luma = self.source.luma(&frame)?;
         Ok(self.detector.process(&luma, elapsed, &settings.detector())?)
+    }
+
+    /// What everybody can use of a frame: camera motion, foreground, background.
+    pub fn scene(&mut self, buffer: &gst::BufferRef, elapsed: Duration) -> Result<SceneMeta, StreamError> {
+        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
+            .map_err(|_| StreamError::Buffer)?;
+        let picture = self.source.picture(&frame)?;
+        let from_pts = std::mem::replace(&mut self.scene_pts, buffer.pts());
+        let view = self.scene.update(&picture, SCENE_WIDTH, elapsed, None).map_err(StreamError::Scene)?;
+        Ok(SceneMeta {
+            from_pts,
+            camera_motion: view.camera_motion,
+            luma: plane(view.luma),
+            chroma: view.chroma.map(|chroma| chroma.map(plane)),
+            foreground: plane(view.foreground),
+            background: plane(view.background),
+        })
     }
 
     /// Whether motion starts or ends with these regions.

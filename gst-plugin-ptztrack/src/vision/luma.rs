@@ -41,6 +41,12 @@ impl<'a> Luma<'a> {
         Ok(Self { data, width, height, stride })
     }
 
+    /// Looks at `data` as packed rows of `width` pixels; what is left over is not looked at.
+    pub fn packed(data: &'a [u8], width: usize) -> Self {
+        let height = data.len().checked_div(width).unwrap_or(0);
+        Self { data, width, height, stride: width }
+    }
+
     /// Pixels a row.
     pub fn width(&self) -> usize {
         self.width

@@ -1,0 +1,239 @@
+use opencv::core::Point2f;
+use ptztrack_contract::{CameraMotion, Homography};
+
+use super::corners::{self, Corner, Grid};
+use super::fit::{self, Centred, Fit, Pair};
+use super::flow::{self, Pyramid};
+use crate::vision::Luma;
+
+/// Farther than this many pixels from the key picture, anywhere in the picture, the next picture becomes the
+/// key picture: blur and perspective change what points look like.
+const MAX_TRAVEL: f64 = 4.0;
+/// New corners looked for in one picture, after the first: a search everywhere costs more than all the rest.
+const TOP_UP: usize = 12;
+/// When a smaller share of the key picture's points agrees, the next picture becomes the key picture.
+const MIN_AGREEING: f64 = 0.6;
+/// Background that was seen as such counts fully; points of unknown standing, and points on what was
+/// foreground in the picture before, count less.
+const NEW_WEIGHT: f64 = 0.5;
+const FOREGROUND_WEIGHT: f64 = 0.1;
+
+/// A point that is followed from the key picture on.
+#[derive(Debug, Clone, Copy)]
+struct Tracked {
+    /// In the key picture, pixels.
+    place: Point2f,
+    /// Belief that it is background: 1 for sure.
+    weight: f64,
+}
+
+impl Tracked {
+    fn new(corner: &Corner) -> Self {
+        Self { place: corner.place, weight: NEW_WEIGHT }
+    }
+}
+
+/// A picture that the following ones are compared with. While the camera rests it stays the same, so that no
+/// errors add up.
+#[derive(Debug)]
+struct Key {
+    pyramid: Pyramid,
+    points: Vec<Tracked>,
+    /// From it to the last picture, pixels.
+    to_last: Homography,
+    /// Eigenvalue up to which a corner may be noise.
+    noise: f64,
+}
+
+/// Estimates the motion of the camera from picture to picture (see the table of this module). Works on
+/// pictures about 320 pixels wide.
+#[derive(Debug, Default)]
+pub struct CameraMotionEstimator {
+    key: Option<Key>,
+    /// Motion of the last picture, pixels: the camera goes on as it did.
+    last: Homography,
+}
+
+impl CameraMotionEstimator {
+    /// Forgets the pictures before.
+    pub fn restart(&mut self) {
+        *self = Self::default();
+    }
+
+    /// How the camera moved since the last picture. `foreground` (of the last picture, in its size) says where
+    /// points are not to be believed, `hint` (normalised) where the picture may have gone; it is only a first
+    /// guess. `None`: the first picture, or nothing to hold on to.
+    pub fn update(
+        &mut self,
+        luma: &Luma,
+        foreground: Option<&Luma>,
+        hint: Option<Homography>,
+    ) -> opencv::Result<Option<CameraMotion>> {
+        let size = (luma.width() as f64, luma.height() as f64);
+        let pyramid = luma.with_mat(Pyramid::of)?;
+        let grid = Grid::of(&pyramid.picture()?);
+        let Some(mut key) = self.key.take().filter(|key| key.grid() == Some(grid)) else {
+            self.last = Homography::IDENTITY;
+            self.key = Some(Key::first(pyramid, grid)?);
+            return Ok(None);
+        };
+        if let Some(foreground) = foreground {
+            key.doubt(foreground);
+        }
+        let hint = hint.map(|hint| to_pixels(&hint, size));
+        let expected: Vec<_> = hint.into_iter().chain([self.last, Homography::IDENTITY]).collect();
+        let Some((fit, ends)) = key.compare(&pyramid, &expected, Centred::of(size.0, size.1))? else {
+            self.last = Homography::IDENTITY;
+            self.key = Some(Key::first(pyramid, grid)?);
+            return Ok(None);
+        };
+        let Some(back) = key.to_last.inverse() else {
+            self.key = Some(Key::first(pyramid, grid)?);
+            return Ok(None);
+        };
+        self.last = back.then(&fit.homography);
+        let inliers = fit.agrees.iter().filter(|agrees| **agrees).count();
+        let motion = CameraMotion {
+            homography: to_frame(&self.last, size),
+            covariance: [
+                fit.covariance[0] / (size.0 * size.0),
+                fit.covariance[1] / (size.0 * size.1),
+                fit.covariance[2] / (size.1 * size.1),
+            ],
+            inliers: u32::try_from(inliers).unwrap_or(u32::MAX),
+        };
+        self.key = Some(key.next(pyramid, grid, &fit, &ends)?);
+        Ok(Some(motion))
+    }
+}
+
+impl Key {
+    fn first(pyramid: Pyramid, grid: Grid) -> opencv::Result<Self> {
+        let picture = pyramid.picture()?;
+        let mut corners = Vec::new();
+        for cell in 0..grid.cells() {
+            corners.extend(corners::best(&picture, grid, cell)?);
+        }
+        let noise = corners::noise(&corners);
+        let points = corners.iter().filter(|corner| corner.stands_out(noise)).map(Tracked::new).collect();
+        Ok(Self { pyramid, points, to_last: Homography::IDENTITY, noise })
+    }
+
+    fn grid(&self) -> Option<Grid> {
+        self.pyramid.picture().ok().map(|picture| Grid::of(&picture))
+    }
+
+    /// Finds corners in some of the cells that have none.
+    fn top_up(&mut self, grid: Grid) -> opencv::Result<()> {
+        let picture = self.pyramid.picture()?;
+        let mut taken = vec![false; grid.cells()];
+        for cell in self.points.iter().filter_map(|point| grid.cell(point.place)) {
+            taken[cell] = true;
+        }
+        // Another few each time: in some cells there is nothing to find.
+        let free: Vec<usize> = (0..grid.cells()).filter(|cell| !taken[*cell]).collect();
+        let start = self.points.first().map_or(0, |point| point.place.x as usize) % free.len().max(1);
+        for &cell in free.iter().cycle().skip(start).take(TOP_UP.min(free.len())) {
+            let corner = corners::best(&picture, grid, cell)?;
+            self.points
+                .extend(corner.filter(|corner| corner.stands_out(self.noise)).as_ref().map(Tracked::new));
+        }
+        Ok(())
+    }
+
+    /// Believes less in points that lie on what was foreground in the last picture.
+    fn doubt(&mut self, foreground: &Luma) {
+        for point in &mut self.points {
+            let at = fit::apply(&self.to_last, point.place);
+            let (x, y) = (at.x.round(), at.y.round());
+            let inside =
+                x >= 0.0 && y >= 0.0 && x < foreground.width() as f32 && y < foreground.height() as f32;
+            if inside && foreground.row(y as usize)[x as usize] > 127 {
+                point.weight = FOREGROUND_WEIGHT;
+            }
+        }
+    }
+
+    /// How the picture moved from this one to `pyramid`, and where each point is now.
+    fn compare(
+        &self,
+        pyramid: &Pyramid,
+        expected: &[Homography],
+        centred: Centred,
+    ) -> opencv::Result<Option<(Fit, Vec<Option<Point2f>>)>> {
+        let places: Vec<Point2f> = self.points.iter().map(|point| point.place).collect();
+        let from_key: Vec<Homography> = expected.iter().map(|motion| self.to_last.then(motion)).collect();
+        for guess in &from_key {
+            let guesses: Vec<Point2f> = places.iter().map(|place| fit::apply(guess, *place)).collect();
+            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses)?;
+            let pairs: Vec<Pair> = self
+                .points
+                .iter()
+                .zip(&ends)
+                .filter_map(|(point, end)| {
+                    Some(Pair { from: point.place, to: (*end)?, weight: point.weight })
+                })
+                .collect();
+            if let Some(fit) = fit::fit(&pairs, &from_key, centred) {
+                return Ok(Some((fit, ends)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// What the picture after `pyramid` is compared with.
+    fn next(
+        mut self,
+        pyramid: Pyramid,
+        grid: Grid,
+        fit: &Fit,
+        ends: &[Option<Point2f>],
+    ) -> opencv::Result<Self> {
+        let found: Vec<usize> = (0..ends.len()).filter(|index| ends[*index].is_some()).collect();
+        for (&index, &agrees) in found.iter().zip(&fit.agrees) {
+            let weight = &mut self.points[index].weight;
+            *weight += 0.3 * (f64::from(u8::from(agrees)) - *weight);
+        }
+        let agreeing = fit.agrees.iter().filter(|agrees| **agrees).count();
+        let near = travel(&fit.homography, grid) <= MAX_TRAVEL;
+        if near && agreeing as f64 >= MIN_AGREEING * self.points.len() as f64 {
+            self.to_last = fit.homography;
+            return Ok(self);
+        }
+        let mut taken = vec![false; grid.cells()];
+        let mut points = Vec::new();
+        for (&index, _) in found.iter().zip(&fit.agrees).filter(|(_, agrees)| **agrees) {
+            let Some(place) = ends[index] else { continue };
+            let Some(cell) = grid.cell(place) else { continue };
+            if !std::mem::replace(&mut taken[cell], true) {
+                points.push(Tracked { place, weight: self.points[index].weight });
+            }
+        }
+        let mut next = Self { pyramid, points, to_last: Homography::IDENTITY, noise: self.noise };
+        next.top_up(grid)?;
+        Ok(next)
+    }
+}
+
+/// How far a corner of the picture goes at most, pixels.
+fn travel(homography: &Homography, grid: Grid) -> f64 {
+    let (width, height) = grid.size();
+    let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+    let length = |(x, y): (f64, f64)| {
+        let to = homography.apply(ptztrack_contract::Point { x, y });
+        (to.x - x).hypot(to.y - y)
+    };
+    corners.map(length).into_iter().fold(0.0, f64::max)
+}
+
+/// A normalised motion as one of pixels, whose middles lie half a pixel inside.
+pub(in crate::vision) fn to_pixels(motion: &Homography, (width, height): (f64, f64)) -> Homography {
+    let scaled = motion.scaled(width, height);
+    Homography::translation(0.5, 0.5).then(&scaled).then(&Homography::translation(-0.5, -0.5))
+}
+
+/// The way back.
+fn to_frame(motion: &Homography, (width, height): (f64, f64)) -> Homography {
+    let moved = Homography::translation(-0.5, -0.5).then(motion).then(&Homography::translation(0.5, 0.5));
+    moved.scaled(1.0 / width, 1.0 / height)
+}

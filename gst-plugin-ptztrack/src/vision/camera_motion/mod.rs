@@ -1,0 +1,18 @@
+//! How the picture moves because the camera does, once a picture.
+//!
+//! | step | file |
+//! |---|---|
+//! | corners, one in each cell of a grid, topped up where they were lost | `corners` |
+//! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow` |
+//! | the motion that most of them share, and how well it is known | `fit` |
+
+mod corners;
+mod estimator;
+mod fit;
+mod flow;
+
+pub use estimator::CameraMotionEstimator;
+pub(super) use estimator::to_pixels;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+use proptest::prelude::*;
+use ptztrack_contract::{CameraMotion, Homography, Point};
+
+use super::CameraMotionEstimator;
+use super::estimator::to_pixels;
+use crate::vision::synthetic::{Canvas, texture};
+
+const SIZE: (usize, usize) = (320, 180);
+
+/// The motion of a camera that turns by so many pixels and zooms: `perspective` is that of a picture 60
+/// degrees wide.
+fn turned(x: f64, y: f64, zoom: f64, roll: f64) -> Homography {
+    let focal = 277.0;
+    let (cos, sin) = (zoom * roll.cos(), zoom * roll.sin());
+    let centred =
+        Homography([[cos, -sin, x], [sin, cos, y], [-x / (focal * focal), -y / (focal * focal), 1.0]]);
+    let middle = Homography::translation(-160.0, -90.0);
+    middle.then(&centred).then(&Homography::translation(160.0, 90.0))
+}
+
+fn world(x: f64, y: f64) -> f64 {
+    texture(1, x, y)
+}
+
+fn seen(motion: &Homography, seed: u32) -> Canvas {
+    Canvas::seen(SIZE, motion, world).noisy(2.0, seed)
+}
+
+fn measure(estimator: &mut CameraMotionEstimator, picture: &Canvas) -> Option<CameraMotion> {
+    estimator.update(&picture.luma(), None, None).expect("OpenCV")
+}
+
+/// How far the measured motion is off at most, pixels, nine places over.
+fn error(measured: &CameraMotion, truth: &Homography) -> f64 {
+    let measured = to_pixels(&measured.homography, (SIZE.0 as f64, SIZE.1 as f64));
+    let places = (0..9).map(|n| Point { x: f64::from(n % 3) * 159.0, y: f64::from(n / 3) * 89.0 });
+    let off = |place: Point| {
+        let (a, b) = (measured.apply(place), truth.apply(place));
+        (a.x - b.x).hypot(a.y - b.y)
+    };
+    places.map(off).fold(0.0, f64::max)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+    #[test]
+    fn turns_and_zooms_are_measured(
+        x in -14.0..14.0, y in -10.0..10.0, zoom in 0.97..1.03, roll in -0.02..0.02, seed in any::<u32>(),
+    ) {
+        let truth = turned(x, y, zoom, roll);
+        let mut estimator = CameraMotionEstimator::default();
+        prop_assert_eq!(measure(&mut estimator, &seen(&Homography::IDENTITY, seed)), None);
+        let motion = measure(&mut estimator, &seen(&truth, seed ^ 1)).expect("textured everywhere");
+        prop_assert!(error(&motion, &truth) < 0.4, "{} pixels off", error(&motion, &truth));
+    }
+}
+
+#[test]
+fn a_camera_at_rest_does_not_drift() {
+    let mut estimator = CameraMotionEstimator::default();
+    let mut sum = Homography::IDENTITY;
+    for seed in 0..40 {
+        if let Some(motion) = measure(&mut estimator, &seen(&Homography::IDENTITY, seed)) {
+            sum = sum.then(&motion.homography);
+        }
+    }
+    let total = CameraMotion { homography: sum, ..CameraMotion::default() };
+    assert!(error(&total, &Homography::IDENTITY) < 0.1);
+}
+
+#[test]
+fn somebody_who_fills_half_the_picture_and_goes_along_is_not_taken_for_the_world() {
+    let mut estimator = CameraMotionEstimator::default();
+    for step in 0..12 {
+        let pan = turned(-4.0 * f64::from(step), 0.0, 1.0, 0.0);
+        let mut picture = Canvas::seen(SIZE, &pan, world);
+        // The camera follows: they stay in the middle.
+        let width = 40.0 + 10.0 * f64::from(step);
+        picture.paint((160.0 - width / 2.0, 10.0, width, 170.0), |x, y| texture(9, x + width / 2.0, y));
+        let motion = measure(&mut estimator, &picture.noisy(2.0, step));
+        if step > 0 {
+            let before = turned(-4.0 * f64::from(step - 1), 0.0, 1.0, 0.0);
+            let truth = before.inverse().expect("a camera").then(&pan);
+            assert!(error(&motion.expect("seen"), &truth) < 1.0, "{step}");
+        }
+    }
+}
+
+#[test]
+fn a_fast_pan_is_followed_through_its_blur() {
+    let mut estimator = CameraMotionEstimator::default();
+    let mut at = 0.0;
+    for (step, speed) in [0.0, 5.0, 10.0, 16.0, 20.0, 20.0, 20.0].into_iter().enumerate() {
+        at += speed;
+        let picture =
+            Canvas::seen(SIZE, &Homography::translation(at, 0.0), world).blurred(speed as usize / 2);
+        let motion = measure(&mut estimator, &picture.noisy(2.0, step as u32));
+        if step > 0 {
+            let truth = Homography::translation(speed, 0.0);
+            let motion = motion.unwrap_or_else(|| panic!("lost at {step}"));
+            assert!(error(&motion, &truth) < 1.0, "{step}: {}", error(&motion, &truth));
+        }
+    }
+}
+
+#[test]
+fn a_hint_helps_over_a_jump() {
+    let jump = Homography::translation(70.0, 0.0);
+    let mut estimator = CameraMotionEstimator::default();
+    measure(&mut estimator, &seen(&Homography::IDENTITY, 1));
+    let hint = Homography::translation(66.0 / SIZE.0 as f64, 0.0);
+    let motion = estimator.update(&seen(&jump, 2).luma(), None, Some(hint)).expect("OpenCV").expect("seen");
+    assert!(error(&motion, &jump) < 0.4);
+}
+
+#[test]
+fn a_blank_wall_and_a_cut_tell_nothing() {
+    let wall = |seed| Canvas::seen(SIZE, &Homography::IDENTITY, |_, _| 120.0).noisy(2.0, seed);
+    let mut estimator = CameraMotionEstimator::default();
+    for seed in 0..5 {
+        assert_eq!(measure(&mut estimator, &wall(seed)), None);
+    }
+    measure(&mut estimator, &seen(&Homography::IDENTITY, 1));
+    let other = Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| texture(77, x, y));
+    assert_eq!(measure(&mut estimator, &other), None);
+    assert!(measure(&mut estimator, &other).is_some(), "and goes on from there");
+}

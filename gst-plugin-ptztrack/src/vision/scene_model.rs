@@ -1,0 +1,74 @@
+use std::time::Duration;
+
+use ptztrack_contract::{CameraMotion, Homography};
+
+use super::Luma;
+use super::camera_motion::CameraMotionEstimator;
+use super::picture::{Picture, Reduced};
+use super::reduce::divisor;
+use super::travelling_background::TravellingBackground;
+
+/// What one picture shows: all planes are of one size, the whole picture reduced.
+#[derive(Debug, Clone, Copy)]
+pub struct SceneView<'a> {
+    /// How the camera moved since the picture before; `None` where that is not known.
+    pub camera_motion: Option<CameraMotion>,
+    /// The picture's luma.
+    pub luma: Luma<'a>,
+    /// Its U and V, where it has colour.
+    pub chroma: Option<[Luma<'a>; 2]>,
+    /// How likely each pixel is foreground: 0 to 255.
+    pub foreground: Luma<'a>,
+    /// Mean luma of the background behind it.
+    pub background: Luma<'a>,
+}
+
+/// Reduces pictures, measures the motion of the camera and carries the background along: all that looks at
+/// whole pictures, in the order in which one needs the other.
+#[derive(Debug, Default)]
+pub struct SceneModel {
+    picture: Reduced,
+    motion: CameraMotionEstimator,
+    background: TravellingBackground,
+    camera_motion: Option<CameraMotion>,
+}
+
+impl SceneModel {
+    /// Forgets the pictures before.
+    pub fn restart(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Looks at the next picture, `elapsed` after the one before, reduced to at most `width` pixels a row (0: not
+    /// reduced). `hint` (normalised) says where the picture may have gone; it is only a first guess.
+    pub fn update(
+        &mut self,
+        picture: &Picture,
+        width: usize,
+        elapsed: Duration,
+        hint: Option<Homography>,
+    ) -> opencv::Result<SceneView<'_>> {
+        let divisor = divisor(picture.luma.width(), width);
+        let size = ((picture.luma.width() / divisor).max(1), (picture.luma.height() / divisor).max(1));
+        if size != self.picture.size() {
+            self.restart();
+        }
+        self.picture.fill(picture, size);
+        let foreground = self.background.foreground();
+        self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), hint)?;
+        self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed)?;
+        Ok(self.view())
+    }
+
+    /// What the last picture showed.
+    pub fn view(&self) -> SceneView<'_> {
+        let luma = self.picture.luma();
+        SceneView {
+            camera_motion: self.camera_motion,
+            luma,
+            chroma: self.picture.chroma(),
+            foreground: self.background.foreground().unwrap_or(luma),
+            background: self.background.mean().unwrap_or(luma),
+        }
+    }
+}
