@@ -59,7 +59,7 @@ fn nobody() -> TargetMeta {
 
 #[test]
 fn an_operator_is_given_way_and_control_comes_back() {
-    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 4000u32));
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 4_000_000_000u64));
     stage.run(12.0, &centred());
     assert_eq!(stage.times(&TAKEN_OVER), 0);
     assert!(stage.camera.operate("rpan=-6"));
@@ -96,7 +96,7 @@ fn an_operator_who_steers_against_us_is_noticed_and_our_own_move_ended() {
 
 #[test]
 fn where_nobody_is_to_be_given_way_nobody_is() {
-    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 0u32));
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("override-timeout", 0u64));
     stage.run(12.0, &centred());
     stage.camera.operate("rpan=-6");
     stage.run(5.0, &aside());
@@ -195,7 +195,8 @@ fn it_goes_home_when_nobody_was_there_for_a_while() {
         ("Gate", "camera=1&gotoserverpresetno=2", 9.0),
     ] {
         let settings = Settings { presets: presets.clone(), ..Settings::default() };
-        let mut stage = Stage::new(settings, |rig| rig.with("home", home).with("home-timeout", 3000u32));
+        let mut stage =
+            Stage::new(settings, |rig| rig.with("home", home).with("home-timeout", 3_000_000_000u64));
         stage.run(2.0, &target(TargetState::Tracking, 0.3, 0.5));
         stage.run(2.8, &nobody());
         assert!(!stage.moves().contains(&command.to_owned()), "{home}: too early");
@@ -214,7 +215,7 @@ fn it_goes_home_when_nobody_was_there_for_a_while() {
 
 #[test]
 fn without_a_home_it_stays_where_the_last_target_was() {
-    let mut stage = Stage::new(Settings::default(), |rig| rig.with("home-timeout", 0u32));
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("home-timeout", 0u64));
     stage.run(1.0, &aside());
     stage.run(1.0, &nobody());
     let before = stage.moves().len();
@@ -249,8 +250,9 @@ fn a_way_home_is_broken_off_for_a_target_and_for_a_pause() {
 
 #[test]
 fn a_home_that_is_none_is_said_once_and_nothing_else_suffers() {
-    let mut stage =
-        Stage::new(Settings::default(), |rig| rig.with("home", "Nowhere").with("home-timeout", 100u32));
+    let mut stage = Stage::new(Settings::default(), |rig| {
+        rig.with("home", "Nowhere").with("home-timeout", 100_000_000u64)
+    });
     stage.run(10.0, &nobody());
     let warnings: Vec<_> = stage.heard.iter().filter(|heard| heard.is_warning()).collect();
     let [Heard::Warning(text)] = warnings[..] else { panic!("{warnings:?}") };

@@ -26,7 +26,7 @@ fn settings(speed_map: SpeedMap, command_delay: Duration) -> Settings {
 /// A sink that is told the truth about a camera; of that, tests make lies.
 fn told(rig: Rig, speed_map: &SpeedMap, latency: Duration) -> Rig {
     let curve = if matches!(speed_map, SpeedMap::Linear { .. }) { "linear" } else { "cubic" };
-    rig.with("latency", latency.as_millis() as u32)
+    rig.with("latency", latency.as_nanos() as u64)
         .with("field-of-view", FOV_DEG)
         .with("camera-speed", speed_map.deg_s(100.0))
         .with_str("speed-curve", curve)
@@ -85,12 +85,12 @@ fn a_linear_camera_taken_for_a_cubic_one_is_found_out() {
 
 #[test]
 fn a_shorter_latency_is_found() {
-    assert_learned(CUBIC, 60, |rig, latency| rig.with("latency", latency.as_millis() as u32 + 300));
+    assert_learned(CUBIC, 60, |rig, latency| rig.with("latency", latency.as_nanos() as u64 + 300_000_000));
 }
 
 #[test]
 fn a_longer_latency_is_found() {
-    assert_learned(CUBIC, 300, |rig, latency| rig.with("latency", latency.as_millis() as u32 - 300));
+    assert_learned(CUBIC, 300, |rig, latency| rig.with("latency", latency.as_nanos() as u64 - 300_000_000));
 }
 
 /// Newer firmware tells both.

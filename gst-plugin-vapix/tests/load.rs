@@ -51,7 +51,7 @@ fn under_load_there_is_one_request_and_each_is_of_the_newest_picture() {
     let (begin, mut pictures) = (Instant::now(), Vec::new());
     // So slow that it never comes to the end of its range.
     let mut rig =
-        Rig::ready(&camera.url()).with("latency", 0u32).with("learn", false).with("gain", 0.3).play();
+        Rig::ready(&camera.url()).with("latency", 0u64).with("learn", false).with("gain", 0.3).play();
     for picture in 0..SIDES * STAYS {
         let meta = side(picture);
         rig.push(&meta);

@@ -3,14 +3,14 @@
 
 mod common;
 
-use common::stage::PATIENT_MS;
+use common::stage::PATIENT_NS;
 use common::{PATIENCE, Rig, camera, moves, target};
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta, TargetState};
 use virtual_camera::{Auth, Fault, VirtualCamera};
 
 fn rig(camera: &VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Rig {
-    set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_MS)).play()
+    set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS)).play()
 }
 
 fn push_at(rig: &mut Rig, milliseconds: u64, meta: Option<&TargetMeta>) {

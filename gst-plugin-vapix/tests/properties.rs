@@ -72,6 +72,35 @@ fn crossed_limits_are_refused_with_both_values_and_the_old_ones_stay() {
     assert!(warnings[1].contains("`pan-min`=-10") && warnings[1].contains("`pan-max`=-20"), "{warnings:?}");
 }
 
+/// As a line written for milliseconds would have them.
+#[test]
+fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
+    for (name, wrong, right) in
+        [("latency", 300u64, 300_000_000u64), ("timeout", 2000, 2_000_000_000), ("home-timeout", 999_999, 0)]
+    {
+        let rig = Rig::ready("http://192.168.0.90").with(name, right).with(name, wrong);
+        assert_eq!(rig.sink.property::<u64>(name), right);
+        match &rig.heard()[..] {
+            [Heard::Warning(text)] => {
+                let expected = format!("`{name}`={wrong} is {wrong} ns: durations are in nanoseconds");
+                assert!(text.starts_with(&expected), "{text}");
+                assert!(text.ends_with(&format!("`{name}` stays as it was")), "{text}");
+            }
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+#[test]
+fn a_duration_below_its_range_is_refused_with_the_range() {
+    let rig = Rig::ready("http://192.168.0.90").with("timeout", 20_000_000u64);
+    assert_eq!(rig.sink.property::<u64>("timeout"), 1_500_000_000);
+    match &rig.heard()[..] {
+        [Heard::Warning(text)] => assert!(text.contains("100ms") && text.contains("60s"), "{text}"),
+        other => panic!("{other:?}"),
+    }
+}
+
 #[test]
 fn user_and_password_of_a_location_are_used_and_taken_out() {
     let camera = camera(Auth::Digest { qop: true });

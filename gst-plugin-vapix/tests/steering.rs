@@ -158,7 +158,7 @@ fn pictures_without_target_meta_stop_the_camera() {
 #[test]
 fn a_long_occlusion_stops_the_camera() {
     let camera = camera(Auth::None);
-    let mut rig = Rig::ready(&camera.url()).with("stale-timeout", 300u32).play();
+    let mut rig = Rig::ready(&camera.url()).with("stale-timeout", 300_000_000u64).play();
     rig.set_going(&camera);
     rig.push_until(&target(TargetState::Occluded, 0.9, 0.4), &camera, |status| !status.moving);
 }

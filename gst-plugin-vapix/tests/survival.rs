@@ -192,7 +192,7 @@ fn a_wrong_password_locks_nobody_out() {
 fn at_rest_a_silent_camera_is_left_without_complaint() {
     let camera = camera(Auth::None);
     camera.set_fault(Fault::Hang);
-    let rig = Rig::ready(&camera.url()).with("timeout", 60_000u32).play();
+    let rig = Rig::ready(&camera.url()).with("timeout", 60_000_000_000u64).play();
     assert!(camera.wait_for(PATIENCE, |status| status.requests > 0));
     rig.sink.set_state(gst::State::Paused).unwrap();
     rig.sink.set_state(gst::State::Null).unwrap();
@@ -202,7 +202,7 @@ fn at_rest_a_silent_camera_is_left_without_complaint() {
 #[test]
 fn a_dead_network_ends_with_a_warning_within_bounds() {
     let camera = camera(Auth::None);
-    let mut rig = Rig::ready(&camera.url()).with("timeout", 60_000u32).play();
+    let mut rig = Rig::ready(&camera.url()).with("timeout", 60_000_000_000u64).play();
     rig.set_going(&camera);
     camera.set_fault(Fault::Hang);
     rig.sink.set_state(gst::State::Null).unwrap();

@@ -1,7 +1,6 @@
 use std::sync::{LazyLock, Mutex};
 use std::time::Duration;
 
-use glib::Properties;
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
@@ -11,10 +10,10 @@ use ptztrack_contract::{BufferMeta, TargetMeta};
 use super::clock::Clock;
 use super::news::camera_event;
 use super::picture::Picture;
+use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
 use super::worker::{self, Legacy, Worker};
-use super::{Mode, Prediction, SpeedCurve};
 use crate::lock::lock;
 use crate::servo::{Sight, Status};
 
@@ -39,169 +38,8 @@ struct Stream {
 
 /// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
 /// order: `settings`, `worker`, so that changes come to the worker in the order in which they were made.
-#[derive(Default, Properties)]
-#[properties(wrapper_type = super::VapixPtzSink)]
+#[derive(Default)]
 pub struct VapixPtzSink {
-    #[property(
-        name = "location", type = Option<String>, get = Self::location, set = Self::set_location, mutable_ready,
-        blurb = "Address of the camera, for example http://192.168.0.90; a user and a password in it are moved to the properties of that name"
-    )]
-    #[property(
-        name = "camera", get, set, type = u32, member = camera, mutable_ready,
-        default = Settings::default().camera, minimum = 1, maximum = 64,
-        blurb = "Video channel of the camera"
-    )]
-    #[property(
-        name = "user", get, set = Self::set_user, type = Option<String>, member = user, mutable_playing,
-        blurb = "User, with the right to control PTZ; where user and password are unset, VAPIX_USER of the environment"
-    )]
-    #[property(
-        name = "password", set = Self::set_password, type = Option<String>, mutable_playing,
-        blurb = "Password (cannot be read); where user and password are unset, VAPIX_PASSWORD of the environment"
-    )]
-    #[property(
-        name = "timeout", get, set, type = u32, member = timeout_ms, mutable_ready,
-        default = Settings::default().timeout_ms, minimum = 100, maximum = 60_000,
-        blurb = "Longest wait for one of the camera's answers, in milliseconds"
-    )]
-    #[property(
-        name = "insecure", get, set, type = bool, member = insecure, mutable_ready,
-        default = Settings::default().insecure,
-        blurb = "With https believe any certificate: who sits on the wire can then take the camera"
-    )]
-    #[property(
-        name = "ca-file", get, set, type = Option<String>, member = ca_file, mutable_ready,
-        blurb = "With https believe only certificates signed by an authority in this PEM file (unset: those the system trusts)"
-    )]
-    #[property(
-        name = "mode", get, set = Self::set_mode, type = Mode, member = mode, mutable_playing,
-        blurb = "How the camera is moved",
-        builder(Settings::default().mode)
-    )]
-    #[property(
-        name = "gain", get, set = Self::set_gain, type = f64, member = gain, mutable_playing,
-        default = Settings::default().gain, minimum = 0.0, maximum = 20.0,
-        blurb = "Degrees per second for each degree off the middle, in 1/s"
-    )]
-    #[property(
-        name = "dead-zone", get, set = Self::set_dead_zone, type = f64, member = dead_zone, mutable_playing,
-        default = Settings::default().dead_zone, minimum = 0.0, maximum = 0.5,
-        blurb = "Offset from the middle at which a camera at rest stays at rest, as a part of the picture's width"
-    )]
-    #[property(
-        name = "max-speed", get, set = Self::set_max_speed, type = f64, member = max_speed_deg_s, mutable_playing,
-        default = Settings::default().max_speed_deg_s, minimum = 0.1, maximum = 1000.0,
-        blurb = "Pan and tilt never turn faster than this, in degrees per second"
-    )]
-    #[property(
-        name = "max-acceleration", get, set = Self::set_max_acceleration, type = f64, member = max_acceleration_deg_s2, mutable_playing,
-        default = Settings::default().max_acceleration_deg_s2, minimum = 1.0, maximum = 10_000.0,
-        blurb = "By how much the speed of pan and tilt changes in a second at most, in degrees per second; a stop is at once"
-    )]
-    #[property(
-        name = "max-rate", get, set = Self::set_max_rate, type = f64, member = max_rate_hz, mutable_playing,
-        default = Settings::default().max_rate_hz, minimum = 0.1, maximum = 50.0,
-        blurb = "Commands per second at most; stops are sent at once"
-    )]
-    #[property(
-        name = "latency", get, set = Self::set_latency, type = u32, member = latency_ms, mutable_playing,
-        default = Settings::default().latency_ms, maximum = 5000,
-        blurb = "Delay of the camera: from the sending of a command until a picture that shows it arrives, in milliseconds"
-    )]
-    #[property(
-        name = "field-of-view", get, set = Self::set_field_of_view, type = f64, member = field_of_view_deg, mutable_playing,
-        default = Settings::default().field_of_view_deg, minimum = 0.0, maximum = 179.0,
-        blurb = "Horizontal field of view zoomed out, in degrees (0: as the camera says)"
-    )]
-    #[property(
-        name = "prediction", get, set = Self::set_prediction, type = Prediction, member = prediction, mutable_playing,
-        blurb = "How the target's motion is carried forward",
-        builder(Settings::default().prediction)
-    )]
-    #[property(
-        name = "stale-timeout", get, set = Self::set_stale_timeout, type = u32, member = stale_timeout_ms, mutable_playing,
-        default = Settings::default().stale_timeout_ms, minimum = 50, maximum = 60_000,
-        blurb = "The camera is stopped when the target was not seen for this long, in milliseconds"
-    )]
-    #[property(
-        name = "camera-speed", get, set = Self::set_camera_speed, type = f64, member = camera_speed_deg_s, mutable_playing,
-        default = Settings::default().camera_speed_deg_s, minimum = 1.0, maximum = 1000.0,
-        blurb = "What a camera that does not tell does at speed step 100, in degrees per second"
-    )]
-    #[property(
-        name = "speed-curve", get, set = Self::set_speed_curve, type = SpeedCurve, member = speed_curve, mutable_playing,
-        blurb = "How the speed of a camera that does not tell grows with the speed step",
-        builder(Settings::default().speed_curve)
-    )]
-    #[property(
-        name = "learn", get, set = Self::set_learn, type = bool, member = learn, mutable_playing,
-        default = Settings::default().learn,
-        blurb = "Learn latency, field of view and speed map while following; what is set or told is where that begins"
-    )]
-    #[property(
-        name = "auto-zoom", get, set = Self::set_auto_zoom, type = bool, member = auto_zoom, mutable_playing,
-        default = Settings::default().auto_zoom,
-        blurb = "Zoom so that the target stays as tall as `target-height`, and out where it is not seen well"
-    )]
-    #[property(
-        name = "target-height", get, set = Self::set_target_height, type = f64, member = target_height, mutable_playing,
-        default = Settings::default().target_height, minimum = 0.05, maximum = 0.9,
-        blurb = "Height that `auto-zoom` gives the target, as a part of the picture's"
-    )]
-    #[property(
-        name = "pan-min", get, set = Self::set_pan_min, type = f64, member = pan_min_deg, mutable_playing,
-        default = Settings::default().pan_min_deg, minimum = -180.0, maximum = 180.0,
-        blurb = "The camera is turned no farther left than this, in degrees (-180 and 180 together: no limit)"
-    )]
-    #[property(
-        name = "pan-max", get, set = Self::set_pan_max, type = f64, member = pan_max_deg, mutable_playing,
-        default = Settings::default().pan_max_deg, minimum = -180.0, maximum = 180.0,
-        blurb = "The camera is turned no farther right than this, in degrees (-180 and 180 together: no limit)"
-    )]
-    #[property(
-        name = "tilt-min", get, set = Self::set_tilt_min, type = f64, member = tilt_min_deg, mutable_playing,
-        default = Settings::default().tilt_min_deg, minimum = -180.0, maximum = 180.0,
-        blurb = "The camera is tilted no farther down than this, in degrees"
-    )]
-    #[property(
-        name = "tilt-max", get, set = Self::set_tilt_max, type = f64, member = tilt_max_deg, mutable_playing,
-        default = Settings::default().tilt_max_deg, minimum = -180.0, maximum = 180.0,
-        blurb = "The camera is tilted no farther up than this, in degrees"
-    )]
-    #[property(
-        name = "zoom-min", get, set = Self::set_zoom_min, type = u32, member = zoom_min, mutable_playing,
-        default = Settings::default().zoom_min, minimum = 1, maximum = 9999,
-        blurb = "`auto-zoom` zooms out no farther than this, in steps of the optical zoom"
-    )]
-    #[property(
-        name = "zoom-max", get, set = Self::set_zoom_max, type = u32, member = zoom_max, mutable_playing,
-        default = Settings::default().zoom_max, minimum = 1, maximum = 9999,
-        blurb = "`auto-zoom` zooms in no farther than this, in steps of the optical zoom"
-    )]
-    #[property(
-        name = "home", get = Self::home, set = Self::set_home, type = Option<String>, mutable_playing,
-        blurb = "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it was met), or the name of one of its presets (unset: where the last target was)"
-    )]
-    #[property(
-        name = "home-timeout", get, set = Self::set_home_timeout, type = u32, member = home_timeout_ms, mutable_playing,
-        default = Settings::default().home_timeout_ms, maximum = 86_400_000,
-        blurb = "The camera goes home when there was no target for this long, in milliseconds"
-    )]
-    #[property(
-        name = "home-at-start", get, set = Self::set_home_at_start, type = bool, member = home_at_start, mutable_ready,
-        default = Settings::default().home_at_start,
-        blurb = "The camera goes home before the first target too, without waiting"
-    )]
-    #[property(
-        name = "override-timeout", get, set = Self::set_override_timeout, type = u32, member = override_timeout_ms, mutable_playing,
-        default = Settings::default().override_timeout_ms, maximum = 86_400_000,
-        blurb = "Whoever else moves the camera keeps it until it was not moved for this long, in milliseconds (0: nobody is given way)"
-    )]
-    #[property(
-        name = "lockstep", get, set, type = bool, member = lockstep, mutable_ready,
-        default = Settings::default().lockstep,
-        blurb = "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras"
-    )]
     pub(super) settings: Mutex<Settings>,
     pub(super) worker: Mutex<Option<Worker>>,
     /// Of the workers so far, that may still be about to stop their cameras.
@@ -220,25 +58,26 @@ impl ObjectSubclass for VapixPtzSink {
 
 impl ObjectImpl for VapixPtzSink {
     fn properties() -> &'static [glib::ParamSpec] {
-        // The macro has no notion of a structure.
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
                 .blurb("What it does and what it knows of the camera: state; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own ends camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
                 .read_only()
                 .build();
-            VapixPtzSink::derived_properties().iter().cloned().chain([stats]).collect()
+            Property::all().iter().map(|property| property.spec.clone()).chain([stats]).collect()
         });
         &PROPERTIES
     }
 
-    fn set_property(&self, id: usize, value: &glib::Value, pspec: &glib::ParamSpec) {
-        self.derived_set_property(id, value, pspec);
+    fn set_property(&self, id: usize, value: &glib::Value, _: &glib::ParamSpec) {
+        if let Some(property) = Property::numbered(id) {
+            self.change(property, value);
+        }
     }
 
-    fn property(&self, id: usize, pspec: &glib::ParamSpec) -> glib::Value {
-        match pspec.name() {
-            "stats" => self.stats().to_value(),
-            _ => self.derived_property(id, pspec),
+    fn property(&self, id: usize, _: &glib::ParamSpec) -> glib::Value {
+        match Property::numbered(id) {
+            Some(property) => property.get(&lock(&self.settings)),
+            None => self.stats().to_value(),
         }
     }
 
@@ -365,7 +204,7 @@ impl VapixPtzSink {
             let refused = settings.judge_limits();
             (settings.clone(), refused)
         };
-        self.limits_refused(&refused);
+        self.warn_of_refused(&refused);
         let Some(client) = settings.client(environment) else {
             gst::element_imp_error!(
                 self,

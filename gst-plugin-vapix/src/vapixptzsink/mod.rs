@@ -79,7 +79,7 @@
 //! ```
 //! One that goes back to its preset "Door" after 20 s without anybody, zooms, and never looks to the left of 60 degrees:
 //! ```sh
-//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 home=Door home-timeout=20000 auto-zoom=true target-height=0.5 pan-min=-60
+//! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 home=Door home-timeout=20000000000 auto-zoom=true target-height=0.5 pan-min=-60
 //! ```
 
 use glib::prelude::*;
@@ -88,12 +88,12 @@ use crate::servo;
 
 mod clock;
 mod desk;
-#[allow(missing_docs, reason = "the accessors that the property macro makes are documented by the blurbs")]
 mod imp;
 mod inbox;
 mod messages;
 mod news;
 mod picture;
+mod properties;
 mod setters;
 mod settings;
 mod statistics;
@@ -141,32 +141,27 @@ pub enum SpeedCurve {
     Cubic,
 }
 
-impl From<Mode> for servo::Mode {
-    fn from(mode: Mode) -> Self {
-        match mode {
-            Mode::Velocity => Self::Velocity,
-            Mode::Absolute => Self::Absolute,
-            Mode::Centre => Self::Centre,
+/// An enumeration of GObject's and the servo's of the same values.
+macro_rules! same_values {
+    ($($name:ident { $($value:ident),+ })+) => {$(
+        impl From<$name> for servo::$name {
+            fn from(value: $name) -> Self {
+                match value { $($name::$value => Self::$value),+ }
+            }
         }
-    }
+
+        impl From<servo::$name> for $name {
+            fn from(value: servo::$name) -> Self {
+                match value { $(servo::$name::$value => Self::$value),+ }
+            }
+        }
+    )+};
 }
 
-impl From<Prediction> for servo::Prediction {
-    fn from(prediction: Prediction) -> Self {
-        match prediction {
-            Prediction::Average => Self::Average,
-            Prediction::Lead => Self::Lead,
-        }
-    }
-}
-
-impl From<SpeedCurve> for servo::SpeedCurve {
-    fn from(curve: SpeedCurve) -> Self {
-        match curve {
-            SpeedCurve::Linear => Self::Linear,
-            SpeedCurve::Cubic => Self::Cubic,
-        }
-    }
+same_values! {
+    Mode { Velocity, Absolute, Centre }
+    Prediction { Average, Lead }
+    SpeedCurve { Linear, Cubic }
 }
 
 glib::wrapper! {

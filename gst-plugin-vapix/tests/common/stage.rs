@@ -13,7 +13,7 @@ use super::{Heard, Rig, moves, target};
 pub const FRAME: Duration = Duration::from_millis(40);
 
 /// Answers are waited for by the clock, in stepped time too: a busy machine is not to be taken for a fault.
-pub const PATIENT_MS: u32 = 60_000;
+pub const PATIENT_NS: u64 = 60_000_000_000;
 
 /// Width and height of the pictures.
 const SIZE: (u32, u32) = (320, 240);
@@ -81,7 +81,7 @@ impl Stage {
     }
 
     pub fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let rig = set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_MS)).play();
+        let rig = set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS)).play();
         let now = camera.status().time;
         Self { camera, rig, now, heard: Vec::new(), stepped: true }
     }

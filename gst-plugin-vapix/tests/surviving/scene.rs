@@ -71,7 +71,7 @@ impl Scene {
         let rig = Rig::ready(&name.url(camera.http_address().port()))
             .with("user", "root")
             .with("password", "pass")
-            .with("timeout", timeout.as_millis() as u32);
+            .with("timeout", timeout.as_nanos() as u64);
         Self::before(title, camera, rig, name)
     }
 

@@ -96,7 +96,7 @@ impl<'a> Stage<'a> {
         let camera = experiment.camera(settings, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
-        let sink = film::beside(&tracker.sink(&camera.url(), "lockstep=true timeout=60000"), film);
+        let sink = film::beside(&tracker.sink(&camera.url(), "lockstep=true timeout=60000000000"), film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;

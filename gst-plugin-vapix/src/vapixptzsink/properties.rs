@@ -1,0 +1,283 @@
+//! The table of properties: one entry gives specification, default, documentation, getter and setter.
+
+use std::ops::RangeInclusive;
+use std::sync::LazyLock;
+use std::time::Duration;
+
+use glib::prelude::*;
+use glib::{HasParamSpec, ParamSpec, Value};
+use gst::prelude::*;
+
+use super::settings::Settings;
+use super::{Mode, Prediction, SpeedCurve};
+use crate::vapix::{Location, Secret};
+
+/// When a value that was set counts, and who must hear of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Takes {
+    /// From the next READY to PAUSED on.
+    AtStart,
+    /// At once: the servo hears of it.
+    AtOnce,
+    /// At once, if no pair of limits is crossed.
+    AsLimit,
+    /// At once: the camera is spoken to as somebody else.
+    AsCredentials,
+}
+
+/// One property.
+pub struct Property {
+    /// What GObject is to know of it.
+    pub spec: ParamSpec,
+    /// When a new value counts.
+    pub takes: Takes,
+    get: Get,
+    set: Set,
+}
+
+type Get = Box<dyn Fn(&Settings) -> Value + Send + Sync>;
+type Set = Box<dyn Fn(&mut Settings, &Value) -> Result<(), String> + Send + Sync>;
+
+/// Where in the settings a value lies.
+type Field<T> = fn(&mut Settings) -> &mut T;
+
+impl Property {
+    /// All but `stats`, which cannot be set.
+    pub fn all() -> &'static [Self] {
+        static ALL: LazyLock<Vec<Property>> = LazyLock::new(table);
+        &ALL
+    }
+
+    /// The property with a GObject number, which counts from 1.
+    pub fn numbered(id: usize) -> Option<&'static Self> {
+        Self::all().get(id.checked_sub(1)?)
+    }
+
+    /// Its value.
+    pub fn get(&self, settings: &Settings) -> Value {
+        (self.get)(settings)
+    }
+
+    /// Sets it.
+    ///
+    /// # Errors
+    /// Why it stays as it was, in words.
+    pub fn set(&self, settings: &mut Settings, value: &Value) -> Result<(), String> {
+        let name = self.spec.name();
+        (self.set)(settings, value).map_err(|reason| format!("{reason}; `{name}` stays as it was"))
+    }
+}
+
+fn table() -> Vec<Property> {
+    use Takes::{AsCredentials, AsLimit, AtOnce, AtStart};
+    vec![
+        special(
+            text("location", AtStart, "Address of the camera, for example http://192.168.0.90; a user and a password in it are moved to the properties of that name"),
+            |s| s.location.as_ref().map(ToString::to_string).to_value(),
+            set_location,
+        ),
+        integer("camera", AtStart, "Video channel of the camera", 1..=64, |s| &mut s.camera),
+        special(
+            text("user", AsCredentials, "User, with the right to control PTZ; where user and password are unset, VAPIX_USER of the environment"),
+            |s| s.user.to_value(),
+            |s, value| { s.user = string(value); Ok(()) },
+        ),
+        special(
+            (glib::ParamSpecString::builder("password").blurb("Password (cannot be read); where user and password are unset, VAPIX_PASSWORD of the environment").write_only().mutable_playing().build(), AsCredentials),
+            |_| None::<String>.to_value(),
+            |s, value| { s.password = string(value).map(Secret::new); Ok(()) },
+        ),
+        duration("timeout", AtStart, "Longest wait for one of the camera's answers, in nanoseconds, from 0.1 s to 60 s", millis(100)..=millis(60_000), |s| &mut s.timeout),
+        switch("insecure", AtStart, "With https believe any certificate: who sits on the wire can then take the camera", |s| &mut s.insecure),
+        special(
+            text("ca-file", AtStart, "With https believe only certificates signed by an authority in this PEM file (unset: those the system trusts)"),
+            |s| s.ca_file.to_value(),
+            |s, value| { s.ca_file = string(value); Ok(()) },
+        ),
+        choice::<Mode, _>("mode", AtOnce, "How the camera is moved", |s| &mut s.servo.mode),
+        number("gain", AtOnce, "Degrees per second for each degree off the middle, in 1/s", 0.0..=20.0, |s| &mut s.servo.gain),
+        number("dead-zone", AtOnce, "Offset from the middle at which a camera at rest stays at rest, as a part of the picture's width", 0.0..=0.5, |s| &mut s.servo.dead_zone),
+        number("max-speed", AtOnce, "Pan and tilt never turn faster than this, in degrees per second", 0.1..=1000.0, |s| &mut s.servo.max_speed_deg_s),
+        number("max-acceleration", AtOnce, "By how much the speed of pan and tilt changes in a second at most, in degrees per second; a stop is at once", 1.0..=10_000.0, |s| &mut s.servo.max_acceleration_deg_s2),
+        number("max-rate", AtOnce, "Commands per second at most; stops are sent at once", 0.1..=50.0, |s| &mut s.servo.max_rate_hz),
+        duration("latency", AtOnce, "Delay of the camera: from the sending of a command until a picture that shows it arrives, in nanoseconds, up to 5 s", Duration::ZERO..=millis(5000), |s| &mut s.servo.latency),
+        optional_number("field-of-view", AtOnce, "Horizontal field of view zoomed out, in degrees (0: as the camera says)", 0.0..=179.0, |s| &mut s.servo.fov_deg),
+        choice::<Prediction, _>("prediction", AtOnce, "How the target's motion is carried forward", |s| &mut s.servo.prediction),
+        duration("stale-timeout", AtOnce, "The camera is stopped when the target was not seen for this long, in nanoseconds, from 50 ms to 60 s", millis(50)..=millis(60_000), |s| &mut s.servo.stale_timeout),
+        number("camera-speed", AtOnce, "What a camera that does not tell does at speed step 100, in degrees per second", 1.0..=1000.0, |s| &mut s.servo.camera_speed_deg_s),
+        choice::<SpeedCurve, _>("speed-curve", AtOnce, "How the speed of a camera that does not tell grows with the speed step", |s| &mut s.servo.speed_curve),
+        switch("learn", AtOnce, "Learn latency, field of view and speed map while following; what is set or told is where that begins", |s| &mut s.servo.learn),
+        switch("auto-zoom", AtOnce, "Zoom so that the target stays as tall as `target-height`, and out where it is not seen well", |s| &mut s.auto_zoom),
+        number("target-height", AtOnce, "Height that `auto-zoom` gives the target, as a part of the picture's", 0.05..=0.9, |s| &mut s.target_height),
+        number("pan-min", AsLimit, "The camera is turned no farther left than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.min),
+        number("pan-max", AsLimit, "The camera is turned no farther right than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.max),
+        number("tilt-min", AsLimit, "The camera is tilted no farther down than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.min),
+        number("tilt-max", AsLimit, "The camera is tilted no farther up than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.max),
+        zoom_steps("zoom-min", AsLimit, "`auto-zoom` zooms out no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.min),
+        zoom_steps("zoom-max", AsLimit, "`auto-zoom` zooms in no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.max),
+        special(
+            text("home", AtOnce, "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it was met), or the name of one of its presets (unset: where the last target was)"),
+            |s| s.servo.home.as_ref().map(ToString::to_string).to_value(),
+            |s, value| { s.servo.home = string(value).filter(|text| !text.is_empty()).map(|text| text.parse()).transpose()?; Ok(()) },
+        ),
+        duration("home-timeout", AtOnce, "The camera goes home when there was no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
+        switch("home-at-start", AtStart, "The camera goes home before the first target too, without waiting", |s| &mut s.servo.home_at_start),
+        duration("override-timeout", AtOnce, "Whoever else moves the camera keeps it until it was not moved for this long, in nanoseconds, up to a day (0: nobody is given way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.override_timeout),
+        switch("lockstep", AtStart, "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras", |s| &mut s.lockstep),
+    ]
+}
+
+/// A user and a password in an address go where they belong.
+fn set_location(settings: &mut Settings, value: &Value) -> Result<(), String> {
+    let text = string(value).filter(|text| !text.is_empty());
+    let parsed = text.map(|text| Location::parse(&text)).transpose().map_err(|err| err.to_string())?;
+    let Some((location, info)) = parsed else {
+        settings.location = None;
+        return Ok(());
+    };
+    settings.location = Some(location);
+    settings.user = info.user.or(settings.user.take());
+    settings.password = info.password.or(settings.password.take());
+    Ok(())
+}
+
+fn integer(name: &str, takes: Takes, blurb: &str, range: RangeInclusive<u32>, field: Field<u32>) -> Property {
+    let builder = glib::ParamSpecUInt::builder(name).minimum(*range.start()).maximum(*range.end());
+    let spec = mutable(builder.default_value(default_of(field)).blurb(blurb), takes).build();
+    plain(spec, takes, field)
+}
+
+fn number(name: &str, takes: Takes, blurb: &str, range: RangeInclusive<f64>, field: Field<f64>) -> Property {
+    let builder = glib::ParamSpecDouble::builder(name).minimum(*range.start()).maximum(*range.end());
+    let spec = mutable(builder.default_value(default_of(field)).blurb(blurb), takes).build();
+    plain(spec, takes, field)
+}
+
+/// A number for which 0 says that nothing is set.
+fn optional_number(
+    name: &str,
+    takes: Takes,
+    blurb: &str,
+    range: RangeInclusive<f64>,
+    field: Field<Option<f64>>,
+) -> Property {
+    let builder = glib::ParamSpecDouble::builder(name).minimum(*range.start()).maximum(*range.end());
+    let spec = mutable(builder.default_value(default_of(field).unwrap_or(0.0)).blurb(blurb), takes).build();
+    converted(
+        (spec, takes),
+        field,
+        |value| value.unwrap_or(0.0),
+        |value| Ok(Some(value).filter(|value| *value > 0.0)),
+    )
+}
+
+/// Steps of the optical zoom, whole ones.
+fn zoom_steps(name: &str, takes: Takes, blurb: &str, field: Field<f64>) -> Property {
+    let builder = glib::ParamSpecUInt::builder(name).minimum(1).maximum(9999);
+    // Within 1 to 9999, whole.
+    let spec = mutable(builder.default_value(default_of(field) as u32).blurb(blurb), takes).build();
+    converted((spec, takes), field, |steps| steps as u32, |steps: u32| Ok(f64::from(steps)))
+}
+
+fn switch(name: &str, takes: Takes, blurb: &str, field: Field<bool>) -> Property {
+    let builder = glib::ParamSpecBoolean::builder(name).default_value(default_of(field)).blurb(blurb);
+    plain(mutable(builder, takes).build(), takes, field)
+}
+
+/// One of the values that an enumeration of GObject's shares with one of the servo's.
+fn choice<G, T>(name: &str, takes: Takes, blurb: &str, field: Field<T>) -> Property
+where
+    G: HasParamSpec<ParamSpec = glib::ParamSpecEnum> + ToValue + From<T> + Into<T> + 'static,
+    G: StaticType + glib::translate::FromGlib<i32> + glib::translate::IntoGlib<GlibType = i32>,
+    G: for<'v> glib::value::FromValue<'v>,
+    T: Copy + 'static,
+{
+    let builder = glib::ParamSpecEnum::builder_with_default(name, G::from(default_of(field)));
+    let spec = mutable(builder.blurb(blurb), takes).build();
+    converted((spec, takes), field, G::from, |value: G| Ok(value.into()))
+}
+
+/// Nanoseconds. GObject would bring a value below the least one there in silence, so that is refused here.
+fn duration(
+    name: &'static str,
+    takes: Takes,
+    blurb: &str,
+    range: RangeInclusive<Duration>,
+    field: Field<Duration>,
+) -> Property {
+    let builder = glib::ParamSpecUInt64::builder(name).maximum(nanoseconds(*range.end()));
+    let spec = mutable(builder.default_value(nanoseconds(default_of(field))).blurb(blurb), takes).build();
+    converted((spec, takes), field, nanoseconds, move |value: u64| {
+        let (least, most) = (range.start(), range.end());
+        match value {
+            1..1_000_000 => Err(format!(
+                "`{name}`={value} is {value} ns: durations are in nanoseconds, and {value} ms would be {value}000000"
+            )),
+            _ if range.contains(&Duration::from_nanos(value)) => Ok(Duration::from_nanos(value)),
+            _ => Err(format!("`{name}`={value} ns is not within {least:?} and {most:?}")),
+        }
+    })
+}
+
+fn text(name: &str, takes: Takes, blurb: &str) -> (ParamSpec, Takes) {
+    (mutable(glib::ParamSpecString::builder(name).blurb(blurb), takes).build(), takes)
+}
+
+/// With a getter and a setter of its own.
+fn special(
+    (spec, takes): (ParamSpec, Takes),
+    get: impl Fn(&Settings) -> Value + Send + Sync + 'static,
+    set: impl Fn(&mut Settings, &Value) -> Result<(), String> + Send + Sync + 'static,
+) -> Property {
+    Property { spec, takes, get: Box::new(get), set: Box::new(set) }
+}
+
+/// As it lies in the settings.
+fn plain<T>(spec: ParamSpec, takes: Takes, field: Field<T>) -> Property
+where
+    T: Copy + ToValue + for<'v> glib::value::FromValue<'v> + 'static,
+{
+    converted((spec, takes), field, |value| value, Ok)
+}
+
+/// Otherwise than it lies in the settings.
+fn converted<T, V>(
+    spec: (ParamSpec, Takes),
+    field: Field<T>,
+    from: impl Fn(T) -> V + Send + Sync + 'static,
+    to: impl Fn(V) -> Result<T, String> + Send + Sync + 'static,
+) -> Property
+where
+    T: Copy + 'static,
+    V: ToValue + for<'v> glib::value::FromValue<'v> + 'static,
+{
+    special(
+        spec,
+        move |settings| from(*field(&mut settings.clone())).to_value(),
+        move |settings, value| {
+            let value = value.get::<V>().map_err(|err| err.to_string())?;
+            *field(settings) = to(value)?;
+            Ok(())
+        },
+    )
+}
+
+fn mutable<'a, B: ParamSpecBuilderExt<'a>>(builder: B, takes: Takes) -> B {
+    if takes == Takes::AtStart { builder.mutable_ready() } else { builder.mutable_playing() }
+}
+
+fn default_of<T: Copy>(field: Field<T>) -> T {
+    *field(&mut Settings::default())
+}
+
+fn string(value: &Value) -> Option<String> {
+    value.get().ok().flatten()
+}
+
+fn millis(millis: u64) -> Duration {
+    Duration::from_millis(millis)
+}
+
+fn nanoseconds(duration: Duration) -> u64 {
+    u64::try_from(duration.as_nanos()).unwrap_or(u64::MAX)
+}
