@@ -2,6 +2,7 @@
 
 use gst::prelude::*;
 
+use crate::named::Named;
 use crate::{ContractError, Point, Rect, Vector};
 
 /// Reads fields of one structure.
@@ -139,33 +140,3 @@ pub(crate) fn vector(vector: Vector) -> gst::Array {
 pub(crate) fn rect(rect: Rect) -> gst::Array {
     flat([[rect.x, rect.y, rect.width, rect.height]])
 }
-
-/// An enumeration whose values travel as words.
-pub(crate) trait Named: Sized + Copy + 'static {
-    const NAMES: &'static [(Self, &'static str)];
-
-    fn from_name(name: &str) -> Option<Self> {
-        Self::NAMES.iter().find(|(_, known)| *known == name).map(|(value, _)| *value)
-    }
-}
-
-/// Declares an enumeration together with the words its values travel as.
-macro_rules! named_enum {
-    ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $word:literal),+ $(,)? }) => {
-        $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum $name { $($(#[$variant_meta])* $variant),+ }
-
-        impl $name {
-            /// The word it travels as.
-            pub fn name(self) -> &'static str {
-                match self { $(Self::$variant => $word),+ }
-            }
-        }
-
-        impl crate::codec::Named for $name {
-            const NAMES: &'static [(Self, &'static str)] = &[$((Self::$variant, $word)),+];
-        }
-    };
-}
-pub(crate) use named_enum;

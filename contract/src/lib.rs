@@ -2,7 +2,8 @@
 //!
 //! Every kind is a typed struct with its [`gst::Structure`] form, so that an application in any
 //! language reads the same fields that the elements exchange. Coordinates are normalised to the
-//! frame (0 is left or top, 1 right or bottom), so that scaling between elements does no harm.
+//! frame (0 is left or top, 1 right or bottom), so that scaling between elements does no harm. Without the feature
+//! `gst` there are only the plain records, for who computes with them and knows no GStreamer.
 //!
 //! | kind | struct | `GstStructure` name |
 //! |---|---|---|
@@ -15,26 +16,44 @@
 //! | element message | [`TargetMessage`] | `ptztrack-target` |
 //! | element message | [`CameraMessage`] | `ptztrack-camera` |
 
+#[cfg(feature = "gst")]
 mod codec;
+#[cfg(feature = "gst")]
 mod error;
+#[cfg(feature = "gst")]
 mod events;
 mod geometry;
 mod homography;
+#[cfg(feature = "gst")]
 mod messages;
+#[cfg(feature = "gst")]
 mod meta;
+#[cfg(feature = "gst")]
 mod motion;
+mod named;
+#[cfg(feature = "gst")]
 mod scene;
 mod target;
+#[cfg(feature = "gst")]
+mod target_meta;
 
-pub use error::ContractError;
-pub use events::{CameraEvent, TrackerEvent};
 pub use geometry::{Point, Rect, Vector};
 pub use homography::Homography;
-pub use messages::{
-    CameraChange, CameraMessage, MotionChange, MotionMessage, ReleaseReason, TargetChange, TargetMessage,
-    Times,
-};
-pub use meta::BufferMeta;
-pub use motion::{MOTION_ROI, MotionMeta, Region, RegionTrack};
-pub use scene::{CameraMotion, Plane, SceneMeta};
-pub use target::{Feature, TARGET_ROI, TargetMeta, TargetState};
+pub use target::{TARGET_ROI, TargetState};
+
+/// What travels, beside the plain records: each with its `GstStructure` form.
+#[cfg(feature = "gst")]
+mod forms {
+    pub use crate::error::ContractError;
+    pub use crate::events::{CameraEvent, TrackerEvent};
+    pub use crate::messages::{
+        CameraChange, CameraMessage, MotionChange, MotionMessage, ReleaseReason, TargetChange, TargetMessage,
+        Times,
+    };
+    pub use crate::meta::BufferMeta;
+    pub use crate::motion::{MOTION_ROI, MotionMeta, Region, RegionTrack};
+    pub use crate::scene::{CameraMotion, Plane, SceneMeta};
+    pub use crate::target_meta::{Feature, TargetMeta};
+}
+#[cfg(feature = "gst")]
+pub use forms::*;

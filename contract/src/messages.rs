@@ -1,6 +1,7 @@
 //! Element messages on the bus. Loss is never silent.
 
-use crate::codec::{self, Reader, named_enum};
+use crate::codec::{self, Reader};
+use crate::named::named_enum;
 use crate::{ContractError, Point, Rect, TargetState, Vector};
 
 /// The three times that GStreamer's own analysers put on a message; `None` where the stream has none.

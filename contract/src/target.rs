@@ -1,5 +1,4 @@
-use crate::codec::{self, Reader, named_enum};
-use crate::{BufferMeta, ContractError, Point, Rect, Vector};
+use crate::named::named_enum;
 
 /// `roi-type` of the standard region-of-interest meta that marks the target.
 pub const TARGET_ROI: &str = "target";
@@ -15,96 +14,5 @@ named_enum! {
         Occluded = "occluded",
         /// The target was given up in this frame; searching follows.
         Lost = "lost",
-    }
-}
-
-/// A feature point of the frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Feature {
-    /// Where it is in this frame.
-    pub position: Point,
-    /// Whether it is followed on the target (thesis figure 3.7, green) or was rejected (red).
-    pub kept: bool,
-}
-
-/// What the tracker knows of its target in one frame.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TargetMeta {
-    /// What the tracker is doing. In [`TargetState::Searching`] the geometry below says nothing.
-    pub state: TargetState,
-    /// Number of the target, counted from 1 by each tracker; 0 where there is none.
-    pub id: u64,
-    /// Bounding box; predicted while occluded.
-    pub bounds: Rect,
-    /// Centre of mass (thesis 3.15); predicted while occluded.
-    pub centroid: Point,
-    /// Motion of the target in the picture, frames per second of time: camera motion included.
-    pub velocity: Vector,
-    /// Motion of the background in the picture, same unit; `None` where it could not be seen.
-    pub ego_velocity: Option<Vector>,
-    /// 0 (a guess) to 1 (certain).
-    pub confidence: f64,
-    /// The feature points.
-    pub features: Vec<Feature>,
-    /// Running time at which the picture was captured, as far as its timestamp tells.
-    pub capture_time: Option<gst::ClockTime>,
-}
-
-impl Default for TargetMeta {
-    fn default() -> Self {
-        Self {
-            state: TargetState::Searching,
-            id: 0,
-            bounds: Rect::default(),
-            centroid: Point::default(),
-            velocity: Vector::default(),
-            ego_velocity: None,
-            confidence: 0.0,
-            features: Vec::new(),
-            capture_time: None,
-        }
-    }
-}
-
-impl BufferMeta for TargetMeta {
-    const NAME: &'static str = "PtzTargetMeta";
-
-    fn write(&self, structure: &mut gst::StructureRef) {
-        structure.set("state", self.state.name());
-        structure.set("id", self.id);
-        structure.set("box", codec::rect(self.bounds));
-        structure.set("centroid", codec::point(self.centroid));
-        structure.set("velocity", codec::vector(self.velocity));
-        if let Some(ego) = self.ego_velocity {
-            structure.set("ego-velocity", codec::vector(ego));
-        }
-        structure.set("confidence", self.confidence);
-        let features = self.features.iter().map(|feature| {
-            let kept = if feature.kept { 1.0 } else { 0.0 };
-            [feature.position.x, feature.position.y, kept]
-        });
-        structure.set("features", codec::flat(features));
-        if let Some(time) = self.capture_time {
-            structure.set("capture-time", time);
-        }
-    }
-
-    fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
-        let reader = Reader::new(structure, Self::NAME)?;
-        let features = reader
-            .tuples::<3>("features")?
-            .into_iter()
-            .map(|[x, y, kept]| Feature { position: Point { x, y }, kept: kept > 0.5 });
-        Ok(Self {
-            state: reader.named("state")?,
-            id: reader.get("id")?,
-            bounds: reader.rect("box")?,
-            centroid: reader.point("centroid")?,
-            velocity: reader.vector("velocity")?,
-            ego_velocity: reader.vector_optional("ego-velocity")?,
-            confidence: reader.number("confidence")?,
-            features: features.collect(),
-            capture_time: reader.get_optional("capture-time")?,
-        })
     }
 }

@@ -1,10 +1,11 @@
 //! What is fuzzed: each parser of something a camera says. `cargo +nightly fuzz run TARGET` feeds one of
-//! them; a test of gst-plugin-vapix runs all of them over the seeds in `corpus`.
+//! them; a test of the crate vapix runs all of them over the seeds in `corpus`.
 #![allow(missing_docs)]
 
-use gstvapix::vapix::{
-    Attributes, Credentials, Limits, Parameters, Position, Presets, QueuePlace, Secret, answer_to_challenge,
-    answer_to_cookie, parse_move_speed,
+use servo::TableRow;
+use vapix::wire::{
+    Attributes, Credentials, Parameters, QueuePlace, Secret, answer_to_challenge, answer_to_cookie,
+    parse_limits, parse_move_speed, parse_position, parse_presets,
 };
 
 /// A target: takes anything, says whether it was understood, and never panics.
@@ -33,14 +34,14 @@ pub fn challenge(bytes: &[u8]) -> bool {
 }
 
 pub fn position(bytes: &[u8]) -> bool {
-    let Ok(position) = Position::parse(&text(bytes)) else { return false };
+    let Ok(position) = parse_position(&text(bytes)) else { return false };
     let told = [position.pan_deg, position.tilt_deg, position.zoom_steps];
     assert!(told.into_iter().flatten().all(f64::is_finite), "{position:?}");
     true
 }
 
 pub fn limits(bytes: &[u8]) -> bool {
-    let Ok(limits) = Limits::parse(&text(bytes)) else { return false };
+    let Ok(limits) = parse_limits(&text(bytes)) else { return false };
     let told = [limits.pan_deg, limits.tilt_deg, limits.zoom_steps, limits.field_angle_deg];
     assert!(told.into_iter().flatten().all(|range| range.min < range.max), "{limits:?}");
     true
@@ -55,7 +56,7 @@ pub fn attributes(bytes: &[u8]) -> bool {
     true
 }
 
-fn grow(a: &gstvapix::vapix::StepMeaning, b: &gstvapix::vapix::StepMeaning) -> bool {
+fn grow(a: &TableRow, b: &TableRow) -> bool {
     a.step < b.step && a.value <= b.value
 }
 
@@ -74,7 +75,7 @@ pub fn queue(bytes: &[u8]) -> bool {
 }
 
 pub fn presets(bytes: &[u8]) -> bool {
-    let Ok(presets) = Presets::parse(&text(bytes)) else { return false };
+    let Ok(presets) = parse_presets(&text(bytes)) else { return false };
     assert!(presets.0.iter().all(|(_, name)| presets.number(name).is_some()), "{presets:?}");
     true
 }

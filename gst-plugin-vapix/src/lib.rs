@@ -1,12 +1,10 @@
 //! GStreamer sink that steers an Axis pan-tilt-zoom camera after the tracked target.
 //!
-//! * [`vapixptzsink`]: the element (thesis 3.6),
-//! * [`servo`]: prediction and control, plain types,
-//! * [`vapix`]: the camera's HTTP client.
+//! [`vapixptzsink`] is the element (thesis 3.6). What it computes is in the crate [`servo`], how it speaks with the camera
+//! in [`vapix`]; the control loop joins both.
 
+mod control_loop;
 mod lock;
-pub mod servo;
-pub mod vapix;
 pub mod vapixptzsink;
 
 /// What GStreamer asks of a plugin; private, as nobody calls it from Rust.

@@ -9,8 +9,8 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::Duration;
 
 use certificates::{certificate, server_config};
-use gstvapix::vapix::{Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust};
 use rustls::{ServerConnection, StreamOwned};
+use vapix::wire::{Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust};
 
 /// Answers every request on a connection with the same bytes; the request lines and credentials go to `seen`.
 fn serve(stream: impl Read + Write, answer: &str, seen: &std::sync::mpsc::Sender<String>) {

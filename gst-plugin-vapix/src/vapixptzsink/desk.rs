@@ -8,13 +8,14 @@ use std::time::Duration;
 use super::inbox::{Inbox, Mail};
 use super::statistics::Statistics;
 use super::worker::{Event, FINISH_BUDGET, LAST_WILL, STOP_GRACE};
+use crate::control_loop::{ControlLoop, Status};
 use crate::lock::lock;
-use crate::servo::{Answer, Job, Pilot, Status};
-use crate::vapix::{Credentials, Error};
+use vapix::session::{Request, Response};
+use vapix::wire::{Credentials, Error};
 
 /// Everything but the client, which is lent out while a request is in flight.
 pub struct Desk<O> {
-    pub pilot: Pilot,
+    pub control: ControlLoop,
     pub inbox: Arc<Inbox>,
     pub statistics: Arc<Mutex<Statistics>>,
     observer: O,
@@ -30,9 +31,14 @@ pub struct Desk<O> {
 
 impl<O: Fn(Event)> Desk<O> {
     /// Nothing has come in yet.
-    pub fn new(pilot: Pilot, inbox: Arc<Inbox>, statistics: Arc<Mutex<Statistics>>, observer: O) -> Self {
+    pub fn new(
+        control: ControlLoop,
+        inbox: Arc<Inbox>,
+        statistics: Arc<Mutex<Statistics>>,
+        observer: O,
+    ) -> Self {
         Self {
-            pilot,
+            control,
             inbox,
             statistics,
             observer,
@@ -48,8 +54,8 @@ impl<O: Fn(Event)> Desk<O> {
     /// Whether the end has come: at rest for good, out of time, or with no right to speak.
     pub fn is_over(&self) -> bool {
         self.deadline.is_some_and(|deadline| {
-            let done = self.pilot.stays_at_rest() && !self.pilot.is_queued();
-            done || self.pilot.halted() || deadline <= self.inbox.now()
+            let done = self.control.session().stays_at_rest() && !self.control.session().is_queued();
+            done || self.control.session().halted() || deadline <= self.inbox.now()
         })
     }
 
@@ -63,45 +69,45 @@ impl<O: Fn(Event)> Desk<O> {
     }
 
     pub fn give_up(&mut self) {
-        if !mem::replace(&mut self.gave_up, true) && !self.pilot.is_at_rest() {
-            (self.observer)(Event::GaveUp { halted: self.pilot.halted() });
+        if !mem::replace(&mut self.gave_up, true) && !self.control.session().is_at_rest() {
+            (self.observer)(Event::GaveUp { halted: self.control.session().halted() });
         }
         self.waiting.clear();
     }
 
     pub fn take_mail(&mut self) {
-        let Mail { credentials, servo, orphan, rest, sight, waiting, settling, finish, quit } =
+        let Mail { credentials, servo, orphan, rest, measurement, waiting, settling, finish, quit } =
             self.inbox.take();
         let now = self.inbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(servo) = servo {
-            self.pilot.configure(servo);
+            self.control.configure(servo);
         }
         if let Some(stop) = orphan {
-            self.pilot.inherit(stop, now);
+            self.control.session_mut().inherit(stop, now);
         }
         if rest {
-            self.pilot.rest();
+            self.control.release();
         }
         if finish {
             self.deadline.get_or_insert(now + FINISH_BUDGET);
-            self.pilot.leave();
+            self.control.session_mut().leave();
         }
         if quit {
             (self.deadline, self.gave_up) = (Some(now), true);
         }
-        if let Some(sight) = sight.filter(|_| self.deadline.is_none()) {
-            self.pilot.see(sight, now);
+        if let Some(measurement) = measurement.filter(|_| self.deadline.is_none()) {
+            self.control.measure(measurement, now);
         }
         self.waiting.extend(waiting);
         self.settling.extend(settling);
     }
 
     /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
-    pub fn is_in_vain(&mut self, job: &Job, now: Duration) -> bool {
-        match job {
-            Job::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
-            Job::Query(_) => {
+    pub fn is_in_vain(&mut self, request: &Request, now: Duration) -> bool {
+        match request {
+            Request::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
+            Request::Query(_) => {
                 self.tell_rest();
                 self.is_over()
             }
@@ -110,61 +116,62 @@ impl<O: Fn(Event)> Desk<O> {
 
     /// When to abandon what is in flight for a stop that waits behind it, after what was said of that before: a stop
     /// that is not due any more hurries nobody.
-    pub fn give_up_at(&self, job: &Job, before: Option<Duration>, now: Duration) -> Option<Duration> {
-        self.stop_waits_behind(job, now).then(|| before.unwrap_or(now + STOP_GRACE))
+    pub fn give_up_at(&self, request: &Request, before: Option<Duration>, now: Duration) -> Option<Duration> {
+        self.stop_waits_behind(request, now).then(|| before.unwrap_or(now + STOP_GRACE))
     }
 
     /// Whether something else than a stop is in flight while a stop is what the camera needs.
-    fn stop_waits_behind(&self, job: &Job, now: Duration) -> bool {
-        let may_move = match job {
-            Job::Command(command) => !command.is_stop(),
-            Job::Query(_) => !self.pilot.is_at_rest(),
+    fn stop_waits_behind(&self, request: &Request, now: Duration) -> bool {
+        let may_move = match request {
+            Request::Command(command) => !command.is_stop(),
+            Request::Query(_) => !self.control.session().is_at_rest(),
         };
-        may_move && !self.pilot.has_errand(now)
+        may_move && !self.control.has_errand(now)
     }
 
-    pub fn answered(&mut self, job: &Job, answer: Result<Answer, Error>, sent: Duration) {
+    pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Duration) {
         let now = self.inbox.now();
-        self.count(job, answer.as_ref().err().cloned(), now.saturating_sub(sent));
-        self.pilot.answered(job, answer, sent, now);
+        self.count(request, answer.as_ref().err().cloned(), now.saturating_sub(sent));
+        self.control.on_response(request, answer, sent, now);
     }
 
-    pub fn abandoned(&mut self, job: &Job, sent: Duration) {
+    pub fn abandoned(&mut self, request: &Request, sent: Duration) {
         let now = self.inbox.now();
         let waited = now.saturating_sub(sent);
-        self.count(job, Some(Error::Timeout(waited)), waited);
-        self.pilot.abandoned(job, now);
+        self.count(request, Some(Error::Timeout(waited)), waited);
+        self.control.abandoned(request, now);
     }
 
-    fn count(&self, job: &Job, failure: Option<Error>, round_trip: Duration) {
+    fn count(&self, request: &Request, failure: Option<Error>, round_trip: Duration) {
         {
             let mut statistics = lock(&self.statistics);
             if let Some(err) = &failure {
                 statistics.last_error = Some(err.to_string());
             }
-            match (job, &failure) {
-                (Job::Query(_), _) => {}
-                (Job::Command(_), Some(_)) => statistics.failed += 1,
-                (Job::Command(_), None) => statistics.succeeded(round_trip),
+            match (request, &failure) {
+                (Request::Query(_), _) => {}
+                (Request::Command(_), Some(_)) => statistics.failed += 1,
+                (Request::Command(_), None) => statistics.succeeded(round_trip),
             }
         }
-        (self.observer)(Event::Exchanged { job: *job, failure, round_trip });
+        (self.observer)(Event::Exchanged { request: *request, failure, round_trip });
     }
 
     /// Tells what has changed: reports and status; and those who wait for rest.
     pub fn publish(&mut self) {
-        let status = self.pilot.status(self.inbox.now());
-        let (belief, stop) = (Some(self.pilot.belief()), Some(self.pilot.stop()));
-        let (may_yet_move, halted) = (!self.pilot.stays_at_rest(), self.pilot.halted());
-        let coalesced = self.pilot.overtaken() + self.inbox.overtaken();
+        let status = self.control.status(self.inbox.now());
+        let (estimates, stop) = (Some(self.control.estimates()), Some(self.control.stop()));
+        let (may_yet_move, halted) =
+            (!self.control.session().stays_at_rest(), self.control.session().halted());
+        let coalesced = self.control.overtaken() + self.inbox.overtaken();
         {
             let mut statistics = lock(&self.statistics);
-            (statistics.status, statistics.belief, statistics.stop) = (status, belief, stop);
+            (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
             (statistics.may_yet_move, statistics.halted) = (may_yet_move, halted);
             statistics.coalesced = coalesced;
         }
-        for report in self.pilot.take_reports() {
-            (self.observer)(Event::Report(report));
+        for event in self.control.take_events() {
+            (self.observer)(Event::Loop(event));
         }
         if status != self.last_status {
             self.last_status = status;
@@ -181,7 +188,7 @@ impl<O: Fn(Event)> Desk<O> {
     }
 
     fn tell_rest(&mut self) {
-        if self.pilot.is_at_rest() {
+        if self.control.session().is_at_rest() {
             // Who waits no longer is not there to be told.
             for waiting in self.waiting.drain(..) {
                 let _ = waiting.try_send(());
@@ -193,18 +200,19 @@ impl<O: Fn(Event)> Desk<O> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::{Next, Query, ServoSettings, Sight, Visibility, sight};
-    use crate::vapix::{Command, Position};
     use crate::vapixptzsink::clock::Clock;
+    use servo::{Measurement, Position, ServoSettings, Visibility};
     use std::sync::mpsc::Receiver;
+    use vapix::session::{Next, Query};
+    use vapix::wire::Command;
 
-    const MOVE: Job = Job::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
+    const MOVE: Request = Request::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
     }
 
-    fn timeout() -> Result<Answer, Error> {
+    fn timeout() -> Result<Response, Error> {
         Err(Error::Timeout(ms(1)))
     }
 
@@ -216,13 +224,13 @@ mod tests {
         let (events, told) = std::sync::mpsc::channel();
         let inbox = Arc::new(Inbox::new(Clock::held()));
         inbox.hold_at(ms(1000));
-        let pilot = Pilot::new(ServoSettings::default());
-        (Desk::new(pilot, inbox, Arc::default(), move |event| drop(events.send(event))), told)
+        let control = ControlLoop::new(ServoSettings::default());
+        (Desk::new(control, inbox, Arc::default(), move |event| drop(events.send(event))), told)
     }
 
     impl<O: Fn(Event)> Desk<O> {
         fn see(&mut self, visibility: Visibility) {
-            self.inbox.see(Sight { visibility, ..sight(0.9, 0.5, self.inbox.now()) });
+            self.inbox.see(Measurement { visibility, ..Measurement::at(0.9, 0.5, self.inbox.now()) });
             self.take_mail();
         }
 
@@ -230,24 +238,24 @@ mod tests {
         fn serve_at(
             &mut self,
             at: Duration,
-            answer: impl Fn(&Command) -> Result<Answer, Error>,
+            answer: impl Fn(&Command) -> Result<Response, Error>,
         ) -> Vec<Command> {
             self.inbox.hold_at(at);
             self.take_mail();
             self.check_deadline();
             let mut sent = Vec::new();
             let now = self.inbox.now();
-            while let Next::Do(job) = self.pilot.next(now) {
-                let answer = match &job {
-                    Job::Command(command) => {
+            while let Next::Do(request) = self.control.next_request(now) {
+                let answer = match &request {
+                    Request::Command(command) => {
                         sent.push(*command);
                         answer(command)
                     }
-                    Job::Query(Query::Position) => Ok(Answer::Position(Position::default())),
-                    Job::Query(_) => Err(Error::Camera("none".to_owned())),
+                    Request::Query(Query::Position) => Ok(Response::Position(Position::default())),
+                    Request::Query(_) => Err(Error::Camera("none".to_owned())),
                 };
-                self.pilot.sending(&job, now);
-                self.answered(&job, answer, now);
+                self.control.sending(&request, now);
+                self.answered(&request, answer, now);
             }
             self.publish();
             sent
@@ -258,8 +266,8 @@ mod tests {
             self.see(Visibility::Seen);
             self.serve_at(ms(1000), |_| timeout());
             let rest = self.inbox.finish();
-            assert_eq!(self.serve_at(ms(2000), |_| Ok(Answer::Accepted)), [Command::Halt]);
-            assert!(self.pilot.is_at_rest());
+            assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [Command::Halt]);
+            assert!(self.control.session().is_at_rest());
             rest
         }
     }
@@ -274,9 +282,9 @@ mod tests {
         let rest = desk.end_in_doubt();
         assert_eq!(rest.try_recv(), Ok(()));
         assert!(!desk.is_over() && lock(&desk.statistics).may_yet_move);
-        assert_eq!(desk.serve_at(ms(5000), |_| Ok(Answer::Accepted)), []);
+        assert_eq!(desk.serve_at(ms(5000), |_| Ok(Response::Accepted)), []);
         assert!(!desk.is_over());
-        assert_eq!(desk.serve_at(ms(9000), |_| Ok(Answer::Accepted)), [Command::Halt]);
+        assert_eq!(desk.serve_at(ms(9000), |_| Ok(Response::Accepted)), [Command::Halt]);
         assert!(desk.is_over() && !lock(&desk.statistics).may_yet_move);
         assert!(!gave_up(&told));
     }
@@ -306,6 +314,6 @@ mod tests {
         assert_eq!(desk.give_up_at(&MOVE, at, ms(1400)), at);
         desk.see(Visibility::Seen);
         assert_eq!(desk.give_up_at(&MOVE, at, ms(1450)), None);
-        assert_eq!(desk.give_up_at(&Job::Command(Command::Halt), None, ms(1450)), None);
+        assert_eq!(desk.give_up_at(&Request::Command(Command::Halt), None, ms(1450)), None);
     }
 }

@@ -6,6 +6,7 @@ use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
+use servo::Measurement;
 
 use super::clock::Clock;
 use super::news::camera_event;
@@ -14,8 +15,8 @@ use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
 use super::worker::{self, Legacy, Worker};
+use crate::control_loop::Status;
 use crate::lock::lock;
-use crate::servo::{Sight, Status};
 
 pub(super) static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("vapixptzsink", gst::DebugColorFlags::empty(), Some("VAPIX PTZ servo"))
@@ -248,7 +249,7 @@ impl VapixPtzSink {
         let age = self.age(target, pts);
         self.with_worker(|worker| {
             let inbox = worker.inbox();
-            inbox.see(Sight {
+            inbox.see(Measurement {
                 visibility: target.state.into(),
                 id: target.id,
                 centroid: target.centroid,

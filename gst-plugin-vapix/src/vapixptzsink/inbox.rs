@@ -9,8 +9,8 @@ use std::time::Duration;
 use tokio::sync::Notify;
 
 use super::clock::Clock;
-use crate::servo::{ServoSettings, Sight};
-use crate::vapix::{Command, Credentials};
+use servo::{Measurement, ServoSettings};
+use vapix::wire::{Command, Credentials};
 
 /// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
 #[derive(Debug, Default)]
@@ -21,7 +21,7 @@ pub struct Mail {
     pub orphan: Option<Command>,
     /// Forget the target and stop; before `sight`.
     pub rest: bool,
-    pub sight: Option<Sight>,
+    pub measurement: Option<Measurement>,
     /// Who waits for the camera to be at rest.
     pub waiting: Vec<SyncSender<()>>,
     /// Who waits until nothing more is to be done at this time.
@@ -77,13 +77,13 @@ impl Inbox {
     }
 
     /// Leaves the newest picture of the target, in place of one not looked at yet.
-    pub fn see(&self, sight: Sight) {
+    pub fn see(&self, measurement: Measurement) {
         let mut mail = self.mail();
         // Read under the lock, so that no picture is left behind those that `rest` makes void.
         if self.blind.load(Ordering::Relaxed) {
             return;
         }
-        if mail.sight.replace(sight).is_some() {
+        if mail.measurement.replace(measurement).is_some() {
             self.overtaken.fetch_add(1, Ordering::Relaxed);
         }
         drop(mail);
@@ -101,7 +101,7 @@ impl Inbox {
         let (sender, receiver) = sync_channel(1);
         self.with_answerer(|mail| {
             mail.rest = true;
-            mail.sight = None;
+            mail.measurement = None;
             mail.waiting.push(sender);
         });
         self.arrived.notify_one();

@@ -6,65 +6,66 @@ use ptztrack_contract::{CameraChange, CameraMessage, Times};
 
 use super::imp::{CAT, VapixPtzSink};
 use super::worker::Event;
+use crate::control_loop::LoopEvent;
 use crate::lock::lock;
-use crate::servo::{Holder, LinkChange, Report};
+use vapix::session::{ConnectionChange, ControlOwner, SessionEvent};
 
 impl VapixPtzSink {
     /// Called by the worker.
     pub(super) fn happened(&self, event: Event) {
         match event {
-            Event::Exchanged { job, failure: None, round_trip } => {
-                gst::log!(CAT, imp = self, "{job} answered in {round_trip:?}");
+            Event::Exchanged { request, failure: None, round_trip } => {
+                gst::log!(CAT, imp = self, "{request} answered in {round_trip:?}");
             }
-            Event::Exchanged { job, failure: Some(err), round_trip } => {
-                gst::debug!(CAT, imp = self, "{job} failed after {round_trip:?}: {err}");
+            Event::Exchanged { request, failure: Some(err), round_trip } => {
+                gst::debug!(CAT, imp = self, "{request} failed after {round_trip:?}: {err}");
             }
-            Event::Report(Report::Link(change)) => self.link_changed(&change),
-            Event::Report(Report::Met(camera)) => gst::info!(CAT, imp = self, "the camera: {camera}"),
-            Event::Report(Report::Moving) => self.post(CameraChange::Moving, "the camera moves"),
-            Event::Report(Report::Stopped) => self.post(CameraChange::Stopped, "the camera has stopped"),
-            Event::Report(Report::AtLimit) => {
+            Event::Loop(LoopEvent::Session(SessionEvent::Connection(change))) => self.link_changed(&change),
+            Event::Loop(LoopEvent::Session(SessionEvent::Discovered(camera))) => gst::info!(CAT, imp = self, "the camera: {camera}"),
+            Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => self.post(CameraChange::Moving, "the camera moves"),
+            Event::Loop(LoopEvent::Session(SessionEvent::Stopped)) => self.post(CameraChange::Stopped, "the camera has stopped"),
+            Event::Loop(LoopEvent::AtLimit) => {
                 self.post(
                     CameraChange::AtLimit,
                     "the target is beyond the end of the camera's pan or tilt range, or of `pan-min` … `tilt-max`",
                 );
             }
-            Event::Report(Report::LimitsUnkept) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::Session(SessionEvent::LimitsUnkept)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera does not tell where it looks: `pan-min` … `tilt-max` cannot be kept. Set limits in the camera itself")
             ),
-            Event::Report(Report::Swinging(trust)) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::Oscillating(gain_scale)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 (
                     "the camera swings to and fro about the target; its speed is lowered to {:.0} % until it is calm. Lower `gain`, or set `latency` and `camera-speed` right",
-                    trust * 100.0
+                    gain_scale * 100.0
                 )
             ),
-            Event::Report(Report::TakenOver(Holder::Operator)) => self.post(
+            Event::Loop(LoopEvent::Session(SessionEvent::TakenOver(ControlOwner::Operator))) => self.post(
                 CameraChange::TakenOver,
                 "somebody else moves the camera; it is not steered until nobody has moved it for `override-timeout`",
             ),
-            Event::Report(Report::TakenOver(Holder::Queue)) => self.post(
+            Event::Loop(LoopEvent::Session(SessionEvent::TakenOver(ControlOwner::Queue))) => self.post(
                 CameraChange::TakenOver,
                 "somebody else is in control by the camera's control queue; it is not steered until our turn",
             ),
-            Event::Report(Report::Resumed) => self.post(CameraChange::Resumed, "the camera is steered again"),
-            Event::Report(Report::Orphan) => {
+            Event::Loop(LoopEvent::Session(SessionEvent::Resumed)) => self.post(CameraChange::Resumed, "the camera is steered again"),
+            Event::Loop(LoopEvent::Session(SessionEvent::Orphan)) => {
                 gst::warning!(CAT, imp = self, "the camera was already moving when it was met: stopping it");
             }
-            Event::Report(Report::NoSuchPreset(name)) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::Session(SessionEvent::NoSuchPreset(name))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera tells of no preset `{name}`; it stays where it is. Correct `home`")
             ),
-            Event::Report(Report::HomeRefused(err)) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::Session(SessionEvent::HomeRefused(err))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera does not go home: {err}; it stays where it is. Correct `home`")
             ),
-            Event::Report(Report::Mode(mode)) => gst::element_imp_info!(
+            Event::Loop(LoopEvent::Session(SessionEvent::Mode(mode))) => gst::element_imp_info!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera is moved by mode `{}` now, the best of those that it takes; `mode` stays as it is set", mode.name())
@@ -88,14 +89,14 @@ impl VapixPtzSink {
         }
     }
 
-    fn link_changed(&self, change: &LinkChange) {
+    fn link_changed(&self, change: &ConnectionChange) {
         match change {
-            LinkChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
-            LinkChange::Disconnected(err) => {
+            ConnectionChange::Connected => self.post(CameraChange::Connected, "the camera answers"),
+            ConnectionChange::Disconnected(err) => {
                 self.post(CameraChange::Disconnected, &err.to_string());
                 gst::element_imp_warning!(self, gst::ResourceError::Write, ("{err}. {}", err.advice()));
             }
-            LinkChange::Refused(err) => {
+            ConnectionChange::Refused(err) => {
                 self.post(CameraChange::Refused, &err.to_string());
                 gst::element_imp_warning!(
                     self,

@@ -84,8 +84,6 @@
 
 use glib::prelude::*;
 
-use crate::servo;
-
 mod clock;
 mod desk;
 mod imp;

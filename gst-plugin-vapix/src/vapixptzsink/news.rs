@@ -2,7 +2,9 @@
 
 use ptztrack_contract::CameraEvent;
 
-use crate::servo::{Status, View};
+use servo::View;
+
+use crate::control_loop::Status;
 
 /// The event for a status; `aspect` of the picture, width by height as displayed, where it is known.
 pub fn camera_event(status: &Status, aspect: Option<f64>) -> CameraEvent {

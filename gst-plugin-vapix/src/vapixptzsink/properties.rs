@@ -10,7 +10,7 @@ use gst::prelude::*;
 
 use super::settings::Settings;
 use super::{Mode, Prediction, SpeedCurve};
-use crate::vapix::{Location, Secret};
+use vapix::wire::{Location, Secret};
 
 /// When a value that was set counts, and who must hear of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -90,7 +90,7 @@ fn table() -> Vec<Property> {
         duration("timeout", AtStart, "Longest wait for one of the camera's answers, in nanoseconds, from 0.1 s to 60 s", millis(100)..=millis(60_000), |s| &mut s.timeout),
         switch("insecure", AtStart, "With https believe any certificate: who sits on the wire can then take the camera", |s| &mut s.insecure),
         special(
-            text("ca-file", AtStart, "With https believe only certificates signed by an authority in this PEM file (unset: those the system trusts)"),
+            text("ca-file", AtStart, "With https believe only certificates signed by an arbitration in this PEM file (unset: those the system trusts)"),
             |s| s.ca_file.to_value(),
             |s, value| { s.ca_file = string(value); Ok(()) },
         ),
@@ -171,7 +171,7 @@ fn optional_number(
     )
 }
 
-/// Steps of the optical zoom, whole ones.
+/// PointToPoint of the optical zoom, whole ones.
 fn zoom_steps(name: &str, takes: Takes, blurb: &str, field: Field<f64>) -> Property {
     let builder = glib::ParamSpecUInt::builder(name).minimum(1).maximum(9999);
     // Within 1 to 9999, whole.

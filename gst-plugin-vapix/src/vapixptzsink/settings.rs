@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::servo::{ServoSettings, SoftLimits};
-use crate::vapix::{ClientSettings, Credentials, Location, Range, Secret, Trust};
+use servo::{Range, ServoSettings, SoftLimits};
+use vapix::wire::{ClientSettings, Credentials, Location, Secret, Trust};
 
 /// What the properties hold.
 #[derive(Debug, Clone)]

@@ -2,15 +2,17 @@
 
 use std::time::Duration;
 
-use crate::servo::{Belief, Mode, Status, is_endless};
-use crate::vapix::Command;
+use servo::{Estimates, Mode, is_endless};
+use vapix::wire::Command;
+
+use crate::control_loop::Status;
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
 pub struct Statistics {
     pub status: Status,
     /// What the camera is taken for by now.
-    pub belief: Option<Belief>,
+    pub estimates: Option<Estimates>,
     /// What ends the last move.
     pub stop: Option<Command>,
     /// The camera does not rest for good: it moves, or something unanswered may set it going.
@@ -76,16 +78,16 @@ impl Statistics {
             .field_if_some("camera-zoom-max", limits.zoom_steps.map(|zoom| zoom.max))
             .field_if_some("camera-endless-pan", limits.pan_deg.map(is_endless))
             .field_if_some("field-of-view", status.fov_deg)
-            .field_if_some("latency", self.belief.map(|belief| nanoseconds(belief.latency)))
-            .field_if_some("speeds", self.belief.map(|belief| speeds(&belief)))
+            .field_if_some("latency", self.estimates.map(|estimates| nanoseconds(estimates.delays.sum())))
+            .field_if_some("speeds", self.estimates.map(|estimates| speeds(&estimates)))
             .field_if_some("last-error", self.last_error.as_deref())
             .build()
     }
 }
 
 /// Degrees per second of the speed steps 1 to 100.
-fn speeds(belief: &Belief) -> gst::Array {
-    gst::Array::new((1..=100).map(|step| belief.map.deg_s(step)))
+fn speeds(estimates: &Estimates) -> gst::Array {
+    gst::Array::new((1..=100).map(|step| estimates.map.deg_s(step)))
 }
 
 fn nanoseconds(duration: Duration) -> u64 {

@@ -1,4 +1,4 @@
-//! The one task that talks to the camera: takes what the streaming thread left, asks the pilot, sends.
+//! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
 
 use std::cell::Cell;
 use std::pin::pin;
@@ -13,9 +13,11 @@ use super::clock::Clock;
 use super::desk::Desk;
 use super::inbox::Inbox;
 use super::statistics::Statistics;
+use crate::control_loop::{ControlLoop, LoopEvent, Status};
 use crate::lock::lock;
-use crate::servo::{Answer, Job, Next, Pilot, Query, Report, ServoSettings, Status};
-use crate::vapix::{Client, ClientSettings, Command, Error, Location};
+use servo::ServoSettings;
+use vapix::session::{Next, Query, Request, Response};
+use vapix::wire::{Client, ClientSettings, Command, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 pub const STOP_GRACE: Duration = Duration::from_millis(500);
@@ -31,9 +33,9 @@ pub const LAST_WILL: Duration = Duration::from_secs(60);
 #[derive(Debug)]
 pub enum Event {
     /// An exchange is over.
-    Exchanged { job: Job, failure: Option<Error>, round_trip: Duration },
-    /// The pilot has something to say.
-    Report(Report),
+    Exchanged { request: Request, failure: Option<Error>, round_trip: Duration },
+    /// The control loop has something to say.
+    Loop(LoopEvent),
     /// The camera is known to be otherwise than before.
     Status(Status),
     /// The end has come, and the camera has not confirmed its stop in time.
@@ -55,7 +57,7 @@ pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
     !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
 }
 
-/// After a stop that was not confirmed, where no pilot is left to see to it, the next one is sent after this.
+/// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
 const LAST_WILL_PAUSE: Duration = Duration::from_secs(1);
 
 /// A running worker; dropping it stops the camera and ends the worker, and waits for that within bounds.
@@ -90,11 +92,12 @@ impl Worker {
         let client = Client::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let inbox = Arc::new(Inbox::new(clock));
-        let pilot = Pilot::new(servo);
-        let (status, belief, stop) = (pilot.status(Duration::ZERO), Some(pilot.belief()), Some(pilot.stop()));
-        let statistics = Statistics { status, belief, stop, ..Statistics::default() };
+        let control = ControlLoop::new(servo);
+        let (status, estimates, stop) =
+            (control.status(Duration::ZERO), Some(control.estimates()), Some(control.stop()));
+        let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
-        let desk = Desk::new(pilot, inbox.clone(), statistics.clone(), observer.clone());
+        let desk = Desk::new(control, inbox.clone(), statistics.clone(), observer.clone());
         let task = Task { client, settings: settings.clone(), desk };
         let running = runtime.spawn(task.run());
         let worker = Self { camera, inbox, statistics };
@@ -156,7 +159,7 @@ impl Legacy {
         statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
     }
 
-    /// Stops the camera, whatever it does, without the pilot, who broke; for a while.
+    /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
     async fn stop(&self, settings: ClientSettings, inbox: &Inbox) {
         let Ok(mut client) = Client::new(settings) else { return };
         let stop = {
@@ -220,8 +223,8 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 break;
             }
             let now = self.desk.inbox.now();
-            match self.desk.pilot.next(now) {
-                Next::Do(job) => self.perform(job).await,
+            match self.desk.control.next_request(now) {
+                Next::Do(request) => self.perform(request).await,
                 Next::Wait(until) => {
                     let until = until.into_iter().chain(self.desk.deadline).min();
                     self.desk.tell_settled();
@@ -238,39 +241,39 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
     /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
     /// may it answer.
     async fn change_credentials(&mut self) {
-        if let Some(stop) = self.desk.pilot.parting_stop() {
-            self.perform(Job::Command(stop)).await;
+        if let Some(stop) = self.desk.control.session().parting_stop() {
+            self.perform(Request::Command(stop)).await;
             // A password often follows on the user's heels.
             self.desk.take_mail();
         }
         if let Some(credentials) = self.desk.credentials.take() {
             lock(&self.settings).credentials.clone_from(&credentials);
             self.client.set_credentials(credentials);
-            self.desk.pilot.credentials_changed();
+            self.desk.control.session_mut().credentials_changed();
         }
     }
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
-    async fn perform(&mut self, job: Job) {
+    async fn perform(&mut self, request: Request) {
         let Self { client, desk, .. } = self;
         let inbox = desk.inbox.clone();
         let sent = inbox.now();
-        desk.pilot.sending(&job, sent);
-        let stop = desk.pilot.stop();
+        desk.control.sending(&request, sent);
+        let stop = desk.control.stop();
         lock(&desk.statistics).stop = Some(stop);
-        let mut exchange = pin!(exchange(client, &job));
+        let mut exchange = pin!(exchange(client, &request));
         let mut give_up_at = None;
         loop {
             let now = inbox.now();
-            give_up_at = desk.give_up_at(&job, give_up_at, now);
-            if desk.is_in_vain(&job, now) || give_up_at.is_some_and(|at| at <= now) {
-                return desk.abandoned(&job, sent);
+            give_up_at = desk.give_up_at(&request, give_up_at, now);
+            if desk.is_in_vain(&request, now) || give_up_at.is_some_and(|at| at <= now) {
+                return desk.abandoned(&request, sent);
             }
-            let stale_at = desk.pilot.stale_at().filter(|at| *at > now);
+            let stale_at = desk.control.stale_at().filter(|at| *at > now);
             let until = [give_up_at, stale_at, desk.deadline].into_iter().flatten().min();
             tokio::select! {
                 biased;
-                answer = &mut exchange => return desk.answered(&job, answer, sent),
+                answer = &mut exchange => return desk.answered(&request, answer, sent),
                 () = inbox.arrived() => desk.take_mail(),
                 () = inbox.sleep_until(until) => {}
             }
@@ -279,25 +282,26 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
 }
 
 /// The answer to a job.
-async fn exchange(client: &mut Client, job: &Job) -> Result<Answer, Error> {
-    match job {
-        Job::Command(command) => client.send(command).await.map(|()| Answer::Accepted),
-        Job::Query(Query::Position) => client.position().await.map(Answer::Position),
-        Job::Query(Query::Limits) => client.limits().await.map(Answer::Limits),
-        Job::Query(Query::Parameters) => client.parameters().await.map(Answer::Parameters),
-        Job::Query(Query::Attributes) => client.attributes().await.map(Answer::Attributes),
-        Job::Query(Query::MoveSpeed) => client.move_speed().await.map(Answer::MoveSpeed),
-        Job::Query(Query::Presets) => client.presets().await.map(Answer::Presets),
-        Job::Query(Query::Queue(request)) => client.queue(*request).await.map(Answer::Place),
+async fn exchange(client: &mut Client, request: &Request) -> Result<Response, Error> {
+    match request {
+        Request::Command(command) => client.send(command).await.map(|()| Response::Accepted),
+        Request::Query(Query::Position) => client.position().await.map(Response::Position),
+        Request::Query(Query::Limits) => client.limits().await.map(Response::Limits),
+        Request::Query(Query::Parameters) => client.parameters().await.map(Response::Parameters),
+        Request::Query(Query::Attributes) => client.attributes().await.map(Response::Attributes),
+        Request::Query(Query::MoveSpeed) => client.move_speed().await.map(Response::MoveSpeed),
+        Request::Query(Query::Presets) => client.presets().await.map(Response::Presets),
+        Request::Query(Query::Queue(request)) => client.queue(*request).await.map(Response::Place),
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::servo::sight;
-    use crate::vapix::{Location, Trust};
+    use servo::Measurement;
     use std::sync::mpsc::RecvTimeoutError;
+    use vapix::session::SessionEvent;
+    use vapix::wire::Trust;
     use virtual_camera::VirtualCamera;
 
     const PATIENCE: Duration = Duration::from_secs(20);
@@ -315,7 +319,7 @@ mod tests {
     }
 
     fn see(worker: &Worker) {
-        worker.inbox().see(sight(0.9, 0.5, worker.inbox().now()));
+        worker.inbox().see(Measurement::at(0.9, 0.5, worker.inbox().now()));
     }
 
     fn camera() -> VirtualCamera {
@@ -353,7 +357,7 @@ mod tests {
         let (events, seen) = std::sync::mpsc::channel();
         let held = worker.clone();
         let started = start(&camera, move |event| {
-            if matches!(event, Event::Report(Report::Moving)) {
+            if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
                 drop(lock(&held).take());
             }
             let _ = events.send(format!("{event:?}"));
@@ -374,7 +378,7 @@ mod tests {
         let camera = camera();
         let (died, death) = std::sync::mpsc::channel();
         let worker = start(&camera, move |event| match event {
-            Event::Report(Report::Moving) => panic!("provoked"),
+            Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => panic!("provoked"),
             Event::Died(_) => died.send(()).unwrap(),
             _ => {}
         });

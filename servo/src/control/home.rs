@@ -1,0 +1,346 @@
+use std::fmt;
+use std::str::FromStr;
+use std::time::Duration;
+
+use super::Actuation;
+use crate::model::{PanTilt, Position, Presets, SoftLimits};
+
+/// Where the camera waits for a target.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Home {
+    /// Where it looked when it was met.
+    Start,
+    /// A direction, and a zoom step where one is given.
+    Position(Position),
+    /// One of the camera's own presets.
+    Preset(String),
+}
+
+impl FromStr for Home {
+    type Err = String;
+
+    /// Reads `start`, `pan,tilt` or `pan,tilt,zoom` in degrees and zoom steps, or the name of a preset.
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "start" {
+            return Ok(Self::Start);
+        }
+        let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+        match numbers.as_deref() {
+            // A preset may be called 7; a direction has two parts.
+            None | Some([_]) => Ok(Self::Preset(text.to_owned())),
+            Some([pan, tilt]) => Self::position(*pan, *tilt, None),
+            Some([pan, tilt, zoom]) => Self::position(*pan, *tilt, Some(*zoom)),
+            Some(_) => Err(format!("`{text}` has more than pan,tilt,zoom")),
+        }
+    }
+}
+
+impl fmt::Display for Home {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Start => f.write_str("start"),
+            Self::Position(position) => {
+                write!(f, "{},{}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))?;
+                position.zoom_steps.map_or(Ok(()), |zoom| write!(f, ",{zoom}"))
+            }
+            Self::Preset(name) => f.write_str(name),
+        }
+    }
+}
+
+impl Home {
+    fn position(pan: f64, tilt: f64, zoom: Option<f64>) -> Result<Self, String> {
+        let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
+        let zooms = zoom.is_none_or(|zoom| (1.0..=9999.0).contains(&zoom));
+        if !turns || !zooms {
+            return Err("pan and tilt are from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
+        }
+        Ok(Self::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }))
+    }
+}
+
+/// Sends the camera home when nobody was seen for a while, once.
+#[derive(Debug, Default)]
+pub struct HomeReturn {
+    home: Option<Home>,
+    /// A direction beyond them is not gone to; a preset is the camera's own business.
+    limits: SoftLimits,
+    timeout: Duration,
+    /// When it was first seen that nobody is there.
+    alone_since: Option<Duration>,
+    /// Pictures are coming until about then: without any it is not known that nobody is there.
+    looking_until: Duration,
+    /// Nothing was commanded since the camera was met.
+    untouched: bool,
+    at_start: bool,
+    start: Option<Position>,
+    /// The number of the preset.
+    preset: Option<u32>,
+    /// When to ask for it.
+    presets_at: Duration,
+    /// The speed step of moves to a position.
+    move_speed: Option<u8>,
+    /// It is there, or on its way, or cannot get there.
+    settled: bool,
+}
+
+impl HomeReturn {
+    /// Takes the settings. `at_start`: go there before the first target too, without waiting.
+    pub fn new(home: Option<Home>, timeout: Duration, at_start: bool, limits: SoftLimits) -> Self {
+        let settled = home == Some(Home::Start);
+        Self { home, limits, timeout, at_start, settled, untouched: true, ..Self::default() }
+    }
+
+    /// Takes other settings.
+    pub fn configure(&mut self, home: Option<&Home>, timeout: Duration, limits: SoftLimits) {
+        (self.timeout, self.limits) = (timeout, limits);
+        if home != self.home.as_ref() {
+            let presets_at = Duration::ZERO;
+            let home = home.cloned();
+            *self = Self { home, preset: None, presets_at, settled: false, at_start: false, ..*self };
+        }
+    }
+
+    /// A picture came without a target; the next is awaited until `next`.
+    pub fn alone(&mut self, now: Duration, next: Duration) {
+        self.alone_since.get_or_insert(now);
+        self.looking_until = next;
+    }
+
+    /// Somebody is there, or it is not known whether anybody is.
+    pub fn not_alone(&mut self) {
+        self.alone_since = None;
+    }
+
+    /// The camera looks there; the first place is where it started.
+    pub fn positioned(&mut self, position: Position) {
+        if self.untouched {
+            self.start.get_or_insert(position);
+        }
+    }
+
+    /// The camera does something else at our word, or at somebody's.
+    pub fn strayed(&mut self) {
+        self.settled = false;
+        self.untouched = false;
+        self.at_start = false;
+    }
+
+    /// It has taken the command to go home, or will not.
+    pub fn settled(&mut self) {
+        self.strayed();
+        self.settled = true;
+    }
+
+    /// It was stopped, perhaps on its way, and what was seen before is void.
+    pub fn interrupt(&mut self) {
+        self.alone_since = None;
+        self.settled &= self.home == Some(Home::Start) && self.untouched;
+    }
+
+    /// Whether it is there, or on its way.
+    pub fn is_settled(&self) -> bool {
+        self.settled
+    }
+
+    /// When the camera is to be asked for its presets, where it is.
+    pub fn presets_due(&self) -> Option<Duration> {
+        let wanted = self.preset.is_none() && !self.settled && matches!(self.home, Some(Home::Preset(_)));
+        wanted.then_some(self.presets_at)
+    }
+
+    /// They went unanswered: not before then again.
+    pub fn ask_presets_at(&mut self, at: Duration) {
+        self.presets_at = at;
+    }
+
+    /// The camera told how fast its moves to a position are.
+    pub fn told_move_speed(&mut self, step: u8) {
+        self.move_speed = Some(step);
+    }
+
+    /// The camera told its presets; returns the name where it has none of that name.
+    pub fn told_presets(&mut self, presets: &Presets) -> Option<String> {
+        let Some(Home::Preset(name)) = &self.home else { return None };
+        self.preset = presets.number(name);
+        self.settled |= self.preset.is_none();
+        self.preset.is_none().then(|| name.clone())
+    }
+
+    /// The camera would not tell its presets.
+    pub fn no_presets(&mut self) -> Option<String> {
+        self.told_presets(&Presets::default())
+    }
+
+    /// The command to go home, where it is time.
+    pub fn due(&self, now: Duration) -> Option<Actuation> {
+        let wait = if self.at_start { Duration::ZERO } else { self.timeout };
+        let alone = self.alone_since.is_some_and(|since| since + wait <= now) && now <= self.looking_until;
+        if self.settled || !alone { None } else { self.actuation() }
+    }
+
+    /// Whether this command leads home.
+    pub fn leads(&self, actuation: &Actuation) -> bool {
+        self.actuation().as_ref() == Some(actuation)
+    }
+
+    fn actuation(&self) -> Option<Actuation> {
+        match self.home.as_ref()? {
+            Home::Start => self.start.and_then(|start| self.go_to(start)),
+            Home::Position(position) => self.go_to(*position),
+            Home::Preset(_) => self.preset.map(|number| Actuation::Preset { number }),
+        }
+    }
+
+    fn go_to(&self, position: Position) -> Option<Actuation> {
+        let place = self.limits.nearest(PanTilt::new(position.pan_deg?, position.tilt_deg?));
+        Some(Actuation::Absolute {
+            pan_deg: place.pan,
+            tilt_deg: place.tilt,
+            speed: self.move_speed.unwrap_or(Actuation::FULL_SPEED),
+            // Within 1 to 9999.
+            zoom: position
+                .zoom_steps
+                .map(|zoom| self.limits.zoom_steps.nearest(zoom).clamp(1.0, 9999.0) as u16),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Range;
+    use proptest::prelude::*;
+
+    fn s(s: u64) -> Duration {
+        Duration::from_secs(s)
+    }
+
+    fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {
+        Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }
+    }
+
+    fn going(home: Option<Home>, timeout: Duration, at_start: bool) -> HomeReturn {
+        HomeReturn::new(home, timeout, at_start, SoftLimits::default())
+    }
+
+    fn alone(home_return: &mut HomeReturn, from: u64, to: u64) -> Vec<(u64, Actuation)> {
+        (from..to)
+            .filter_map(|second| {
+                home_return.alone(s(second), s(second + 1));
+                let command = home_return.due(s(second))?;
+                home_return.settled();
+                Some((second, command))
+            })
+            .collect()
+    }
+
+    #[test]
+    fn homes_are_read() {
+        assert_eq!("start".parse(), Ok(Home::Start));
+        assert_eq!("-12.5, 3".parse(), Ok(Home::Position(at(-12.5, 3.0, None))));
+        assert_eq!("10,-5,3868".parse(), Ok(Home::Position(at(10.0, -5.0, Some(3868.0)))));
+        for name in ["Gate", "7", "Gate, left", "north,south"] {
+            assert_eq!(name.parse(), Ok(Home::Preset(name.to_owned())), "{name}");
+        }
+        for wrong in ["200,0", "0,-190", "0,0,0", "0,0,20000", "NaN,1", "1,2,3,4"] {
+            assert!(wrong.parse::<Home>().is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn it_goes_home_once_when_nobody_was_seen_for_a_while() {
+        let home = Home::Position(at(5.0, 1.0, Some(20.0)));
+        let mut home_return = going(Some(home), s(10), false);
+        let there = Actuation::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 100, zoom: Some(20) };
+        assert_eq!(alone(&mut home_return, 3, 60), [(13, there)]);
+        home_return.not_alone();
+        home_return.strayed();
+        assert_eq!(home_return.due(s(61)), None);
+        assert_eq!(alone(&mut home_return, 70, 100), [(80, there)]);
+        home_return.strayed();
+        assert_eq!(alone(&mut home_return, 100, 110), [(100, there)], "somebody else took it away");
+    }
+
+    #[test]
+    fn without_pictures_nobody_knows_that_nobody_is_there() {
+        let mut home_return = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
+        home_return.alone(s(0), s(1));
+        assert_eq!(home_return.due(s(20)), None);
+    }
+
+    #[test]
+    fn at_the_start_it_does_not_wait() {
+        let mut home_return = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        assert_eq!(alone(&mut home_return, 0, 30).len(), 1);
+        let mut home_return = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), true);
+        home_return.strayed();
+        assert_eq!(alone(&mut home_return, 0, 30)[0].0, 10, "there was a target first");
+    }
+
+    #[test]
+    fn where_it_started_is_where_it_was_before_our_first_command() {
+        let mut home_return = going(Some(Home::Start), s(10), true);
+        home_return.positioned(at(7.0, -2.0, Some(1.0)));
+        assert_eq!(alone(&mut home_return, 0, 30), [], "it is there");
+        home_return.positioned(at(7.5, -2.0, Some(1.0)));
+        home_return.strayed();
+        home_return.positioned(at(90.0, 0.0, Some(500.0)));
+        let start = Actuation::Absolute { pan_deg: 7.0, tilt_deg: -2.0, speed: 100, zoom: Some(1) };
+        home_return.not_alone();
+        assert_eq!(alone(&mut home_return, 40, 80), [(50, start)]);
+    }
+
+    #[test]
+    fn a_home_beyond_the_limits_is_gone_to_as_far_as_they_allow() {
+        let within = |min, max| Range { min, max };
+        let limits = SoftLimits {
+            pan_deg: within(-30.0, 60.0),
+            tilt_deg: within(-20.0, 5.0),
+            zoom_steps: within(100.0, 2000.0),
+        };
+        let there = Actuation::Absolute { pan_deg: 60.0, tilt_deg: -20.0, speed: 100, zoom: Some(2000) };
+        let beyond = Home::Position(at(100.0, -60.0, Some(9999.0)));
+        let mut home_return = HomeReturn::new(Some(beyond.clone()), s(0), false, limits);
+        assert_eq!(alone(&mut home_return, 3, 5), [(3, there)]);
+        let mut home_return = going(Some(beyond.clone()), s(0), false);
+        home_return.configure(Some(&beyond), s(0), limits);
+        assert_eq!(alone(&mut home_return, 3, 5), [(3, there)]);
+    }
+
+    #[test]
+    fn a_preset_goes_by_its_number() {
+        let mut home_return = going(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        assert_eq!(home_return.presets_due(), Some(s(0)));
+        assert_eq!(alone(&mut home_return, 0, 30), []);
+        assert_eq!(
+            home_return.told_presets(&Presets(vec![(1, "Home".to_owned()), (4, "Gate".to_owned())])),
+            None
+        );
+        assert_eq!(home_return.presets_due(), None);
+        assert_eq!(alone(&mut home_return, 30, 60), [(30, Actuation::Preset { number: 4 })]);
+    }
+
+    #[test]
+    fn a_preset_that_is_none_is_told_once() {
+        let mut home_return = going(Some(Home::Preset("Gate".to_owned())), s(10), false);
+        assert_eq!(home_return.told_presets(&Presets::default()), Some("Gate".to_owned()));
+        assert_eq!(home_return.presets_due(), None);
+        assert_eq!(alone(&mut home_return, 0, 30), []);
+        home_return.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10), SoftLimits::default());
+        assert_eq!(alone(&mut home_return, 30, 60).len(), 1);
+    }
+
+    proptest! {
+        #[test]
+        fn a_home_is_read_back(pan in -180.0..180.0f64, tilt in -180.0..180.0f64, zoom in prop::option::of(1.0..9999.0f64)) {
+            let home = Home::Position(at(pan, tilt, zoom));
+            prop_assert_eq!(home.to_string().parse(), Ok(home));
+        }
+
+        #[test]
+        fn any_text_is_a_home_or_refused(text in ".{0,40}") {
+            let _ = text.parse::<Home>();
+        }
+    }
+}

@@ -1,0 +1,64 @@
+use std::time::Duration;
+
+use ptztrack_contract::{Point, Rect, TargetState, Vector};
+
+/// How the tracker knows where the target is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Visibility {
+    /// It sees it.
+    Seen,
+    /// It is hidden, and predicted.
+    Predicted,
+    /// There is none.
+    Gone,
+}
+
+impl From<TargetState> for Visibility {
+    fn from(state: TargetState) -> Self {
+        match state {
+            TargetState::Tracking => Self::Seen,
+            TargetState::Occluded => Self::Predicted,
+            TargetState::Searching | TargetState::Lost => Self::Gone,
+        }
+    }
+}
+
+/// The target in one picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measurement {
+    /// How the tracker knows.
+    pub visibility: Visibility,
+    /// Which target.
+    pub id: u64,
+    /// Where, in frame widths and heights from the top left.
+    pub centroid: Point,
+    /// The box about it, in the same units.
+    pub bounds: Rect,
+    /// Its motion in the picture, frames per second.
+    pub velocity: Vector,
+    /// The background's motion in the picture, same unit, where it was seen.
+    pub ego_velocity: Option<Vector>,
+    /// Size of the picture in pixels.
+    pub size: (u32, u32),
+    /// Width by height of the picture as displayed.
+    pub aspect: f64,
+    /// When the picture was taken, as far as its timestamp tells.
+    pub taken_at: Duration,
+}
+
+impl Measurement {
+    /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.
+    pub fn at(x: f64, y: f64, taken_at: Duration) -> Self {
+        Self {
+            visibility: Visibility::Seen,
+            id: 1,
+            centroid: Point { x, y },
+            bounds: Rect { x: x - 0.05, y: y - 0.1, width: 0.1, height: 0.2 },
+            velocity: Vector::default(),
+            ego_velocity: None,
+            size: (640, 480),
+            aspect: 4.0 / 3.0,
+            taken_at,
+        }
+    }
+}

@@ -1,0 +1,25 @@
+//! Model, estimation and control of a camera that follows a target: from where the target is in the picture to what
+//! the camera is to do. No HTTP, no GStreamer: what any camera protocol would need.
+//!
+//! ```text
+//! Measurement ─ estimation (angles, rates, prediction) ─ control (limits, zoom, home) ─ Actuation
+//!                     │                                         │
+//!                     └──────── model (projection, speeds, delays, what was commanded) ────────┘
+//! ```
+//! Angles are degrees, positive to the right and up; times are [`Duration`](std::time::Duration)s since any fixed
+//! moment, always given by the caller, so that tests turn the clock themselves. [`Servo`] is the whole of it.
+
+mod control;
+mod estimation;
+mod model;
+mod servo;
+mod settings;
+
+pub use control::{Access, Actuation, ActuatorStatus, Home};
+pub use estimation::{Estimates, Measurement, Prediction, Visibility};
+pub use model::{
+    CameraModel, Capabilities, CommandHistory, Delays, Lens, Limits, PanTilt, Position, Presets, Range,
+    SoftLimits, SpeedCurve, SpeedMap, TableRow, View, around_deg, is_endless, magnified, narrower,
+};
+pub use servo::Servo;
+pub use settings::{Mode, ServoSettings};

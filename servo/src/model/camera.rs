@@ -1,0 +1,137 @@
+use super::{CommandHistory, Lens, Limits, PanTilt, Position, Range, SpeedMap, TableRow};
+
+/// Field of view of a camera that does not tell: a common dome's, zoomed out.
+const ASSUMED_FOV_DEG: f64 = 55.0;
+
+/// Steps of optical zoom; beyond them cameras magnify digitally.
+const OPTICAL_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+
+/// What the camera told of itself; every part is optional.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Capabilities {
+    /// How far it can look and zoom.
+    pub limits: Limits,
+    /// Degrees per second of speed steps, growing.
+    pub speeds: Vec<TableRow>,
+    /// Magnification of zoom steps, growing.
+    pub zooms: Vec<TableRow>,
+    /// Magnification at the end of the optical zoom.
+    pub max_optical_magnification: Option<f64>,
+    /// Fields of view per second that no speed exceeds, where speeds are proportional to the field of view.
+    pub max_fields_s: Option<f64>,
+    /// The speed step of its moves to a position.
+    pub move_speed: Option<u8>,
+}
+
+/// The camera as it is known.
+#[derive(Debug)]
+pub struct CameraModel {
+    /// What it told of itself.
+    pub capabilities: Capabilities,
+    /// Where it last said it looks.
+    pub position: Position,
+    /// What it was told.
+    pub history: CommandHistory,
+    /// How fast its speed steps are, as it is known by now.
+    pub speed_map: SpeedMap,
+}
+
+impl CameraModel {
+    /// A camera that told nothing yet, and whose speed steps are taken to be those.
+    pub fn new(speed_map: SpeedMap) -> Self {
+        let (capabilities, position) = (Capabilities::default(), Position::default());
+        Self { capabilities, position, history: CommandHistory::default(), speed_map }
+    }
+
+    /// Where it looks, where it told both angles.
+    pub fn pan_tilt(&self) -> Option<PanTilt> {
+        self.position.pan_tilt()
+    }
+
+    /// Horizontal field of view in degrees at the zoom it last told. `wide_fov_deg`: that of the lens zoomed out, where
+    /// it is set; else what the camera told, or what is common.
+    pub fn fov_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
+        let lens = self.capabilities.lens_or_fixed(wide_fov_deg);
+        lens.fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
+    }
+}
+
+impl Capabilities {
+    /// Its lens; `None` where it told neither field of view nor zoom.
+    pub fn lens(&self) -> Option<Lens> {
+        let angle = self.limits.field_angle_deg;
+        let wide_deg = angle.map_or(ASSUMED_FOV_DEG, |angle| angle.max);
+        if self.zooms.len() > 1 {
+            return Some(Lens::new(wide_deg, self.zooms.clone()));
+        }
+        let most = angle.map(|angle| Lens::magnification_between(angle.max, angle.min));
+        let most = self.max_optical_magnification.or(most)?;
+        let steps = self.limits.zoom_steps.unwrap_or(OPTICAL_STEPS);
+        // Beyond the optical steps it magnifies on, but by how much nobody says.
+        let max = steps.max.min(OPTICAL_STEPS.max).max(steps.min + 1.0);
+        Some(Lens::linear(wide_deg, Range { max, ..steps }, most))
+    }
+
+    /// Its lens, with another field of view zoomed out where one is set; one that does not zoom where it did not tell.
+    pub fn lens_or_fixed(&self, wide_fov_deg: Option<f64>) -> Lens {
+        match (self.lens(), wide_fov_deg) {
+            (Some(lens), Some(wide_deg)) => lens.with_wide_fov(wide_deg),
+            (Some(lens), None) => lens,
+            (None, wide_deg) => Lens::fixed(wide_deg.unwrap_or(ASSUMED_FOV_DEG)),
+        }
+    }
+
+    /// Horizontal field of view in degrees, zoomed out.
+    pub fn fov_zoomed_out_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
+        self.lens_or_fixed(wide_fov_deg).fov_deg(OPTICAL_STEPS.min)
+    }
+
+    /// Whether it told its field of view.
+    pub fn tells_fov(&self) -> bool {
+        self.limits.field_angle_deg.is_some()
+    }
+
+    /// The speed map it told, as it is without proportional speed.
+    pub fn told_speeds(&self) -> Option<SpeedMap> {
+        SpeedMap::through(&self.speeds)
+    }
+
+    /// The most degrees per second that proportional speed leaves at a field of view.
+    pub fn proportional_cap_deg_s(&self, fov_deg: f64) -> f64 {
+        self.max_fields_s.map_or(f64::INFINITY, |fields_of_view| fields_of_view * fov_deg)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::SpeedCurve;
+
+    fn camera(capabilities: Capabilities) -> CameraModel {
+        CameraModel { capabilities, ..CameraModel::new(SpeedMap::new(450.0, SpeedCurve::Cubic)) }
+    }
+
+    #[test]
+    fn field_of_view_follows_the_zoom() {
+        let limits = Limits { field_angle_deg: Some(Range { min: 3.2, max: 55.2 }), ..Limits::default() };
+        let mut told = camera(Capabilities { limits, ..Capabilities::default() });
+        assert!((told.fov_deg(None) - 55.2).abs() < 1e-9);
+        told.position.zoom_steps = Some(9999.0);
+        assert!((told.fov_deg(None) - 3.2).abs() < 1e-9);
+        // Set by hand: the widest, from which the lens narrows as it does.
+        let magnification = Lens::magnification_between(40.0, told.fov_deg(Some(40.0)));
+        assert!((magnification - Lens::magnification_between(55.2, 3.2)).abs() < 1e-9);
+        let silent = camera(Capabilities::default());
+        assert!((silent.fov_deg(None) - ASSUMED_FOV_DEG).abs() < 1e-9);
+        assert!((silent.fov_deg(Some(40.0)) - 40.0).abs() < 1e-9);
+        assert!(!silent.capabilities.tells_fov());
+    }
+
+    #[test]
+    fn a_told_magnification_outweighs_the_field_angles() {
+        let mut told = Capabilities { max_optical_magnification: Some(10.0), ..Capabilities::default() };
+        assert!((told.lens().unwrap().magnification(9999.0) - 10.0).abs() < 1e-9);
+        told.zooms = vec![TableRow { step: 1.0, value: 1.0 }, TableRow { step: 9999.0, value: 3.0 }];
+        assert!((told.lens().unwrap().magnification(9999.0) - 3.0).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,320 @@
+mod feedback;
+mod steering;
+
+use std::mem;
+use std::time::Duration;
+
+use crate::control::{
+    Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, PointToPoint, ZoomDrive,
+};
+use crate::estimation::{Estimates, Measurement, SelfCalibration, TargetEstimator, Visibility};
+use crate::model::{
+    CameraModel, Capabilities, CommandHistory, Delays, Lens, PanTilt, SpeedMap, View, magnified,
+};
+use crate::settings::{Mode, ServoSettings};
+
+/// Steers one camera: takes what is measured, says what the camera is to do, hears what became of that. It speaks with
+/// nobody, and has no clock: both are the caller's.
+#[derive(Debug)]
+pub struct Servo {
+    settings: ServoSettings,
+    camera: CameraModel,
+    calibration: SelfCalibration,
+    estimator: TargetEstimator,
+    controller: Controller,
+    limits: LimitEnforcer,
+    zoom: ZoomDrive,
+    moves: PointToPoint,
+    home: HomeReturn,
+    target: Option<Target>,
+}
+
+#[derive(Debug)]
+struct Target {
+    measurement: Measurement,
+    last_seen: Duration,
+    /// Whether the camera was steered by this measurement.
+    considered: bool,
+    /// Since when it is not known whether the camera is ours to follow it.
+    undecided_since: Option<Duration>,
+}
+
+impl Servo {
+    /// To be an oscillation, an offset goes so many dead zones beyond the middle: gait and tracker go beyond one.
+    const OSCILLATION_ZONES: f64 = 2.5;
+    /// And this part of the picture's width.
+    const OSCILLATION_LEAST: f64 = 0.04;
+
+    /// Knows nothing of the camera yet.
+    pub fn new(settings: ServoSettings) -> Self {
+        Self {
+            camera: CameraModel::new(settings.speed_map()),
+            calibration: SelfCalibration::new(settings.latency),
+            estimator: TargetEstimator::new(settings.prediction),
+            controller: Controller::default(),
+            limits: LimitEnforcer::default(),
+            zoom: ZoomDrive::default(),
+            moves: PointToPoint::default(),
+            home: HomeReturn::new(
+                settings.home.clone(),
+                settings.home_timeout,
+                settings.home_at_start,
+                settings.limits,
+            ),
+            target: None,
+            settings,
+        }
+    }
+
+    /// Takes new settings.
+    pub fn configure(&mut self, settings: ServoSettings) {
+        if settings.prediction != self.estimator.prediction() {
+            self.estimator = TargetEstimator::new(settings.prediction);
+        }
+        let before = mem::replace(&mut self.settings, settings);
+        let now = &self.settings;
+        self.home.configure(now.home.as_ref(), now.home_timeout, now.limits);
+        if !now.learn {
+            self.calibration = SelfCalibration::new(now.latency);
+        }
+        self.calibration.assume_latency(now.latency);
+        if now.fov_deg != before.fov_deg {
+            self.calibration.assume_field();
+        }
+        if now.speed_map() != before.speed_map() {
+            self.assume_speeds();
+        }
+        self.revise();
+    }
+
+    /// Takes the newest picture of the target. Returns what part of the gain is left where this shows that the loop
+    /// oscillates.
+    pub fn measure(
+        &mut self,
+        measurement: Measurement,
+        actuator: &ActuatorStatus,
+        now: Duration,
+    ) -> Option<f64> {
+        let last_seen = match (measurement.visibility, &self.target) {
+            (Visibility::Seen, _) => now,
+            (Visibility::Predicted, Some(target)) => target.last_seen,
+            (Visibility::Predicted, None) | (Visibility::Gone, _) => {
+                self.lose();
+                self.home.alone(now, now + self.settings.stale_timeout);
+                return None;
+            }
+        };
+        self.home.not_alone();
+        self.calibrate(&measurement, actuator, now);
+        self.measure_height(&measurement, actuator.mode);
+        let view = self.view(&measurement);
+        self.estimator.see(&measurement, &view, &self.camera.history, &self.delays());
+        let oscillates = self.oscillates(&measurement, &view);
+        let undecided_since = self.target.as_ref().and_then(|target| target.undecided_since);
+        self.target = Some(Target { measurement, last_seen, considered: false, undecided_since });
+        oscillates.then(|| self.controller.oscillation.gain_scale())
+    }
+
+    /// Learns of the camera what the picture shows, if nothing else moves it.
+    fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Duration) {
+        let zooms = self.zoom.moves(measurement.taken_at, &self.calibration.delays(), now);
+        if self.settings.learn && actuator.access == Access::Ours && !zooms {
+            let maps = [&self.assumed_speeds(), &self.camera.speed_map];
+            self.calibration.see(measurement, &self.view(measurement), &self.camera.history, maps);
+            self.revise();
+        }
+    }
+
+    /// Finds how tall the target is, to zoom by.
+    fn measure_height(&mut self, measurement: &Measurement, mode: Mode) {
+        let delays = self.delays();
+        // How much a picture is magnified nobody knows while a move to a position is under way.
+        let known = mode == Mode::Velocity || self.moves.shows_last_rest(measurement.taken_at, &delays);
+        if self.settings.target_height.is_some() && known {
+            self.zoom.see(measurement, &self.lens(), &delays);
+        }
+    }
+
+    /// Whether this is one half-cycle too many about the target.
+    fn oscillates(&mut self, measurement: &Measurement, view: &View) -> bool {
+        if self.target.as_ref().is_some_and(|target| target.measurement.id != measurement.id) {
+            self.controller.oscillation.clear();
+        }
+        let tolerated = (Self::OSCILLATION_ZONES * self.settings.dead_zone).max(Self::OSCILLATION_LEAST);
+        let tolerated_deg = self.zone_deg(view, tolerated);
+        // Told by the commands it would be no witness against them.
+        let by_itself = measurement.ego_velocity.map_or(PanTilt::default(), |_| self.estimator.pace());
+        let error = self.estimator.error();
+        self.controller.oscillation.see(error, by_itself, tolerated_deg, measurement.taken_at)
+    }
+
+    /// What the camera is to do now.
+    pub fn control(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+        if actuator.access == Access::Others {
+            // What moves it is theirs; what we last said must not outlive our hold on it.
+            return Actuation::Rest;
+        }
+        if !self.has_target(now) {
+            self.lose();
+        }
+        let Some(target) = &mut self.target else { return self.idle(actuator, now) };
+        if actuator.access == Access::Undecided {
+            target.undecided_since.get_or_insert(now);
+            return if self.undecided_until(now).is_some() { Actuation::Continue } else { Actuation::Rest };
+        }
+        target.undecided_since = None;
+        target.considered = true;
+        let measurement = target.measurement;
+        match actuator.mode {
+            Mode::Velocity => self.velocity(&measurement, actuator, now),
+            _ => self.point_to_point(&measurement, actuator, now),
+        }
+    }
+
+    /// Forgets the target; the camera is to be stopped, whatever it does.
+    pub fn release(&mut self) {
+        self.lose();
+        self.home.interrupt();
+    }
+
+    fn lose(&mut self) {
+        self.target = None;
+        self.estimator.clear();
+        self.controller.rest();
+        self.controller.oscillation.clear();
+        self.zoom.forget();
+    }
+
+    /// Whether there is a target that was seen lately.
+    pub fn has_target(&self, now: Duration) -> bool {
+        self.stale_at().is_some_and(|at| now < at)
+    }
+
+    /// Whether there is one, seen lately or not.
+    pub fn holds_target(&self) -> bool {
+        self.target.is_some()
+    }
+
+    /// Whether the newest measurement was not steered by.
+    pub fn is_behind(&self) -> bool {
+        self.target.as_ref().is_some_and(|target| !target.considered)
+    }
+
+    /// When the target will not have been seen for too long, where there is one.
+    pub fn stale_at(&self) -> Option<Duration> {
+        self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout)
+    }
+
+    /// Until when the camera goes on as it was last told, while it is found out whether it is ours.
+    pub fn undecided_until(&self, now: Duration) -> Option<Duration> {
+        const LONGEST: Duration = Duration::from_secs(1);
+        let since = self.target.as_ref()?.undecided_since?;
+        Some(since + LONGEST).filter(|until| now < *until)
+    }
+
+    /// What was set.
+    pub fn settings(&self) -> &ServoSettings {
+        &self.settings
+    }
+
+    /// The camera as it is known.
+    pub fn camera(&self) -> &CameraModel {
+        &self.camera
+    }
+
+    /// Where it goes without a target.
+    pub fn home(&mut self) -> &mut HomeReturn {
+        &mut self.home
+    }
+
+    /// Whether a move to a position is under way.
+    pub fn is_under_way(&self) -> bool {
+        self.moves.under_way()
+    }
+
+    /// Whether the zoom was last told to move.
+    pub fn is_zooming(&self, now: Duration) -> bool {
+        self.zoom.is_moving(now)
+    }
+
+    /// The speed steps that the zoom was told, as the pan of a history; `None`: it is anybody's to move.
+    pub fn zoom_commands(&self) -> Option<&CommandHistory> {
+        self.settings.target_height.map(|_| self.zoom.commands())
+    }
+
+    /// Whether the last wish was held back at a limit.
+    pub fn at_limit(&self) -> bool {
+        self.limits.at_limit()
+    }
+
+    /// The camera as it was learned.
+    pub fn estimates(&self) -> Estimates {
+        Estimates {
+            delays: self.calibration.delays(),
+            fov_deg: self.fov_deg(None),
+            map: self.camera.speed_map,
+        }
+    }
+
+    /// Horizontal field of view in degrees, where it is set, told or learned.
+    pub fn known_fov_deg(&self) -> Option<f64> {
+        let learned = self.calibration.field_factor() != 1.0;
+        let known = self.settings.fov_deg.is_some() || self.camera.capabilities.tells_fov() || learned;
+        // To a tenth of a degree: those who are told need not hear of every picture's.
+        known.then(|| (self.fov_deg(None) * 10.0).round() / 10.0)
+    }
+
+    fn delays(&self) -> Delays {
+        let delays = self.calibration.delays();
+        let uncertainty = if self.settings.learn { delays.uncertainty } else { Duration::ZERO };
+        Delays { uncertainty, ..delays }
+    }
+
+    fn view(&self, measurement: &Measurement) -> View {
+        let delays = self.delays();
+        // Since it told where it looks it has turned on; steep downwards a few degrees of tilt make much of pan.
+        let shown = delays.sent_by(measurement.taken_at);
+        let position = self.limits.position(&self.camera.history, delays.command, shown);
+        let tilt_deg = position.map(|position| position.tilt).or(self.camera.position.tilt_deg);
+        View {
+            horizontal_fov_deg: self.fov_deg(self.zoom.step_shown(measurement.taken_at, &delays)),
+            aspect: measurement.aspect,
+            tilt_deg: tilt_deg.unwrap_or(0.0),
+        }
+    }
+
+    /// How far off each axis may be for the target to be off the middle by a part of the picture's width.
+    fn zone_deg(&self, view: &View, part: f64) -> PanTilt {
+        view.turns(part * view.horizontal_fov_deg, self.estimator.error())
+    }
+
+    /// The field of view at a zoom step, or at the last told one.
+    fn fov_deg(&self, zoom_step: Option<f64>) -> f64 {
+        let assumed = match zoom_step {
+            Some(step) => self.lens().fov_deg(step),
+            None => self.camera.fov_deg(self.settings.fov_deg),
+        };
+        magnified(assumed, 1.0 / self.calibration.field_factor())
+    }
+
+    fn lens(&self) -> Lens {
+        self.camera.capabilities.lens_or_fixed(self.settings.fov_deg)
+    }
+
+    fn assume_speeds(&mut self) {
+        self.calibration.assume_speeds(self.camera.capabilities.told_speeds().is_some());
+    }
+
+    /// The speed map before anything is learned.
+    fn assumed_speeds(&self) -> SpeedMap {
+        self.camera.capabilities.told_speeds().unwrap_or_else(|| self.settings.speed_map())
+    }
+
+    /// Brings the speed map up to what is known by now.
+    fn revise(&mut self) {
+        let fov_deg = self.fov_deg(None);
+        let map = self.calibration.correct(&self.assumed_speeds(), fov_deg);
+        self.camera.speed_map = map.capped(self.camera.capabilities.proportional_cap_deg_s(fov_deg));
+        self.camera.history.revise(&self.camera.speed_map);
+    }
+}

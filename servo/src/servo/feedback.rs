@@ -1,0 +1,102 @@
+//! What became of an actuation, and what the camera told.
+
+use std::mem;
+use std::time::Duration;
+
+use super::{Access, Actuation, ActuatorStatus, Capabilities, Servo};
+use crate::model::{PanTilt, Position};
+
+impl Servo {
+    /// The camera accepted what was sent then: that is when it can begin to act, however late the answer is.
+    pub fn accepted(&mut self, actuation: &Actuation, sent: Duration, now: Duration) {
+        match actuation {
+            Actuation::Velocity { pan, tilt, zoom } => {
+                self.camera.history.push_steps(sent, (*pan, *tilt), &self.camera.speed_map);
+                if let Some(zoom) = zoom {
+                    self.zoom.commanded(sent, *zoom);
+                }
+            }
+            _ => self.camera.history.push(sent, PanTilt::default()),
+        }
+        if actuation.is_point_to_point() {
+            self.moves.begin(sent);
+        } else {
+            // A move under way, from before the mode was changed, is over.
+            self.moves.rest(now);
+        }
+        if actuation.is_rest() {
+            self.controller.speed_steps = (0, 0);
+        }
+        if self.home.leads(actuation) {
+            self.home.settled();
+        } else if !actuation.is_rest() {
+            self.home.strayed();
+        }
+    }
+
+    /// It may have acted on this, or may yet.
+    pub fn unanswered(&mut self, actuation: &Actuation, now: Duration) {
+        if let Actuation::Velocity { zoom: Some(zoom), .. } = actuation
+            && *zoom != 0
+        {
+            self.zoom.commanded(now, *zoom);
+        }
+    }
+
+    /// The camera told where it looked at a time, or does not tell. Returns whether it has arrived by this.
+    pub fn told_position(
+        &mut self,
+        position: Option<Position>,
+        at: Duration,
+        actuator: &ActuatorStatus,
+        now: Duration,
+    ) -> bool {
+        if let Some(position) = position {
+            self.take_position(position, at, actuator);
+        }
+        let delays = self.delays();
+        let arrived = self.moves.position(position, now, &delays);
+        if !self.moves.under_way() {
+            self.zoom.told(at, position.and_then(|position| position.zoom_steps), &delays);
+        }
+        // It came before this was known.
+        if let Some(measurement) = self.target.as_ref().map(|target| target.measurement).filter(|_| arrived) {
+            self.measure_height(&measurement, actuator.mode);
+        }
+        if position.is_some() {
+            self.revise();
+        }
+        arrived
+    }
+
+    fn take_position(&mut self, position: Position, at: Duration, actuator: &ActuatorStatus) {
+        let before = mem::replace(&mut self.camera.position, position);
+        self.home.positioned(position);
+        if position.zoom_steps != before.zoom_steps {
+            self.calibration.zoomed();
+        }
+        let Some(place) = position.pan_tilt() else { return };
+        if actuator.access == Access::Ours {
+            self.calibration.positioned(at, place);
+        }
+        self.limits.told(at, place);
+    }
+
+    /// The camera told what it can. What was learned by other assumptions is void; what is told once more is no other.
+    pub fn told_capabilities(&mut self, capabilities: Capabilities) {
+        if let Some(step) = capabilities.move_speed {
+            self.home.told_move_speed(step);
+        }
+        let before = mem::replace(&mut self.camera.capabilities, capabilities);
+        let now = &self.camera.capabilities;
+        let wide_deg = self.settings.fov_deg;
+        let other_field = now.fov_zoomed_out_deg(wide_deg) != before.fov_zoomed_out_deg(wide_deg);
+        if now.told_speeds() != before.told_speeds() {
+            self.assume_speeds();
+        }
+        if other_field {
+            self.calibration.assume_field();
+        }
+        self.revise();
+    }
+}

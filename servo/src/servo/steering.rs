@@ -1,0 +1,164 @@
+//! From the target's place to what the camera is to do.
+
+use std::time::Duration;
+
+use ptztrack_contract::Point;
+
+use super::{Access, Actuation, ActuatorStatus, Servo};
+use crate::control::{ControlLaw, Jump, ZoomGoal};
+use crate::estimation::Measurement;
+use crate::model::{PanTilt, View, around_deg, narrower};
+use crate::settings::Mode;
+
+impl Servo {
+    pub(super) fn velocity(
+        &mut self,
+        measurement: &Measurement,
+        actuator: &ActuatorStatus,
+        now: Duration,
+    ) -> Actuation {
+        let law = self.control_law(&self.view(measurement), actuator.interval);
+        let delays = self.delays();
+        let history = &self.camera.history;
+        let offset = self.estimator.offset(now, history, &delays);
+        let wanted = self.controller.rate(&offset, history.rate_at(now), &law);
+        let position = self.limits.position(history, delays.command, now);
+        let rate = self.limited(wanted, position, (delays.sum() + actuator.interval).as_secs_f64());
+        let (pan, tilt) = self.controller.quantise(rate, &self.camera.speed_map);
+        let zoom = self.zoom_speed(measurement, now);
+        Some(Actuation::Velocity { pan, tilt, zoom })
+            .filter(|actuation| !actuation.is_rest())
+            .unwrap_or(Actuation::Rest)
+    }
+
+    /// What the zoom is to do; `None` leaves it alone.
+    fn zoom_speed(&mut self, measurement: &Measurement, now: Duration) -> Option<i8> {
+        let delays = self.delays();
+        let lens = self.camera.capabilities.lens();
+        let wanted = self
+            .zoom_goal()
+            .zip(lens)
+            .and_then(|(goal, lens)| self.zoom.speed(&goal, &lens, measurement, &delays, now));
+        wanted.or(self.zoom.is_moving(now).then_some(0))
+    }
+
+    fn zoom_goal(&self) -> Option<ZoomGoal> {
+        let steps = narrower(self.camera.capabilities.limits.zoom_steps, self.settings.limits.zoom_steps);
+        Some(ZoomGoal { target_height: self.settings.target_height?, steps })
+    }
+
+    /// What of a motion from `position` the limits leave, if it goes on for so long.
+    fn limited(&mut self, motion: PanTilt, position: Option<PanTilt>, lasting_s: f64) -> PanTilt {
+        let hard = self.camera.capabilities.limits;
+        self.limits.apply(motion, position, (&hard, &self.settings.limits), lasting_s)
+    }
+
+    fn control_law(&self, view: &View, interval: Duration) -> ControlLaw {
+        let settings = &self.settings;
+        let interval_s = interval.as_secs_f64();
+        // No error is worth a move that would leave nearly as large a one on the other side.
+        let least_deg = 0.75 * self.camera.speed_map.deg_s(1) * interval_s;
+        let zone_deg = self.zone_deg(view, settings.dead_zone);
+        ControlLaw {
+            gain: settings.gain,
+            dead_zone_deg: PanTilt::new(zone_deg.pan.max(least_deg), zone_deg.tilt.max(least_deg)),
+            max_deg_s: settings.max_speed_deg_s,
+            max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
+        }
+    }
+
+    /// One step of [`Mode::Absolute`] or [`Mode::Centre`].
+    pub(super) fn point_to_point(
+        &mut self,
+        measurement: &Measurement,
+        actuator: &ActuatorStatus,
+        now: Duration,
+    ) -> Actuation {
+        if actuator.may_move && !self.moves.under_way() {
+            // By speed, before the mode was changed; or who knows, as a step went unanswered.
+            return Actuation::Rest;
+        }
+        let delays = self.delays();
+        if !self.moves.shows_rest(measurement.taken_at, &delays) {
+            return Actuation::Continue;
+        }
+        let view = self.view(measurement);
+        let error = self.estimator.error_at_effect(now, &self.camera.history, &delays);
+        let jump = self.jump(measurement, now);
+        let zooms = jump.is_some_and(|jump| jump.pressing);
+        let zone_deg = self.zone_deg(&view, self.settings.dead_zone);
+        let (pans, tilts) = (error.pan.abs() > zone_deg.pan, error.tilt.abs() > zone_deg.tilt);
+        if !pans && !tilts && !zooms {
+            return Actuation::Continue;
+        }
+        let position = self.camera.pan_tilt();
+        let turn = self.limited(error, position, 1.0);
+        // An axis that is at its end is no reason to correct the other by next to nothing.
+        let worth_it = pans && turn.pan != 0.0 || tilts && turn.tilt != 0.0;
+        if !worth_it && !zooms {
+            return Actuation::Continue;
+        }
+        match actuator.mode {
+            // What is wrong with the field of view made the angle of the place, and makes a place of it again.
+            Mode::Centre => centre(view.point_within(turn), measurement.size, jump.map(|jump| jump.factor)),
+            _ => position.map_or(Actuation::Continue, |position| {
+                let speed = self.camera.capabilities.move_speed;
+                absolute(position + turn, speed, jump.map(|jump| jump.step))
+            }),
+        }
+    }
+
+    /// How a step is to zoom: so that the height is right half way to the next one.
+    fn jump(&self, measurement: &Measurement, now: Duration) -> Option<Jump> {
+        let delays = self.delays();
+        let shown_after = now.saturating_sub(measurement.taken_at) + delays.sum();
+        let lead = shown_after + self.moves.interval(&delays) / 2;
+        self.zoom.jump(&self.zoom_goal()?, &self.camera.capabilities.lens()?, &delays, now, lead)
+    }
+
+    /// Without a target.
+    pub(super) fn idle(&self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+        if self.moves.under_way() && self.home.is_settled() {
+            return Actuation::Continue;
+        }
+        self.way_home(actuator, now).unwrap_or(Actuation::Rest)
+    }
+
+    /// Whether the camera is on its way home, or is to go there.
+    pub fn is_homeward(&self, actuator: &ActuatorStatus, now: Duration) -> bool {
+        self.moves.under_way() && self.home.is_settled() || self.way_home(actuator, now).is_some()
+    }
+
+    /// The move home, where it is time. A zoom that goes on at its own speed, or may yet begin to, is no part of that
+    /// move, and has to be ended first.
+    fn way_home(&self, actuator: &ActuatorStatus, now: Duration) -> Option<Actuation> {
+        let zooms = self.zoom.is_moving(now) || actuator.in_doubt;
+        self.home.due(now).filter(|_| actuator.access == Access::Ours && !zooms)
+    }
+}
+
+/// The actuation to bring a place in the picture of that size to its middle.
+fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Actuation {
+    let pixel = |place: f64, size: u32| {
+        let last = f64::from(size.saturating_sub(1));
+        // Saturates; inside the picture by the clamp.
+        (place * f64::from(size)).round().clamp(0.0, last) as u32
+    };
+    Actuation::Centre {
+        x: pixel(place.x, width),
+        y: pixel(place.y, height),
+        width,
+        height,
+        zoom_percent: magnify.map(|factor| (factor * 100.0).round() as u32),
+    }
+}
+
+/// The actuation to look there, the short way round.
+fn absolute(position: PanTilt, speed: Option<u8>, zoom: Option<u16>) -> Actuation {
+    Actuation::Absolute {
+        pan_deg: around_deg(0.0, position.pan),
+        tilt_deg: position.tilt.clamp(-180.0, 180.0),
+        speed: speed.unwrap_or(Actuation::FULL_SPEED),
+        zoom,
+    }
+}

@@ -1,0 +1,104 @@
+use std::time::Duration;
+
+use crate::control::Home;
+use crate::estimation::Prediction;
+use crate::model::{SoftLimits, SpeedCurve, SpeedMap};
+
+/// How the camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Continuously, by speed.
+    #[default]
+    Velocity,
+    /// From position to position: look, move, wait until at rest, look again.
+    Absolute,
+    /// Like `Absolute`, but the camera itself works out the angles.
+    Centre,
+}
+
+impl Mode {
+    /// As the property has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Absolute => "absolute",
+            Self::Centre => "centre",
+        }
+    }
+}
+
+/// Everything that can be set about the servo.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ServoSettings {
+    /// How the camera is to be moved, if it takes the words for that.
+    pub mode: Mode,
+    /// Degrees per second for a degree of error, 1/s.
+    pub gain: f64,
+    /// Offset from the middle that an axis at rest tolerates, as a part of the picture's width.
+    pub dead_zone: f64,
+    /// Degrees per second that neither axis exceeds.
+    pub max_speed_deg_s: f64,
+    /// Degrees per second that either axis' speed changes by in a second; a stop is at once.
+    pub max_acceleration_deg_s2: f64,
+    /// Commands per second at most; a stop does not wait for its turn.
+    pub max_rate_hz: f64,
+    /// From sending a command to the motion, and from light on the sensor to the picture's timestamp, together.
+    pub latency: Duration,
+    /// Horizontal field of view in degrees; `None`: what the camera says.
+    pub fov_deg: Option<f64>,
+    /// How the target's motion is carried forward.
+    pub prediction: Prediction,
+    /// The camera is stopped when the target was not seen for this long.
+    pub stale_timeout: Duration,
+    /// Degrees per second the camera does at speed step 100.
+    pub camera_speed_deg_s: f64,
+    /// How its speed grows up to there.
+    pub speed_curve: SpeedCurve,
+    /// How far the camera may be moved.
+    pub limits: SoftLimits,
+    /// The target's height that the zoom keeps, as a part of the picture's; `None` leaves the zoom as it is.
+    pub target_height: Option<f64>,
+    /// Whether latency, field of view and speed map are learned; the settings above are where that begins.
+    pub learn: bool,
+    /// Where the camera waits for a target; `None`: where the last one left it.
+    pub home: Option<Home>,
+    /// It goes there when nobody was there for this long, ...
+    pub home_timeout: Duration,
+    /// ... and as soon as it was met, unless somebody is there.
+    pub home_at_start: bool,
+    /// An operator who moves the camera keeps it until it was not moved for this long; zero: he is not looked for.
+    pub override_timeout: Duration,
+}
+
+impl ServoSettings {
+    /// The speed map of a camera that does not tell its own.
+    pub fn speed_map(&self) -> SpeedMap {
+        SpeedMap::new(self.camera_speed_deg_s, self.speed_curve)
+    }
+}
+
+impl Default for ServoSettings {
+    fn default() -> Self {
+        Self {
+            mode: Mode::default(),
+            gain: 2.0,
+            dead_zone: 0.03,
+            max_speed_deg_s: 100.0,
+            max_acceleration_deg_s2: 600.0,
+            max_rate_hz: 10.0,
+            latency: Duration::from_millis(200),
+            fov_deg: None,
+            prediction: Prediction::default(),
+            stale_timeout: Duration::from_secs(1),
+            camera_speed_deg_s: 450.0,
+            speed_curve: SpeedCurve::default(),
+            limits: SoftLimits::default(),
+            target_height: None,
+            learn: true,
+            home: None,
+            home_timeout: Duration::from_secs(10),
+            home_at_start: false,
+            override_timeout: Duration::from_secs(10),
+        }
+    }
+}

@@ -1,0 +1,408 @@
+use std::time::Duration;
+
+use servo::{CommandHistory, PanTilt};
+
+/// What was commanded.
+#[derive(Debug, Clone, Copy)]
+pub struct CommandedMotion<'a> {
+    /// Rates of pan and tilt.
+    pub pan_tilt: &'a CommandHistory,
+    /// Speed steps of the zoom, as the pan of a history; `None`: the zoom is anybody's.
+    pub zoom: Option<&'a CommandHistory>,
+}
+
+/// Tells from the positions a camera reports whether somebody else moves it.
+///
+/// A hand that is taken for the camera's own noise costs a moment of quarrel; one that is seen where there is none
+/// costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn or zoom
+/// of an axis in a direction that it was not told, of more than any noise, and still there when asked again.
+#[derive(Debug, Default)]
+pub struct OperatorDetector {
+    /// Where the camera has stood since it last moved at our word, and when it was last asked.
+    place: Option<Place>,
+    /// One turn of the camera was seen that is ours, or none: what follows is not its way of starting up.
+    armed: bool,
+    suspects: bool,
+    /// Until then it may turn any way at our word.
+    excused_until: Duration,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    position: PanTilt,
+    zoom_steps: Option<f64>,
+    asked: Duration,
+}
+
+impl Place {
+    /// This, but where the camera was before.
+    fn seen_from(self, before: &Self) -> Self {
+        // Where the zoom was is forgotten while it is anybody's.
+        let zoom_steps = self.zoom_steps.map(|now| before.zoom_steps.unwrap_or(now));
+        Self { position: before.position, zoom_steps, ..self }
+    }
+}
+
+/// What a position tells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// Nothing that we, or nobody, could not have done.
+    Ours,
+    /// Something; the camera is to be asked again before anything else.
+    Suspicious,
+    /// Somebody else moves it.
+    Foreign,
+}
+
+impl OperatorDetector {
+    /// Turns up to this come from noise, from whole degrees told, from an end that springs back.
+    const TOLERANCE_DEG: f64 = 1.5;
+
+    /// So do zooms up to this, and from a lens that settles: 1 % of its travel.
+    const TOLERANCE_ZOOM_STEPS: f64 = 100.0;
+
+    /// A command acts no later than this, rest included, and positions are no older.
+    const LATEST: Duration = Duration::from_secs(2);
+
+    /// Of a moving camera that was not asked for longer, nobody can tell which way it went.
+    const LONGEST: Duration = Duration::from_secs(3);
+
+    /// A pan by more may have gone either way round.
+    const CLEAR_DEG: f64 = 90.0;
+
+    /// Tilted this steeply, a camera may swing round by itself to keep the picture upright (AutoFlip).
+    const STEEP_DEG: f64 = 75.0;
+
+    /// Judges a position that was asked for and answered then.
+    pub fn position(
+        &mut self,
+        (position, zoom_steps): (PanTilt, Option<f64>),
+        (asked, answered): (Duration, Duration),
+        commands: CommandedMotion,
+    ) -> Verdict {
+        let zoom_steps = commands.zoom.and(zoom_steps);
+        let place = Place { position, zoom_steps, asked };
+        let Some(before) = self.place else {
+            self.place = Some(place);
+            return Verdict::Ours;
+        };
+        if self.explains(&before, &place, answered, commands) {
+            let alone = before.asked > self.excused_until && is_still(&before, answered, commands);
+            // What turns slowly by somebody's hand turns far in time.
+            let place = if alone { place.seen_from(&before) } else { place };
+            *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
+            return Verdict::Ours;
+        }
+        if !self.armed {
+            self.place = Some(place);
+            return Verdict::Ours;
+        }
+        if !self.suspects {
+            self.suspects = true;
+            return Verdict::Suspicious;
+        }
+        *self = Self { place: Some(place), suspects: false, ..*self };
+        Verdict::Foreign
+    }
+
+    /// At this time the camera may turn any way at our word.
+    pub fn excuse(&mut self, now: Duration) {
+        self.excused_until = self.excused_until.max(now + Self::LATEST);
+    }
+
+    /// The camera was out of sight: what it did meanwhile, and does until it is seen at rest, is nobody's.
+    pub fn forget(&mut self) {
+        *self = Self { excused_until: self.excused_until, ..Self::default() };
+    }
+
+    /// The position that was to decide did not come: whoever moved it will be noticed again.
+    pub fn undecided(&mut self) {
+        self.suspects = false;
+    }
+
+    /// Whether the next position decides.
+    pub fn suspects(&self) -> bool {
+        self.suspects
+    }
+
+    fn explains(&self, before: &Place, place: &Place, answered: Duration, commands: CommandedMotion) -> bool {
+        if before.asked <= self.excused_until {
+            return true;
+        }
+        let since = before.asked.saturating_sub(Self::LATEST);
+        explains_turn(before, place, (since, answered), commands.pan_tilt)
+            && commands.zoom.is_none_or(|zoom| explains_zoom(before, place, (since, answered), zoom))
+    }
+}
+
+/// Whether no command could move the camera since then.
+fn is_still(before: &Place, answered: Duration, commands: CommandedMotion) -> bool {
+    let since = before.asked.saturating_sub(OperatorDetector::LATEST);
+    let rests =
+        |history: &CommandHistory| history.rates_between(since, answered).all(|rate| rate.largest() == 0.0);
+    rests(commands.pan_tilt) && commands.zoom.is_none_or(rests)
+}
+
+fn explains_turn(
+    before: &Place,
+    place: &Place,
+    (since, answered): (Duration, Duration),
+    commands: &CommandHistory,
+) -> bool {
+    let turn = before.position.turn_to(place.position);
+    let rates: Vec<PanTilt> = commands.rates_between(since, answered).collect();
+    let still = rates.iter().all(|rate| rate.largest() == 0.0);
+    if !still {
+        let steep = before.position.tilt.abs().max(place.position.tilt.abs()) > OperatorDetector::STEEP_DEG;
+        let long = answered.saturating_sub(before.asked) > OperatorDetector::LONGEST;
+        if steep || long {
+            return true;
+        }
+    }
+    let commanded = commands.rotation(since, answered);
+    let unclear = !still && turn.pan.abs().max(commanded.pan.abs()) > OperatorDetector::CLEAR_DEG;
+    let tolerance = OperatorDetector::TOLERANCE_DEG;
+    (unclear || told(turn.pan, tolerance, rates.iter().map(|rate| rate.pan)))
+        && told(turn.tilt, tolerance, rates.iter().map(|rate| rate.tilt))
+}
+
+fn explains_zoom(
+    before: &Place,
+    place: &Place,
+    (since, answered): (Duration, Duration),
+    commands: &CommandHistory,
+) -> bool {
+    let zoomed = before.zoom_steps.zip(place.zoom_steps).map_or(0.0, |(from, to)| to - from);
+    let speeds = commands.rates_between(since, answered).map(|rate| rate.pan);
+    told(zoomed, OperatorDetector::TOLERANCE_ZOOM_STEPS, speeds)
+}
+
+/// Whether an axis was told to move that way at any time.
+fn told(moved: f64, tolerance: f64, mut rates: impl Iterator<Item = f64>) -> bool {
+    moved.abs() <= tolerance || rates.any(|rate| rate * moved > 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use servo::around_deg;
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// A watch that is told positions, one a second, each answered after 100 ms.
+    #[derive(Default)]
+    struct Rig {
+        watch: OperatorDetector,
+        commands: CommandHistory,
+        zooms: CommandHistory,
+        zoom_steps: f64,
+        now: Duration,
+    }
+
+    impl Rig {
+        fn armed() -> Self {
+            let mut rig = Self { now: ms(10_000), ..Self::default() };
+            assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+            assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+            rig
+        }
+
+        fn tell(&mut self, pan: f64, tilt: f64) -> Verdict {
+            self.tell_after(ms(1000), pan, tilt)
+        }
+
+        fn tell_after(&mut self, wait: Duration, pan: f64, tilt: f64) -> Verdict {
+            self.now += wait;
+            let asked = self.now.saturating_sub(ms(100));
+            let place = (PanTilt::new(pan, tilt), Some(self.zoom_steps));
+            let commands = CommandedMotion { pan_tilt: &self.commands, zoom: Some(&self.zooms) };
+            self.watch.position(place, (asked, self.now), commands)
+        }
+
+        fn command(&mut self, pan: f64, tilt: f64) {
+            self.commands.push(self.now, PanTilt::new(pan, tilt));
+        }
+    }
+
+    #[test]
+    fn a_resting_camera_that_turns_is_moved_by_somebody() {
+        for (pan, tilt) in [(10.0, 0.0), (-2.0, 0.0), (0.0, 3.0), (170.0, -80.0)] {
+            let mut rig = Rig::armed();
+            assert_eq!(rig.tell(pan, tilt), Verdict::Suspicious);
+            assert!(rig.watch.suspects());
+            assert_eq!(rig.tell_after(ms(100), pan, tilt), Verdict::Foreign);
+            assert_eq!(rig.tell(pan, tilt), Verdict::Ours, "it rests there");
+        }
+    }
+
+    #[test]
+    fn a_hand_that_turns_slowly_is_noticed_too() {
+        for (pan, tilt, zoom) in [(0.4, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 30.0)] {
+            let mut rig = Rig::armed();
+            let verdicts: Vec<Verdict> = (1..=5)
+                .map(|second| {
+                    let turned = f64::from(second);
+                    rig.zoom_steps = zoom * turned;
+                    rig.tell(pan * turned, tilt * turned)
+                })
+                .collect();
+            assert_eq!(verdicts[2..], [Verdict::Ours, Verdict::Suspicious, Verdict::Foreign]);
+        }
+    }
+
+    #[test]
+    fn a_camera_that_turns_against_its_command_is_moved_by_somebody() {
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell(4.0, 0.0), Verdict::Ours);
+        assert_eq!(rig.tell(-3.0, 0.0), Verdict::Suspicious);
+        assert_eq!(rig.tell_after(ms(100), -4.0, 0.0), Verdict::Foreign);
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell(5.0, 4.0), Verdict::Suspicious, "an axis that was told nothing");
+    }
+
+    #[test]
+    fn a_zoom_that_was_not_told_is_somebodys_and_one_that_was_is_ours() {
+        let mut rig = Rig::armed();
+        rig.zooms.push(rig.now, PanTilt::new(40.0, 0.0));
+        rig.zoom_steps = 900.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
+        rig.zoom_steps = 300.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious, "the other way");
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Foreign);
+        rig.zooms.push(rig.now, PanTilt::default());
+        rig.now += ms(10_000);
+        rig.tell(0.0, 0.0);
+        rig.zoom_steps = 390.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours, "it settles");
+        rig.zoom_steps = 900.0;
+        assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious);
+    }
+
+    #[test]
+    fn where_the_zoom_is_anybodys_it_tells_nothing() {
+        let mut watch = OperatorDetector::default();
+        let commands = CommandHistory::default();
+        for second in 1..20 {
+            let place = (PanTilt::default(), Some(500.0 * second as f64));
+            let asked = ms(1000 * second);
+            let commands = CommandedMotion { pan_tilt: &commands, zoom: None };
+            assert_eq!(watch.position(place, (asked, asked), commands), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn one_wrong_answer_is_no_operator() {
+        let mut rig = Rig::armed();
+        for _ in 0..10 {
+            assert_eq!(rig.tell(60.0, -20.0), Verdict::Suspicious);
+            assert_eq!(rig.tell_after(ms(100), 0.0, 0.0), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn an_operator_is_noticed_later_where_the_deciding_answer_failed() {
+        let mut rig = Rig::armed();
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Suspicious);
+        rig.watch.undecided();
+        assert!(!rig.watch.suspects());
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Suspicious);
+        assert_eq!(rig.tell(10.0, 0.0), Verdict::Foreign);
+    }
+
+    #[test]
+    fn a_camera_at_its_end_is_no_operator() {
+        let mut rig = Rig::armed();
+        rig.command(30.0, 0.0);
+        for pan in [20.0, 20.0, 19.2, 20.0, 20.0] {
+            assert_eq!(rig.tell(pan, 0.0), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn whole_degrees_are_no_operator() {
+        let mut rig = Rig::armed();
+        for second in 0..60 {
+            assert_eq!(rig.tell(f64::from(second % 2), f64::from(second % 3 - 1) * 0.7), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn a_camera_out_of_sight_may_come_back_anywhere_and_turn_to_find_its_zero() {
+        let mut rig = Rig::armed();
+        rig.watch.forget();
+        for pan in [120.0, -60.0, 170.0, 20.0, 0.0, 0.0] {
+            assert_eq!(rig.tell(pan, 0.0), Verdict::Ours);
+        }
+        assert_eq!(rig.tell(5.0, 0.0), Verdict::Suspicious, "that was at rest");
+    }
+
+    #[test]
+    fn a_move_of_unknown_course_is_excused_while_it_may_last() {
+        let mut rig = Rig::armed();
+        rig.watch.excuse(rig.now);
+        assert_eq!(rig.tell(40.0, 5.0), Verdict::Ours);
+        assert_eq!(rig.tell(60.0, 5.0), Verdict::Ours);
+        rig.tell(60.0, 5.0);
+        rig.tell(60.0, 5.0);
+        assert_eq!(rig.tell(20.0, 5.0), Verdict::Suspicious);
+    }
+
+    #[test]
+    fn where_an_excused_move_began_is_no_place_to_stand() {
+        let mut rig = Rig::armed();
+        rig.watch.excuse(rig.now + ms(6000));
+        assert_eq!(rig.tell_after(ms(5000), 0.0, 0.0), Verdict::Ours);
+        // It acted late.
+        for _ in 0..5 {
+            assert_eq!(rig.tell_after(ms(5000), 12.0, 0.0), Verdict::Ours);
+        }
+    }
+
+    #[test]
+    fn flips_and_long_silences_of_a_moving_camera_say_nothing() {
+        let mut rig = Rig::armed();
+        rig.command(0.0, -20.0);
+        assert_eq!(rig.tell(175.0, -80.0), Verdict::Ours, "AutoFlip");
+        let mut rig = Rig::armed();
+        rig.command(5.0, 0.0);
+        assert_eq!(rig.tell_after(ms(5000), -80.0, 0.0), Verdict::Ours);
+    }
+
+    proptest! {
+        /// Whatever we command: late by up to the longest latency, and as fast or slow as it will, it is ours.
+        #[test]
+        fn our_own_commands_are_no_operator(
+            moves in prop::collection::vec((-60.0..60.0f64, -30.0..30.0f64, 1u32..20), 1..12),
+            latency_steps in 0usize..19, slow_or_fast in 0.1..1.4f64, end in 15.0..200.0f64,
+            coarse in prop::sample::select(vec![0.001, 0.1, 1.0]), noise in 0.0..0.2f64,
+        ) {
+            const STEP: Duration = Duration::from_millis(100);
+            let mut rig = Rig::armed();
+            let (mut at, mut late) = (PanTilt::default(), vec![PanTilt::default(); latency_steps]);
+            let wobble = |tick: u64| noise * if tick.is_multiple_of(3) { 1.0 } else { -1.0 };
+            let mut ticks = 0u64;
+            for (pan, tilt, steps) in moves.into_iter().chain([(0.0, 0.0, 60)]) {
+                rig.command(pan, tilt);
+                for _ in 0..steps {
+                    late.push(PanTilt::new(pan, tilt));
+                    let rate = late.remove(0) * slow_or_fast;
+                    at = at + rate * STEP.as_secs_f64();
+                    at = PanTilt::new(at.pan.clamp(-end, end), at.tilt.clamp(-70.0, 20.0));
+                    ticks += 1;
+                    if ticks.is_multiple_of(10) {
+                        let told = |angle: f64| ((angle + wobble(ticks / 10)) / coarse).round() * coarse;
+                        let told_pan = around_deg(0.0, told(at.pan));
+                        prop_assert_eq!(rig.tell_after(STEP, told_pan, told(at.tilt)), Verdict::Ours);
+                    } else {
+                        rig.now += STEP;
+                    }
+                }
+            }
+        }
+    }
+}

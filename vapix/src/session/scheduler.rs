@@ -1,0 +1,220 @@
+use std::time::Duration;
+
+use crate::wire::Command;
+
+/// When to say what to the camera: the newest only, not too often, nothing twice, stops first and
+/// until they are confirmed.
+#[derive(Debug)]
+pub struct Scheduler {
+    accepted: Option<(Command, Duration)>,
+    last_attempt: Option<Duration>,
+    /// A move was sent that may have had an effect, and no stop was confirmed since.
+    may_move: bool,
+    stop_tried: bool,
+    /// A move went unanswered: it may still act until then, even after a stop.
+    doubt_until: Option<Duration>,
+    /// The words that end the last move, whatever the mode is by now.
+    stop: Command,
+    /// How long the last command took.
+    round_trip: Duration,
+}
+
+impl Default for Scheduler {
+    fn default() -> Self {
+        Self {
+            accepted: None,
+            last_attempt: None,
+            may_move: false,
+            stop_tried: false,
+            doubt_until: None,
+            stop: Command::Halt,
+            round_trip: Duration::ZERO,
+        }
+    }
+}
+
+impl Scheduler {
+    /// An accepted move is repeated this often, in case somebody else's command came in between.
+    const KEEP_ALIVE: Duration = Duration::from_secs(2);
+
+    /// A camera that answers a command later than this is not expected to act on it any more.
+    pub const DOUBT: Duration = Duration::from_secs(6);
+
+    /// When to send a stop; `None`: no need to.
+    pub fn stop_due(&self, now: Duration, interval: Duration, retry_at: Duration) -> Option<Duration> {
+        if !self.may_move {
+            return self.doubt_until.map(|until| until.max(retry_at));
+        }
+        Some(if self.stop_tried { self.next_slot(interval).max(retry_at) } else { now })
+    }
+
+    /// When to send this move.
+    pub fn move_due(&self, command: &Command, interval: Duration, retry_at: Duration) -> Duration {
+        let repeat = match self.accepted {
+            Some((accepted, at)) if accepted == *command => at + Self::KEEP_ALIVE,
+            _ => Duration::ZERO,
+        };
+        repeat.max(self.next_slot(interval)).max(retry_at)
+    }
+
+    fn next_slot(&self, interval: Duration) -> Duration {
+        self.last_attempt.map_or(Duration::ZERO, |last| last + interval)
+    }
+
+    /// A command is being sent.
+    pub fn attempted(&mut self, command: &Command, now: Duration) {
+        self.last_attempt = Some(now);
+        self.stop_tried = command.is_stop();
+        match command {
+            _ if command.is_stop() => {}
+            Command::Velocity { zoom: Some(_), .. } => self.stop = Command::REST,
+            // A zoom goes on until it is told otherwise.
+            Command::Velocity { .. } if self.stop == Command::REST => {}
+            Command::Velocity { .. } => self.stop = Command::Halt,
+            Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
+                self.stop = Command::Stop;
+            }
+            Command::Halt | Command::Stop => {}
+        }
+    }
+
+    /// What ends the last move.
+    pub fn stop(&self) -> Command {
+        self.stop
+    }
+
+    /// The camera is to be stopped by these words.
+    pub fn stop_by(&mut self, stop: Command) {
+        self.stop = stop;
+    }
+
+    /// How long the last command took.
+    pub fn round_trip(&self) -> Duration {
+        self.round_trip
+    }
+
+    /// The camera said yes to what was sent then.
+    pub fn accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
+        self.round_trip = now.saturating_sub(sent);
+        self.accepted = Some((*command, now));
+        self.may_move = !command.is_stop();
+        if self.doubt_until.is_some_and(|until| until <= now) {
+            self.doubt_until = None;
+        }
+        let zoom_rests = matches!(command, Command::Velocity { zoom: Some(0), .. });
+        if zoom_rests && self.stop == Command::REST && !self.in_doubt() {
+            self.stop = Command::Halt;
+        }
+    }
+
+    /// It did not; `may_have_acted` where that does not mean that nothing happened.
+    pub fn failed(&mut self, command: &Command, may_have_acted: bool, now: Duration) {
+        if may_have_acted {
+            // What the camera does is unknown: the same command is worth sending again.
+            self.accepted = None;
+            if !command.is_stop() {
+                self.may_move = true;
+                self.doubt_until = Some(now + Self::DOUBT);
+            }
+        }
+    }
+
+    /// A move to a position has ended by itself; from here the same words mean another move.
+    pub fn arrived(&mut self) {
+        self.accepted = None;
+        self.may_move = false;
+    }
+
+    /// It moves at the word of somebody who is not there any more.
+    pub fn found_moving(&mut self, stop: Command) {
+        self.stop = stop;
+        self.may_move = true;
+        self.stop_tried = false;
+    }
+
+    /// The same, and not all that he said may have been acted on yet.
+    pub fn inherited(&mut self, stop: Command, now: Duration) {
+        self.found_moving(stop);
+        self.doubt_until = Some(now + Self::DOUBT);
+    }
+
+    /// Whether the camera may be moving on our behalf.
+    pub fn may_move(&self) -> bool {
+        self.may_move
+    }
+
+    /// Whether it may yet act on a move that went unanswered, even where it is at rest.
+    pub fn in_doubt(&self) -> bool {
+        self.doubt_until.is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const INTERVAL: Duration = Duration::from_millis(100);
+    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false };
+    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0, zoom: None, free: false };
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    fn accept(scheduler: &mut Scheduler, command: Command, at: Duration) {
+        scheduler.attempted(&command, at);
+        scheduler.accepted(&command, at, at);
+    }
+
+    #[test]
+    fn a_camera_never_moved_needs_no_stop() {
+        assert_eq!(Scheduler::default().stop_due(ms(5), INTERVAL, ms(0)), None);
+    }
+
+    #[test]
+    fn moves_keep_their_distance_and_stops_do_not() {
+        let mut scheduler = Scheduler::default();
+        assert!(scheduler.move_due(&RIGHT, INTERVAL, ms(0)) <= ms(1000));
+        accept(&mut scheduler, RIGHT, ms(1000));
+        assert_eq!(scheduler.move_due(&LEFT, INTERVAL, ms(0)), ms(1100));
+        assert_eq!(scheduler.stop_due(ms(1001), INTERVAL, ms(0)), Some(ms(1001)));
+    }
+
+    #[test]
+    fn a_move_is_not_repeated_before_its_keep_alive() {
+        let mut scheduler = Scheduler::default();
+        accept(&mut scheduler, RIGHT, ms(1000));
+        assert_eq!(scheduler.move_due(&RIGHT, INTERVAL, ms(0)), ms(3000));
+    }
+
+    #[test]
+    fn a_stop_is_repeated_until_the_camera_says_yes() {
+        let mut scheduler = Scheduler::default();
+        accept(&mut scheduler, RIGHT, ms(0));
+        scheduler.attempted(&Command::Halt, ms(500));
+        scheduler.failed(&Command::Halt, true, ms(600));
+        assert_eq!(scheduler.stop_due(ms(600), INTERVAL, ms(725)), Some(ms(725)));
+        accept(&mut scheduler, Command::Halt, ms(725));
+        assert_eq!(scheduler.stop_due(ms(800), INTERVAL, ms(0)), None);
+        assert!(!scheduler.may_move());
+    }
+
+    #[test]
+    fn a_refused_move_needs_no_stop() {
+        let mut scheduler = Scheduler::default();
+        scheduler.attempted(&RIGHT, ms(0));
+        scheduler.failed(&RIGHT, false, ms(10));
+        assert_eq!(scheduler.stop_due(ms(10), INTERVAL, ms(0)), None);
+    }
+
+    #[test]
+    fn after_an_unanswered_move_the_stop_is_said_twice() {
+        let mut scheduler = Scheduler::default();
+        scheduler.attempted(&RIGHT, ms(0));
+        scheduler.failed(&RIGHT, true, ms(2000));
+        accept(&mut scheduler, Command::Halt, ms(2100));
+        assert_eq!(scheduler.stop_due(ms(2100), INTERVAL, ms(0)), Some(ms(8000)));
+        accept(&mut scheduler, Command::Halt, ms(8000));
+        assert_eq!(scheduler.stop_due(ms(8000), INTERVAL, ms(0)), None);
+    }
+}

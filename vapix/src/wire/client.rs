@@ -1,0 +1,291 @@
+use std::time::Duration;
+
+use reqwest::header::{AUTHORIZATION, HeaderMap, LOCATION};
+use reqwest::{Response, StatusCode, redirect};
+use servo::{Limits, Position, Presets};
+
+use super::auth::Authenticator;
+use super::cookies::Cookies;
+use super::location::without_user_info;
+use super::text::{complaint, excerpt, unexpected};
+use super::{
+    Attributes, Command, Credentials, Error, Location, Parameters, QueuePlace, QueueRequest, Trust,
+    parse_limits, parse_move_speed, parse_position, parse_presets,
+};
+
+/// Longest answer that is read; a full PTZ parameter list is a few kilobytes.
+const MAX_BODY_BYTES: usize = 64 * 1024;
+
+/// Requests that one exchange may take: a redirect, a closed connection, a challenge and a stale one.
+const MAX_ATTEMPTS: usize = 5;
+
+/// How a camera is spoken to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ClientSettings {
+    /// Where it is.
+    pub location: Location,
+    /// Its video channel, from 1.
+    pub camera: u32,
+    /// Who we are.
+    pub credentials: Option<Credentials>,
+    /// Longest time for one answer.
+    pub timeout: Duration,
+    /// Whose certificates are believed.
+    pub trust: Trust,
+}
+
+/// One camera. Every request takes `&mut self`: there is at most one in flight.
+#[derive(Debug)]
+pub struct Client {
+    settings: ClientSettings,
+    http: reqwest::Client,
+    authenticator: Authenticator,
+    cookies: Cookies,
+    /// Set once user and password were refused: asking again could lock the account.
+    locked_out: bool,
+    /// Set once the camera did something for this user and password: what it refuses then is not for them.
+    accepted: bool,
+    /// Whether the connection may be one that the camera has closed since its last answer.
+    connected: bool,
+}
+
+/// A complete answer.
+struct Answer {
+    status: StatusCode,
+    body: String,
+}
+
+impl Client {
+    /// Prepares to speak to a camera; nothing is sent yet.
+    ///
+    /// # Errors
+    /// [`Error::Tls`] where `trust` cannot be used.
+    pub fn new(settings: ClientSettings) -> Result<Self, Error> {
+        Ok(Self {
+            http: http_client(&settings)?,
+            authenticator: Authenticator::new(settings.credentials.clone()),
+            cookies: Cookies::default(),
+            settings,
+            locked_out: false,
+            accepted: false,
+            connected: false,
+        })
+    }
+
+    /// Takes another user or password, and asks again even where the last were refused.
+    pub fn set_credentials(&mut self, credentials: Option<Credentials>) {
+        self.authenticator = Authenticator::new(credentials.clone());
+        self.settings.credentials = credentials;
+        (self.locked_out, self.accepted) = (false, false);
+    }
+
+    /// Commands a move. `Ok` means that the camera accepted it, not that it has finished.
+    ///
+    /// # Errors
+    /// Any; see [`Error::may_have_acted`].
+    pub async fn send(&mut self, command: &Command) -> Result<(), Error> {
+        let target = format!("/axis-cgi/com/ptz.cgi?camera={}&{command}", self.settings.camera);
+        let answer = self.get(&target).await?;
+        match answer.status {
+            StatusCode::NO_CONTENT => Ok(()),
+            // 200 in answer to a move is a refusal, whatever it says.
+            _ => Err(complaint(&answer.body).map_or_else(|| unexpected(&answer.body), Error::Camera)),
+        }
+    }
+
+    /// Asks where the camera looks.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn position(&mut self) -> Result<Position, Error> {
+        parse_position(&self.query("position").await?)
+    }
+
+    /// Asks how far the camera can look.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn limits(&mut self) -> Result<Limits, Error> {
+        parse_limits(&self.query("limits").await?)
+    }
+
+    /// Asks for the camera's PTZ parameters.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn parameters(&mut self) -> Result<Parameters, Error> {
+        let answer = self.get("/axis-cgi/param.cgi?action=list&group=PTZ").await?;
+        Parameters::parse(&answer.body, self.settings.camera)
+    }
+
+    /// Asks what the camera's steps mean.
+    ///
+    /// # Errors
+    /// Any; [`Error::Camera`] where the firmware does not know.
+    pub async fn attributes(&mut self) -> Result<Attributes, Error> {
+        Attributes::parse(&self.query("attributes").await?)
+    }
+
+    /// Asks for the speed step of moves to a position.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn move_speed(&mut self) -> Result<u8, Error> {
+        parse_move_speed(&self.query("speed").await?)
+    }
+
+    /// Asks which presets the camera has.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn presets(&mut self) -> Result<Presets, Error> {
+        parse_presets(&self.query("presetposcam").await?)
+    }
+
+    /// Asks for control where the camera has a control queue. `None`: accepted without a place.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn queue(&mut self, request: QueueRequest) -> Result<Option<QueuePlace>, Error> {
+        let target = format!("/axis-cgi/com/ptzqueue.cgi?control={request}&camera={}", self.settings.camera);
+        let answer = self.get(&target).await?;
+        let accepted = answer.status == StatusCode::NO_CONTENT;
+        if accepted { Ok(None) } else { QueuePlace::parse(&answer.body).map(Some) }
+    }
+
+    async fn query(&mut self, what: &str) -> Result<String, Error> {
+        let target = format!("/axis-cgi/com/ptz.cgi?camera={}&query={what}", self.settings.camera);
+        let answer = self.get(&target).await?;
+        match complaint(&answer.body) {
+            Some(text) => Err(Error::Camera(text)),
+            None if answer.body.trim().is_empty() => Err(Error::NoPtz),
+            None => Ok(answer.body),
+        }
+    }
+
+    /// One exchange: the answer to a GET of this path and query, with the challenges, the redirect to
+    /// the camera's own HTTPS and the closed connection that may lie in between.
+    async fn get(&mut self, target: &str) -> Result<Answer, Error> {
+        if self.locked_out {
+            return Err(self.bad_credentials());
+        }
+        // Whether the signature answers a challenge of this very exchange.
+        let mut signed_fresh = false;
+        for _ in 0..MAX_ATTEMPTS {
+            let response = match self.request(target).await {
+                Err(Error::Broken(_)) if self.connected => {
+                    self.connected = false;
+                    continue;
+                }
+                other => other?,
+            };
+            let status = response.status();
+            if status == StatusCode::UNAUTHORIZED {
+                let stale = self.authenticator.challenged(response.headers())?;
+                if signed_fresh && !stale {
+                    self.locked_out = !self.accepted;
+                    return Err(if self.accepted { self.not_permitted() } else { self.bad_credentials() });
+                }
+                signed_fresh = true;
+                // Read to its end, so that the connection can carry the answer to the challenge.
+                if let Err(err @ Error::Timeout(_)) = self.body(response).await {
+                    return Err(err);
+                }
+            } else if status.is_redirection() {
+                self.follow(&response)?;
+            } else if status.is_success() {
+                self.accepted |= self.authenticator.is_signing();
+                let body = self.body(response).await?;
+                return Ok(Answer { status, body });
+            } else {
+                let reason = status.canonical_reason().unwrap_or("");
+                return Err(Error::Status { status: status.as_u16(), reason });
+            }
+        }
+        Err(Error::Unexpected("challenged or redirected again and again".to_owned()))
+    }
+
+    async fn request(&mut self, target: &str) -> Result<Response, Error> {
+        let url = self.settings.location.join(target)?;
+        let mut request = self.http.get(url);
+        if let Some(authorization) = self.authenticator.authorization(target)? {
+            request = request.header(AUTHORIZATION, authorization);
+        }
+        let mut headers = HeaderMap::new();
+        self.cookies.put(&mut headers);
+        let response = request.headers(headers).send().await.map_err(|err| self.failure(&err))?;
+        self.cookies.take(response.headers());
+        self.connected = true;
+        Ok(response)
+    }
+
+    /// The body as text, bounded; what is not UTF-8 is replaced, as it is only searched for keys.
+    async fn body(&self, mut response: Response) -> Result<String, Error> {
+        let mut body = Vec::new();
+        while let Some(chunk) = response.chunk().await.map_err(|err| self.failure(&err))? {
+            if body.len() + chunk.len() > MAX_BODY_BYTES {
+                return Err(Error::TooLong(MAX_BODY_BYTES));
+            }
+            body.extend_from_slice(&chunk);
+        }
+        Ok(String::from_utf8_lossy(&body).into_owned())
+    }
+
+    fn follow(&mut self, response: &Response) -> Result<(), Error> {
+        let redirect = response.headers().get(LOCATION).and_then(|value| value.to_str().ok()).unwrap_or("");
+        let Some(location) = self.settings.location.upgraded_by(redirect) else {
+            let target = redirect.split('?').next().unwrap_or("");
+            return Err(Error::Redirected(excerpt(&without_user_info(target))));
+        };
+        // Where TLS cannot be set up nothing changes, so that each attempt fails alike.
+        let settings = ClientSettings { location, ..self.settings.clone() };
+        self.http = http_client(&settings)?;
+        self.settings = settings;
+        self.authenticator.forget_challenge();
+        self.connected = false;
+        Ok(())
+    }
+
+    fn bad_credentials(&self) -> Error {
+        Error::BadCredentials { user: self.authenticator.user().to_owned() }
+    }
+
+    fn not_permitted(&self) -> Error {
+        Error::NotPermitted { user: self.authenticator.user().to_owned() }
+    }
+
+    fn failure(&self, err: &reqwest::Error) -> Error {
+        if err.is_timeout() {
+            Error::Timeout(self.settings.timeout)
+        } else if err.is_connect() {
+            Error::Unreachable(innermost(err))
+        } else {
+            Error::Broken(innermost(err))
+        }
+    }
+}
+
+fn http_client(settings: &ClientSettings) -> Result<reqwest::Client, Error> {
+    let tls = settings.trust.client_config(settings.location.is_https())?;
+    reqwest::Client::builder()
+        .tls_backend_preconfigured(tls)
+        // The camera is at hand; a proxy from the environment would be asked for every command.
+        .no_proxy()
+        .redirect(redirect::Policy::none())
+        .http1_only()
+        .pool_max_idle_per_host(1)
+        .connect_timeout(settings.timeout)
+        .timeout(settings.timeout)
+        .tcp_nodelay(true)
+        .build()
+        .map_err(|err| Error::Tls(innermost(&err)))
+}
+
+/// What happened at the bottom: the outer errors only repeat the address.
+fn innermost(err: &reqwest::Error) -> String {
+    let mut cause: &dyn std::error::Error = err;
+    while let Some(source) = cause.source() {
+        cause = source;
+    }
+    cause.to_string()
+}
