@@ -7,7 +7,6 @@ use ptztrack_contract::{Homography, Point};
 pub(super) struct Canvas {
     pub pixels: Vec<u8>,
     pub width: usize,
-    pub height: usize,
 }
 
 impl Canvas {
@@ -23,7 +22,7 @@ impl Canvas {
             let at = back.apply(Point { x: (index % width) as f64, y: (index / width) as f64 });
             paint(at.x, at.y).clamp(0.0, 255.0).round() as u8
         };
-        Self { pixels: (0..width * height).map(pixel).collect(), width, height }
+        Self { pixels: (0..width * height).map(pixel).collect(), width }
     }
 
     pub fn luma(&self) -> super::Luma<'_> {
