@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo evaluate install packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo evaluate evaluate-all install packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -63,10 +63,16 @@ demo: packages-demo
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
-##       (ARGS="--test 1-6 --tracker all --sweep-delay ..."; ARGS=--help lists the options)
+##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all)
 evaluate: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate $(ARGS)
+
+## evaluate-all: the same with every tracker and ten seeds, hours of it; broken off, it goes on where it was
+##       (leaves summary.md for the README and tables.md for docs/evaluation.md in target/evaluation/all)
+evaluate-all: packages-evaluate
+	$(CARGO) build --release --package evaluation
+	target/release/evaluate --matrix --out target/evaluation/all $(ARGS)
 
 ## install: build, and copy the plugins to a GStreamer plugin folder
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)

@@ -16,7 +16,7 @@ use ptztrack_contract::{
 
 use super::settings::{Settings, ZoneSetting};
 use super::stream::{Stream, StreamError};
-use super::{Output, Selection, Test, caps};
+use super::{Output, Profile, Selection, Test, caps};
 use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
@@ -31,6 +31,11 @@ static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
 #[derive(Properties)]
 #[properties(wrapper_type = super::BgAvgDetect)]
 pub struct BgAvgDetect {
+    #[property(
+        name = "profile", get, set, type = Profile, member = profile, mutable_playing,
+        blurb = "Which steps are taken; `thesis` overrides analysis-width, alpha-interval, noise-floor, shed-trail, relearn-fraction and confirm-frames",
+        builder(Settings::default().profile)
+    )]
     #[property(
         name = "analysis-width", get, set, type = u32, member = analysis_width, mutable_playing,
         default = Settings::default().analysis_width, maximum = 16384,

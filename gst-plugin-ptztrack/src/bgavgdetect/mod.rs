@@ -34,6 +34,11 @@
 //! are never foreground; both are polygons separated by `;`, each of three or more points `x,y` separated
 //! by spaces, with x and y from 0 (left, top) to 1 (right, bottom).
 //!
+//! ## Profiles
+//! `profile=thesis` takes the steps of the thesis alone: no noise floor, no shedding of trails, no learning anew, every
+//! picture at its own size and of the same weight, a region reported as soon as it is seen, and, where no size is given,
+//! a square closing. It overrides the properties of these steps.
+//!
 //! ## Messages
 //! An element message `ptztrack-motion` with `change` (`start`, `end`), `timestamp`, `running-time`,
 //! `stream-time`, `regions` (number) and `box` (of the first region) when motion starts, and when nothing
@@ -59,7 +64,7 @@
 //! ```
 //! The thesis as written:
 //! ```text
-//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect alpha-interval=0 shed-trail=false confirm-frames=1 analysis-width=0 ! fakesink
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect profile=thesis ! fakesink
 //! ```
 
 use glib::prelude::*;
@@ -85,6 +90,23 @@ pub enum Output {
     /// The frames with the reported regions in alpha (thesis 3.4.2).
     #[enum_value(name = "The frames, opaque only within the reported regions (RGBA)", nick = "foreground")]
     Foreground,
+}
+
+/// Which steps are taken.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstBgAvgDetectProfile")]
+#[repr(i32)]
+pub enum Profile {
+    /// Thesis 3.2 to 3.4 as written.
+    #[enum_value(name = "The thesis as written: running mean, opening, closing, contours", nick = "thesis")]
+    Thesis,
+    /// With all that makes it find people in noise, at any frame rate.
+    #[default]
+    #[enum_value(
+        name = "With noise floor, upright closing, shed trails, confirmation and learning anew",
+        nick = "robust"
+    )]
+    Robust,
 }
 
 /// How foreground is told from background.

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use super::{Output, Selection, Test};
+use super::{Output, Profile, Selection, Test};
 use crate::vision::{Criterion, DetectorConfig, ForegroundTest, RegionChoice, ZoneError, Zones};
 
 /// Polygons as written and as read.
@@ -20,6 +20,7 @@ impl std::str::FromStr for ZoneSetting {
 
 #[derive(Debug, Clone)]
 pub(super) struct Settings {
+    pub profile: Profile,
     pub analysis_width: u32,
     pub alpha: f64,
     pub alpha_interval_ns: u64,
@@ -49,6 +50,7 @@ pub(super) struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
+            profile: Profile::default(),
             analysis_width: 640,
             alpha: 0.5,
             alpha_interval_ns: 200_000_000,
@@ -86,7 +88,7 @@ impl Settings {
                 ForegroundTest::Spread { factor: self.spread_factor, window: self.window as usize }
             }
         };
-        DetectorConfig {
+        let config = DetectorConfig {
             analysis_width: self.analysis_width as usize,
             alpha: self.alpha,
             alpha_interval: Duration::from_nanos(self.alpha_interval_ns),
@@ -105,6 +107,29 @@ impl Settings {
             warm_up: self.warm_up,
             relearn_fraction: self.relearn_fraction,
             confirm_pictures: self.confirm_frames,
+        };
+        match self.profile {
+            Profile::Robust => config,
+            Profile::Thesis => as_in_the_thesis(config),
         }
+    }
+}
+
+/// Side of the square that the thesis opens and closes with, in pixels; it names none, so the smallest there is.
+const THESIS_SQUARE: usize = 3;
+
+/// Thesis 3.2 to 3.4 and no more: every picture weighs the same and is looked at as it comes, any difference of the
+/// threshold counts, both elements are square, and a region counts as soon as and as far as it is seen.
+fn as_in_the_thesis(config: DetectorConfig) -> DetectorConfig {
+    DetectorConfig {
+        analysis_width: 0,
+        alpha_interval: Duration::ZERO,
+        criterion: Criterion { noise_floor: 0.0, ..config.criterion },
+        open_size: config.open_size.or(Some(THESIS_SQUARE)),
+        close_size: config.close_size.or(Some(THESIS_SQUARE)),
+        shed_trail: false,
+        relearn_fraction: 1.0,
+        confirm_pictures: 1,
+        ..config
     }
 }

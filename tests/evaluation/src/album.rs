@@ -13,15 +13,27 @@ use crate::{
 /// The first box is at the edge of the picture: how long the camera may take to bring it to the middle, seconds.
 const APPROACH_S: f64 = 2.0;
 
+#[derive(Clone)]
 struct Page {
     frame: usize,
     picture: Picture,
+}
+
+/// A picture in which the person is not held any more: it will show the beginning of a loss if that lasts.
+struct Doubt {
+    begin_s: f64,
+    page: Page,
 }
 
 /// What is kept so far: one picture for a moment.
 #[derive(Default)]
 pub(crate) struct Album {
     pages: BTreeMap<Moment, Page>,
+    /// The first picture with somebody to follow, as long as they were never found.
+    unseen: Option<Page>,
+    /// Beginnings of losses.
+    losses: Vec<Page>,
+    doubt: Option<Doubt>,
     /// d_gc of the worst one.
     worst: f64,
     /// Whether the tracker ever was.
@@ -31,6 +43,7 @@ pub(crate) struct Album {
 impl Album {
     /// Keeps `picture`, number `frame` of those that count, if it tells something.
     pub fn look(&mut self, frame: usize, record: &FrameRecord, picture: Picture) {
+        self.doubt(frame, record, &picture);
         let first = self.tells(record).filter(|moment| !self.pages.contains_key(moment));
         self.was_right |= metrics::is_true_positive(record);
         let is_worst = |distance: &f64| {
@@ -44,16 +57,30 @@ impl Album {
         }
     }
 
+    /// Keeps the picture in which a loss begins, once it is one: see [`metrics::losses`].
+    fn doubt(&mut self, frame: usize, record: &FrameRecord, picture: &Picture) {
+        if !self.was_right && self.unseen.is_none() && record.truth.is_some() {
+            self.unseen = Some(Page { frame, picture: picture.clone() });
+        }
+        if metrics::holds(record) || !self.was_right {
+            self.doubt = None;
+            return;
+        }
+        let begin = || Doubt { begin_s: record.time_s, page: Page { frame, picture: picture.clone() } };
+        let doubt = self.doubt.get_or_insert_with(begin);
+        let kept = self.losses.last().is_some_and(|page| page.frame == doubt.page.frame);
+        // The loss ends with the next picture at the earliest.
+        if !kept && record.time_s - doubt.begin_s >= metrics::LASTING_S {
+            self.losses.push(doubt.page.clone());
+        }
+    }
+
     /// What the picture would be the first of.
     fn tells(&self, record: &FrameRecord) -> Option<Moment> {
-        let is_wrong = metrics::contains_target(record) && !metrics::is_true_positive(record);
         match record.estimate.as_ref().map(|estimate| estimate.state) {
-            Some(TargetState::Lost) => Some(Moment::Lost),
             Some(TargetState::Occluded) => Some(Moment::Occluded),
-            // Some trackers never say that they lost it.
-            _ if self.was_right && is_wrong => Some(Moment::Lost),
             Some(TargetState::Tracking) => Some(Moment::Acquired),
-            Some(TargetState::Searching) | None => None,
+            Some(TargetState::Lost | TargetState::Searching) | None => None,
         }
     }
 
@@ -61,7 +88,9 @@ impl Album {
     pub fn develop(self, info: &gst_video::VideoInfo) -> Result<Vec<Snapshot>, PipelineError> {
         let encoder = Encoder::new(info)?;
         let mut snapshots = Vec::new();
-        for (moment, Page { frame, picture }) in self.pages {
+        let never = self.unseen.filter(|_| !self.was_right);
+        let losses = self.losses.into_iter().chain(never).map(|page| (Moment::Lost, page));
+        for (moment, Page { frame, picture }) in self.pages.into_iter().chain(losses) {
             snapshots.push(Snapshot { moment, frame, jpeg: encoder.encode(&picture, info, frame)? });
         }
         snapshots.sort_by_key(|snapshot| (snapshot.frame, snapshot.moment));
@@ -144,12 +173,14 @@ mod tests {
 
     /// As a tracker that stays behind while the person goes on.
     fn wrong(mut record: FrameRecord) -> FrameRecord {
-        record.estimate.as_mut().unwrap().centroid = (32.0, 45.0);
+        let estimate = record.estimate.as_mut().unwrap();
+        estimate.bounds.left += 20.0;
+        estimate.centroid = estimate.bounds.centre();
         made_up::judged_by_boxes(record)
     }
 
     #[test]
-    fn who_is_wrong_after_being_right_has_lost_it_unless_there_was_nothing_to_see() {
+    fn a_loss_that_lasts_is_shown_from_its_beginning() {
         gst::init().unwrap();
         use TargetState::{Occluded, Tracking};
         let mut hidden = wrong(record(1.0, 30.0, Tracking));
@@ -165,7 +196,7 @@ mod tests {
         for (frame, record) in run.iter().enumerate() {
             look(&mut album, frame, record);
         }
-        let expected = [(Moment::Acquired, 0), (Moment::Occluded, 3), (Moment::Lost, 4)];
+        let expected = [(Moment::Acquired, 0), (Moment::Lost, 2), (Moment::Occluded, 3)];
         assert_eq!(developed(album).0, expected);
     }
 

@@ -11,12 +11,67 @@ use std::{
     time::Instant,
 };
 
-use crate::{experiment::Experiment, metrics::Metrics, pipeline::lock, record::Run};
+use crate::{
+    experiment::Experiment,
+    metrics::Metrics,
+    pipeline::lock,
+    record::{Run, TrackerName},
+    store::Store,
+};
 
-/// Runs all `experiments`, `jobs` at a time; the runs come in the order of the experiments. Writes a line for each to
-/// `progress`.
-pub fn run_all(experiments: &[Experiment], jobs: usize, progress: impl Write + Send) -> Vec<Run> {
-    run_all_with(experiments, jobs, progress, crate::run)
+/// Runs those of the `experiments` that `store` has no result of, `jobs` at a time, and keeps the results there; the runs
+/// come in the order of the experiments. Writes a line for each to `progress`.
+pub fn run_all(
+    experiments: &[Experiment],
+    jobs: usize,
+    store: &Store,
+    mut progress: impl Write + Send,
+) -> Vec<Run> {
+    let kept: Vec<_> = experiments.iter().map(|experiment| store.get(experiment)).collect();
+    let missing: Vec<_> = experiments
+        .iter()
+        .zip(&kept)
+        .filter(|(_, kept)| kept.is_none())
+        .map(|(one, _)| one.clone())
+        .collect();
+    if missing.len() < experiments.len() {
+        // Nobody may be reading.
+        let _ = writeln!(progress, "{} of {} are kept", experiments.len() - missing.len(), experiments.len());
+    }
+    let fault = Mutex::new(None);
+    let run = |experiment: &Experiment| {
+        let run = crate::run(experiment);
+        if let Err(error) = store.put(experiment, &run) {
+            lock(&fault).get_or_insert(error);
+        }
+        run
+    };
+    let mut made = run_all_with(&missing, jobs, &mut progress, run).into_iter();
+    if let Some(error) = lock(&fault).take() {
+        let _ = writeln!(progress, "results cannot be kept: {error}");
+    }
+    kept.into_iter().filter_map(|kept| kept.or_else(|| made.next())).collect()
+}
+
+/// How long runs take, tracker by tracker.
+struct Pace<'a> {
+    experiments: &'a [Experiment],
+    taken_s: Vec<(TrackerName, f64)>,
+}
+
+impl Pace<'_> {
+    /// Minutes until all is done with so many jobs: a tracker that was not run yet takes as long as the others do.
+    fn minutes_left(&self, done: usize, jobs: usize) -> f64 {
+        let mean = |of: &dyn Fn(TrackerName) -> bool| {
+            let taken: Vec<_> = self.taken_s.iter().filter(|(name, _)| of(*name)).map(|(_, s)| *s).collect();
+            crate::metrics::mean(&taken)
+        };
+        let any = mean(&|_| true).unwrap_or(0.0);
+        let left = self.experiments.iter().skip(done);
+        let left_s: f64 = left.map(|one| mean(&|name| name == one.tracker).unwrap_or(any)).sum();
+        // Adding zero turns -0, the sum of nothing, into 0.
+        left_s / 60.0 / jobs as f64 + 0.0
+    }
 }
 
 fn run_all_with(
@@ -26,7 +81,7 @@ fn run_all_with(
     run: impl Fn(&Experiment) -> Run + Sync,
 ) -> Vec<Run> {
     let (next, done) = (AtomicUsize::new(0), AtomicUsize::new(0));
-    let progress = Mutex::new(progress);
+    let progress = Mutex::new((progress, Pace { experiments, taken_s: Vec::new() }));
     let take = || {
         let number = next.fetch_add(1, Ordering::Relaxed);
         Some((number, experiments.get(number)?))
@@ -34,11 +89,15 @@ fn run_all_with(
     let perform = |(number, experiment): (usize, &Experiment)| {
         let begin = Instant::now();
         let run = caught(experiment, &run);
-        let mut progress = lock(&progress);
+        let mut both = lock(&progress);
+        let (progress, pace) = &mut *both;
         let count = done.fetch_add(1, Ordering::Relaxed) + 1;
         let (all, took_s) = (experiments.len(), begin.elapsed().as_secs_f64());
         // Nobody may be reading.
-        let _ = writeln!(progress, "[{count}/{all}] {} ({took_s:.1} s)", summary(&run));
+        pace.taken_s.push((run.tracker, took_s));
+        let left_min = pace.minutes_left(count, jobs.max(1));
+        let _ =
+            writeln!(progress, "[{count}/{all}, {left_min:.0} min left] {} ({took_s:.1} s)", summary(&run));
         (number, run)
     };
     let work = || std::iter::from_fn(take).map(perform).collect::<Vec<_>>();
@@ -75,15 +134,21 @@ fn summary(run: &Run) -> String {
         return line + ": " + error;
     }
     let metrics = Metrics::of(run);
+    let losses: Vec<_> = crate::metrics::losses(&run.frames)
+        .iter()
+        .map(|loss| format!("; {} at {:.1} s", loss.cause, loss.begin_s))
+        .collect();
     let percent = |share: Option<f64>| share.map_or("-".into(), |share| format!("{:.1} %", 100.0 * share));
     let number = |number: Option<f64>| number.map_or("-".into(), |number| format!("{number:.3}"));
     line + &format!(
-        ": P {}, DP {}, TF {}, d_gc {}, d_gp {}",
+        ", seed {}: P {}, DP {}, TF {}, d_gc {}, d_gp {}{}",
+        run.seed,
         percent(metrics.precision),
         percent(metrics.detection_precision),
         percent(metrics.track_fragmentation),
         number(metrics.mean_dgc),
-        number(metrics.mean_dgp)
+        number(metrics.mean_dgp),
+        losses.concat()
     )
 }
 
@@ -130,7 +195,7 @@ mod tests {
             assert_eq!(tests, TestId::all().collect::<Vec<_>>());
             let text = String::from_utf8(progress).unwrap();
             assert_eq!(text.lines().count(), 72);
-            assert!(text.lines().last().unwrap().starts_with("[72/72] still test "), "{text}");
+            assert!(text.lines().last().unwrap().starts_with("[72/72, 0 min left] still test "), "{text}");
         }
     }
 }

@@ -1,12 +1,12 @@
 //! The command line: which experiments are run, how many at once, and where the report goes.
 
-use std::{ops::RangeInclusive, path::PathBuf, str::FromStr, time::Duration};
+use std::{collections::BTreeSet, ops::RangeInclusive, path::PathBuf, str::FromStr, time::Duration};
 
 use clap::Parser;
 
 use crate::{
     experiment::{Experiment, Scene},
-    footage::SceneError,
+    footage::{SceneError, Whom},
     record::{Codec, Delays, FirstBox, TestId, TrackerName},
     trackers::missing,
 };
@@ -27,9 +27,9 @@ pub struct Args {
     /// Width and height of the pictures; a recording as it is has its own
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size, conflicts_with = "still_recording")]
     pub size: (u32, u32),
-    /// Number of the world; 1 is the reference
-    #[arg(long, default_value_t = 1)]
-    pub seed: u64,
+    /// Numbers of worlds, `1` or `1-3`; 1 is the reference, 1 to 5 are for tuning, 6 to 10 are not
+    #[arg(long, value_name = "N[,N-M]", value_delimiter = ',', default_value = "1")]
+    pub seed: Vec<Seeds>,
     /// From light on the sensor to the picture at the tracker, in milliseconds
     #[arg(long, value_name = "MS", default_value_t = 100)]
     pub video_delay: u64,
@@ -39,9 +39,23 @@ pub struct Args {
     /// Run tests 1, 19, 37 and 55 with delays of 0 to 600 ms as well
     #[arg(long)]
     pub sweep_delay: bool,
-    /// Who draws the first box: given (the truth, to every tracker) or detected (by those that can)
-    #[arg(long, default_value = "given")]
-    pub first_box: FirstBox,
+    /// Who draws the first box: detected (by those that can) or given (the truth, to every tracker). Detected in tests and given
+    /// in recordings, unless said otherwise
+    #[arg(long)]
+    pub first_box: Option<FirstBox>,
+    /// Run everything that the published tables are made from, hours of it: ours and `thesis` on seeds 1 to 10, all others on 1
+    /// and 6. What is kept is not run again, so it may be broken off and called again
+    #[arg(long, conflicts_with_all = ["test", "tracker", "seed", "first_box", "sweep_delay", "footage", "still_recording", "real_time"])]
+    pub matrix: bool,
+    /// Run everything anew, whatever results are kept
+    #[arg(long)]
+    pub fresh: bool,
+    /// Folder of the results that are kept
+    #[arg(long, default_value = "target/evaluation/results")]
+    pub results: PathBuf,
+    /// Instead of running tests, say what changed from one report to another, test by test: two folders once given as --out
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["matrix", "test", "gallery", "footage", "still_recording"])]
+    pub compare: Vec<PathBuf>,
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
@@ -62,8 +76,9 @@ pub struct Args {
     /// a line, left,top,width,height or left,top,right,bottom
     #[arg(long, value_name = "FILE", requires = "recording")]
     pub truth: Option<PathBuf>,
-    /// Number of the person to follow in the recording, or auto: who is there longest
-    #[arg(long, value_name = "ID|auto", default_value = "auto", requires = "recording")]
+    /// Number of the person to follow in the recording, auto: who is there longest, or all: everybody who is there for five
+    /// seconds or more, one after the other
+    #[arg(long, value_name = "ID|auto|all", default_value = "auto", requires = "recording")]
     pub person: Whom,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
@@ -103,21 +118,20 @@ impl FromStr for Tests {
     }
 }
 
-/// Whom to follow.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Whom(Option<u32>);
+/// Worlds from one number to another.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Seeds(RangeInclusive<u64>);
 
-impl FromStr for Whom {
+impl FromStr for Seeds {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        match text {
-            "auto" => Ok(Self(None)),
-            number => number
-                .parse()
-                .map(|id| Self(Some(id)))
-                .map_err(|_| format!("`{text}` is no number, nor auto")),
-        }
+        let (first, last) = text.split_once('-').unwrap_or((text, text));
+        let range = first.trim().parse().ok().zip(last.trim().parse().ok()).map(|(first, last)| first..=last);
+        range
+            .filter(|range: &RangeInclusive<u64>| !range.is_empty())
+            .map(Self)
+            .ok_or_else(|| format!("seeds are whole numbers or ranges of them, not `{text}`"))
     }
 }
 
@@ -158,7 +172,9 @@ impl Args {
 
     /// The trackers asked for, in the order of the tables, and what is to be said of those that are left out.
     pub fn trackers(&self) -> (Vec<TrackerName>, Vec<String>) {
-        let asked = |name: &TrackerName| self.tracker.iter().any(|Trackers(names)| names.contains(name));
+        let asked = |name: &TrackerName| {
+            self.matrix || self.tracker.iter().any(|Trackers(names)| names.contains(name))
+        };
         let (mut there, mut left_out) = (Vec::new(), Vec::new());
         for name in TrackerName::ALL.iter().copied().filter(asked) {
             match missing(name) {
@@ -171,11 +187,23 @@ impl Args {
 
     /// What pictures of the room are to be like.
     pub fn gallery(&self) -> Option<Experiment> {
-        let scene = self.gallery.then(|| Scene::room(TestId(1), self.seed)).flatten()?;
-        Some(self.experiment(scene, TrackerName::Still))
+        let seed = *self.seeds().first()?;
+        let scene = self.gallery.then(|| Scene::room(TestId(1), seed)).flatten()?;
+        Some(self.experiment(scene, TrackerName::Still, seed))
     }
 
-    fn experiment(&self, scene: Scene, tracker: TrackerName) -> Experiment {
+    /// The worlds asked for, in order and each once.
+    pub fn seeds(&self) -> Vec<u64> {
+        let asked: BTreeSet<_> = self.seed.iter().flat_map(|Seeds(range)| range.clone()).collect();
+        asked.into_iter().collect()
+    }
+
+    fn is_recording(&self) -> bool {
+        self.footage.is_some() || self.still_recording.is_some()
+    }
+
+    fn experiment(&self, scene: Scene, tracker: TrackerName, seed: u64) -> Experiment {
+        let usual = if self.is_recording() { FirstBox::Given } else { FirstBox::Detected };
         let delays = Delays {
             video: Duration::from_millis(self.video_delay),
             command: Duration::from_millis(self.command_delay),
@@ -184,10 +212,10 @@ impl Args {
             codec: self.codec,
             size: self.size,
             delays,
-            first_box: self.first_box,
+            first_box: self.first_box.unwrap_or(usual),
             real_time: self.real_time,
             films: self.record.then(|| self.out.join("films")),
-            ..Experiment::new(scene, tracker, self.seed)
+            ..Experiment::new(scene, tracker, seed)
         }
     }
 
@@ -196,14 +224,40 @@ impl Args {
         if self.real_time { 1 } else { self.jobs }
     }
 
-    /// What is to be followed.
-    fn scenes(&self) -> Result<Vec<Scene>, SceneError> {
-        let Whom(person) = self.person;
-        match (&self.footage, &self.still_recording, &self.truth) {
-            (Some(file), _, Some(truth)) => Ok(vec![Scene::footage(file, truth, person, self.size)?]),
-            (None, Some(file), Some(truth)) => Ok(vec![Scene::recording(file, truth, person)?]),
-            _ => Ok(self.tests().into_iter().filter_map(|test| Scene::room(test, self.seed)).collect()),
+    /// What is to be followed, and the number of its world.
+    fn scenes(&self) -> Result<Vec<(Scene, u64)>, SceneError> {
+        let recordings = match (&self.footage, &self.still_recording, &self.truth) {
+            (Some(file), _, Some(truth)) => Scene::footage(file, truth, self.person, self.size)?,
+            (None, Some(file), Some(truth)) => Scene::recordings(file, truth, self.person)?,
+            _ => return Ok(self.seeds().into_iter().flat_map(|seed| self.rooms(seed)).collect()),
+        };
+        // A recording is what it is: there is no other world of it.
+        Ok(recordings.into_iter().map(|scene| (scene, 1)).collect())
+    }
+
+    fn rooms(&self, seed: u64) -> Vec<(Scene, u64)> {
+        let rooms = self.tests().into_iter().filter_map(|test| Scene::room(test, seed));
+        rooms.map(|scene| (scene, seed)).collect()
+    }
+
+    /// What the published tables are made from.
+    fn matrix(&self, trackers: &[TrackerName]) -> Vec<Experiment> {
+        let mut experiments = Vec::new();
+        let runs = |name: TrackerName, seed: u64, first_box: FirstBox| {
+            let with = move |(scene, seed)| Experiment { first_box, ..self.experiment(scene, name, seed) };
+            self.rooms(seed).into_iter().map(with).collect::<Vec<_>>()
+        };
+        for &name in trackers {
+            let detects = name.detects();
+            for seed in if detects { (1..=10).collect() } else { vec![1, 6] } {
+                experiments.extend(runs(name, seed, FirstBox::Detected));
+            }
         }
+        // Beside it, with the first box given to those that need none.
+        for &name in trackers.iter().filter(|name| name.detects()) {
+            experiments.extend([1, 6].into_iter().flat_map(|seed| runs(name, seed, FirstBox::Given)));
+        }
+        experiments
     }
 
     /// Everything asked for, tracker after tracker.
@@ -211,10 +265,14 @@ impl Args {
     /// # Errors
     /// Where a recording or its ground truth cannot be used.
     pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
+        if self.matrix {
+            return Ok(self.matrix(trackers));
+        }
         let scenes = self.scenes()?;
         let mut experiments = Vec::new();
         for tracker in trackers {
-            experiments.extend(scenes.iter().map(|scene| self.experiment(scene.clone(), *tracker)));
+            let of = |(scene, seed): &(Scene, u64)| self.experiment(scene.clone(), *tracker, *seed);
+            experiments.extend(scenes.iter().map(of));
             if self.sweep_delay {
                 experiments.extend(self.sweep(*tracker));
             }
@@ -228,9 +286,10 @@ impl Args {
             let command = total.min(Delays::default().command);
             Delays { video: total - command, command }
         });
+        let seed = self.seeds().first().copied().unwrap_or(1);
         let at = |delays: Delays| {
-            let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), self.seed));
-            let experiments = scenes.map(move |scene| self.experiment(scene, tracker));
+            let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), seed));
+            let experiments = scenes.map(move |scene| self.experiment(scene, tracker, seed));
             experiments.map(move |experiment| Experiment { delays, sweep: true, films: None, ..experiment })
         };
         delays.flat_map(at).collect()
@@ -254,6 +313,29 @@ mod tests {
         assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
         assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
         assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
+    }
+
+    #[test]
+    fn several_worlds_are_run_one_after_the_other() {
+        let args = parse("--test 1,5 --seed 1-3,7,2").unwrap();
+        assert_eq!(args.seeds(), [1, 2, 3, 7]);
+        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
+        let seeds: Vec<_> = experiments.iter().map(|one| one.seed).collect();
+        assert_eq!(seeds, [1, 1, 2, 2, 3, 3, 7, 7]);
+        assert!(experiments.iter().all(|one| one.first_box == FirstBox::Detected));
+    }
+
+    #[test]
+    fn the_matrix_has_all_of_ours_and_two_seeds_of_the_others() {
+        let experiments = parse("--matrix").unwrap().matrix(TrackerName::ALL);
+        let count = |name, first_box| {
+            experiments.iter().filter(|one| one.tracker == name && one.first_box == first_box).count()
+        };
+        assert_eq!(count(TrackerName::Ptztrack, FirstBox::Detected), 720);
+        assert_eq!(count(TrackerName::Thesis, FirstBox::Given), 144);
+        assert_eq!(count(TrackerName::Csrt, FirstBox::Detected), 144);
+        assert_eq!(count(TrackerName::Csrt, FirstBox::Given), 0, "it is given the box anyway");
+        assert_eq!(experiments.len(), 720 * 2 + 144 * 2 + 144 * 8);
     }
 
     #[test]
@@ -294,7 +376,10 @@ mod tests {
             ("--size 640", "WIDTHxHEIGHT"),
             ("--tracker best", "ptztrack, thesis"),
             ("--codec h264", "mjpeg, mpeg4, raw"),
-            ("--first-box drawn", "given, detected"),
+            ("--first-box drawn", "detected, given"),
+            ("--seed 3-1", "whole numbers"),
+            ("--compare a", "2 values"),
+            ("--matrix --seed 2", "cannot be used with"),
             ("--footage x.avi", "--truth"),
             ("--truth x.csv", "--footage"),
             ("--person 3", "--still-recording"),

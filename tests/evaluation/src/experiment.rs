@@ -5,7 +5,7 @@ use std::{path::PathBuf, time::Duration};
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, Sighting, VirtualCamera, World};
 
 use crate::{
-    record::{Codec, Delays, FirstBox, FrameRecord, Run, Suite, TestId, TrackerName},
+    record::{Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Suite, TestId, TrackerName},
     still::Recording,
 };
 
@@ -123,7 +123,7 @@ impl Experiment {
             size: (640, 480),
             seed,
             delays: Delays::default(),
-            first_box: FirstBox::Given,
+            first_box: FirstBox::Detected,
             sweep: false,
             real_time: false,
             films: None,
@@ -200,6 +200,7 @@ impl Experiment {
             path: self.scene.path.clone(),
             title: self.scene.title.clone(),
             tracker: self.tracker,
+            provenance: Provenance::of(self.tracker),
             codec: self.codec,
             size: self.size,
             seed: self.seed,

@@ -3,8 +3,8 @@
 //!
 //! ## What is counted
 //! Counting begins with the *first box*: the first picture, with the camera still at home, in which the person's whole
-//! box lies inside the view. That is decided before anything runs, so that it is the same picture for every tracker,
-//! and in it every tracker is given the true box (`--first-box detected`: those with a detector are not). It ends with
+//! box lies inside the view. That is decided before anything runs, so that it is the same picture for every tracker. Those
+//! with a detector find the person themselves, all others are given the true box in it (`--first-box given`: all are). It ends with
 //! the person's walk. Pictures are counted by when they were taken, whatever the delays.
 //!
 //! ## Recordings
@@ -24,15 +24,17 @@ mod lockstep;
 pub mod metrics;
 mod people;
 mod pipeline;
+mod provenance;
 mod realtime;
 pub mod record;
 pub mod report;
 mod still;
+pub mod store;
 mod trackers;
 
 pub use batch::run_all;
 pub use experiment::{Experiment, Place, Scene, Target};
-pub use footage::SceneError;
+pub use footage::{SceneError, Whom};
 pub use lockstep::run;
 pub use people::TruthError;
 pub use still::Recording;
@@ -41,7 +43,8 @@ pub use trackers::missing;
 /// Makes GStreamer and our elements ready; again does nothing.
 ///
 /// OpenCV gets one thread and only those instructions that every processor has: a run shall not depend on how many cores
-/// there are or on what they are, and several go on at once.
+/// there are or on what they are, and several go on at once. That makes everything that is OpenCV's slower than it is for a
+/// user, the trackers of `cvtracker` most of all: what is measured here says nothing of speed.
 ///
 /// # Errors
 /// Where GStreamer does not start.

@@ -10,7 +10,7 @@ use std::{
 };
 
 use ptztrack_contract::{TargetMeta, TargetState};
-use virtual_camera::{Clock, Picture, Settings, VirtualCamera};
+use virtual_camera::{Clock, Picture, Pose, Settings, VirtualCamera};
 
 use crate::{
     album::Album,
@@ -89,6 +89,8 @@ struct Stage<'a> {
     info: gst_video::VideoInfo,
     /// Number of the last command that was counted.
     counted: u64,
+    /// Where the camera looked in the picture before.
+    looked: Option<Pose>,
 }
 
 impl<'a> Stage<'a> {
@@ -106,7 +108,7 @@ impl<'a> Stage<'a> {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;
-        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0 })
+        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0, looked: None })
     }
 
     /// Takes picture `number` and sends it through.
@@ -117,7 +119,10 @@ impl<'a> Stage<'a> {
         self.camera.advance_to(arrival);
         let (witnessed, people) = self.experiment.witness(&self.camera, number, first);
         let phase = Phase::of(number >= first, number > first);
-        let cue = Cue { phase, truth: witnessed.truth.clone(), size };
+        let pose = self.camera.pose_at(exposure);
+        let motion =
+            self.looked.replace(pose).map(|before| self.camera.background_motion(&before, &pose, size));
+        let cue = Cue { phase, truth: witnessed.truth.clone(), motion, size };
         self.tracker.next(self.pipeline.bin(), cue)?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::Parser;
-use evaluation::{cli::Args, gallery, report};
+use evaluation::{cli::Args, gallery, report, store::Store};
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -24,6 +24,10 @@ fn main() -> ExitCode {
 /// Whether every run came to its end.
 fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     evaluation::init()?;
+    if let [before, after] = args.compare.as_slice() {
+        tell(io::stdout(), format_args!("{}", report::compare::compare(before, after)?))?;
+        return Ok(true);
+    }
     if let Some(like) = args.gallery() {
         let folder = args.out.join("gallery");
         report::make_room(&folder)?;
@@ -37,7 +41,8 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
         return Err(format!("nothing to run: {}", left_out.join("; ")).into());
     }
     report::make_room(&args.out)?;
-    let runs = evaluation::run_all(&experiments, args.jobs(), io::stderr());
+    let store = Store::new(&args.results, args.fresh);
+    let runs = evaluation::run_all(&experiments, args.jobs(), &store, io::stderr());
     let report = report::write(&runs, &left_out, &args.out)?;
     for note in &report.notes {
         tell(io::stderr(), format_args!("evaluate: {note}"))?;

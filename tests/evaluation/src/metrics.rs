@@ -4,13 +4,17 @@
 //! inside the view. That depends on nothing that a tracker does, so every tracker is counted over the same time.
 //! A value that cannot be computed (no frame to compute it from) is `None`, never a number.
 
-use crate::record::{FrameRecord, GroundTruth, Run, TargetState};
+use crate::record::{Estimate, FrameRecord, GroundTruth, Run, TargetState};
 
 mod boxes;
+mod centred;
 mod identity;
+mod losses;
 
 pub use boxes::{box_precision, success};
+pub use centred::{centred_after_s, mean_dgc_centred};
 pub use identity::{identity_kept, identity_switches, is_hidden};
+pub use losses::{Cause, LASTING_S, Loss, holds, losses};
 
 /// A picture contains the target when at least this part of the person is inside it and hidden by nothing.
 pub const CONTAINS: f64 = 0.1;
@@ -23,6 +27,8 @@ pub const SPECK: f64 = 0.01;
 pub struct Metrics {
     /// P, equation 5.1.
     pub precision: Option<f64>,
+    /// P where a box that is predicted counts as tracked.
+    pub precision_predicted: Option<f64>,
     /// DP, equation 5.2.
     pub detection_precision: Option<f64>,
     /// TF, equation 5.5.
@@ -35,6 +41,12 @@ pub struct Metrics {
     pub mean_dgp: Option<f64>,
     /// Variance of d_gp.
     pub var_dgp: Option<f64>,
+    /// From the first counted picture until the person is and stays in the middle, seconds.
+    pub centred_after_s: Option<f64>,
+    /// Mean of d_gc from then on.
+    pub mean_dgc_centred: Option<f64>,
+    /// How often the person was lost.
+    pub losses: usize,
     /// From the first counted picture to the first true positive, seconds.
     pub time_to_acquire_s: Option<f64>,
     /// Whether it was still the same person after every full occlusion; `None` without one.
@@ -62,12 +74,16 @@ impl Metrics {
         let (dgc, dgp): (Vec<_>, Vec<_>) = (counted_dgc(frames).collect(), counted_dgp(frames).collect());
         Self {
             precision: precision(frames),
+            precision_predicted: precision_predicted(frames),
             detection_precision: detection_precision(frames),
             track_fragmentation: track_fragmentation(frames),
             mean_dgc: mean(&dgc),
             var_dgc: variance(&dgc),
             mean_dgp: mean(&dgp),
             var_dgp: variance(&dgp),
+            centred_after_s: centred_after_s(frames),
+            mean_dgc_centred: mean_dgc_centred(frames),
+            losses: losses(frames).len(),
             time_to_acquire_s: time_to_acquire_s(frames),
             identity_kept: identity_kept(frames),
             identity_switches: identity_switches(frames),
@@ -119,6 +135,13 @@ pub fn is_out(frame: &FrameRecord) -> bool {
 pub fn precision(frames: &[FrameRecord]) -> Option<f64> {
     let [right, wrong] = [is_true_positive, is_false_positive].map(|is| count(frames, is));
     share(right, right + wrong)
+}
+
+/// P where a predicted box counts as tracked: of the pictures for which the tracker gives a place, the share of hits, on
+/// persons who are wholly hidden too.
+pub fn precision_predicted(frames: &[FrameRecord]) -> Option<f64> {
+    let placed = |frame: &FrameRecord| frame.estimate.as_ref().is_some_and(Estimate::has_place);
+    share(count(frames, is_hit), count(frames, placed))
 }
 
 /// DP = CDF / nF (5.2), where CDF are the frames in which the target is detected correctly and nF those that contain it.

@@ -123,7 +123,7 @@ impl Watch {
         drop(journal);
         let exposure = experiment::exposure(number, self.camera.frame_period());
         let (truth, _) = self.experiment.scene.split(self.camera.ground_truth(exposure, size));
-        self.tracker.next(pipeline, Cue { phase, truth, size })
+        self.tracker.next(pipeline, Cue { phase, truth, motion: None, size })
     }
 
     /// Everybody has done with it.

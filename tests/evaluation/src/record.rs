@@ -1,9 +1,10 @@
 //! What one run leaves: per picture what was true, what the tracker said and where the camera looked. Pure data.
 
-use std::{fmt, str::FromStr, time::Duration};
+use std::{fmt, time::Duration};
 
 use serde::{Deserialize, Serialize};
 
+pub use crate::provenance::Provenance;
 pub use ptztrack_contract::TargetState;
 pub use virtual_camera::{Bounds, GroundTruth, Sighting, Silhouette};
 
@@ -31,7 +32,7 @@ impl fmt::Display for TestId {
 macro_rules! named {
     ($(#[$meta:meta])* $type:ident, $what:literal { $($(#[$variant_meta:meta])* $variant:ident = $name:literal),+ $(,)? }) => {
         $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
         pub enum $type { $($(#[$variant_meta])* $variant),+ }
 
         impl $type {
@@ -44,13 +45,13 @@ macro_rules! named {
             }
         }
 
-        impl fmt::Display for $type {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
                 f.pad(self.name())
             }
         }
 
-        impl FromStr for $type {
+        impl std::str::FromStr for $type {
             type Err = String;
 
             fn from_str(name: &str) -> Result<Self, String> {
@@ -63,6 +64,8 @@ macro_rules! named {
         }
     };
 }
+
+pub(crate) use named;
 
 named! {
     /// What follows the person.
@@ -81,8 +84,19 @@ named! {
         MedianFlow = "medianflow",
         /// Bound: knows the truth of the delayed picture. What is lost is lost by the servo.
         Oracle = "oracle",
+        /// Bound: an oracle that also tells the servo how the background moves, as ours does.
+        OracleEgo = "oracle-ego",
+        /// Bound: the same, and sees through what hides the person.
+        OracleXray = "oracle-xray",
         /// Bound: a camera that never moves.
         Still = "still",
+    }
+}
+
+impl TrackerName {
+    /// Whether it finds people itself, so that it needs no first box.
+    pub fn detects(self) -> bool {
+        matches!(self, Self::Ptztrack | Self::Thesis)
     }
 }
 
@@ -115,10 +129,10 @@ named! {
 named! {
     /// Who draws the first box.
     FirstBox, "first box" {
+        /// As users have it: trackers with a detector find the person themselves; the others are given the box.
+        Detected = "detected",
         /// Every tracker is given the true box of the first counted picture.
         Given = "given",
-        /// Trackers with a detector find the person themselves; the others are given the box.
-        Detected = "detected",
     }
 }
 
@@ -269,6 +283,8 @@ pub struct Run {
     pub path: String,
     /// What followed.
     pub tracker: TrackerName,
+    /// What it was made with.
+    pub provenance: Provenance,
     /// What the pictures went through.
     pub codec: Codec,
     /// Width and height of the pictures.

@@ -24,6 +24,8 @@ const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(30);
 
 /// Pictures a second where the file does not tell.
 const UNKNOWN_RATE: f64 = 25.0;
+/// Their distance.
+pub(crate) const USUAL_PERIOD: Duration = Duration::from_millis(40);
 
 /// A video and who is where in it.
 #[derive(Debug, Clone)]
@@ -113,7 +115,7 @@ impl<'a> Screening<'a> {
         if phase == Phase::FirstBox {
             self.first = Some(number);
         }
-        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), size })?;
+        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), motion: None, size })?;
         let buffer = stamped(sample, number as f64 / self.frame_rate)?;
         let picture = Picture::from_buffer(&buffer, &self.info).ok_or(RunError::Size(size.0, size.1))?;
         let target = self.pipeline.finish(buffer)?;

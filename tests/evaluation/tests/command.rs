@@ -16,7 +16,7 @@ fn folder(name: &str) -> PathBuf {
 /// Runs it where GStreamer finds no elements but ours.
 fn evaluate(line: &str, out: &Path) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_evaluate"));
-    command.args(line.split_whitespace()).arg("--out").arg(out);
+    command.args(line.split_whitespace()).arg("--out").arg(out).arg("--results").arg(out.join("results"));
     command.env("GST_PLUGIN_SYSTEM_PATH_1_0", "").env("GST_PLUGIN_PATH_1_0", "");
     command.env("GST_REGISTRY_FORK", "no").env("GST_REGISTRY_1_0", folder("registry"));
     command.output().unwrap()
@@ -53,11 +53,16 @@ fn a_lesser_processor_gives_the_same_figures() {
     let run = |name: &str, without: &str| {
         let out = folder(name);
         let mut command = Command::new(env!("CARGO_BIN_EXE_evaluate"));
-        command.args(["--test", "37", "--size", "160x120", "--seed", "4", "--out"]).arg(&out);
+        command
+            .args(["--test", "37", "--size", "160x120", "--seed", "4", "--out"])
+            .arg(&out)
+            .arg("--results")
+            .arg(out.join("results"));
         let output = command.env("OPENCV_CPU_DISABLE", without).output().unwrap();
         assert!(output.status.success(), "{output:?}");
         let figures = fs::read_to_string(out.join("results.csv")).unwrap();
-        let frames = out.join("frames/seed4-mjpeg-160x120-given-video100ms-command60ms/test-37-ptztrack.csv");
+        let frames =
+            out.join("frames/seed4-mjpeg-160x120-detected-video100ms-command60ms/test-37-ptztrack.csv");
         let frames = fs::read_to_string(frames).unwrap();
         fs::remove_dir_all(&out).unwrap();
         (figures, frames)

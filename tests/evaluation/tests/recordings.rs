@@ -4,7 +4,7 @@
 use std::{fmt::Write, fs, path::PathBuf};
 
 use evaluation::{
-    Experiment, Scene, SceneError, Target,
+    Experiment, Scene, SceneError, Target, Whom,
     metrics::Metrics,
     record::{Codec, Run, TrackerName},
     report,
@@ -101,7 +101,7 @@ fn run(scene: &Scene, tracker: TrackerName) -> Run {
 #[test]
 fn a_camera_follows_one_person_within_a_recording() {
     let (file, truth) = recording("closed-loop");
-    let scene = Scene::footage(&file, &truth, None, (320, 240)).unwrap();
+    let scene = Scene::footage(&file, &truth, Whom::Longest, (320, 240)).unwrap().remove(0);
     assert_eq!((scene.title.as_str(), scene.target), ("closed-loop, person 4", Target::Person(4)));
 
     let oracle = run(&scene, TrackerName::Oracle);
@@ -122,7 +122,7 @@ fn a_camera_follows_one_person_within_a_recording() {
 #[test]
 fn in_a_recording_as_it_is_the_box_is_judged() {
     let (file, truth) = recording("as-it-is");
-    let scene = Scene::recording(&file, &truth, Some(7)).unwrap();
+    let scene = Scene::recordings(&file, &truth, Whom::Person(7)).unwrap().remove(0);
     let oracle = run(&scene, TrackerName::Oracle);
     assert_eq!((oracle.size, oracle.frame_rate), ((WIDTH as u32, HEIGHT as u32), 25.0));
     assert_eq!((oracle.codec, oracle.delays.total().as_millis()), (Codec::Raw, 0));
@@ -151,21 +151,21 @@ fn it_ends_with_the_persons_last_box() {
     let (file, truth) = recording("last-box");
     let early: String = (1..=20).map(|frame| format!("{frame},4,200,150,32,72,1,1,1\n")).collect();
     fs::write(&truth, early).unwrap();
-    let closed = Scene::footage(&file, &truth, None, (320, 240)).unwrap();
-    let as_it_is = Scene::recording(&file, &truth, None).unwrap();
+    let closed = Scene::footage(&file, &truth, Whom::Longest, (320, 240)).unwrap().remove(0);
+    let as_it_is = Scene::recordings(&file, &truth, Whom::Longest).unwrap().remove(0);
     assert_eq!([closed, as_it_is].map(|scene| run(&scene, TrackerName::Still).frames.len()), [20, 20]);
 }
 
 #[test]
 fn what_cannot_be_used_is_told_of_in_words() {
     let (file, truth) = recording("refused");
-    let nobody = Scene::recording(&file, &truth, Some(5));
+    let nobody = Scene::recordings(&file, &truth, Whom::Person(5));
     assert!(matches!(nobody, Err(SceneError::Person(5))), "{nobody:?}");
-    let no_truth = Scene::footage(&file, &file.with_extension("txt"), None, (320, 240)).unwrap_err();
+    let no_truth = Scene::footage(&file, &file.with_extension("txt"), Whom::Longest, (320, 240)).unwrap_err();
     assert!(no_truth.to_string().contains("refused.txt"), "{no_truth}");
-    let no_video = Scene::footage(&truth, &truth, None, (320, 240)).unwrap_err();
+    let no_video = Scene::footage(&truth, &truth, Whom::Longest, (320, 240)).unwrap_err();
     assert!(no_video.to_string().contains("refused.csv"), "{no_video}");
-    let scene = Scene::recording(&truth, &truth, None).unwrap();
+    let scene = Scene::recordings(&truth, &truth, Whom::Longest).unwrap().remove(0);
     let run = evaluation::run(&Experiment::new(scene, TrackerName::Oracle, 1));
     assert!(run.frames.is_empty() && run.error.is_some(), "{:?}", run.error);
 }

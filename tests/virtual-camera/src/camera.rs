@@ -473,6 +473,13 @@ impl VirtualCamera {
         self.camera.world.overview_to_view(pose, size)
     }
 
+    /// How what stands still moves in a view of that size while the camera turns and zooms from one pose to another: from
+    /// pixels of the first view to pixels of the second.
+    pub fn background_motion(&self, from: &Pose, to: &Pose, size: (u32, u32)) -> Matrix {
+        let pinhole = |pose: &Pose| self.camera.world.pinhole(pose.zoom_step, size);
+        crate::geometry::between((from, &pinhole(from)), (to, &pinhole(to)))
+    }
+
     /// Where the camera looked at a time since its start, not longer ago than its video delay and two seconds.
     pub fn pose_at(&self, time: Duration) -> Pose {
         self.camera.pose_at(time)

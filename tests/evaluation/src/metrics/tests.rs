@@ -67,6 +67,28 @@ fn precision_counts_only_what_is_said_to_be_tracked() {
 }
 
 #[test]
+fn a_predicted_box_counts_as_tracked_where_it_is_asked_for() {
+    let frames = [
+        at(MIDDLE, says(Tracking, MIDDLE)),
+        seen(0.0, at(MIDDLE, says(Occluded, MIDDLE))), // behind something, and foretold
+        at(MIDDLE, says(Occluded, (60.0, 30.0))),
+        at(MIDDLE, says(Lost, MIDDLE)), // says nothing
+    ];
+    assert_eq!(precision_predicted(&frames), Some(2.0 / 3.0));
+    assert_eq!(precision_predicted(&frames[3..]), None);
+}
+
+#[test]
+fn the_person_is_in_the_middle_when_they_stay_there_for_half_a_second() {
+    // d_gc is 0.2, then 0.04 for 0.4 s, 0.2 again, and 0.04 from 0.9 s on.
+    let far = |index: usize| index < 2 || (7..9).contains(&index);
+    let frames = timed((0..20).map(|index| at((if far(index) { 50.0 } else { 42.0 }, 30.0), None)));
+    assert_eq!(centred_after_s(&frames), Some(0.9));
+    assert!((mean_dgc_centred(&frames).unwrap() - 0.04).abs() < 1e-9);
+    assert_eq!((centred_after_s(&frames[..12]), mean_dgc_centred(&frames[..12])), (None, None));
+}
+
+#[test]
 fn detection_precision_counts_frames_that_contain_the_target() {
     let right = says(Tracking, MIDDLE);
     let frames = [

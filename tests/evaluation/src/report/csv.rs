@@ -7,23 +7,14 @@ use super::{
 };
 use crate::{
     metrics::{Metrics, d_gc, d_gp, is_true_positive},
-    record::{FrameRecord, GroundTruth},
+    record::{FrameRecord, GroundTruth, Provenance},
 };
 
 /// Digits after the point; as many as the thesis gives.
 const DECIMALS: usize = 6;
 
-const SETUP: [&str; 9] = [
-    "seed",
-    "codec",
-    "width",
-    "height",
-    "first_box",
-    "video_delay_ms",
-    "command_delay_ms",
-    "sweep",
-    "real_time",
-];
+const SETUP: [&str; 8] =
+    ["codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms", "sweep", "real_time"];
 /// What every line on a run begins with.
 const RUN: [&str; 3] = ["title", "test", "tracker"];
 
@@ -32,21 +23,45 @@ pub fn results(judged: &[Judged]) -> String {
     let figures = column::ALL.iter().map(|column| column.key);
     let mut csv = line(
         RUN.into_iter()
+            .chain(["seed"])
             .chain(SETUP)
             .chain(["frames", "frames_with_target"])
             .chain(figures)
-            .chain(["dropped", "error"]),
+            .chain(["dropped", "suite", "path", "tracker_made_of", "servo", "laboratory", "error"]),
     );
     for one in judged {
         let run = one.run;
         let test = run.test.map(|test| test.to_string()).unwrap_or_default();
-        let mut cells = vec![run.title.clone(), test, run.tracker.to_string()];
+        let mut cells = vec![run.title.clone(), test, run.tracker.to_string(), run.seed.to_string()];
         cells.extend(setup(&one.setup));
         cells.extend([one.metrics.frames, one.metrics.frames_with_target].map(|number| number.to_string()));
         cells.extend(column::ALL.iter().map(|column| number(column.of(&one.metrics))));
         cells.push(run.dropped.map(|dropped| dropped.to_string()).unwrap_or_default());
+        let Provenance { tracker, servo, laboratory } = run.provenance.clone();
+        cells.extend([run.suite.to_string(), run.path.clone(), tracker, servo, laboratory]);
         cells.push(run.error.clone().unwrap_or_default());
         csv += &line(cells);
+    }
+    csv
+}
+
+/// One line a loss.
+pub fn losses(judged: &[Judged]) -> String {
+    let mut csv =
+        line(["suite", "title", "tracker", "seed", "first_box", "cause", "begin_s", "duration_s", "frame"]);
+    for (one, loss) in judged.iter().flat_map(|one| one.losses.iter().map(move |loss| (one, loss))) {
+        let run = one.run;
+        csv += &line([
+            run.suite.to_string(),
+            run.title.clone(),
+            run.tracker.to_string(),
+            run.seed.to_string(),
+            run.first_box.to_string(),
+            loss.cause.to_string(),
+            number(Some(loss.begin_s)),
+            number(Some(loss.duration_s)),
+            loss.frame.to_string(),
+        ]);
     }
     csv
 }
@@ -58,21 +73,38 @@ pub fn is_results(text: &str) -> bool {
 
 /// One line a tracker and condition, and the thesis' own means of the same tests.
 pub fn by_condition(sections: &[Section]) -> String {
-    let figures = column::OF_TESTS.iter().map(|column| column.key);
-    let mut csv = line(["tracker", "condition", "runs"].into_iter().chain(SETUP).chain(figures));
+    let figures = column::OF_TESTS.iter().map(|column| column.key.to_owned());
+    let intervals = column::WITH_INTERVAL
+        .iter()
+        .flat_map(|column| ["low", "high"].map(|end| format!("{}_{end}", column.key)));
+    let first = ["tracker", "condition", "runs", "worlds"].into_iter().chain(SETUP).map(str::to_owned);
+    let mut csv = line(first.chain(figures).chain(intervals));
     for section in sections {
         let printed = section.printed();
         for condition in conditions(section) {
             let ours = section.trackers().map(|tracker| {
                 (tracker.to_string(), in_condition(section, tracker, condition).collect::<Vec<_>>())
             });
-            let theirs = (PRINTED.to_owned(), printed_in(&printed, condition).collect());
-            for (name, metrics) in ours.chain([theirs]) {
-                let mut cells = vec![name, condition.name.to_owned(), metrics.len().to_string()];
+            let begin = |name: String, count: usize| {
+                let worlds = section.setup.worlds.name().to_owned();
+                let mut cells = vec![name, condition.name.to_owned(), count.to_string(), worlds];
                 cells.extend(setup(&section.setup));
-                cells.extend(means(&metrics));
+                cells
+            };
+            for (name, runs) in ours {
+                let mut cells = begin(name, runs.len());
+                cells.extend(means(&runs.iter().map(|one| &one.metrics).collect::<Vec<_>>()));
+                cells.extend(column::WITH_INTERVAL.iter().flat_map(|column| {
+                    let interval = column.interval(runs.iter().copied());
+                    [number(interval.map(|i| i.low)), number(interval.map(|i| i.high))]
+                }));
                 csv += &line(cells);
             }
+            let theirs: Vec<_> = printed_in(&printed, condition).collect();
+            let mut cells = begin(PRINTED.to_owned(), theirs.len());
+            cells.extend(means(&theirs));
+            cells.extend(column::WITH_INTERVAL.iter().flat_map(|_| [String::new(), String::new()]));
+            csv += &line(cells);
         }
     }
     csv
@@ -145,10 +177,9 @@ fn estimate(frame: &FrameRecord) -> [String; 9] {
     [state, x, y, left, top, width, height, estimate.id.to_string(), estimate.features.to_string()]
 }
 
-fn setup(setup: &Setup) -> [String; 9] {
+fn setup(setup: &Setup) -> [String; 8] {
     let (video, command) = (setup.delays.video.as_millis(), setup.delays.command.as_millis());
     [
-        setup.seed.to_string(),
         setup.codec.to_string(),
         setup.size.0.to_string(),
         setup.size.1.to_string(),
@@ -179,5 +210,37 @@ fn quoted(cell: &str) -> String {
         format!("\"{}\"", cell.replace('"', "\"\""))
     } else {
         cell.into()
+    }
+}
+
+/// Lines of cells, as [`line`] writes them.
+pub fn parse(text: &str) -> Vec<Vec<String>> {
+    let (mut lines, mut cells, mut cell, mut in_quotes) = (Vec::new(), Vec::new(), String::new(), false);
+    let mut chars = text.chars().peekable();
+    while let Some(c) = chars.next() {
+        match c {
+            '"' if in_quotes && chars.next_if_eq(&'"').is_some() => cell.push('"'),
+            '"' => in_quotes = !in_quotes,
+            ',' if !in_quotes => cells.push(std::mem::take(&mut cell)),
+            '\n' if !in_quotes => {
+                cells.push(std::mem::take(&mut cell));
+                lines.push(std::mem::take(&mut cells));
+            }
+            c => cell.push(c),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        let cells = ["plain", "", "a, b", "\"quoted\"", "two\nlines", "\"", "end"];
+        let text = line(cells) + &line(["x"]);
+        assert_eq!(parse(&text), [cells.map(str::to_owned).to_vec(), vec!["x".to_owned()]]);
+        assert_eq!(parse(""), Vec::<Vec<String>>::new());
     }
 }

@@ -1,26 +1,61 @@
 //! Runs with their metrics, in an order that does not depend on which ended first.
 
-use std::fmt;
+use std::{collections::BTreeSet, fmt};
 
-use super::thesis::{self, Row};
-use crate::{
-    metrics::Metrics,
-    record::{Codec, Delays, FirstBox, Run, TestId, TrackerName},
+use super::{
+    bootstrap::Group,
+    thesis::{self, Row},
 };
+use crate::{
+    metrics::{Loss, Metrics, losses},
+    record::{Codec, Delays, FirstBox, Run, Suite, TestId, TrackerName},
+};
+
+/// Which worlds: those that anybody may tune on are told apart from those that nobody does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Worlds {
+    /// Seeds 1 to 5.
+    Tuning,
+    /// Seeds 6 to 10.
+    HeldOut,
+    /// Any other.
+    Other,
+}
+
+impl Worlds {
+    fn of(seed: u64) -> Self {
+        match seed {
+            1..=5 => Self::Tuning,
+            6..=10 => Self::HeldOut,
+            _ => Self::Other,
+        }
+    }
+
+    /// In words.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Tuning => "seeds 1 to 5 (for tuning)",
+            Self::HeldOut => "seeds 6 to 10 (never tuned on)",
+            Self::Other => "other seeds",
+        }
+    }
+}
 
 /// What makes runs comparable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Setup {
     /// Only one point of a series over the delay.
     pub sweep: bool,
-    /// Number of the world.
-    pub seed: u64,
+    /// Which suite.
+    pub suite: Suite,
+    /// Who draws the first box.
+    pub first_box: FirstBox,
+    /// Which worlds.
+    pub worlds: Worlds,
     /// What the pictures go through.
     pub codec: Codec,
     /// Width and height in pixels.
     pub size: (u32, u32),
-    /// Who draws the first box.
-    pub first_box: FirstBox,
     /// How late things are.
     pub delays: Delays,
     /// By the clock, so that pictures may be dropped.
@@ -29,29 +64,31 @@ pub struct Setup {
 
 impl Setup {
     fn of(run: &Run) -> Self {
-        let Run { sweep, seed, codec, size, first_box, delays, .. } = *run;
-        Self { sweep, seed, codec, size, first_box, delays, real_time: run.dropped.is_some() }
+        let Run { sweep, suite, seed, codec, size, first_box, delays, .. } = *run;
+        let (worlds, real_time) = (Worlds::of(seed), run.dropped.is_some());
+        Self { sweep, suite, first_box, worlds, codec, size, delays, real_time }
     }
 
-    /// Name of a folder.
-    pub fn folder(&self) -> String {
-        let Self { seed, codec, size: (width, height), first_box, delays, sweep, real_time } = self;
+    /// Name of a folder for runs of that seed.
+    pub fn folder(&self, seed: u64) -> String {
+        let Self { suite, codec, size: (width, height), first_box, delays, sweep, real_time, .. } = self;
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         let sweep = if *sweep { "sweep-" } else { "" };
         let real_time = if *real_time { "realtime-" } else { "" };
         format!(
-            "{sweep}{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
+            "{suite}/{sweep}{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
         )
     }
 }
 
 impl fmt::Display for Setup {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { seed, codec, size: (width, height), first_box, delays, .. } = self;
+        let Self { suite, codec, size: (width, height), first_box, delays, .. } = self;
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         write!(
             f,
-            "seed {seed}, {codec}, {width}x{height}, first box {first_box}, delays: video {video} ms, command {command} ms{}",
+            "{suite}, {}, first box {first_box}, {codec}, {width}x{height}, delays: video {video} ms, command {command} ms{}",
+            self.worlds.name(),
             if self.real_time { ", in real time" } else { "" }
         )
     }
@@ -65,15 +102,34 @@ pub struct Judged<'a> {
     pub setup: Setup,
     /// What came out.
     pub metrics: Metrics,
+    /// When the person was lost, and why.
+    pub losses: Vec<Loss>,
 }
 
 impl<'a> Judged<'a> {
     /// All of them, sorted.
     pub fn all(runs: &'a [Run]) -> Vec<Self> {
-        let mut all: Vec<_> =
-            runs.iter().map(|run| Self { run, setup: Setup::of(run), metrics: Metrics::of(run) }).collect();
-        all.sort_by_key(|one| (one.setup, one.run.test, &one.run.title, one.run.tracker));
+        let mut all: Vec<_> = runs
+            .iter()
+            .map(|run| Self {
+                run,
+                setup: Setup::of(run),
+                metrics: Metrics::of(run),
+                losses: losses(&run.frames),
+            })
+            .collect();
+        all.sort_by_key(|one| (one.setup, one.run.test, &one.run.title, one.run.seed, one.run.tracker));
         all
+    }
+
+    /// With what it is not independent.
+    pub fn group(&self) -> Group<'a> {
+        (self.run.seed, &self.run.path)
+    }
+
+    /// What was shown: the same to every tracker.
+    pub fn shown(&self) -> (&'a str, u64) {
+        (&self.run.title, self.run.seed)
     }
 
     /// The thesis' row of the same test.
@@ -84,7 +140,7 @@ impl<'a> Judged<'a> {
 
 /// Name of a file of one run alone, without its ending: the setup is a folder.
 pub fn place(run: &Run) -> String {
-    format!("{}/{}-{}", Setup::of(run).folder(), slug(&run.title), run.tracker)
+    format!("{}/{}-{}", Setup::of(run).folder(run.seed), slug(&run.title), run.tracker)
 }
 
 /// A title as part of a file name.
@@ -129,10 +185,19 @@ impl<'a> Section<'a> {
         titles
     }
 
-    /// The runs of what was shown.
+    /// What was shown to every tracker there is, to the end.
+    pub fn shared(&self) -> BTreeSet<(&'a str, u64)> {
+        let of = |name: TrackerName| self.whole(name).map(Judged::shown).collect::<BTreeSet<_>>();
+        let all: Vec<_> = self.trackers().map(of).collect();
+        let Some((first, others)) = all.split_first() else { return BTreeSet::new() };
+        first.iter().filter(|shown| others.iter().all(|other| other.contains(*shown))).copied().collect()
+    }
+
+    /// The runs of what was shown, in the first of the worlds.
     pub fn showing(&self, title: &str) -> impl Iterator<Item = &'a Judged<'a>> + use<'a, '_> {
         let title = title.to_owned();
-        self.runs.iter().filter(move |judged| judged.run.title == title)
+        let first = self.runs.iter().filter(|one| one.run.title == title).map(|one| one.run.seed).min();
+        self.runs.iter().filter(move |one| one.run.title == title && Some(one.run.seed) == first)
     }
 
     /// The thesis' rows of the tests that were run.

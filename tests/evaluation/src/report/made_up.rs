@@ -1,7 +1,7 @@
 //! Runs that nobody ran.
 
 use crate::record::{
-    Codec, Delays, FirstBox, FrameRecord, Run, Sighting, Silhouette, Suite, TestId, TrackerName,
+    Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Sighting, Silhouette, Suite, TestId, TrackerName,
 };
 
 /// Test 7 with ours, at ten pictures a second.
@@ -12,6 +12,7 @@ pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
         path: "1".into(),
         title: "test 7".into(),
         tracker: TrackerName::Ptztrack,
+        provenance: Provenance { tracker: "t".into(), servo: "s".into(), laboratory: "l".into() },
         codec: Codec::Mjpeg,
         size: (80, 60),
         seed: 1,

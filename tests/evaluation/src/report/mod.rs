@@ -5,7 +5,9 @@
 //! | `results.csv` | one line a run |
 //! | `conditions.csv` | means a tracker and condition, the thesis' beside them |
 //! | `frames/…/….csv` | one line a picture of a run |
-//! | `summary.md` | trackers × figures, trackers × conditions |
+//! | `losses.csv` | one line a loss, with its cause |
+//! | `summary.md` | the worst conditions, trackers × figures, causes of losses: for a screen, and for the README |
+//! | `tables.md` | trackers × figures, trackers × conditions |
 //! | `tests.md` | every test of every tracker beside the thesis' figures |
 //! | `plots/….png` | d_gc and d_gp over time; figures against delay |
 //! | `index.html` | all of it in one file |
@@ -24,7 +26,9 @@ use table::Table;
 
 use crate::record::{Run, TestId};
 
+mod bootstrap;
 mod column;
+pub mod compare;
 mod csv;
 mod definitions;
 mod judged;
@@ -57,10 +61,25 @@ pub struct Report {
 
 /// Why nothing was written.
 #[derive(Debug, thiserror::Error)]
-#[error("cannot write {}: {source}; is there room, and may you write there?", path.display())]
-pub struct ReportError {
-    path: PathBuf,
-    source: io::Error,
+pub enum ReportError {
+    /// The system does not let us.
+    #[error("cannot write {}: {source}; is there room, and may you write there?", path.display())]
+    Write {
+        /// Where.
+        path: PathBuf,
+        /// What it says.
+        source: io::Error,
+    },
+    /// They were made with different things.
+    #[error(
+        "{one} and {other} were run with another servo or laboratory and do not belong into one table; run them anew (--fresh)"
+    )]
+    Mixed {
+        /// A run.
+        one: String,
+        /// Another one.
+        other: String,
+    },
 }
 
 /// Makes the folder `out` where it is missing, and tries to write into it: better now than after hours of work.
@@ -72,33 +91,42 @@ pub fn make_room(out: &Path) -> Result<(), ReportError> {
     fs::create_dir_all(out)
         .and_then(|()| fs::write(&probe, ""))
         .and_then(|()| fs::remove_file(&probe))
-        .map_err(|source| ReportError { path: out.into(), source })
+        .map_err(|source| ReportError::Write { path: out.into(), source })
 }
 
 /// Writes everything about `runs` into the folder `out`, which is made where it is missing; `left_out` says which trackers
 /// were not run and why. What an earlier report left there is gone.
 ///
 /// # Errors
-/// Where a file cannot be written. A missing gnuplot is no error but a note.
+/// Where a file cannot be written, or runs are not comparable. A missing gnuplot is no error but a note.
 pub fn write(runs: &[Run], left_out: &[String], out: &Path) -> Result<Report, ReportError> {
+    comparable(runs)?;
     let judged = Judged::all(runs);
     let content = Content::of(&judged, left_out);
     clear(out)?;
     save(&out.join(RESULTS), csv::results(&judged))?;
     save(&out.join("conditions.csv"), csv::by_condition(&content.sections))?;
+    save(&out.join("losses.csv"), csv::losses(&judged))?;
     for one in &judged {
         save(&out.join(format!("frames/{}.csv", place(one.run))), csv::frames(&one.run.frames))?;
     }
     let plots = out.join("plots");
-    fs::create_dir_all(&plots).map_err(|source| ReportError { path: plots.clone(), source })?;
+    fs::create_dir_all(&plots).map_err(|source| ReportError::Write { path: plots.clone(), source })?;
     let failures = content.failures().map(|(what, why)| format!("{what} failed: {why}"));
     let mut notes: Vec<_> = left_out.iter().cloned().chain(failures).collect();
     notes.extend(content.draw(&plots));
     let summary = content.summary();
     save(&out.join("summary.md"), with_notes(&summary, &notes))?;
+    save(&out.join("tables.md"), content.tables())?;
     save(&out.join("tests.md"), content.test_by_test())?;
     save(&out.join("index.html"), page::html(&content, &plots))?;
     Ok(Report { summary, notes })
+}
+
+fn comparable(runs: &[Run]) -> Result<(), ReportError> {
+    let name = |run: &Run| format!("{} on {}, seed {}", run.tracker, run.title, run.seed);
+    let odd = runs.windows(2).find(|pair| !pair[0].provenance.is_comparable(&pair[1].provenance));
+    odd.map_or(Ok(()), |pair| Err(ReportError::Mixed { one: name(&pair[0]), other: name(&pair[1]) }))
 }
 
 /// Removes the folders of an earlier report: nothing of it shall stand beside the new tables. Where there is none, folders of
@@ -110,7 +138,7 @@ fn clear(out: &Path) -> Result<(), ReportError> {
     for path in ["frames", "plots"].map(|folder| out.join(folder)) {
         match fs::remove_dir_all(&path) {
             Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                return Err(ReportError { path, source });
+                return Err(ReportError::Write { path, source });
             }
             _ => {}
         }
@@ -127,7 +155,7 @@ pub(crate) fn save(path: &Path, content: impl AsRef<[u8]>) -> Result<(), ReportE
     let folder = path.parent().unwrap_or(Path::new("."));
     fs::create_dir_all(folder)
         .and_then(|()| fs::write(path, content))
-        .map_err(|source| ReportError { path: path.into(), source })
+        .map_err(|source| ReportError::Write { path: path.into(), source })
 }
 
 /// What tables, plots and page are made from.
@@ -180,17 +208,39 @@ impl<'a> Content<'a> {
         })
     }
 
+    /// What fits a screen.
     fn summary(&self) -> String {
         let of_section = |section: &Section| {
-            let figures = [column::DP, column::TF, column::MEAN_DGC];
-            let tests = std::iter::once(tables::overview(section))
-                .chain(figures.iter().map(|column| tables::by_condition(section, column)))
-                .filter(|_| !section.printed().is_empty());
             let recordings = Some(tables::recordings(section)).filter(|table| !table.rows.is_empty());
-            tests.chain(recordings).collect::<Vec<_>>()
+            let overview = tables::overview(section);
+            let causes = tables::causes(section);
+            let tables = [Some(overview), tables::all_worlds(section), Some(causes), recordings];
+            let worst = tables::worst(section).map(|worst| worst + "\n").unwrap_or_default();
+            worst + &joined(tables.into_iter().flatten())
         };
-        let tables = self.sections.iter().flat_map(of_section).chain(self.tables_against_delay());
-        joined(tables)
+        let sections: Vec<_> = self.sections.iter().map(of_section).collect();
+        let note = self.sections.iter().any(|section| !section.printed().is_empty());
+        let note = if note { format!("\n{}\n", thesis::NOTE) } else { String::new() };
+        sections.join("\n") + &note + &joined(self.tables_against_delay().into_iter())
+    }
+
+    /// Everything by condition.
+    fn tables(&self) -> String {
+        let figures = [
+            column::P,
+            column::P_PREDICTED,
+            column::DP,
+            column::TF,
+            column::SUCCESS,
+            column::MEAN_DGC,
+            column::MEAN_DGP,
+            column::LOSSES,
+        ];
+        let sections = self.sections.iter().filter(|section| !section.printed().is_empty());
+        let tables = sections.flat_map(|section| {
+            figures.iter().map(|column| tables::by_condition(section, column)).collect::<Vec<_>>()
+        });
+        format!("{}\n{}", self.summary(), joined(tables))
     }
 
     fn test_by_test(&self) -> String {

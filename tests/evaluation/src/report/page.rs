@@ -10,13 +10,15 @@ use super::{
     plot::Plot,
     strip,
     table::escape,
-    tables,
+    tables, thesis,
 };
+use crate::record::TrackerName;
 
 const STYLE: &str = include_str!("page.css");
 
 /// The figures by condition.
-const BY_CONDITION: [Column; 5] = [column::P, column::DP, column::TF, column::MEAN_DGC, column::MEAN_DGP];
+const BY_CONDITION: [Column; 6] =
+    [column::P, column::DP, column::TF, column::SUCCESS, column::MEAN_DGC, column::LOSSES];
 
 /// The page. Plots are read from `plots` as far as they were drawn.
 pub fn html(content: &Content, plots: &Path) -> String {
@@ -38,15 +40,19 @@ pub fn html(content: &Content, plots: &Path) -> String {
 
 fn section(section: &Section, content: &Content, plots: &Path) -> String {
     let mut html = format!("<h2>{}</h2>\n", escape(&capitalised(&section.setup.to_string())));
+    html += &tables::worst(section).map(|worst| format!("<p>{}</p>\n", escape(&worst))).unwrap_or_default();
     if !section.printed().is_empty() {
         html += "<p>P and DP: more is better; TF, d_gc, d_gp: less is better. See <a href=\"#counted\">what is counted</a>.</p>\n";
         html += &tables::overview(section).html();
+        html += &tables::all_worlds(section).map(|table| table.html()).unwrap_or_default();
+        html += &format!("<p>{}</p>\n", escape(thesis::NOTE));
         html += &BY_CONDITION.map(|column| tables::by_condition(section, &column).html()).concat();
     }
     let recordings = tables::recordings(section);
     if !recordings.rows.is_empty() {
         html += &recordings.html();
     }
+    html += &losses(section);
     let shown = content.shown(section);
     let over_time = shown.iter().filter_map(|title| image(&Plot::over_time(section, title), plots));
     html += &titled("h3", "Over time", over_time.collect());
@@ -63,6 +69,23 @@ fn section(section: &Section, content: &Content, plots: &Path) -> String {
         format!("<details><summary>{}</summary>\n{}</details>\n", escape(&table.caption), table.html())
     });
     html + &titled("h3", "Test by test", details.collect())
+}
+
+/// So many pictures of losses of one tracker; all of them are in `losses.csv`.
+const LOSSES_SHOWN: usize = 60;
+
+fn losses(section: &Section) -> String {
+    let pictures = section.trackers().map(|name| {
+        let lossy = section.of(name).filter(|one| !one.losses.is_empty()).take(LOSSES_SHOWN);
+        let strips: String = lossy.map(strip::losses).collect();
+        if strips.is_empty() {
+            return strips;
+        }
+        let open = if name == TrackerName::Ptztrack { " open" } else { "" };
+        format!("<details{open}><summary>{name}: where losses began</summary>\n<div class=\"strip\">\n{strips}</div></details>\n")
+    });
+    let pictures: String = pictures.collect();
+    titled("h3", "Losses", tables::causes(section).html() + &pictures)
 }
 
 fn sweep(content: &Content, plots: &Path) -> String {

@@ -29,7 +29,8 @@ impl Plot {
     /// d_gc and d_gp over time of all trackers in one test, as in the thesis' figures 5.10 to 5.13.
     pub fn over_time(section: &Section, title: &str) -> Self {
         let runs: Vec<&Judged> = section.showing(title).collect();
-        let file = format!("time-{}-{}.png", slug(title), section.setup.folder());
+        let seed = runs.first().map_or(0, |one| one.run.seed);
+        let file = format!("time-{}-{}.png", slug(title), slug(&section.setup.folder(seed)));
         let panel = |block: &str, axis: &str, top: &str| {
             let data = runs.iter().map(|one| Curve::of(block, one.run.tracker));
             format!("set ylabel \"{axis}\"\nset yrange [0:{top}]\n{}", plot(data))
@@ -127,7 +128,7 @@ struct Curve {
 
 impl Curve {
     fn of(block: &str, tracker: TrackerName) -> Self {
-        Self { block: format!("${block}_{tracker}"), tracker, points: false }
+        Self { block: format!("${block}_{}", variable(tracker)), tracker, points: false }
     }
 }
 
@@ -167,7 +168,12 @@ fn datablock(name: &str, tracker: TrackerName, points: impl Iterator<Item = (f64
         Some(y) => format!("{x:.6} {y:.6}\n"),
         None => format!("{x:.6} NaN\n"),
     };
-    format!("${name}_{tracker} << END\n{}END\n", points.map(line).collect::<String>())
+    format!("${name}_{} << END\n{}END\n", variable(tracker), points.map(line).collect::<String>())
+}
+
+/// As part of a variable's name.
+fn variable(tracker: TrackerName) -> String {
+    tracker.name().replace('-', "_")
 }
 
 fn shade_hidden(frames: &[FrameRecord]) -> String {
@@ -197,6 +203,8 @@ pub fn colour(tracker: TrackerName) -> &'static str {
         TrackerName::Mosse => "#e69f00",
         TrackerName::MedianFlow => "#56b4e9",
         TrackerName::Oracle => "#000000",
+        TrackerName::OracleEgo => "#444444",
+        TrackerName::OracleXray => "#777777",
         TrackerName::Still => "#999999",
     }
 }

@@ -4,8 +4,8 @@ use std::fmt::Write;
 
 use super::{judged::Judged, table::escape};
 use crate::{
-    metrics::{d_gc, d_gp, is_true_positive},
-    record::{Bounds, FrameRecord, Snapshot, TargetState},
+    metrics::{Loss, d_gc, d_gp, is_true_positive},
+    record::{Bounds, FrameRecord, Moment, Snapshot, TargetState},
 };
 
 /// The moments of one run side by side; nothing where none were kept.
@@ -14,12 +14,32 @@ pub fn html(one: &Judged) -> String {
         .run
         .snapshots
         .iter()
+        .filter(|snapshot| snapshot.moment != Moment::Lost)
         .filter_map(|snapshot| Some(figure(snapshot, one.run.frames.get(snapshot.frame)?)))
         .collect();
     if figures.is_empty() {
         return String::new();
     }
     format!("<h4>{}</h4>\n<div class=\"strip\">\n{figures}</div>\n", one.run.tracker)
+}
+
+/// The pictures in which losses of one run began, each with its cause.
+pub fn losses(one: &Judged) -> String {
+    let figure = |loss: &Loss| {
+        let shown = |snapshot: &&Snapshot| snapshot.moment == Moment::Lost && snapshot.frame == loss.frame;
+        let picture = figure(one.run.snapshots.iter().find(shown)?, one.run.frames.get(loss.frame)?);
+        let run = one.run;
+        Some(format!(
+            "<div><p><b>{}</b><br>{}, {}, seed {}, at {:.1} s for {:.1} s</p>\n{picture}</div>\n",
+            loss.cause,
+            run.tracker,
+            escape(&run.title),
+            run.seed,
+            loss.begin_s,
+            loss.duration_s
+        ))
+    };
+    one.losses.iter().filter_map(figure).collect()
 }
 
 fn figure(snapshot: &Snapshot, frame: &FrameRecord) -> String {

@@ -5,6 +5,8 @@ use std::sync::{Arc, Mutex};
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 
+use virtual_camera::Matrix;
+
 use crate::{
     pipeline::{PipelineError, SINK, lock},
     record::{Bounds, FirstBox, GroundTruth, TrackerName},
@@ -42,6 +44,8 @@ impl Phase {
 pub(crate) struct Cue {
     pub phase: Phase,
     pub truth: Option<GroundTruth>,
+    /// How the background moved since the picture before: from its pixels to those of this one.
+    pub motion: Option<Matrix>,
     pub size: (u32, u32),
 }
 
@@ -50,7 +54,7 @@ pub(crate) type CurrentCue = Arc<Mutex<Cue>>;
 
 impl Cue {
     pub fn new(size: (u32, u32)) -> Self {
-        Self { phase: Phase::Before, truth: None, size }
+        Self { phase: Phase::Before, truth: None, motion: None, size }
     }
 
     /// The box that trackers are given with this picture.
@@ -84,7 +88,9 @@ impl Tracker {
             TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
                 stock::description(self.name)
             }
-            TrackerName::Oracle | TrackerName::Still => "identity name=tracker".to_owned(),
+            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
+                "identity name=tracker".to_owned()
+            }
         }
     }
 
@@ -110,7 +116,9 @@ impl Tracker {
             TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
                 stock::attach(pipeline, &self.cue)
             }
-            TrackerName::Oracle | TrackerName::Still => bounds::attach(pipeline, &self.cue),
+            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
+                bounds::attach(pipeline, self.name, &self.cue)
+            }
         }
     }
 
@@ -122,7 +130,9 @@ impl Tracker {
             TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
                 stock::next(pipeline, &cue)
             }
-            TrackerName::Oracle | TrackerName::Still => Ok(()),
+            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
+                Ok(())
+            }
         }
     }
 }

@@ -16,10 +16,9 @@ use crate::{
 /// Ours as it stands.
 pub(super) const DEFAULTS: &str = "bgavgdetect ! lkfeaturetrack name=tracker";
 
-/// Thesis 3.2 to 3.5, no more: every picture weighs the same, at its own size, and a region counts as soon as it is
-/// seen and as it is seen.
-pub(super) const THESIS: &str = "bgavgdetect alpha-interval=0 shed-trail=false confirm-frames=1 analysis-width=0 \
-                                 ! lkfeaturetrack name=tracker profile=thesis confirm-frames=1";
+/// Thesis 3.2 to 3.5, no more.
+pub(super) const THESIS: &str =
+    "bgavgdetect profile=thesis ! lkfeaturetrack name=tracker profile=thesis confirm-frames=1";
 
 /// How the tracker chooses by itself: its default.
 const CHOICE: &str = "largest";

@@ -8,7 +8,7 @@ use std::sync::Mutex;
 
 use gst::prelude::*;
 use gst_video::VideoRegionOfInterestMeta;
-use ptztrack_contract::{Rect, TargetMeta, TargetState};
+use ptztrack_contract::{Point, Rect, TargetMeta, TargetState};
 
 use super::{Cue, CurrentCue, Phase, attach_targets, normalised, rate};
 use crate::{
@@ -43,11 +43,11 @@ pub(super) fn attach(pipeline: &gst::Pipeline, cue: &CurrentCue) -> Result<(), P
         }
         gst::PadProbeReturn::Handled
     });
-    let last = Mutex::default();
+    let (coast, last) = (coast_time()?, Mutex::default());
     attach_targets(&pipeline.pad("said", "src")?, cue, move |cue, buffer| {
         let seen = cue.given().or_else(|| region_of_interest(buffer));
         let seen = seen.map(|bounds| normalised(bounds, cue.size));
-        translate(cue.phase, seen, buffer.pts(), &mut lock(&last))
+        translate(cue.phase, seen, buffer.pts(), coast, &mut lock(&last))
     });
     Ok(())
 }
@@ -71,26 +71,68 @@ fn region_of_interest(buffer: &gst::BufferRef) -> Option<Bounds> {
     Some(Bounds { left, top, width: f64::from(width), height: f64::from(height) })
 }
 
-/// Where it saw the target last, and when.
-type Last = Option<(Rect, Option<gst::ClockTime>)>;
+/// For how long ours holds a target that it does not see for hidden: so do they.
+fn coast_time() -> Result<gst::ClockTime, PipelineError> {
+    let ours = gst::ElementFactory::make("lkfeaturetrack").build()?;
+    Ok(gst::ClockTime::from_nseconds(ours.property("coast-time")))
+}
 
-fn translate(phase: Phase, seen: Option<Rect>, time: Option<gst::ClockTime>, last: &mut Last) -> TargetMeta {
-    let known = std::mem::replace(last, seen.map(|bounds| (bounds, time)));
+/// What it said when it saw the target last.
+struct Seen {
+    target: TargetMeta,
+    time: Option<gst::ClockTime>,
+    /// Whether there were pictures since in which it did not see it.
+    hidden: bool,
+}
+
+fn translate(
+    phase: Phase,
+    seen: Option<Rect>,
+    time: Option<gst::ClockTime>,
+    coast: gst::ClockTime,
+    last: &mut Option<Seen>,
+) -> TargetMeta {
     let Some(bounds) = seen else {
         let state = if phase == Phase::Before { TargetState::Searching } else { TargetState::Lost };
-        return TargetMeta { state, ..TargetMeta::default() };
+        let gone = TargetMeta { state, ..TargetMeta::default() };
+        return last.as_mut().and_then(|last| coasted(last, time, coast)).unwrap_or(gone);
     };
-    TargetMeta {
+    let velocity = last.as_ref().map(|before| {
+        // What happened while it was hidden is no velocity.
+        let place = (before.target.centroid, before.time);
+        let rate = rate(place, (bounds.centre(), time)).filter(|_| !before.hidden);
+        rate.unwrap_or(before.target.velocity)
+    });
+    let target = TargetMeta {
         state: TargetState::Tracking,
         id: 1,
         bounds,
         centroid: bounds.centre(),
-        velocity: known
-            .and_then(|(before, then)| rate((before.centre(), then), (bounds.centre(), time)))
-            .unwrap_or_default(),
+        velocity: velocity.unwrap_or_default(),
         confidence: 1.0,
         ..TargetMeta::default()
-    }
+    };
+    *last = Some(Seen { target: target.clone(), time, hidden: false });
+    target
+}
+
+/// The target where it would be by its last velocity; `None` where it was not seen for too long.
+fn coasted(last: &mut Seen, time: Option<gst::ClockTime>, coast: gst::ClockTime) -> Option<TargetMeta> {
+    last.hidden = true;
+    let before = &last.target;
+    let unseen = time?.checked_sub(last.time?).filter(|unseen| *unseen <= coast)?;
+    let moved = |place: f64, velocity: f64| place + velocity * unseen.seconds_f64();
+    let Rect { x, y, .. } = before.bounds;
+    Some(TargetMeta {
+        state: TargetState::Occluded,
+        bounds: Rect { x: moved(x, before.velocity.x), y: moved(y, before.velocity.y), ..before.bounds },
+        centroid: Point {
+            x: moved(before.centroid.x, before.velocity.x),
+            y: moved(before.centroid.y, before.velocity.y),
+        },
+        confidence: 0.0,
+        ..before.clone()
+    })
 }
 
 #[cfg(test)]
@@ -104,18 +146,24 @@ mod tests {
     }
 
     #[test]
-    fn boxes_become_a_target_that_moves_and_gets_lost() {
-        let (mut last, ms) = (None, |n| Some(gst::ClockTime::from_mseconds(n)));
-        let none = translate(Phase::Before, None, ms(0), &mut last);
-        assert_eq!(none.state, TargetState::Searching);
-        let first = translate(Phase::FirstBox, at(0.1), ms(40), &mut last);
+    fn boxes_become_a_target_that_moves_is_hidden_and_gets_lost() {
+        let mut last = None;
+        let mut say = |phase, seen, ms| {
+            let coast = gst::ClockTime::from_mseconds(100);
+            translate(phase, seen, Some(gst::ClockTime::from_mseconds(ms)), coast, &mut last)
+        };
+        assert_eq!(say(Phase::Before, None, 0).state, TargetState::Searching);
+        let first = say(Phase::FirstBox, at(0.1), 40);
         assert_eq!((first.state, first.velocity), (TargetState::Tracking, Vector::default()));
-        let second = translate(Phase::After, at(0.14), ms(80), &mut last);
+        let second = say(Phase::After, at(0.14), 80);
         assert!((second.velocity.x - 1.0).abs() < 1e-9 && second.velocity.y == 0.0, "{second:?}");
         assert!((second.centroid.x - 0.19).abs() < 1e-9);
-        assert_eq!(translate(Phase::After, None, ms(120), &mut last).state, TargetState::Lost);
-        let again = translate(Phase::After, at(0.5), ms(160), &mut last);
-        assert_eq!((again.state, again.velocity), (TargetState::Tracking, Vector::default()));
+        let hidden = say(Phase::After, None, 180);
+        assert_eq!((hidden.state, hidden.velocity), (TargetState::Occluded, second.velocity));
+        assert!((hidden.centroid.x - 0.29).abs() < 1e-9 && (hidden.bounds.x - 0.24).abs() < 1e-9);
+        assert_eq!(say(Phase::After, None, 181).state, TargetState::Lost);
+        let again = say(Phase::After, at(0.5), 220);
+        assert_eq!((again.state, again.velocity), (TargetState::Tracking, second.velocity));
     }
 
     #[test]
