@@ -13,7 +13,7 @@ const NO_PART_OF_A_RUN: [&str; 7] =
 fn main() -> io::Result<()> {
     let parts = [
         ("TRACKER_SOURCES", vec!["contract/src", "gst-plugin-ptztrack/src"]),
-        ("SERVO_SOURCES", vec!["contract/src", "gst-plugin-vapix/src"]),
+        ("SERVO_SOURCES", vec!["contract/src", "servo/src", "vapix/src", "gst-plugin-vapix/src"]),
         ("LABORATORY_SOURCES", vec!["tests/virtual-camera/src", "tests/evaluation/src", "Cargo.lock"]),
     ];
     for (name, folders) in parts {
