@@ -73,7 +73,7 @@ impl Camera {
     fn new(settings: Settings) -> Result<Self, Error> {
         let world = world::open(&settings)?;
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
-        let memory = settings.video.delay + settings.video.exposure + Duration::from_secs(2);
+        let memory = settings.video.delay + world.shutter(settings.video.exposure) + Duration::from_secs(2);
         let limits = settings.kinematics.limits_in(world.limits());
         let head =
             Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
@@ -283,8 +283,9 @@ impl Camera {
     /// The picture whose exposure began at `time`, not later than now.
     pub fn picture(&self, time: Duration, size: (u32, u32)) -> Result<Picture, FootageError> {
         let opening = self.pose_at(time);
-        let closing = self.pose_at(time + self.settings.video.exposure);
-        self.world.render(&Exposure { time, opening, closing }, size)
+        let duration = self.world.shutter(self.settings.video.exposure);
+        let closing = self.pose_at(time + duration);
+        self.world.render(&Exposure { time, opening, closing, duration }, size)
     }
 
     /// Of the picture whose exposure began at `time`: who is in it.
@@ -299,8 +300,7 @@ impl Camera {
 
     /// Only the moment at which the shutter opens.
     fn opening(&self, time: Duration) -> Exposure {
-        let pose = self.pose_at(time);
-        Exposure { time, opening: pose, closing: pose }
+        Exposure::at(time, self.pose_at(time))
     }
 
     /// When the picture leaves the sensor that leaves the camera now.
@@ -429,7 +429,7 @@ impl VirtualCamera {
 
     /// Who would be in a picture at any time, the future too, if the camera looked along `pose`.
     pub fn ground_truth_from(&self, pose: &Pose, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
-        self.camera.world.truth(&Exposure { time, opening: *pose, closing: *pose }, size)
+        self.camera.world.truth(&Exposure::at(time, *pose), size)
     }
 
     /// Which pixels of that picture show a person; `None` in worlds that know boxes at best.

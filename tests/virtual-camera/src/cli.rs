@@ -69,7 +69,7 @@ pub struct Options {
     /// JPEG compression, 0 (best) to 100
     #[arg(long, default_value_t = 30, value_parser = clap::value_parser!(u32).range(0..=100))]
     compression: u32,
-    /// Exposure time in milliseconds: what moves meanwhile is blurred
+    /// Exposure time in good light, in milliseconds: what moves meanwhile is blurred; dim light takes longer
     #[arg(long, default_value_t = 16.7, value_name = "MS", value_parser = not_negative)]
     exposure: f64,
     /// From light to wire, in milliseconds

@@ -142,7 +142,8 @@ pub struct Video {
     pub compression: u32,
     /// From light on the sensor to data on the wire.
     pub delay: Duration,
-    /// How long the shutter is open: what the camera turns meanwhile is blurred.
+    /// How long the shutter is open in good light: what moves in the picture meanwhile is blurred. In dim light it is
+    /// open longer.
     pub exposure: Duration,
 }
 

@@ -13,7 +13,8 @@ pub(crate) fn motion_blur(picture: &mut Picture, x: f64, y: f64) {
     blur_plane(v, x / 2.0, y / 2.0);
 }
 
-fn blur_plane(plane: &mut Plane, x: f64, y: f64) {
+/// The same of one plane.
+pub(crate) fn blur_plane(plane: &mut Plane, x: f64, y: f64) {
     let (mut x, mut y) = (x / 2.0, y / 2.0);
     while x.abs().max(y.abs()) > 0.5 {
         average_with_moved(plane, x.round() as isize, y.round() as isize);

@@ -35,6 +35,26 @@ pub(crate) struct Exposure {
     pub opening: Pose,
     /// Where it looks when the shutter closes.
     pub closing: Pose,
+    /// How long the shutter is open.
+    pub duration: Duration,
+}
+
+impl Exposure {
+    /// Only a moment.
+    pub fn at(time: Duration, pose: Pose) -> Self {
+        Self { time, opening: pose, closing: pose, duration: Duration::ZERO }
+    }
+
+    /// Where the camera looks when a part of it, 0 to 1, is over.
+    pub fn pose(&self, share: f64) -> Pose {
+        let between = |from: f64, to: f64| from + (to - from) * share;
+        let (from, to) = (&self.opening, &self.closing);
+        Pose {
+            pan_deg: between(from.pan_deg, to.pan_deg),
+            tilt_deg: between(from.tilt_deg, to.tilt_deg),
+            zoom_step: between(from.zoom_step, to.zoom_step),
+        }
+    }
 }
 
 /// What a turning and zooming camera can be put into.
@@ -49,6 +69,10 @@ pub(crate) trait World: Send + Sync {
     fn frame_rate(&self) -> f64;
     /// Number of the world's picture at a time.
     fn frame_at(&self, time: Duration) -> u64;
+    /// How long the shutter is open where it is set to `set`: longer where it is dim, as cameras do by themselves.
+    fn shutter(&self, set: Duration) -> Duration {
+        set
+    }
     /// What the sensor catches, at any `size`.
     fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError>;
     /// Who is there as the shutter opens, wherever the camera looks, and in what shape.

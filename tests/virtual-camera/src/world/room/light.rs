@@ -9,23 +9,45 @@ pub(crate) struct Light {
     pub lamps: Vec<Vector>,
     /// Middles of the windows; their glow is weaker and falls off faster.
     pub windows: Vec<Vector>,
+    /// How strong they are.
+    pub strength: Strength,
+}
+
+/// What the sources of light give.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Strength {
+    /// Light that comes from everywhere.
+    around: f64,
+    /// A lamp, and how far away it gives half of that, in metres.
+    lamp: (f64, f64),
+    /// A window, likewise.
+    window: (f64, f64),
+}
+
+impl Strength {
+    /// Lamps all over the ceiling, and daylight.
+    pub const DAY: Self = Self { around: 0.42, lamp: (0.62, 2.4), window: (0.5, 1.5) };
+    /// A few lamps in the dark: what is not beside one is a shade darker or lighter than black.
+    pub const NIGHT: Self = Self { around: 0.045, lamp: (0.34, 0.9), window: (0.03, 1.0) };
 }
 
 impl Light {
-    /// What a surface at `point` facing along `normal` (a unit vector) sends back of its brightness: about 0.4 to 1.15.
+    /// What a surface at `point` facing along `normal` (a unit vector) sends back of its brightness: about 0.4 to 1.15 by
+    /// day, 0.06 to 0.5 by night.
     pub fn at(&self, point: Vector, normal: Vector) -> f64 {
-        let falling = |&source: &Vector, strength: f64, radius: f64| {
+        let falling = |&source: &Vector, (strength, radius): (f64, f64)| {
             let way = subtract(source, point);
             let squared = dot(way, way);
             // Half Lambert: light thrown back by the walls comes from everywhere.
             let facing = 0.5 + 0.5 * dot(scale(way, 1.0 / squared.sqrt().max(1e-6)), normal);
             strength * facing / (1.0 + squared / (radius * radius))
         };
-        let lamps: f64 = self.lamps.iter().map(|lamp| falling(lamp, 0.62, 2.4)).sum();
-        let windows: f64 = self.windows.iter().map(|window| falling(window, 0.5, 1.5)).sum();
-        let upwards = 0.06 * normal[1];
+        let Strength { around, lamp, window } = self.strength;
+        let lamps: f64 = self.lamps.iter().map(|source| falling(source, lamp)).sum();
+        let windows: f64 = self.windows.iter().map(|source| falling(source, window)).sum();
+        let upwards = 0.14 * around * normal[1];
         // Bright places saturate as film does.
-        let sum = 0.42 + lamps + windows + upwards;
+        let sum = around + lamps + windows + upwards;
         1.22 * (1.0 - (-1.3 * sum).exp())
     }
 }

@@ -1,5 +1,7 @@
 //! From light to numbers: the lens' softness, exposure, flickering lamps, noise.
 
+use std::time::Duration;
+
 use super::settings::Lighting;
 use crate::{
     picture::{Picture, Plane},
@@ -24,7 +26,9 @@ const ROLLING_PERIODS: f64 = 0.6;
 /// How the sensor is set for the light there is.
 #[derive(Debug, Clone, Copy)]
 struct Exposure {
-    /// Part of full light that falls on it.
+    /// How much longer the shutter is open than set, for good light.
+    shutter: f64,
+    /// Part of full light that falls on it meanwhile.
     light: f64,
     /// How often what it counts is enlarged.
     gain: f64,
@@ -35,11 +39,21 @@ struct Exposure {
 }
 
 impl Exposure {
-    fn of(lighting: Lighting) -> Self {
-        match lighting {
-            Lighting::Optimal => Self { light: 1.0, gain: 1.0, step: 1, noise: (1.9, 1.3) },
-            // Half the light; the gain makes up for a half of what is missing, and enlarges the noise.
-            Lighting::Dim => Self { light: 0.5, gain: 1.5, step: 2, noise: (3.0, 2.2) },
+    /// In a room with lamps all over, or by night with a few, whose light is painted as a shutter catches it that is open as
+    /// long as can be.
+    fn of(lighting: Lighting, night: bool) -> Self {
+        match (lighting, night) {
+            (Lighting::Optimal, false) => {
+                Self { shutter: 1.0, light: 1.0, gain: 1.0, step: 1, noise: (1.9, 1.3) }
+            }
+            // Half the light: first the shutter is open longer, then the gain makes up for a part of what is missing.
+            (Lighting::Dim, false) => {
+                Self { shutter: 1.6, light: 0.8, gain: 1.1, step: 2, noise: (3.0, 2.2) }
+            }
+            (Lighting::Optimal, true) => {
+                Self { shutter: 2.2, light: 1.0, gain: 1.5, step: 1, noise: (3.0, 2.0) }
+            }
+            (Lighting::Dim, true) => Self { shutter: 2.2, light: 0.5, gain: 2.0, step: 2, noise: (3.4, 2.4) },
         }
     }
 }
@@ -53,14 +67,19 @@ pub(super) struct Sensor {
 }
 
 impl Sensor {
-    pub fn new(lighting: Lighting, seeded: &Seeded) -> Self {
+    pub fn new(lighting: Lighting, night: bool, seeded: &Seeded) -> Self {
         let mut chance = seeded.fork(1);
         let gauss = |chance: &mut Seeded| {
             let sum: f64 = (0..12).map(|_| chance.unit()).sum();
             ((sum - 6.0) * NOISE_SIGMA).round().clamp(-127.0, 127.0) as i8
         };
         let noise = (0..NOISE_LENGTH + LONGEST_ROW).map(|_| gauss(&mut chance)).collect();
-        Self { exposure: Exposure::of(lighting), noise, phase: chance.unit(), seeded: seeded.fork(2) }
+        Self { exposure: Exposure::of(lighting, night), noise, phase: chance.unit(), seeded: seeded.fork(2) }
+    }
+
+    /// How long the shutter is open where `set` is for good light.
+    pub fn shutter(&self, set: Duration) -> Duration {
+        set.mul_f64(self.exposure.shutter)
     }
 
     /// Counts the light of a picture; `frame` and its `time_s` say which noise and flicker.
@@ -90,7 +109,7 @@ impl Sensor {
     }
 
     fn count(&self, pixels: &mut [u8], noise: &[i8], flicker: f64) {
-        let Exposure { light, gain, step, noise: (dark, white) } = self.exposure;
+        let Exposure { light, gain, step, noise: (dark, white), .. } = self.exposure;
         let light = (128.0 * light * flicker).round() as i16;
         let gain = (64.0 * gain).round() as i16;
         // In 1/128 of a count by value of the table.
@@ -151,7 +170,7 @@ mod tests {
     use super::*;
 
     fn spread(lighting: Lighting, luma: u8) -> (f64, f64) {
-        let sensor = Sensor::new(lighting, &Seeded::new(3));
+        let sensor = Sensor::new(lighting, false, &Seeded::new(3));
         let mut picture = Picture::grey(320, 240, luma);
         sensor.expose(&mut picture, 7, 0.28);
         let mean = |line: &[u8]| line.iter().map(|&value| f64::from(value)).sum::<f64>() / line.len() as f64;
@@ -169,26 +188,37 @@ mod tests {
         let (mean, sigma) = spread(Lighting::Optimal, 126);
         assert!((mean - 126.0).abs() < 2.5 && (1.4..2.0).contains(&sigma), "{mean} {sigma}");
         let (mean, sigma) = spread(Lighting::Dim, 126);
-        assert!((mean - 98.0).abs() < 4.0 && (3.4..5.0).contains(&sigma), "{mean} {sigma}");
+        assert!((mean - 113.0).abs() < 4.0 && (2.4..4.0).contains(&sigma), "{mean} {sigma}");
         assert!(spread(Lighting::Optimal, 50).1 > spread(Lighting::Optimal, 200).1, "more in the dark");
+    }
+
+    #[test]
+    fn in_dim_light_the_shutter_is_open_longer() {
+        let shutter = |lighting, night| {
+            Sensor::new(lighting, night, &Seeded::new(3)).shutter(Duration::from_millis(16)).as_secs_f64()
+        };
+        assert_eq!(shutter(Lighting::Optimal, false), 0.016);
+        assert!(shutter(Lighting::Dim, false) > 0.024 && shutter(Lighting::Optimal, true) > 0.03);
+        // Never longer than from picture to picture.
+        assert!(shutter(Lighting::Dim, true) < 0.04);
     }
 
     #[test]
     fn in_dim_light_there_are_fewer_grey_levels() {
         let levels = |lighting| {
-            let sensor = Sensor::new(lighting, &Seeded::new(3));
+            let sensor = Sensor::new(lighting, false, &Seeded::new(3));
             let mut picture = Picture::grey(440, 220, 0);
             let ramp = |i: usize| (16 + i / 2 % 220) as u8;
             picture.planes[0].data.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = ramp(i));
             sensor.expose(&mut picture, 0, 0.0);
             picture.planes[0].data.iter().collect::<std::collections::BTreeSet<_>>().len()
         };
-        assert!(levels(Lighting::Dim) * 3 < levels(Lighting::Optimal), "{}", levels(Lighting::Dim));
+        assert!(levels(Lighting::Dim) * 2 < levels(Lighting::Optimal), "{}", levels(Lighting::Dim));
     }
 
     #[test]
     fn every_picture_has_its_own_noise_and_always_the_same() {
-        let sensor = Sensor::new(Lighting::Optimal, &Seeded::new(3));
+        let sensor = Sensor::new(Lighting::Optimal, false, &Seeded::new(3));
         let picture = |frame| {
             let mut picture = Picture::grey(64, 48, 100);
             sensor.expose(&mut picture, frame, 0.0);
@@ -200,7 +230,7 @@ mod tests {
 
     #[test]
     fn flicker_is_slight() {
-        let sensor = Sensor::new(Lighting::Optimal, &Seeded::new(3));
+        let sensor = Sensor::new(Lighting::Optimal, false, &Seeded::new(3));
         let values: Vec<f64> = (0..100).map(|i| sensor.flicker(f64::from(i) * 0.04, 0.5)).collect();
         let (low, high) = values.iter().fold((9.0f64, 0.0f64), |(l, h), &v| (l.min(v), h.max(v)));
         assert!(low > 0.98 && high < 1.02 && high - low > 0.01, "{low} {high}");

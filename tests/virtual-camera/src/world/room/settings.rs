@@ -37,11 +37,11 @@ pub enum Change {
 /// Who walks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Subject {
-    /// Tall, in strong colours.
+    /// Tall, clothed nearly in the colour of the wall.
     A,
     /// Short and quick of step.
     B,
-    /// Of middle height, clothed nearly as grey as the wall.
+    /// Of middle height, in wide clothes.
     C,
 }
 

@@ -3,11 +3,11 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    scene::{Scene, Side},
+    scene::{Scene, Style},
     sensor::{Sensor, soften},
     settings::RoomSettings,
     view::View,
-    walker::{BodyPose, Walker},
+    walker::{BodyPose, MOMENTS, Walker},
 };
 use crate::{
     geometry::{Pinhole, aim},
@@ -51,9 +51,13 @@ impl Room {
         let obstacle = walker.obstacle(room);
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         Self {
-            scene: Scene::new(&seeded, obstacle.as_slice()),
+            scene: Scene::new(room.seed, obstacle.as_slice()),
             walker,
-            sensor: Sensor::new(room.lighting, &seeded.fork(SENSOR).fork(u64::from(room.number()))),
+            sensor: Sensor::new(
+                room.lighting,
+                Style::of(room.seed).night,
+                &seeded.fork(SENSOR).fork(u64::from(room.number())),
+            ),
             optics: Optics { wide_fov_deg: WIDE_FOV_DEG, max_magnification },
             view_size: settings.video.size.unwrap_or(VIEW_SIZE),
         }
@@ -67,17 +71,33 @@ impl Room {
         View::new(pose, self.pinhole(pose.zoom_step, size), size)
     }
 
-    /// The light of a view at a time, `sweep` pixels of movement included, as the sensor counts it.
-    fn take(&self, time: Duration, view: &View, sweep: (f64, f64)) -> Picture {
-        let body = self.body_at(time);
+    /// The light of an exposure on a picture through `view`, which is the camera's as the shutter opens, as the sensor counts
+    /// it; `seen` says what the camera sees at a part of the exposure, 0 to 1.
+    fn take(
+        &self,
+        exposure: &Exposure,
+        view: &View,
+        sweep: (f64, f64),
+        seen: impl Fn(f64) -> View,
+    ) -> Picture {
+        let time = exposure.time.as_secs_f64();
+        let body = self.body_at(exposure.time);
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
-        self.scene.draw(Side::Behind, body.place, view, &mut canvas);
+        self.scene.draw_shell(view, &mut canvas);
         self.walker.draw_shadow(&body, view, &mut canvas);
-        self.walker.draw(&body, view, &self.scene.light, &mut canvas);
-        self.scene.draw(Side::Before, body.place, view, &mut canvas);
-        canvas.planes.iter_mut().for_each(soften);
+        self.scene.draw_pieces(view, &mut canvas);
         motion_blur(&mut canvas, sweep.0, sweep.1);
-        self.sensor.expose(&mut canvas, self.frame_at(time), time.as_secs_f64());
+        let views = std::array::from_fn(|moment| seen((moment as f64 + 0.5) / MOMENTS as f64));
+        if let Some(layer) =
+            self.walker.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light)
+        {
+            let close = layer.view(view);
+            let mut unhidden = Plane::filled(close.size.0, close.size.1, 255);
+            self.scene.hide(body.place, &close, &mut unhidden);
+            layer.over(&mut canvas, unhidden, sweep);
+        }
+        canvas.planes.iter_mut().for_each(soften);
+        self.sensor.expose(&mut canvas, self.frame_at(exposure.time), time);
         canvas
     }
 
@@ -194,9 +214,14 @@ impl World for Room {
         (time.as_nanos() * u128::from(FRAME_RATE) / 1_000_000_000) as u64
     }
 
+    fn shutter(&self, set: Duration) -> Duration {
+        self.sensor.shutter(set)
+    }
+
     fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
         let sweep = self.sweep(exposure, size);
-        Ok(self.take(exposure.time, &self.view(&exposure.opening, size), sweep))
+        let seen = |share| self.view(&exposure.pose(share), size);
+        Ok(self.take(exposure, &seen(0.0), sweep, seen))
     }
 
     fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
@@ -210,7 +235,8 @@ impl World for Room {
 
     fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
         let (pose, pinhole) = self.overview_view();
-        Ok(Arc::new(self.take(time, &View::new(&pose, pinhole, OVERVIEW_SIZE), (0.0, 0.0))))
+        let (view, exposure) = (View::new(&pose, pinhole, OVERVIEW_SIZE), Exposure::at(time, pose));
+        Ok(Arc::new(self.take(&exposure, &view, (0.0, 0.0), |_| view.clone())))
     }
 
     fn overview_size(&self) -> (u32, u32) {

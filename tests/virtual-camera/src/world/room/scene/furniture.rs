@@ -117,12 +117,38 @@ impl Painter {
     pub fn table(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
         let [w, h, d] = at.size;
         let top = Finish::all(&self.some_wood(seeded).1);
-        let leg = Finish::all(&self.smooth([0.25, 0.25, 0.26]));
+        let leg = Finish::all(&self.metal);
         let mut joiner = Joiner::new(at);
         joiner.add(0.0, h - 0.04, d / 2.0, [w, 0.04, d], &top);
         for (right, back) in [(-1.0, 0.05), (1.0, 0.05), (-1.0, d - 0.05), (1.0, d - 0.05)] {
             joiner.add(right * (w / 2.0 - 0.06), 0.0, back, [0.05, h - 0.04, 0.05], &leg);
         }
+        joiner.pieces
+    }
+
+    /// A chair: legs, seat and back; it faces where its front does.
+    pub fn chair(&self, at: Solid, seeded: &mut Seeded) -> Vec<Piece> {
+        let [w, h, d] = at.size;
+        let frame = Finish::all(&self.metal);
+        let (_, wood) = self.some_wood(seeded);
+        let seat = Finish::all(&if seeded.unit() < 0.5 { self.some_cloth(seeded) } else { wood });
+        let mut joiner = Joiner::new(at);
+        for (right, back) in [(-1.0, 0.03), (1.0, 0.03), (-1.0, d - 0.03), (1.0, d - 0.03)] {
+            joiner.add(right * (w / 2.0 - 0.03), 0.0, back, [0.035, 0.47 * h, 0.035], &frame);
+        }
+        joiner.add(0.0, 0.47 * h, d / 2.0, [w, 0.05, d], &seat);
+        joiner.add(0.0, 0.6 * h, d - 0.03, [w, 0.4 * h, 0.04], &seat);
+        joiner.pieces
+    }
+
+    /// A standing lamp that is on: its pole, and its shade on top.
+    pub fn standing_lamp(&self, at: Solid) -> Vec<Piece> {
+        let [w, h, d] = at.size;
+        let pole = Finish::all(&self.metal);
+        let shade = Finish::all(&self.lampshade((w, 0.3)));
+        let mut joiner = Joiner::new(at);
+        joiner.add(0.0, 0.0, d / 2.0, [0.04, h - 0.3, 0.04], &pole);
+        joiner.add(0.0, h - 0.3, d / 2.0, [w, 0.3, d], &shade);
         joiner.pieces
     }
 
@@ -175,11 +201,11 @@ impl Painter {
         let mut joiner = Joiner::new(at);
         joiner.add(0.0, 0.0, w / 2.0, [0.62 * w, 0.3, 0.62 * w], &pot);
         let middle = at.place(0.0, 0.0, 0.0);
-        let greens: Vec<_> = (0..3)
-            .map(|_| self.smooth([seeded.range(0.1, 0.3) as f32, seeded.range(0.3, 0.5) as f32, 0.14]))
-            .collect();
         let mut leaves: Vec<Surface> = (0..34)
-            .map(|_| leaf(add(middle, [0.0, 0.3, 0.0]), (w, h - 0.3), &greens[seeded.below(3)], seeded))
+            .map(|_| {
+                let green = self.some_green(seeded);
+                leaf(add(middle, [0.0, 0.3, 0.0]), (w, h - 0.3), green, seeded)
+            })
             .collect();
         let far = |surface: &Surface| {
             let way = subtract(surface.origin, CAMERA);

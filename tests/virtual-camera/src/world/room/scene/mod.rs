@@ -3,15 +3,20 @@
 mod furniture;
 mod hall;
 mod lighting;
+mod look;
 mod paint;
 mod solid;
+mod standing;
 mod stuff;
+mod style;
 mod things;
+mod walls;
 
 use furniture::Piece;
 use hall::Hall;
 pub(super) use solid::Solid;
 use stuff::Painter;
+pub(super) use style::Style;
 
 use super::{
     light::Light,
@@ -29,6 +34,9 @@ pub(super) enum Obstacle {
     Screen,
 }
 
+/// Nobody reaches higher, in metres.
+const TALLEST: f64 = 2.0;
+
 /// All that does not move.
 pub(super) struct Scene {
     /// Walls and what hangs on them, in the order of drawing.
@@ -39,18 +47,12 @@ pub(super) struct Scene {
     pub light: Light,
 }
 
-/// Which part of the room, as seen from the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Side {
-    Behind,
-    Before,
-}
-
 impl Scene {
     /// The room of a seed. `obstacles` stand on the floor where their boxes are; what they are is up to the seed.
-    pub fn new(seeded: &Seeded, obstacles: &[(Obstacle, Solid)]) -> Self {
+    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Self {
+        let (seeded, style) = (Seeded::new(seed), Style::of(seed));
         let painter = Painter::new(seeded.fork(1));
-        let mut hall = Hall::new(&mut seeded.fork(2));
+        let mut hall = Hall::new(style, &mut seeded.fork(2));
         let (mut shell, mut pieces) = hall.furnish(&painter, &mut seeded.fork(3));
         let mut choice = seeded.fork(4);
         for &(kind, solid) in obstacles {
@@ -61,19 +63,20 @@ impl Scene {
         Self { shell, pieces, light: hall.light }
     }
 
-    /// Draws all that stands behind a person with these feet, walls included; or before them.
-    pub fn draw(&self, side: Side, feet: Vector, view: &View, canvas: &mut Canvas) {
-        if side == Side::Behind {
-            self.shell.iter().for_each(|surface| surface.draw(view, canvas));
-        }
-        for piece in self.pieces.iter().filter(|piece| side_of(&piece.solid, feet) == side) {
-            piece.surfaces.iter().for_each(|surface| surface.draw(view, canvas));
-        }
+    /// Draws walls, floor and ceiling, and what hangs there.
+    pub fn draw_shell(&self, view: &View, canvas: &mut Canvas) {
+        self.shell.iter().for_each(|surface| surface.draw(view, canvas));
+    }
+
+    /// Draws all that stands in the room.
+    pub fn draw_pieces(&self, view: &View, canvas: &mut Canvas) {
+        self.pieces.iter().flat_map(|piece| &piece.surfaces).for_each(|surface| surface.draw(view, canvas));
     }
 
     /// Takes out of `mask` (of the size of the view) what is hidden by what stands before a person with these feet.
     pub fn hide(&self, feet: Vector, view: &View, mask: &mut Plane) {
-        for piece in self.pieces.iter().filter(|piece| side_of(&piece.solid, feet) == Side::Before) {
+        let head = [feet[0], feet[1] + TALLEST, feet[2]];
+        for piece in self.pieces.iter().filter(|piece| piece.solid.hides(&[feet, head])) {
             for surface in &piece.surfaces {
                 cover(&surface.polygon(view), view.size, |covered| {
                     let line = &mut mask.data[covered.row * view.size.0..][..view.size.0];
@@ -87,22 +90,31 @@ impl Scene {
     }
 }
 
-/// Where something stands for a person with these feet, seen from the camera.
-fn side_of(solid: &Solid, feet: Vector) -> Side {
-    let head = [feet[0], feet[1] + 1.0, feet[2]];
-    if solid.hides(&[feet, head]) { Side::Before } else { Side::Behind }
-}
-
 /// Sorted so that what may hide others comes after them.
-fn in_order(mut pieces: Vec<Piece>) -> Vec<Piece> {
-    let mut sorted = Vec::with_capacity(pieces.len());
-    while !pieces.is_empty() {
-        let free = |&i: &usize| {
-            let piece = &pieces[i].solid;
-            pieces.iter().all(|other| std::ptr::eq(&other.solid, piece) || !other.solid.precedes(piece))
-        };
-        let next = (0..pieces.len()).find(free).unwrap_or(0);
-        sorted.push(pieces.remove(next));
+fn in_order(pieces: Vec<Piece>) -> Vec<Piece> {
+    let solids: Vec<Solid> = pieces.iter().map(|piece| piece.solid).collect();
+    // For each piece, how many must be drawn before it, and which ones after it.
+    let mut before = vec![0usize; solids.len()];
+    let mut after = vec![Vec::new(); solids.len()];
+    for (first, one) in solids.iter().enumerate() {
+        for (second, other) in solids.iter().enumerate() {
+            if first != second && one.precedes(other) {
+                before[second] += 1;
+                after[first].push(second);
+            }
+        }
+    }
+    let mut left: Vec<Option<Piece>> = pieces.into_iter().map(Some).collect();
+    let mut sorted = Vec::with_capacity(left.len());
+    // Where things hide each other in a circle, the one that hides fewest of the others goes first.
+    let next = |left: &[Option<Piece>], before: &[usize]| {
+        (0..left.len()).filter(|&i| left[i].is_some()).min_by_key(|&i| before[i])
+    };
+    while let Some(index) = next(&left, &before) {
+        sorted.extend(left[index].take());
+        for &later in &after[index] {
+            before[later] = before[later].saturating_sub(1);
+        }
     }
     sorted
 }

@@ -10,6 +10,7 @@ use crate::{seeded::Seeded, world::room::raster::Material};
 pub(super) enum Wall {
     Plaster,
     Brick,
+    BareBrick,
     Panels,
     Stripes,
 }
@@ -23,14 +24,18 @@ pub(super) struct Painter {
     woods: Vec<(Colour, Arc<Material>)>,
     cloths: Vec<Arc<Material>>,
     paints: Vec<(Colour, Arc<Material>)>,
+    greens: Vec<Arc<Material>>,
+    /// What legs and frames are of.
+    pub metal: Arc<Material>,
 }
 
 impl Painter {
     pub fn new(seeded: Seeded) -> Self {
         let (noise, grains) = (Noise::new(seeded.fork(1)), Grains::new(&seeded.fork(2)));
         let mut choice = seeded.fork(3);
-        let mut painter =
-            Self { seeded, noise, grains, woods: Vec::new(), cloths: Vec::new(), paints: Vec::new() };
+        let metal = Self::smooth_with(&noise, &grains, [0.2, 0.19, 0.19]);
+        let (woods, cloths, paints, greens) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let mut painter = Self { seeded, noise, grains, woods, cloths, paints, greens, metal };
         for _ in 0..3 {
             let wood = Self::wood_colour(&mut choice);
             painter.woods.push((wood, painter.wood(wood)));
@@ -39,6 +44,10 @@ impl Painter {
         for _ in 0..6 {
             let paint = Self::any_colour(&mut choice);
             painter.paints.push((paint, painter.smooth(paint)));
+        }
+        for _ in 0..4 {
+            let green = [choice.range(0.1, 0.3) as f32, choice.range(0.3, 0.5) as f32, 0.14];
+            painter.greens.push(painter.smooth(green));
         }
         painter
     }
@@ -55,14 +64,15 @@ impl Painter {
     pub fn wall(&self, kind: Wall, colour: Colour) -> Arc<Material> {
         match kind {
             Wall::Plaster => self.plaster(colour),
-            Wall::Brick => self.brick(colour),
+            Wall::Brick => self.brick(colour, colour, 0.08),
+            Wall::BareBrick => self.brick(colour, [0.66, 0.63, 0.58], 0.35),
             Wall::Panels => self.panels(colour),
             Wall::Stripes => self.stripes(colour),
         }
     }
 
-    /// Bricks under paint: 8 by 24 of them.
-    fn brick(&self, colour: Colour) -> Arc<Material> {
+    /// 8 by 24 bricks with `mortar` between them, under paint where it is of their colour; how much they differ in tone.
+    fn brick(&self, colour: Colour, mortar: Colour, tones: f64) -> Arc<Material> {
         let grain = detail(&self.grains.plaster, 0.3, 0.22);
         Arc::new(paint(9, (2.0, 2.0), grain, |u, v| {
             let row = (v * 24.0).floor();
@@ -72,7 +82,8 @@ impl Painter {
             let tone = self.noise.at(along.floor() % 8.0 + 0.5, row + 0.5, (8, 32));
             let joint = 1.0 - ((edge - 4.0 - 2.0 * self.noise.sum(u, v, (64, 64), 2)) / 5.0).clamp(0.0, 1.0);
             let rough = self.noise.sum(u, v, (16, 16), 5);
-            times(colour, (1.0 + 0.08 * tone + 0.06 * rough) * (1.0 - 0.22 * joint))
+            let brick = times(colour, 1.0 + tones * tone + 0.06 * rough);
+            mix(brick, times(mortar, 0.78 + 0.06 * rough), joint)
         }))
     }
 
@@ -110,6 +121,16 @@ impl Painter {
             let veins = 1.0 - self.noise.sum(u, v, (8, 8), 4).abs() * 8.0;
             let cloud = self.noise.sum(u + 0.5 * tone, v, (8, 8), 6);
             times(colour, (1.0 + 0.05 * tone + 0.07 * cloud + 0.05 * veins.max(0.0)) * (1.0 - 0.35 * joint))
+        }))
+    }
+
+    /// Square tiles of two colours by turns, `side` metres each: 4 by 4 of them.
+    pub fn chequers(&self, colours: [Colour; 2], side: f64) -> Arc<Material> {
+        let grain = detail(&self.grains.plaster, 0.4, 0.14);
+        Arc::new(paint(9, (side * 4.0, side * 4.0), grain, |u, v| {
+            let (column, row) = ((u * 4.0) as usize, (v * 4.0) as usize);
+            let cloud = self.noise.sum(u + 0.3 * column as f64, v, (8, 8), 5);
+            times(colours[(column + row) % 2], 1.0 + 0.06 * cloud)
         }))
     }
 
@@ -166,6 +187,11 @@ impl Painter {
         self.paints[seeded.below(self.paints.len())].clone()
     }
 
+    /// One of the room's leaves.
+    pub fn some_green(&self, seeded: &mut Seeded) -> &Arc<Material> {
+        &self.greens[seeded.below(self.greens.len())]
+    }
+
     /// Wood for furniture, fibres along u.
     fn wood(&self, colour: Colour) -> Arc<Material> {
         let grain = detail(&self.grains.wood, 0.35, 0.2);
@@ -178,10 +204,12 @@ impl Painter {
 
     /// Varnish, plastic, painted metal.
     pub fn smooth(&self, colour: Colour) -> Arc<Material> {
-        let grain = detail(&self.grains.plaster, 0.3, 0.09);
-        Arc::new(paint(7, (1.1, 1.1), grain, |u, v| {
-            times(colour, 1.0 + 0.03 * self.noise.sum(u, v, (2, 2), 6))
-        }))
+        Self::smooth_with(&self.noise, &self.grains, colour)
+    }
+
+    fn smooth_with(noise: &Noise, grains: &Grains, colour: Colour) -> Arc<Material> {
+        let grain = detail(&grains.plaster, 0.3, 0.09);
+        Arc::new(paint(7, (1.1, 1.1), grain, |u, v| times(colour, 1.0 + 0.03 * noise.sum(u, v, (2, 2), 6))))
     }
 
     /// Cloth with seams every 0.6 m.

@@ -12,13 +12,13 @@ fn view(pan_deg: f64, tilt_deg: f64, fov_deg: f64) -> View {
 
 fn picture(scene: &Scene, view: &View) -> Canvas {
     let mut canvas = Canvas::grey(320, 240, 0);
-    scene.draw(Side::Behind, [0.0, 0.0, 6.0], view, &mut canvas);
-    scene.draw(Side::Before, [0.0, 0.0, 6.0], view, &mut canvas);
+    scene.draw_shell(view, &mut canvas);
+    scene.draw_pieces(view, &mut canvas);
     canvas
 }
 
 fn scene(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Scene {
-    Scene::new(&Seeded::new(seed), obstacles)
+    Scene::new(seed, obstacles)
 }
 
 fn spread(plane: &Plane) -> f64 {
@@ -27,6 +27,8 @@ fn spread(plane: &Plane) -> f64 {
     (sum / plane.data.len() as f64).sqrt()
 }
 
+/// A room that is lit, and whose floor is free.
+const DAY: u64 = 2;
 const SCREEN: (Obstacle, Solid) =
     (Obstacle::Screen, Solid { base: [0.5, 0.0, 4.0], size: [1.6, 2.2, 0.3], yaw_deg: 0.0 });
 
@@ -42,7 +44,7 @@ fn a_seed_is_a_room() {
 
 #[test]
 fn there_is_a_wall_everywhere() {
-    let room = scene(3, &[SCREEN]);
+    let room = scene(DAY, &[SCREEN]);
     for (pan, tilt, fov) in [(0.0, 20.0, 55.0), (90.0, -80.0, 55.0), (180.0, -5.0, 40.0), (-133.0, 0.0, 3.0)]
     {
         let picture = picture(&room, &view(pan, tilt, fov));
@@ -52,7 +54,7 @@ fn there_is_a_wall_everywhere() {
 
 #[test]
 fn things_are_where_they_stand() {
-    let (empty, screened) = (scene(1, &[]), scene(1, &[SCREEN]));
+    let (empty, screened) = (scene(DAY, &[]), scene(DAY, &[SCREEN]));
     let solid = SCREEN.1;
     for view in [view(5.0, -12.0, 40.0), view(-3.0, -20.0, 55.0), view(-5.0, -10.0, 25.0)] {
         let (before, after) = (picture(&empty, &view), picture(&screened, &view));
@@ -69,7 +71,7 @@ fn things_are_where_they_stand() {
 
 #[test]
 fn close_up_there_is_something_to_hold_on_to() {
-    for seed in 1..4 {
+    for seed in (1..5).filter(|seed| !Style::of(*seed).night) {
         let room = scene(seed, &[]);
         for (pan, tilt) in [(-20.0, -30.0), (12.0, -28.0), (0.0, -24.0)] {
             let spread = spread(&picture(&room, &view(pan, tilt, 3.0)).planes[0]);
@@ -107,10 +109,48 @@ fn a_screen_hides_who_is_behind_it_and_nobody_else() {
 #[test]
 fn the_camera_is_inside_of_the_room_and_of_nothing_else() {
     for seed in 1..20 {
-        let hall = Hall::new(&mut Seeded::new(seed).fork(2));
+        let hall = Hall::new(Style::of(seed), &mut Seeded::new(seed).fork(2));
         for (out, distance) in hall.planes() {
             let inside = out[0] * CAMERA[0] + out[1] * CAMERA[1] + out[2] * CAMERA[2] - distance;
             assert!(inside > 0.5, "seed {seed}");
         }
     }
+}
+
+#[test]
+fn what_fills_a_room_hides_nobody_on_the_way() {
+    for seed in (1..10).filter(|seed| Style::of(*seed).full) {
+        let room = scene(seed, &[]);
+        for (x, z) in [(-7.5, 5.0), (-3.0, 5.0), (0.0, 5.1), (4.0, 6.0), (7.5, 6.9)] {
+            let feet = [x, 0.0, z];
+            let view = view(f64::atan2(x, z).to_degrees(), -16.0, 30.0);
+            let mut mask = Plane::filled(320, 240, 255);
+            room.hide(feet, &view, &mut mask);
+            for height in [0.05, 0.5, 1.8] {
+                let ((column, row), _) = view.pixel(add(feet, [0.0, height, 0.0])).unwrap();
+                assert_eq!(mask.data[row as usize * 320 + column as usize], 255, "seed {seed}: {feet:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn half_of_the_rooms_are_full_and_by_night_only_lamps_stand_out() {
+    let bright = |seed: u64| {
+        let picture = picture(&scene(seed, &[]), &view(0.0, -10.0, 55.0));
+        let count = |least: u8| picture.planes[0].data.iter().filter(|pixel| **pixel >= least).count();
+        (count(90), count(200))
+    };
+    let mut things = [0, 0];
+    for seed in 1..11 {
+        let style = Style::of(seed);
+        things[usize::from(style.full)] += scene(seed, &[]).pieces.len();
+        let (lit, glowing) = bright(seed);
+        if style.night {
+            assert!(lit < 320 * 240 / 20 && glowing > 20, "seed {seed}: {lit} {glowing}");
+        } else {
+            assert!(lit > 320 * 240 / 5, "seed {seed}: {lit}");
+        }
+    } // As many of the ones as of the others.
+    assert!(things[1] > 3 * things[0] / 2, "{things:?}");
 }

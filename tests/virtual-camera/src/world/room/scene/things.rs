@@ -95,8 +95,8 @@ impl Painter {
         }))
     }
 
-    /// A window on a bright day: frame, bars, sky, something green.
-    pub fn window(&self, size: (f64, f64), label: u64) -> Arc<Material> {
+    /// A window on a bright day: frame, bars, sky, something green; by night next to nothing behind it.
+    pub fn window(&self, size: (f64, f64), label: u64, night: bool) -> Arc<Material> {
         let mut seeded = self.seeded.fork(3000 + label);
         let (columns, skyline) = (2.0 + seeded.below(2) as f64, seeded.range(0.5, 0.75));
         let shift = seeded.unit();
@@ -109,9 +109,10 @@ impl Painter {
             let pane = ((u * columns).fract() - 0.5).abs() - 0.5 + 0.035 * columns / 2.0;
             let bars = inside(pane.max((v - 0.5).abs() - 0.46), 0.01)
                 * (1.0 - inside((v - 0.3).abs() - 0.012, 0.006));
+            let outside = if night { times(outside, 0.09) } else { outside };
             mix([0.78, 0.77, 0.74], outside, bars)
         });
-        material.glows = true;
+        material.glows = !night;
         Arc::new(material)
     }
 
@@ -120,6 +121,16 @@ impl Painter {
         let mut material = paint(6, (1.2, 0.3), None, |u, v| {
             let tube = inside(beyond(u, v, (0.5, 0.5), (0.47, 0.4)), 0.05);
             mix([0.7, 0.7, 0.7], times([1.0, 1.0, 0.97], 0.93 + 0.07 * (v * 12.0).sin()), tube)
+        });
+        material.glows = true;
+        Arc::new(material)
+    }
+
+    /// The shade of a standing lamp that is on: brightest in the middle.
+    pub fn lampshade(&self, size: (f64, f64)) -> Arc<Material> {
+        let mut material = paint(5, size, None, |u, v| {
+            let glow = 1.0 - 1.2 * (u - 0.5).powi(2) - 0.9 * (v - 0.6).powi(2);
+            times([1.0, 0.93, 0.78], glow)
         });
         material.glows = true;
         Arc::new(material)

@@ -1,6 +1,10 @@
-//! What the person wears: colours, patterns, folds and weave, as tiles of cloth.
+//! What covers the person: skin, hair and clothes, with their patterns, folds and weave, as tiles of cloth.
 
-use super::{super::settings::Subject, pattern::Pattern};
+use super::{
+    super::settings::Subject,
+    pattern::Pattern,
+    wardrobe::{Attire, Rgb},
+};
 use crate::seeded::Seeded;
 
 /// Which cloth a patch of skin is of: indices into [`Outfit::cloths`].
@@ -91,12 +95,12 @@ pub(crate) struct Outfit {
 }
 
 impl Outfit {
-    /// Clothes of the subject's kind.
-    pub fn of(subject: Subject, chance: &mut Seeded) -> Self {
+    /// Somebody of the subject's kind, in a room whose wall has this colour.
+    pub fn of(subject: Subject, wall: Rgb, chance: &mut Seeded) -> Self {
         let skin =
             chance.pick(&[rgb(224.0, 178.0, 150.0), rgb(198.0, 146.0, 116.0), rgb(150.0, 104.0, 80.0)]);
         let hair = chance.pick(&[rgb(38.0, 28.0, 24.0), rgb(84.0, 58.0, 38.0), rgb(22.0, 21.0, 23.0)]);
-        let kind = Kind::of(subject, chance);
+        let kind = Attire::of(subject, wall, chance);
         let mut noise = Pattern::new(chance.bits());
         let fold_seed = chance.unit();
         let worn = |colour: Colour, shade: f64| [16.0 + (colour[0] - 16.0) * shade, colour[1], colour[2]];
@@ -110,8 +114,7 @@ impl Outfit {
             mix(&face(skin, u, v), &hair, grown(u, v, long_hair, strand))
         });
         let shirt = Cloth::painted(FINE, 0.10, |u, v| {
-            let colour = kind.shirt.colour(&kind.shirt_colours, u, v, &noise);
-            worn(colour, folds(&noise, u, v, fold_seed, kind.shirt_folds))
+            worn(kind.shirt.colour(u, v, &noise), folds(&noise, u, v, fold_seed, kind.shirt_folds))
         });
         let trousers = Cloth::painted(FINE, 0.14, |u, v| {
             let faded = 0.10 * (noise.smooth(u, v, 6) - 0.5) + 0.12 * (noise.smooth(u, v, 128) - 0.5);
@@ -136,114 +139,7 @@ impl Outfit {
     }
 }
 
-/// What a subject's clothes have in common over all seeds, and what chance made of it.
-struct Kind {
-    shirt: Cut,
-    shirt_colours: [Colour; 3],
-    shirt_folds: f64,
-    trousers: Colour,
-    shoes: Colour,
-    sole: Colour,
-    looseness: f64,
-    trouser_width: f64,
-    short_sleeves: bool,
-}
-
-impl Kind {
-    fn of(subject: Subject, chance: &mut Seeded) -> Self {
-        let white = rgb(226.0, 224.0, 218.0);
-        let black = rgb(34.0, 33.0, 36.0);
-        match subject {
-            Subject::A => Self {
-                shirt: chance.pick(&[Cut::Check, Cut::Check, Cut::Print]),
-                shirt_colours: chance.pick(&[
-                    [rgb(178.0, 40.0, 42.0), rgb(40.0, 34.0, 52.0), rgb(222.0, 206.0, 190.0)],
-                    [rgb(36.0, 92.0, 160.0), rgb(28.0, 34.0, 66.0), rgb(226.0, 226.0, 220.0)],
-                    [rgb(34.0, 120.0, 84.0), rgb(28.0, 46.0, 44.0), rgb(226.0, 214.0, 160.0)],
-                ]),
-                shirt_folds: 0.22,
-                trousers: chance.pick(&[
-                    rgb(52.0, 70.0, 112.0),
-                    rgb(44.0, 56.0, 84.0),
-                    rgb(70.0, 84.0, 118.0),
-                ]),
-                shoes: rgb(86.0, 56.0, 38.0),
-                sole: white,
-                looseness: 1.07,
-                trouser_width: 1.16,
-                short_sleeves: chance.unit() < 0.3,
-            },
-            Subject::B => Self {
-                shirt: Cut::Stripes,
-                shirt_colours: chance.pick(&[
-                    [white, rgb(36.0, 52.0, 110.0), white],
-                    [rgb(232.0, 208.0, 96.0), rgb(72.0, 60.0, 50.0), white],
-                    [rgb(216.0, 150.0, 166.0), rgb(120.0, 30.0, 58.0), white],
-                ]),
-                shirt_folds: 0.18,
-                trousers: chance.pick(&[black, rgb(52.0, 44.0, 48.0), rgb(40.0, 48.0, 60.0)]),
-                shoes: chance.pick(&[white, rgb(180.0, 60.0, 60.0)]),
-                sole: black,
-                looseness: 1.03,
-                trouser_width: 1.0,
-                short_sleeves: chance.unit() < 0.4,
-            },
-            Subject::C => {
-                let grey = chance.range(172.0, 198.0);
-                let warm = chance.range(-4.0, 6.0);
-                let of = |level: f64| rgb(level + warm, level, level - warm);
-                Self {
-                    shirt: Cut::Plain,
-                    shirt_colours: [of(grey), of(grey - 12.0), of(grey + 10.0)],
-                    shirt_folds: 0.24,
-                    trousers: of(grey - chance.range(20.0, 40.0)),
-                    shoes: of(grey - 60.0),
-                    sole: of(grey + 20.0),
-                    looseness: 1.12,
-                    trouser_width: 1.22,
-                    short_sleeves: false,
-                }
-            }
-        }
-    }
-}
-
-#[derive(Debug, Clone, Copy)]
-enum Cut {
-    Plain,
-    Stripes,
-    Check,
-    Print,
-}
-
-impl Cut {
-    fn colour(self, [ground, second, third]: &[Colour; 3], u: f64, v: f64, noise: &Pattern) -> Colour {
-        match self {
-            Self::Plain => mix(ground, second, noise.smooth(u, v, 96)),
-            Self::Stripes => *if (v * 14.0).fract() < 0.42 { second } else { ground },
-            Self::Check => {
-                let band = |place: f64| (place * 7.0).fract() < 0.5;
-                let line = |place: f64| ((place * 7.0 + 0.25).fract() - 0.5).abs() < 0.045;
-                let crossed = f64::from(u8::from(band(u))) * 0.5 + f64::from(u8::from(band(v))) * 0.5;
-                let woven = mix(ground, second, crossed);
-                if line(u) || line(v) { mix(&woven, third, 0.75) } else { woven }
-            }
-            Self::Print => {
-                let leaf = noise.smooth(u, v, 14);
-                let vein = noise.smooth(v, u, 22);
-                if leaf > 0.62 {
-                    *third
-                } else if vein > 0.6 {
-                    *second
-                } else {
-                    *ground
-                }
-            }
-        }
-    }
-}
-
-fn mix(one: &Colour, other: &Colour, share: f64) -> Colour {
+pub(super) fn mix(one: &Colour, other: &Colour, share: f64) -> Colour {
     [0, 1, 2].map(|part| one[part] + (other[part] - one[part]) * share)
 }
 

@@ -5,13 +5,16 @@ mod clothes;
 mod figure;
 mod fill;
 mod gait;
+mod layer;
 mod mesh;
 mod obstruction;
 mod paint;
 mod pattern;
 mod walk;
+mod wardrobe;
 
 pub(crate) use gait::BodyPose;
+pub(crate) use layer::{Layer, MOMENTS};
 pub(crate) use walk::Walk;
 
 use self::{
@@ -19,10 +22,11 @@ use self::{
     figure::Build,
     gait::Gait,
     mesh::{Detail, Patch},
+    paint::Moment,
 };
 use super::{
     light::Light,
-    scene::{Obstacle, Solid},
+    scene::{Obstacle, Solid, Style},
     settings::RoomSettings,
     view::{Canvas, View, add, scale},
 };
@@ -45,7 +49,7 @@ impl Walker {
         let root = Seeded::new(settings.seed);
         let mut person = root.fork(PERSON).fork(settings.subject as u64);
         let build = Build::of(settings.subject, &mut person);
-        let outfit = Outfit::of(settings.subject, &mut person);
+        let outfit = Outfit::of(settings.subject, Style::of(settings.seed).wall, &mut person);
         let phase = root.fork(STEP).fork(settings.way()).unit();
         let gait = Gait::new(Walk::new(settings), build.clone(), phase);
         Self { build, outfit, gait, repeats: settings.repeats }
@@ -61,9 +65,16 @@ impl Walker {
         self.gait.pose(if self.repeats { time.rem_euclid(self.walk().duration()) } else { time })
     }
 
-    /// Draws the whole body, as far as it is in the picture.
-    pub fn draw(&self, pose: &BodyPose, view: &View, light: &Light, canvas: &mut Canvas) {
-        paint::paint(&self.patches(pose, view), &self.outfit.cloths, view, light, canvas);
+    /// The whole body, as far as it is in the picture, during an exposure that begins at `time` in seconds; `views` are
+    /// the camera's at as many moments, evenly spread over the exposure's `duration`.
+    pub fn layer(&self, time: f64, duration: f64, views: &[View; MOMENTS], light: &Light) -> Option<Layer> {
+        let mut number = 0.0;
+        let moments = views.each_ref().map(|view| {
+            number += 1.0;
+            let pose = self.pose_at(time + duration * (number - 0.5) / MOMENTS as f64);
+            Moment { patches: self.patches(&pose, view), view: view.clone() }
+        });
+        paint::paint(&moments, &self.outfit.cloths, light)
     }
 
     /// Darkens the floor below the body: softly all around, more where a foot stands.
@@ -106,3 +117,6 @@ impl Walker {
         body::patches(pose, &self.build, &self.outfit, detail)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,6 +1,4 @@
-//! Painting skins into a picture, nearest first, several samples a pixel.
-
-use std::ops::Range;
+//! Painting skins into a picture, nearest first.
 
 use super::{
     super::{
@@ -9,51 +7,49 @@ use super::{
     },
     clothes::Cloth,
     fill::{CARRIED, Corner, triangle},
+    layer::{Layer, MOMENTS},
     mesh::{Detail, Patch, Ring, Vertex, skin},
 };
-use crate::picture::Plane;
+use crate::{picture::Plane, truth::Bounds};
 
-/// Samples that a picture's worth of body may take; closer up it is sampled less finely.
-const BUDGET: f64 = 600_000.0;
-
-/// A part of the picture, cut into samples.
+/// A part of the picture.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Window {
     /// First pixel; even, so that chroma pixels are whole.
-    left: usize,
-    top: usize,
+    pub left: usize,
+    pub top: usize,
     /// In pixels.
-    width: usize,
-    height: usize,
-    /// Samples along a pixel's side.
-    fineness: usize,
+    pub width: usize,
+    pub height: usize,
 }
 
 impl Window {
-    /// The part of the view that these places lie in, if any.
-    pub fn around(patches: &[Patch], view: &View, most: usize) -> Option<Self> {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        for vertex in patches.iter().flat_map(|patch| &patch.vertices) {
-            let ((x, y), _) = view.pixel(vertex.place)?;
-            low = [low[0].min(x), low[1].min(y)];
-            high = [high[0].max(x), high[1].max(y)];
-        }
+    /// The part of a picture of `size` that these pixels lie in, if any.
+    fn around(pixels: impl Iterator<Item = (f64, f64)>, size: (usize, usize)) -> Option<Self> {
+        let bounds = Bounds::around(pixels)?;
         let limit = |place: f64, end: usize| place.clamp(0.0, end as f64) as usize;
-        let (left, top) = (limit(low[0] - 1.0, view.size.0) & !1, limit(low[1] - 1.0, view.size.1) & !1);
-        let width = limit(high[0] + 2.0, view.size.0).saturating_sub(left);
-        let height = limit(high[1] + 2.0, view.size.1).saturating_sub(top);
-        let pixels = (width * height) as f64;
-        let fineness = if pixels * (most * most) as f64 > BUDGET { 1 } else { most };
-        (width > 0 && height > 0).then_some(Self { left, top, width, height, fineness })
+        let (left, top) = (limit(bounds.left - 1.0, size.0) & !1, limit(bounds.top - 1.0, size.1) & !1);
+        let width = limit(bounds.left + bounds.width + 2.0, size.0).saturating_sub(left);
+        let height = limit(bounds.top + bounds.height + 2.0, size.1).saturating_sub(top);
+        (width > 0 && height > 0).then_some(Self { left, top, width, height })
     }
 
-    fn samples(&self) -> (usize, usize) {
-        (self.width * self.fineness, self.height * self.fineness)
+    /// The part that these skins lie in; none where one of them is behind the camera.
+    fn of(patches: &[Patch], view: &View) -> Option<Self> {
+        let vertices = patches.iter().flat_map(|patch| &patch.vertices);
+        let pixels: Vec<_> =
+            vertices.map(|vertex| Some(view.pixel(vertex.place)?.0)).collect::<Option<_>>()?;
+        Self::around(pixels.into_iter(), view.size)
     }
 
-    fn corner(&self, (x, y): (f64, f64), carried: [f32; CARRIED]) -> Corner {
-        let fine = self.fineness as f64;
-        let place = |pixel: f64, first: usize| ((pixel - first as f64 + 0.5) * fine - 0.5) as f32;
-        Corner { x: place(x, self.left), y: place(y, self.top), carried }
+    fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+
+    /// A corner, for samples that lie `aside` of the middle of their pixel.
+    fn corner(&self, (x, y): (f64, f64), aside: (f64, f64), carried: [f32; CARRIED]) -> Corner {
+        let place = |pixel: f64, aside: f64, first: usize| (pixel - aside - first as f64) as f32;
+        Corner { x: place(x, aside.0, self.left), y: place(y, aside.1, self.top), carried }
     }
 }
 
@@ -92,27 +88,59 @@ fn facing(
     triangles
 }
 
-/// Paints the body into the picture.
-pub(super) fn paint(patches: &[Patch], cloths: &[Cloth], view: &View, light: &Light, canvas: &mut Canvas) {
-    let Some(window) = Window::around(patches, view, 2) else { return };
-    let samples = window.samples();
+/// A body at one moment of an exposure, and how the camera sees it then.
+pub(super) struct Moment {
+    pub patches: Vec<Patch>,
+    pub view: View,
+}
+
+/// Where in a pixel each moment of an exposure has its sample: together they smooth the edges.
+const ASIDE: [(f64, f64); MOMENTS] = [(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)];
+
+/// Paints the body alone, as the mean of some moments; `None` where nothing of it is in the picture.
+pub(super) fn paint(moments: &[Moment; MOMENTS], cloths: &[Cloth], light: &Light) -> Option<Layer> {
+    let windows = moments.iter().filter_map(|moment| Window::of(&moment.patches, &moment.view));
+    let corners = windows.flat_map(|Window { left, top, width, height }| {
+        [(left, top), (left + width, top + height)].map(|(x, y)| (x as f64, y as f64))
+    });
+    let window = Window::around(corners, moments[0].view.size)?;
+    let mut layer = Layer::new(window);
+    let samples = window.width * window.height;
     // Nearness and colour of the nearest skin; 0 is none.
-    let mut nearness = vec![0.0f32; samples.0 * samples.1];
-    let mut colours = vec![[0u8; 4]; samples.0 * samples.1];
+    let (mut nearness, mut colours) = (vec![0.0f32; samples], vec![[0u8; 4]; samples]);
+    for (moment, aside) in moments.iter().zip(ASIDE) {
+        nearness.fill(0.0);
+        colours.fill([0; 4]);
+        sample(moment, aside, cloths, light, &window, (&mut nearness, &mut colours));
+        layer.add(&colours);
+    }
+    Some(layer)
+}
+
+/// Takes one sample a pixel of a window.
+fn sample(
+    Moment { patches, view }: &Moment,
+    aside: (f64, f64),
+    cloths: &[Cloth],
+    light: &Light,
+    window: &Window,
+    (nearness, colours): (&mut [f32], &mut [[u8; 4]]),
+) {
     // The nearest first: what is hidden need not be coloured.
     let depth = |patch: &Patch| view.seen(patch.vertices[patch.vertices.len() / 2].place)[2];
     let mut order: Vec<(f64, &Patch)> = patches.iter().map(|patch| (depth(patch), patch)).collect();
     order.sort_by(|one, other| one.0.total_cmp(&other.0));
     for (depth, patch) in order {
-        let fine = view.pinhole.focal / depth * window.fineness as f64;
+        // Moments together are twice as fine.
+        let fine = view.pinhole.focal / depth * 2.0;
         let (texels, side, texels_per_metre) = cloths[patch.material].level(fine);
         let texture = Texture { texels, side, weave: (cloths[patch.material].weave * 256.0) as i32 };
         let corners = |vertex: &Vertex, pixel, depth: f64| {
             let [u, v] = vertex.cloth.map(|metres| (metres * texels_per_metre) as f32);
-            window.corner(pixel, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
+            window.corner(pixel, aside, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
         };
         for corners in facing(patch, view, corners) {
-            triangle(corners, samples, |start, end, carried, step| {
+            triangle(corners, window.size(), |start, end, carried, step| {
                 let run = (&mut nearness[start..end], &mut colours[start..end]);
                 // Close up texels are wider than samples: they melt into each other, and threads show.
                 if fine > CLOSE {
@@ -123,7 +151,6 @@ pub(super) fn paint(patches: &[Patch], cloths: &[Cloth], view: &View, light: &Li
             });
         }
     }
-    blend(&window, &colours, canvas);
 }
 
 /// Samples a metre from which on texels are smoothed.
@@ -208,94 +235,12 @@ fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
     [scaled(y, 16), scaled(u, 128), scaled(v, 128), 1]
 }
 
-/// Averages the samples of every pixel over what the picture shows behind them.
-fn blend(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
-    match window.fineness {
-        1 => blend_fine::<1>(window, colours, canvas),
-        _ => blend_fine::<2>(window, colours, canvas),
-    }
-}
-
-/// The same for so many samples along a pixel's side, known beforehand: sums need no loops.
-fn blend_fine<const FINE: usize>(window: &Window, colours: &[[u8; 4]], canvas: &mut Canvas) {
-    let stride = window.samples().0;
-    let [luma, chroma @ ..] = &mut canvas.planes;
-    for (index, rows) in colours.chunks(2 * FINE * stride).enumerate() {
-        let (y, covered) = (2 * index, covered(rows, stride));
-        for x in (((covered.start / FINE) & !1)..covered.end.div_ceil(FINE)).step_by(2) {
-            let mut block = Sum::default();
-            for (x, down) in [(x, 0), (x + 1, 0), (x, 1), (x + 1, 1)] {
-                if x < window.width && y + down < window.height {
-                    let sum = Sum::of::<FINE>(rows, down * FINE * stride + x * FINE, stride);
-                    sum.over(&mut luma.data[(window.top + y + down) * luma.width + window.left + x], 0);
-                    block.add(sum);
-                }
-            }
-            for (index, plane) in chroma.iter_mut().enumerate() {
-                let place = (window.top + y) / 2 * plane.width + (window.left + x) / 2;
-                block.over(&mut plane.data[place], index + 1);
-            }
-        }
-    }
-}
-
-/// From the first to the last column of some rows in which there is any skin.
-fn covered(rows: &[[u8; 4]], stride: usize) -> Range<usize> {
-    let none = |colour: &&[u8; 4]| colour[3] == 0;
-    let (mut start, mut end) = (stride, 0);
-    for row in rows.chunks_exact(stride) {
-        start = start.min(row.iter().take_while(none).count());
-        end = end.max(stride - row.iter().rev().take_while(none).count());
-    }
-    start..end
-}
-
-/// Y, U, V and coverage of some samples together; what is not covered is black.
-#[derive(Default, Clone, Copy)]
-struct Sum {
-    parts: [u32; 4],
-    samples: u32,
-}
-
-impl Sum {
-    /// A square of samples, a power of two along its side.
-    fn of<const SIDE: usize>(colours: &[[u8; 4]], first: usize, stride: usize) -> Self {
-        // Two parts at a time, each with 16 bits to grow.
-        let (mut even, mut odd) = (0u32, 0u32);
-        for row in 0..SIDE {
-            for &colour in &colours[first + row * stride..][..SIDE] {
-                let parts = u32::from_le_bytes(colour);
-                even += parts & 0x00ff_00ff;
-                odd += parts >> 8 & 0x00ff_00ff;
-            }
-        }
-        let parts = [even & 0xffff, odd & 0xffff, even >> 16, odd >> 16];
-        Self { parts, samples: (SIDE * SIDE) as u32 }
-    }
-
-    fn add(&mut self, other: Self) {
-        self.parts.iter_mut().zip(other.parts).for_each(|(part, more)| *part += more);
-        self.samples += other.samples;
-    }
-
-    /// One of its parts over a pixel of the picture.
-    fn over(&self, pixel: &mut u8, part: usize) {
-        let covered = self.parts[3];
-        if covered > 0 {
-            let behind = u32::from(*pixel) * (self.samples - covered);
-            // Samples are as many as a power of two: of one, two or four pixels.
-            let half = self.samples / 2;
-            *pixel = ((self.parts[part] + behind + half) >> self.samples.trailing_zeros()) as u8;
-        }
-    }
-}
-
 /// Marks the pixels whose centre the body covers.
 pub(super) fn mark(patches: &[Patch], view: &View, mask: &mut Plane) {
-    let Some(window) = Window::around(patches, view, 1) else { return };
+    let Some(window) = Window::of(patches, view) else { return };
     for patch in patches {
-        for corners in facing(patch, view, |_, pixel, _| window.corner(pixel, [0.0; 4])) {
-            triangle(corners, window.samples(), |start, end, _, _| {
+        for corners in facing(patch, view, |_, pixel, _| window.corner(pixel, (0.0, 0.0), [0.0; 4])) {
+            triangle(corners, window.size(), |start, end, _, _| {
                 let (row, first) = (start / window.width, start % window.width);
                 let begin = (window.top + row) * mask.width + window.left + first;
                 mask.data[begin..begin + end - start].fill(255);
@@ -320,11 +265,12 @@ pub(super) fn shadow(middle: Vector, radius: f64, dark: f64, view: &View, canvas
     let mut disc = skin(&rings, 0, [0.0; 2], Detail { corners: 20, steps: 1 });
     disc.vertices.iter_mut().for_each(|vertex| vertex.normal = [0.0, 1.0, 0.0]);
     let patches = [disc];
-    let Some(window) = Window::around(&patches, view, 1) else { return };
-    let corners = |vertex: &Vertex, pixel, _| window.corner(pixel, [vertex.open as f32, 0.0, 0.0, 0.0]);
+    let Some(window) = Window::of(&patches, view) else { return };
+    let corners =
+        |vertex: &Vertex, pixel, _| window.corner(pixel, (0.0, 0.0), [vertex.open as f32, 0.0, 0.0, 0.0]);
     let plane = &mut canvas.planes[0];
     for corners in facing(&patches[0], view, corners) {
-        triangle(corners, window.samples(), |start, end, mut carried, step| {
+        triangle(corners, window.size(), |start, end, mut carried, step| {
             let begin =
                 (window.top + start / window.width) * plane.width + window.left + start % window.width;
             for pixel in &mut plane.data[begin..begin + end - start] {

@@ -3,6 +3,7 @@ use crate::{
     geometry::Pinhole,
     kinematics::Pose,
     world::room::{
+        light::Strength,
         settings::{Change, Lighting, Occlusion, Subject},
         view::{CAMERA, Vector, dot, subtract},
     },
@@ -38,8 +39,15 @@ fn frames(walker: &Walker) -> impl Iterator<Item = f64> {
     (0..count).map(|frame| f64::from(frame) * FRAME)
 }
 
+/// The person as they stand at a time, before what the canvas shows.
+fn draw(walker: &Walker, time: f64, view: &View, canvas: &mut Canvas) {
+    let layer = walker.layer(time, 0.0, &std::array::from_fn(|_| view.clone()), &lamps()).unwrap();
+    let (width, height) = layer.view(view).size;
+    layer.over(canvas, Plane::filled(width, height, 255), (0.0, 0.0));
+}
+
 fn lamps() -> Light {
-    Light { lamps: vec![[-3.0, 3.2, 4.0], [3.0, 3.2, 4.0]], windows: Vec::new() }
+    Light { lamps: vec![[-3.0, 3.2, 4.0], [3.0, 3.2, 4.0]], windows: Vec::new(), strength: Strength::DAY }
 }
 
 #[test]
@@ -52,7 +60,11 @@ fn light_and_occlusion_change_nothing_else() {
             assert_eq!(plain.pose_at(time).place, twin.pose_at(time).place);
         }
     }
-    assert_ne!(walker(1, 3).walk().at(4.0), walker(2, 3).walk().at(4.0), "each subject has a way of their own");
+    assert_ne!(
+        walker(1, 3).walk().at(4.0),
+        walker(2, 3).walk().at(4.0),
+        "each subject has a way of their own"
+    );
 }
 
 #[test]
@@ -133,6 +145,19 @@ fn the_way_sweeps_more_than_a_quarter_circle_inside_the_hall() {
         }
         assert!(high - low > 90.0, "{settings:?} {low} {high}");
     }
+}
+
+#[test]
+fn the_person_comes_in_at_different_heights_of_the_picture() {
+    let middle = |settings: &RoomSettings| {
+        let walker = Walker::new(settings);
+        let view = looking(&settings.home(), 55.0, (640, 480));
+        let [_, top, _, bottom] = walker.bounds(&walker.pose_at(2.4), &view).unwrap();
+        (top + bottom) / 2.0
+    };
+    let middles: Vec<f64> = (1..8).flat_map(tests).step_by(5).map(|settings| middle(&settings)).collect();
+    let (above, below) = (middles.iter().filter(|y| **y < 200.0), middles.iter().filter(|y| **y > 280.0));
+    assert!(above.count() * 6 > middles.len() && below.count() * 6 > middles.len(), "{middles:?}");
 }
 
 #[test]
@@ -228,13 +253,34 @@ fn what_is_drawn_is_the_silhouette() {
     let mut mask = Plane::filled(320, 240, 0);
     walker.silhouette(&pose, &view, &mut mask);
     let mut canvas = Canvas::grey(320, 240, 255);
-    walker.draw(&pose, &view, &lamps(), &mut canvas);
+    draw(&walker, 6.3, &view, &mut canvas);
     let differ =
         mask.data.iter().zip(&canvas.planes[0].data).filter(|(m, y)| (**m == 255) != (**y < 225)).count();
     let body = mask.data.iter().filter(|pixel| **pixel == 255).count();
     // At the edge a pixel may be half covered.
     assert!(body > 2000 && differ * 8 < body, "{differ} of {body}");
     walker.draw_shadow(&pose, &view, &mut canvas);
+}
+
+#[test]
+fn who_moves_is_blurred_along_their_way_and_nobody_else() {
+    let walker = walker(1, 1);
+    let view = towards(walker.pose_at(6.0).place, 30.0, (320, 240));
+    let canvas = |duration: f64| {
+        let mut canvas = Canvas::grey(320, 240, 255);
+        let layer = walker.layer(6.0, duration, &std::array::from_fn(|_| view.clone()), &lamps()).unwrap();
+        let (width, height) = layer.view(&view).size;
+        layer.over(&mut canvas, Plane::filled(width, height, 255), (0.0, 0.0));
+        canvas
+    };
+    // How much brightness changes from column to column, and from row to row.
+    let contrast = |canvas: &Canvas, step: usize| -> u64 {
+        let data = &canvas.planes[0].data;
+        data.iter().zip(&data[step..]).map(|(a, b)| u64::from(a.abs_diff(*b))).sum()
+    };
+    let (short, long) = (canvas(0.001), canvas(0.08));
+    let part = |step: usize| contrast(&long, step) as f64 / contrast(&short, step) as f64;
+    assert!(part(1) < 0.8 && part(1) < part(320), "{} {}", part(1), part(320));
 }
 
 #[test]
@@ -271,7 +317,7 @@ fn the_same_seed_is_the_same_person_and_another_is_another() {
         let walker = walker(number, seed);
         let pose = walker.pose_at(6.0);
         let mut canvas = Canvas::grey(160, 120, 128);
-        walker.draw(&pose, &towards(pose.place, 30.0, (160, 120)), &lamps(), &mut canvas);
+        draw(&walker, 6.0, &towards(pose.place, 30.0, (160, 120)), &mut canvas);
         canvas
     };
     assert_eq!(picture(2, 4), picture(2, 4));

@@ -28,6 +28,10 @@ const RATE: f64 = 250.0;
 const MIDDLE: f64 = 0.87;
 /// Half of the widest view, in degrees.
 const HALF_VIEW_DEG: f64 = 27.5;
+/// How far above or below the middle of the first view somebody comes in, in degrees; all of them is in it still.
+const ENTRY_DEG: f64 = 9.0;
+/// Stream of chance for that.
+const ENTRY: u64 = 0xe27e;
 
 /// The person on their way at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -52,11 +56,14 @@ pub(crate) struct Walk {
     /// 1 from left to right, -1 the other way.
     side: f64,
     at_the_edge: f64,
+    /// How far above the middle of the first view they come in, in degrees.
+    above_deg: f64,
 }
 
 impl Walk {
     pub fn new(settings: &RoomSettings) -> Self {
         let mut chance = Seeded::new(settings.seed).fork(0x3a1c).fork(settings.way());
+        let above_deg = chance.fork(ENTRY).range(-ENTRY_DEG, ENTRY_DEG);
         let side = chance.pick(&[-1.0, 1.0]);
         let (from_z, to_z) = (chance.range(5.1, 6.1), chance.range(5.1, 6.1));
         let from_x = -side * from_z * chance.range(50f64, 52.0).to_radians().tan();
@@ -65,7 +72,7 @@ impl Walk {
         let plan = Plan::new(settings, length, &mut chance);
         let heading = (to_x - from_x).atan2(to_z - from_z);
         let moments = plan.walked(from_x, from_z, heading, side);
-        Self { moments, duration: plan.duration(), side, at_the_edge: plan.time_at(TO_THE_EDGE) }
+        Self { moments, duration: plan.duration(), side, at_the_edge: plan.time_at(TO_THE_EDGE), above_deg }
     }
 
     /// The person at a time in seconds; before the first and after the last they stand still.
@@ -99,13 +106,16 @@ impl Walk {
         self.at_the_edge
     }
 
-    /// The first view: beside the person's start, their middle at the height of the picture's.
+    /// The first view: beside the person's start, their middle somewhat above or below the middle of the picture.
     pub fn home(&self) -> Pose {
         let edge = self.at(self.at_the_edge);
-        let tilt = (MIDDLE - CAMERA[1]).atan2(edge.x.hypot(edge.z));
-        // Tilted down, the sides of the view at its middle row reach a little further round.
-        let half = (HALF_VIEW_DEG.to_radians().tan() / tilt.cos()).atan();
-        let pan = edge.x.atan2(edge.z) + self.side * half;
+        let height = (MIDDLE - CAMERA[1]).atan2(edge.x.hypot(edge.z));
+        let tilt = height - self.above_deg.to_radians();
+        // The side of a tilted view where it shows what lies that high.
+        let half = HALF_VIEW_DEG.to_radians().tan();
+        let (across, down) = (half * tilt.cos(), half * height.tan() * tilt.sin());
+        let beside = across.atan() + (down / across.hypot(1.0)).asin();
+        let pan = edge.x.atan2(edge.z) + self.side * beside;
         Pose { pan_deg: pan.to_degrees(), tilt_deg: tilt.to_degrees(), ..Pose::default() }
     }
 }
