@@ -68,6 +68,11 @@ impl<'a> Luma<'a> {
         &self.data[start..start + self.width]
     }
 
+    /// All of its memory: the pixels alone where rows are packed.
+    pub fn bytes(&self) -> &'a [u8] {
+        self.data
+    }
+
     /// The part of it from (`x`, `y`), cut to the picture.
     pub fn crop(&self, x: usize, y: usize, width: usize, height: usize) -> Luma<'a> {
         let (x, y) = (x.min(self.width), y.min(self.height));

@@ -19,7 +19,7 @@ mod scene_model;
 mod synthetic;
 mod tracker;
 mod trail;
-mod travelling_background;
+mod travelling;
 mod zones;
 
 pub use background::{Background, Criterion, ForegroundTest};
@@ -35,5 +35,5 @@ pub use scene::{FrameSize, Parts, Seen, Spot, scene};
 pub use scene_model::{SceneModel, SceneView};
 pub use tracker::{Choice, Config, Detection, Limits, Profile, Report, Tracker};
 pub use trail::Trail;
-pub use travelling_background::TravellingBackground;
+pub use travelling::TravellingBackground;
 pub use zones::{ZoneError, Zones, zone_mask};

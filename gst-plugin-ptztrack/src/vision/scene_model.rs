@@ -6,7 +6,7 @@ use super::Luma;
 use super::camera_motion::CameraMotionEstimator;
 use super::picture::{Picture, Reduced};
 use super::reduce::divisor;
-use super::travelling_background::TravellingBackground;
+use super::travelling::TravellingBackground;
 
 /// What one picture shows: all planes are of one size, the whole picture reduced.
 #[derive(Debug, Clone, Copy)]

@@ -1,0 +1,249 @@
+//! The background travels with the camera (Yi et al., Detection of Moving Objects with Non-stationary Cameras
+//! in 5.8 ms, CVPR Workshops 2013): mean and spread (thesis 3.1, 3.2) of every pixel on a canvas somewhat larger
+//! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not
+//! the canvas on the picture, so that what is known is not blurred by being resampled in every picture.
+
+mod model;
+mod noise;
+mod warp;
+
+use std::time::Duration;
+
+use opencv::core::{self, Mat};
+use opencv::imgproc;
+use opencv::prelude::*;
+use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
+
+use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
+use self::noise::Noise;
+use self::warp::Warp;
+use super::Luma;
+use super::camera_motion::to_pixels;
+use super::picture::Reduced;
+
+/// Pixels of the canvas around the picture: what leaves the picture for a moment is still known on return.
+const MARGIN: usize = 32;
+/// When the map bends the picture by more than this many pixels beyond a displacement, the canvas is laid anew.
+const MAX_BEND: f64 = 5.0;
+/// A camera that rests as long as this is looked at without resampling.
+const REST: Duration = Duration::from_millis(300);
+/// Displacement of a picture, in pixels, below which the camera rests.
+const RESTS: f64 = 0.05;
+/// A resting camera's picture may lie this far beside the canvas' pixels, in pixels.
+const MAX_BLUR: f64 = 0.15;
+/// Time constant of mean and spread.
+const MEMORY: Duration = Duration::from_secs(4);
+/// How long something must stay the same to become background.
+const PATIENCE: Duration = Duration::from_secs(6);
+/// Parts of a pixel by which a picture may lie beside the model: at rest, and turning.
+const MISPLACED_AT_REST: f32 = 0.2;
+const MISPLACED: f32 = 1.0;
+/// Foreground beyond this fraction of the picture is a new picture: lights, a cut.
+const NEW_PICTURE: f64 = 0.6;
+
+/// Tells foreground from background, whether the camera turns or not.
+#[derive(Debug, Default)]
+pub struct TravellingBackground {
+    model: Model,
+    noise: Noise,
+    /// From the canvas to the last picture, pixels.
+    to_picture: Homography,
+    rested: Duration,
+    /// Where nothing is learned: in the last picture, normalised.
+    held: Option<Rect>,
+    size: (usize, usize),
+    sampled: Sampled,
+    forth: Warp,
+    back: Warp,
+    foreground: Vec<u8>,
+    shown: Vec<u8>,
+}
+
+impl TravellingBackground {
+    /// How likely each pixel of the last picture is foreground: 0 for known background, 128 where nothing is known,
+    /// 255 for what is surely not background; `None` before the first picture. Neither smoothed nor cleaned.
+    pub fn foreground(&self) -> Option<Luma<'_>> {
+        (!self.foreground.is_empty()).then(|| Luma::packed(&self.foreground, self.size.0))
+    }
+
+    /// Mean luma of the background where the last picture shows it.
+    pub fn mean(&self) -> Option<Luma<'_>> {
+        (!self.shown.is_empty()).then(|| Luma::packed(&self.shown, self.size.0))
+    }
+
+    /// What lies in `bounds` (normalised, of the last picture) does not become background, however long it stands
+    /// still. Holds until it is said again; it is carried along with the camera.
+    pub fn protect(&mut self, bounds: Option<Rect>) {
+        self.held = bounds;
+    }
+
+    /// Tells foreground from background in the next picture, to which the camera moved by `motion`, then learns
+    /// from it. Where `motion` is not known, the camera may still rest, if the picture shows what is known.
+    pub fn update(
+        &mut self,
+        picture: &Reduced,
+        motion: Option<&CameraMotion>,
+        elapsed: Duration,
+    ) -> opencv::Result<()> {
+        if picture.size() != self.size {
+            *self = Self { size: picture.size(), ..Self::default() };
+        }
+        if self.size.0 == 0 || self.size.1 == 0 {
+            return Ok(());
+        }
+        if self.model.size == (0, 0) {
+            self.start();
+        }
+        self.move_on(motion, elapsed);
+        let how = self.comparison(motion, elapsed);
+        self.lay(picture)?;
+        self.compare(how);
+        let stale = self.changed() > NEW_PICTURE;
+        if stale {
+            self.start();
+            self.lay(picture)?;
+            self.compare(how);
+        }
+        if self.rested > REST {
+            self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
+        }
+        let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
+        let holds = |x: usize, y: usize| {
+            held.is_some_and(|held| held.contains(Point { x: x as f64, y: y as f64 }))
+        };
+        self.model.learn(&self.sampled, self.forth.spans(), how, holds);
+        self.show();
+        Ok(())
+    }
+
+    /// A canvas of which nothing is known.
+    fn start(&mut self) {
+        self.model = Model::new((self.size.0 + 2 * MARGIN, self.size.1 + 2 * MARGIN));
+        self.to_picture = Homography::translation(-(MARGIN as f64), -(MARGIN as f64));
+        self.rested = Duration::ZERO;
+    }
+
+    /// Finds where the next picture lies on the canvas, and lays the canvas anew where it has to be.
+    fn move_on(&mut self, motion: Option<&CameraMotion>, elapsed: Duration) {
+        let size = (self.size.0 as f64, self.size.1 as f64);
+        if let Some(motion) = motion {
+            let step = to_pixels(&motion.homography, size);
+            self.to_picture = self.to_picture.then(&step);
+            let middle = Point { x: size.0 / 2.0, y: size.1 / 2.0 };
+            let to = step.apply(middle);
+            let rests = (to.x - middle.x).hypot(to.y - middle.y) < RESTS;
+            self.rested = if rests { self.rested.saturating_add(elapsed) } else { Duration::ZERO };
+            self.held = self.held.map(|held| moved(held, &motion.homography));
+        }
+        let wanted = Homography::translation(-(MARGIN as f64), -(MARGIN as f64));
+        let margin = MARGIN as f64;
+        let (shift, bend) = shift_and_bend(&self.to_picture, self.model.size);
+        let off = (shift.0 + margin).abs().max((shift.1 + margin).abs());
+        let askew = bend > MAX_BEND || off > margin - 2.0;
+        let between = (shift.0 - shift.0.round()).abs().max((shift.1 - shift.1.round()).abs());
+        let blurred = self.rested > REST && bend.max(between) > MAX_BLUR;
+        if !askew && !blurred {
+            return;
+        }
+        // From the new canvas to the old one.
+        let Some(back) = self.to_picture.inverse() else { return self.start() };
+        let mut warp = Warp::default();
+        warp.prepare(self.model.size, self.model.size, &wanted.then(&back));
+        self.model.carry(&warp);
+        self.to_picture = wanted;
+    }
+
+    fn comparison(&self, motion: Option<&CameraMotion>, elapsed: Duration) -> Comparison {
+        let rests = motion.is_none() || self.rested > REST;
+        let ticks = |time: Duration| (time.as_secs_f64() * TICKS).round().clamp(1.0, 255.0) as u8;
+        Comparison {
+            misplaced: if rests { MISPLACED_AT_REST } else { MISPLACED },
+            min_weight: (elapsed.as_secs_f64() / MEMORY.as_secs_f64()).min(1.0) as f32,
+            ticks: ticks(elapsed),
+            patience: ticks(PATIENCE),
+        }
+    }
+
+    /// Lays the picture on the canvas.
+    fn lay(&mut self, picture: &Reduced) -> opencv::Result<()> {
+        self.forth.prepare(self.model.size, self.size, &self.to_picture);
+        self.forth.sample(picture.luma().bytes(), 0, &mut self.sampled.luma);
+        self.sampled.chroma = picture.chroma().map(|planes| {
+            let mut sampled = self.sampled.chroma.take().unwrap_or_default();
+            for (plane, out) in planes.iter().zip(&mut sampled) {
+                self.forth.sample(plane.bytes(), 128, out);
+            }
+            sampled
+        });
+        let model = &mut self.model;
+        model.shown.iter_mut().zip(&model.luma).for_each(|(shown, mean)| *shown = (mean.saturating_add(128) >> 8) as u8);
+        let shown = Luma::packed(&model.shown, model.size.0);
+        let around = imgproc::get_structuring_element_def(imgproc::MORPH_RECT, core::Size::new(3, 3))?;
+        let (mut low, mut high) = (Mat::default(), Mat::default());
+        shown.with_mat(|shown| {
+            imgproc::erode_def(shown, &mut low, &around)?;
+            imgproc::dilate_def(shown, &mut high, &around)
+        })?;
+        model.low.copy_from_slice(low.data_bytes()?);
+        model.high.copy_from_slice(high.data_bytes()?);
+        Ok(())
+    }
+
+    fn compare(&mut self, how: Comparison) {
+        self.model.compare(&self.sampled, self.forth.spans(), how, &self.noise);
+    }
+
+    /// Which fraction of what is known is foreground.
+    fn changed(&self) -> f64 {
+        let (mut known, mut changed) = (1_u32, 0_u32);
+        for (y, &(start, end)) in self.forth.spans().iter().enumerate() {
+            let row = &self.model.likelihood[y * self.model.size.0..][start..end];
+            known += row.iter().map(|&likelihood| u32::from(likelihood != UNKNOWN)).sum::<u32>();
+            changed += row.iter().map(|&likelihood| u32::from(likelihood > UNKNOWN)).sum::<u32>();
+        }
+        f64::from(changed) / f64::from(known)
+    }
+
+    /// Leaves likelihood and mean as they lie in the picture.
+    fn show(&mut self) {
+        let Some(back) = self.to_picture.inverse() else { return };
+        self.back.prepare(self.size, self.model.size, &back);
+        self.back.sample(&self.model.likelihood, UNKNOWN, &mut self.foreground);
+        self.back.sample(&self.model.shown, 0, &mut self.shown);
+    }
+}
+
+/// The displacement of the canvas' middle, and how far its corners go beyond that.
+fn shift_and_bend(map: &Homography, size: (usize, usize)) -> ((f64, f64), f64) {
+    let (width, height) = (size.0 as f64, size.1 as f64);
+    let shift = |x: f64, y: f64| {
+        let to = map.apply(Point { x, y });
+        (to.x - x, to.y - y)
+    };
+    let middle = shift(width / 2.0, height / 2.0);
+    let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
+    let bend = corners.map(|(x, y)| {
+        let corner = shift(x, y);
+        (corner.0 - middle.0).hypot(corner.1 - middle.1)
+    });
+    (middle, bend.into_iter().fold(0.0, f64::max))
+}
+
+/// A box after the camera moved.
+fn moved(bounds: Rect, motion: &Homography) -> Rect {
+    let first = motion.apply(Point { x: bounds.x, y: bounds.y });
+    let last = motion.apply(Point { x: bounds.x + bounds.width, y: bounds.y + bounds.height });
+    Rect { x: first.x, y: first.y, width: last.x - first.x, height: last.y - first.y }
+}
+
+/// Where a box of the picture (normalised) lies on the canvas, pixels.
+fn canvas_box(bounds: Rect, size: (usize, usize), to_picture: &Homography) -> Rect {
+    let (width, height) = (size.0 as f64, size.1 as f64);
+    let pixels = Rect {
+        x: bounds.x * width,
+        y: bounds.y * height,
+        width: bounds.width * width,
+        height: bounds.height * height,
+    };
+    to_picture.inverse().map_or(pixels, |back| moved(pixels, &back))
+}

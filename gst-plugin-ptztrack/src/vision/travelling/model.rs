@@ -1,0 +1,275 @@
+//! What is known of each pixel of the background, and how a picture is held against it.
+
+use super::noise::{Line, Noise, PER_MEAN_DEVIATION};
+use super::warp::Warp;
+
+/// An apparent background that nobody has looked at yet has this age.
+const UNSEEN: u8 = 0;
+/// From this age (pictures) on, a pixel is known: before, who can tell what is foreground?
+const KNOWN: u8 = 4;
+const MAX_AGE: u8 = 250;
+/// Likelihood of a pixel of which nothing is known.
+pub(super) const UNKNOWN: u8 = 128;
+/// Squared deviations (of luma and chroma together) at which foreground is as likely as background. The noise of
+/// three channels has a mean of 3, and anything else is spread over many more grey levels than noise is.
+const EVEN: f32 = 16.0;
+/// Light varies by this part of what it is: clouds, exposure, faint shadows (a part of the mean, as thesis 3.3).
+const LIGHT: f32 = 0.04;
+/// Pixels of each row that the noise is learned from: one in so many.
+const SAMPLING: usize = 7;
+/// Where the background's own range around a pixel is larger, its deviations say little of noise.
+const FLAT: u8 = 8;
+
+/// The picture as it lies on the model.
+#[derive(Debug, Default)]
+pub(super) struct Sampled {
+    pub luma: Vec<u8>,
+    pub chroma: Option<[Vec<u8>; 2]>,
+}
+
+/// How a picture is held against the model.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Comparison {
+    /// How far the picture may lie beside the model, as a part of a pixel.
+    pub misplaced: f32,
+    /// Least weight of a picture in mean and spread (the α of thesis 3.1).
+    pub min_weight: f32,
+    /// Time since the last picture, in `TICKS` a second.
+    pub ticks: u8,
+    /// After so many ticks what stays the same is background.
+    pub patience: u8,
+}
+
+/// Ticks that every candidate waits: somebody walking past looks alike from picture to picture.
+const MIN_PATIENCE: u8 = 12;
+
+/// Units of time in which candidates wait.
+pub(super) const TICKS: f64 = 25.0;
+
+/// Mean and spread of every pixel (thesis 3.1, 3.2), its age, and beside it a candidate (Yi et al. 2013) for
+/// what it may become: so foreground never gets into the mean of the background.
+#[derive(Debug, Default)]
+pub(super) struct Model {
+    pub size: (usize, usize),
+    /// 8.8 fixed point, as the other means.
+    pub luma: Vec<u16>,
+    pub chroma: [Vec<u16>; 2],
+    /// Mean absolute deviation of luma, 8.8.
+    pub spread: Vec<u16>,
+    pub age: Vec<u8>,
+    /// Luma, U and V of what may become background.
+    pub candidate: [Vec<u8>; 3],
+    /// For how long it has been the same, in ticks.
+    pub waited: Vec<u8>,
+    /// The mean's luma in whole grey levels, and the range of it within one pixel.
+    pub shown: Vec<u8>,
+    pub low: Vec<u8>,
+    pub high: Vec<u8>,
+    pub likelihood: Vec<u8>,
+    /// Mean absolute deviation of one row, kept as memory.
+    row: Vec<f32>,
+}
+
+impl Model {
+    pub fn new(size: (usize, usize)) -> Self {
+        let count = size.0 * size.1;
+        Self {
+            size,
+            luma: vec![0; count],
+            chroma: [vec![128 << 8; count], vec![128 << 8; count]],
+            spread: vec![0; count],
+            age: vec![UNSEEN; count],
+            candidate: [vec![0; count], vec![0; count], vec![0; count]],
+            waited: vec![0; count],
+            shown: vec![0; count],
+            low: vec![0; count],
+            high: vec![0; count],
+            likelihood: vec![UNKNOWN; count],
+            row: Vec::new(),
+        }
+    }
+
+    /// Lays all planes anew as `warp` says; what was never seen has no age.
+    pub fn carry(&mut self, warp: &Warp) {
+        let mut wide = Vec::new();
+        for plane in [&mut self.luma, &mut self.spread].into_iter().chain(&mut self.chroma) {
+            warp.sample_wide(plane, 0, &mut wide);
+            std::mem::swap(plane, &mut wide);
+        }
+        let mut narrow = Vec::new();
+        for plane in [&mut self.waited].into_iter().chain(&mut self.candidate) {
+            warp.sample_nearest(plane, 0, &mut narrow);
+            std::mem::swap(plane, &mut narrow);
+        }
+        // A mean mixed with one of which nothing is known is not known.
+        warp.sample_least(&self.age, 0, &mut narrow);
+        std::mem::swap(&mut self.age, &mut narrow);
+    }
+
+    /// Holds the picture against the model where `spans` say that it covers it (3.3, with the deviation measured
+    /// in units of what noise makes): leaves the likelihood of foreground.
+    pub fn compare(&mut self, picture: &Sampled, spans: &[(usize, usize)], how: Comparison, noise: &Noise) {
+        self.likelihood.fill(UNKNOWN);
+        let (line, chroma_noise) = (noise.luma(), noise.chroma());
+        for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
+            let row = y * self.size.0 + start..y * self.size.0 + end;
+            self.row.clear();
+            self.row.resize(row.len(), 0.0);
+            if let Some(chroma) = &picture.chroma {
+                for (seen, mean) in chroma.iter().zip(&self.chroma) {
+                    let pixels = self.row.iter_mut().zip(&seen[row.clone()]).zip(&mean[row.clone()]);
+                    for ((sum, &seen), &mean) in pixels {
+                        let off = f32::from(seen) - f32::from(mean) / 256.0;
+                        *sum += off * off / chroma_noise;
+                    }
+                }
+            }
+            let ranges = self.low[row.clone()].iter().zip(&self.high[row.clone()]);
+            let known = self.luma[row.clone()].iter().zip(&self.spread[row.clone()]).zip(&self.age[row.clone()]);
+            let pixels = picture.luma[row.clone()].iter().zip(&self.row).zip(known.zip(ranges));
+            for (out, ((&seen, &colour), (((&mean, &spread), &age), (&low, &high)))) in
+                self.likelihood[row.clone()].iter_mut().zip(pixels)
+            {
+                *out = likelihood(seen, colour, mean, spread, age, high.saturating_sub(low), how.misplaced, line);
+            }
+        }
+    }
+
+    /// Learns the noise from what is background for sure.
+    pub fn note_noise(&self, picture: &Sampled, spans: &[(usize, usize)], noise: &mut Noise) {
+        for (y, &(start, end)) in spans.iter().enumerate() {
+            for x in (start..end).skip(y % SAMPLING).step_by(SAMPLING) {
+                let at = y * self.size.0 + x;
+                let flat = self.high[at].saturating_sub(self.low[at]) <= FLAT;
+                if self.likelihood[at] < UNKNOWN && self.age[at] > 2 * KNOWN && flat {
+                    let off = |seen: u8, mean: u16| (f32::from(seen) - f32::from(mean) / 256.0).abs();
+                    let luma = off(picture.luma[at], self.luma[at]);
+                    let chroma = picture.chroma.as_ref().map_or(0.0, |chroma| {
+                        0.5 * (off(chroma[0][at], self.chroma[0][at]) + off(chroma[1][at], self.chroma[1][at]))
+                    });
+                    noise.note(self.shown[at], luma, chroma);
+                }
+            }
+        }
+        noise.learn();
+    }
+
+    /// Takes the picture into the model: (3.1) and the spread where it is background, or else into the candidate,
+    /// which becomes background when it has waited long enough. Nothing becomes background where `held` says.
+    pub fn learn(
+        &mut self,
+        picture: &Sampled,
+        spans: &[(usize, usize)],
+        how: Comparison,
+        held: impl Fn(usize, usize) -> bool,
+    ) {
+        let weights: Vec<u16> = (0..=u8::MAX)
+            .map(|age| (65536.0 * (1.0 / (f32::from(age) + 1.0)).max(how.min_weight)).min(65535.0) as u16)
+            .collect();
+        let mut alphas = Vec::new();
+        for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
+            let row = y * self.size.0 + start..y * self.size.0 + end;
+            alphas.clear();
+            let seen = self.likelihood[row.clone()].iter().zip(&self.age[row.clone()]);
+            // What is unknown is learned, too: it is 128 and no more.
+            alphas.extend(seen.map(|(&likelihood, &age)| {
+                if likelihood <= UNKNOWN { weights[usize::from(age)] } else { 0 }
+            }));
+            let pixels = self.luma[row.clone()].iter_mut().zip(&mut self.spread[row.clone()]);
+            for ((&seen, (mean, spread)), &alpha) in
+                picture.luma[row.clone()].iter().zip(pixels).zip(&alphas)
+            {
+                let seen = u16::from(seen) << 8;
+                *spread = towards(*spread, seen.abs_diff(*mean), alpha);
+                *mean = towards(*mean, seen, alpha);
+            }
+            if let Some(chroma) = &picture.chroma {
+                for (seen, mean) in chroma.iter().zip(&mut self.chroma) {
+                    for ((&seen, mean), &alpha) in
+                        seen[row.clone()].iter().zip(&mut mean[row.clone()]).zip(&alphas)
+                    {
+                        *mean = towards(*mean, u16::from(seen) << 8, alpha);
+                    }
+                }
+            }
+            for (age, &alpha) in self.age[row.clone()].iter_mut().zip(&alphas) {
+                *age = age.saturating_add(u8::from(alpha > 0)).min(MAX_AGE);
+            }
+            for (waited, &alpha) in self.waited[row.clone()].iter_mut().zip(&alphas) {
+                *waited = if alpha > 0 { 0 } else { *waited };
+            }
+            for x in start..end {
+                if alphas[x - start] == 0 {
+                    self.wait(picture, y * self.size.0 + x, how, || held(x, y));
+                }
+            }
+        }
+    }
+
+    /// What a foreground pixel's candidate makes of the picture.
+    fn wait(&mut self, picture: &Sampled, at: usize, how: Comparison, held: impl Fn() -> bool) {
+        let seen = [
+            picture.luma[at],
+            picture.chroma.as_ref().map_or(128, |chroma| chroma[0][at]),
+            picture.chroma.as_ref().map_or(128, |chroma| chroma[1][at]),
+        ];
+        let alike = (0..3).all(|k| seen[k].abs_diff(self.candidate[k][at]) <= CANDIDATE_TOLERANCE);
+        for (candidate, &seen) in self.candidate.iter_mut().zip(&seen) {
+            candidate[at] = if alike { near(candidate[at], seen) } else { seen };
+        }
+        self.waited[at] = if alike { self.waited[at].saturating_add(how.ticks) } else { 0 };
+        // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
+        let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);
+        if self.waited[at] >= how.patience.min(seen_for) && !held() {
+            self.adopt(at);
+        }
+    }
+
+    /// Makes the candidate background.
+    pub fn adopt(&mut self, at: usize) {
+        let [luma, u, v] = [0, 1, 2].map(|k| u16::from(self.candidate[k][at]) << 8);
+        (self.luma[at], self.chroma[0][at], self.chroma[1][at]) = (luma, u, v);
+        (self.age[at], self.waited[at]) = (KNOWN, 0);
+    }
+}
+
+/// Grey levels within which a candidate is still the same.
+const CANDIDATE_TOLERANCE: u8 = 12;
+
+/// A quarter of the way.
+fn near(from: u8, to: u8) -> u8 {
+    ((u16::from(from) * 3 + u16::from(to) + 2) / 4) as u8
+}
+
+/// (3.1) in 8.8 fixed point: `alpha` of 65536 parts of the way.
+#[inline(always)]
+fn towards(from: u16, to: u16, alpha: u16) -> u16 {
+    let way = i32::from(to) - i32::from(from);
+    // Rounded, so that a small alpha pulls to neither side.
+    (i32::from(from) + ((way * i32::from(alpha >> 1) + (1 << 14)) >> 15)) as u16
+}
+
+#[allow(clippy::too_many_arguments, reason = "one pixel of every plane, inlined into the loop")]
+#[inline(always)]
+fn likelihood(
+    seen: u8,
+    colour: f32,
+    mean: u16,
+    spread: u16,
+    age: u8,
+    range: u8,
+    misplaced: f32,
+    noise: Line,
+) -> u8 {
+    let (mean, age) = (f32::from(mean) / 256.0, f32::from(age));
+    let spread = f32::from(spread) * (PER_MEAN_DEVIATION / 256.0);
+    let sensor = noise.variance(mean);
+    // A spread of a few pictures says less than what is known of all pixels.
+    let light = LIGHT * mean;
+    let variance = ((age * spread * spread + 8.0 * sensor) / (age + 8.0)).max(sensor) + light * light;
+    let off = ((f32::from(seen) - mean).abs() - misplaced * f32::from(range)).max(0.0);
+    let squares = off * off / variance + colour;
+    let known = age.min(f32::from(KNOWN)) / f32::from(KNOWN);
+    let level = 128.0 + known * (squares * (128.0 / EVEN) - 128.0);
+    level.clamp(0.0, 255.0) as u8
+}
