@@ -57,6 +57,19 @@ impl Homography {
         Self(scaled)
     }
 
+    /// The similarity that is nearest to it in the middle of a frame of that size in pixels, `(a, b, x, y)`: from
+    /// (x, y) to (ax − by + x, bx + ay + y). Perspective is left out.
+    pub fn similarity(&self, width: f64, height: f64) -> [f64; 4] {
+        let map = self.scaled(width, height);
+        let (middle, reach) = (Point { x: width / 2.0, y: height / 2.0 }, width / 4.0);
+        let at = |dx: f64, dy: f64| map.apply(Point { x: middle.x + dx, y: middle.y + dy });
+        let (right, left, below, above) = (at(reach, 0.0), at(-reach, 0.0), at(0.0, reach), at(0.0, -reach));
+        let a = (right.x - left.x + below.y - above.y) / (4.0 * reach);
+        let b = (right.y - left.y - below.x + above.x) / (4.0 * reach);
+        let to = at(0.0, 0.0);
+        [a, b, to.x - a * middle.x + b * middle.y, to.y - b * middle.x - a * middle.y]
+    }
+
     /// With 1 in the last place, as all that is drawn from it here assumes no picture turned inside out.
     fn normalised(self) -> Self {
         let last = self.0[2][2];
@@ -100,6 +113,17 @@ mod tests {
             let moved = Point { x: pixel.x / 320.0, y: pixel.y / 180.0 };
             prop_assert!(near(moved, place));
         }
+    }
+
+    #[test]
+    fn a_similarity_is_its_own_nearest_one() {
+        let [a, b, x, y] = [1.02, 0.03, 14.0, -5.0];
+        let pixels = Homography([[a, -b, x], [b, a, y], [0.0, 0.0, 1.0]]);
+        let found = pixels.scaled(1.0 / 640.0, 1.0 / 360.0).similarity(640.0, 360.0);
+        assert!(
+            found.iter().zip([a, b, x, y]).all(|(found, value)| (found - value).abs() < 1e-9),
+            "{found:?}"
+        );
     }
 
     #[test]

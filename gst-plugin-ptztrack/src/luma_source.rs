@@ -147,7 +147,13 @@ fn chroma<'a>(
         let stride = usize::try_from(stride).map_err(|_| LumaSourceError::Stride(stride))?;
         let size = (frame.comp_width(index) as usize, frame.comp_height(index) as usize);
         let (first, step) = (frame.comp_poffset(index) as usize, frame.comp_pstride(index) as usize);
-        Ok::<_, LumaSourceError>(Samples::new(frame.comp_data(index)?, size, stride, first, step)?)
+        Ok::<_, LumaSourceError>(Samples::new(
+            frame.plane_data(frame.comp_plane(index))?,
+            size,
+            stride,
+            first,
+            step,
+        )?)
     };
     let format = frame.format_info();
     Ok(if format.is_rgb() {

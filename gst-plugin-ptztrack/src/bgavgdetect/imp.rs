@@ -10,7 +10,7 @@ use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Region, SceneMeta,
+    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Rect, Region, SceneMeta,
     TargetState, Times, TrackerEvent,
 };
 
@@ -162,6 +162,8 @@ pub struct BgAvgDetect {
     /// Taken out by the streaming thread while it works on a frame.
     stream: Mutex<Option<Stream>>,
     duty: Mutex<Duty>,
+    /// Where the tracker last said that its target is, and nothing becomes background.
+    target: Mutex<Option<Rect>>,
 }
 
 impl Default for BgAvgDetect {
@@ -172,6 +174,7 @@ impl Default for BgAvgDetect {
             settings: Mutex::new(settings),
             stream: Mutex::default(),
             duty: Mutex::default(),
+            target: Mutex::default(),
         }
     }
 }
@@ -223,6 +226,7 @@ impl BaseTransformImpl for BgAvgDetect {
 
     fn start(&self) -> Result<(), gst::ErrorMessage> {
         *lock(&self.duty) = Duty::default();
+        *lock(&self.target) = None;
         self.apply_output();
         Ok(())
     }
@@ -262,7 +266,7 @@ impl BaseTransformImpl for BgAvgDetect {
     fn src_event(&self, event: gst::Event) -> bool {
         if let Some(tracker) = TrackerEvent::of(&event) {
             match tracker {
-                Ok(tracker) => self.heed_tracker(tracker.state),
+                Ok(tracker) => self.heed_tracker(&tracker),
                 Err(error) => gst::warning!(CAT, imp = self, "Unreadable event of a tracker: {error}"),
             }
         } else if let Some(camera) = CameraEvent::of(&event) {
@@ -359,10 +363,11 @@ impl BgAvgDetect {
         }
     }
 
-    fn heed_tracker(&self, state: TargetState) {
-        let asleep = matches!(state, TargetState::Tracking | TargetState::Occluded);
-        gst::debug!(CAT, imp = self, "Tracker is {}", state.name());
-        lock(&self.duty).sleep(asleep);
+    fn heed_tracker(&self, tracker: &TrackerEvent) {
+        let follows = matches!(tracker.state, TargetState::Tracking | TargetState::Occluded);
+        gst::debug!(CAT, imp = self, "Tracker is {}", tracker.state.name());
+        lock(&self.duty).sleep(follows);
+        *lock(&self.target) = tracker.bounds.filter(|_| follows);
     }
 
     fn heed_camera(&self, moving: bool) {
@@ -378,25 +383,32 @@ impl BgAvgDetect {
             stream.interrupt();
         }
         let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));
-        let awake = lock(&self.duty).looks(elapsed);
-        if !awake {
-            stream.skip();
-        }
         if buffer.flags().contains(gst::BufferFlags::GAP) {
             return Seen::default();
         }
-        let scene = stream.scene(buffer, elapsed);
-        let scene = scene.inspect_err(|error| self.warn_once(stream, error)).ok();
-        if !awake {
-            return Seen { regions: None, scene };
-        }
-        let regions = stream.look(buffer, elapsed, &settings);
-        let regions = regions.inspect_err(|error| self.warn_once(stream, error)).ok().flatten();
-        if let Some(regions) = &regions {
+        let seen = match settings.profile {
+            Profile::Robust => {
+                let target = *lock(&self.target);
+                let seen = stream.look_at_scene(buffer, elapsed, &settings, target);
+                seen.map(|(regions, scene)| Seen { regions, scene: Some(scene) })
+            }
+            Profile::Thesis => {
+                if !lock(&self.duty).looks(elapsed) {
+                    stream.skip();
+                    return Seen::default();
+                }
+                stream.look(buffer, elapsed, &settings).map(|regions| Seen { regions, scene: None })
+            }
+        };
+        let seen = seen.unwrap_or_else(|error| {
+            self.warn_once(stream, &error);
+            Seen::default()
+        });
+        if let Some(regions) = &seen.regions {
             let change = stream.change(regions, elapsed, &settings);
             self.post(change, buffer.pts(), regions);
         }
-        Seen { regions, scene }
+        seen
     }
 
     fn post(&self, change: Option<MotionChange>, pts: Option<gst::ClockTime>, regions: &[Region]) {

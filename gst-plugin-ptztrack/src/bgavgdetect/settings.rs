@@ -51,7 +51,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             profile: Profile::default(),
-            analysis_width: 640,
+            analysis_width: 400,
             alpha: 0.5,
             alpha_interval_ns: 200_000_000,
             test: Test::default(),

@@ -2,7 +2,7 @@ use std::time::Duration;
 
 use gst_video::prelude::*;
 use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{MotionChange, Plane, Region, SceneMeta};
+use ptztrack_contract::{MotionChange, Plane, Rect, Region, SceneMeta};
 
 use super::Output;
 use super::settings::Settings;
@@ -28,9 +28,6 @@ pub(super) enum StreamError {
     #[error("the output cannot be converted: {0}")]
     Conversion(#[from] glib::BoolError),
 }
-
-/// Width of the scene's planes at most, pixels.
-const SCENE_WIDTH: usize = 400;
 
 fn plane(luma: Luma) -> Plane {
     let pixels: Vec<u8> = (0..luma.height()).flat_map(|y| luma.row(y)).copied().collect();
@@ -88,7 +85,7 @@ impl Stream {
 
     /// The next picture has nothing to do with those before.
     pub fn flush(&mut self) {
-        self.detector.relearn();
+        self.forget();
         self.last_pts = None;
         self.interrupted = false;
     }
@@ -114,7 +111,7 @@ impl Stream {
             None => (false, self.nominal_distance()),
         };
         if relearn {
-            self.detector.relearn();
+            self.forget();
         }
         self.last_pts = pts;
         elapsed
@@ -128,12 +125,17 @@ impl Stream {
         Duration::from_secs_f64(f64::from(fps.denom()) / f64::from(fps.numer()))
     }
 
+    fn forget(&mut self) {
+        self.detector.relearn();
+        self.scene.restart();
+    }
+
     /// Lets a picture pass unseen; the background will have changed when it looks again.
     pub fn skip(&mut self) {
         self.detector.relearn();
     }
 
-    /// The moving regions of a frame; `None` while it learns.
+    /// The moving regions of a frame as the thesis finds them; `None` while it learns.
     pub fn look(
         &mut self,
         buffer: &gst::BufferRef,
@@ -146,21 +148,34 @@ impl Stream {
         Ok(self.detector.process(&luma, elapsed, &settings.detector())?)
     }
 
-    /// What everybody can use of a frame: camera motion, foreground, background.
-    pub fn scene(&mut self, buffer: &gst::BufferRef, elapsed: Duration) -> Result<SceneMeta, StreamError> {
+    /// The moving regions of a frame, the camera at rest or not (`None` while it learns), and what everybody can
+    /// use of it: camera motion, foreground, background. What lies in `target` does not become background.
+    pub fn look_at_scene(
+        &mut self,
+        buffer: &gst::BufferRef,
+        elapsed: Duration,
+        settings: &Settings,
+        target: Option<Rect>,
+    ) -> Result<(Option<Vec<Region>>, SceneMeta), StreamError> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
             .map_err(|_| StreamError::Buffer)?;
         let picture = self.source.picture(&frame)?;
         let from_pts = std::mem::replace(&mut self.scene_pts, buffer.pts());
-        let view = self.scene.update(&picture, SCENE_WIDTH, elapsed, None).map_err(StreamError::Scene)?;
-        Ok(SceneMeta {
+        let config = settings.detector();
+        self.scene.protect(target);
+        let view =
+            self.scene.update(&picture, config.analysis_width, elapsed, None).map_err(StreamError::Scene)?;
+        let size = (frame.width() as usize, frame.height() as usize);
+        let regions = self.detector.process_likelihood(&view.foreground, size, &config)?;
+        let scene = SceneMeta {
             from_pts,
             camera_motion: view.camera_motion,
             luma: plane(view.luma),
             chroma: view.chroma.map(|chroma| chroma.map(plane)),
             foreground: plane(view.foreground),
             background: plane(view.background),
-        })
+        };
+        Ok((regions, scene))
     }
 
     /// Whether motion starts or ends with these regions.

@@ -11,6 +11,7 @@ use super::contours::{Grid, fill_regions, regions};
 use super::morphology::clean;
 use super::persistence::Persistence;
 use super::reduce::{divisor, with_reduced};
+use super::segmentation::segment;
 use super::zones::{Zones, zone_mask};
 use super::{Luma, LumaError};
 
@@ -144,6 +145,31 @@ impl Detector {
         found
     }
 
+    /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods, `foreground`: 0 to
+    /// 255 for each pixel of the picture reduced. Gives the moving regions, longest perimeter first, or `None` while
+    /// the background is learned.
+    pub fn process_likelihood(
+        &mut self,
+        foreground: &Luma,
+        frame: (usize, usize),
+        config: &DetectorConfig,
+    ) -> Result<Option<Vec<Region>>, DetectorError> {
+        let divisor = (frame.0 / foreground.width().max(1)).max(1);
+        if (self.frame, self.divisor) != (frame, divisor) {
+            self.relearn();
+            (self.frame, self.divisor) = (frame, divisor);
+        }
+        if self.learned < config.warm_up.max(1) {
+            self.learned += 1;
+            self.mask = Mat::default();
+            return Ok(None);
+        }
+        let (open_size, close_size) = self.sizes(config);
+        self.mask = segment(foreground, open_size, close_size)?;
+        self.look_in_zones(config)?;
+        self.report(config).map(Some)
+    }
+
     /// The same of the reduced picture.
     fn look(
         &mut self,
@@ -195,6 +221,11 @@ impl Detector {
         } else {
             self.afterimage.restart();
         }
+        self.report(config)
+    }
+
+    /// The regions of `mask` that are reported.
+    fn report(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
         let mut found = regions(&self.mask, self.grid())?;
         found.retain(|region| (config.min_area..=config.max_area).contains(&region.area));
         let mut found = self.persistence.confirmed(found, config.confirm_pictures);

@@ -15,6 +15,7 @@ mod presence;
 mod reduce;
 mod scene;
 mod scene_model;
+mod segmentation;
 #[cfg(test)]
 mod synthetic;
 mod tracker;

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography};
+use ptztrack_contract::{CameraMotion, Homography, Rect};
 
 use super::Luma;
 use super::camera_motion::CameraMotionEstimator;
@@ -58,6 +58,12 @@ impl SceneModel {
         self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), hint)?;
         self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed)?;
         Ok(self.view())
+    }
+
+    /// What lies in `bounds` (normalised, of the last picture) does not become background: see
+    /// [`TravellingBackground::protect`].
+    pub fn protect(&mut self, bounds: Option<Rect>) {
+        self.background.protect(bounds);
     }
 
     /// What the last picture showed.

@@ -25,6 +25,9 @@ pub(super) struct Fit {
 /// Fewer points, or a smaller share of what they weigh, say nothing about the background.
 const MIN_POINTS: usize = 6;
 const MIN_SHARE: f64 = 0.3;
+/// Half widths of the picture that they span at least, in one direction: a world does not fit into a corner, somebody
+/// before a blank wall does.
+const MIN_EXTENT: f64 = 0.7;
 /// Pairs of points that are tried: of twenty, one misses a share of a quarter by less than one in three
 /// thousand times.
 const TRIALS: usize = 100;
@@ -110,12 +113,24 @@ pub(super) fn fit(pairs: &[Pair], expected: &[Homography], centred: Centred) -> 
     let all: f64 = pairs.iter().map(|pair| pair.weight).sum();
     let share: f64 =
         pairs.iter().zip(&agrees).filter(|(_, agrees)| **agrees).map(|(pair, _)| pair.weight).sum();
-    if count < MIN_POINTS || share < MIN_SHARE * all {
+    if count < MIN_POINTS || share < MIN_SHARE * all || extent(pairs, &agrees, centred) < MIN_EXTENT {
         return None;
     }
     let deviation = spread(&homography, pairs, limit).max(PRECISION);
     let covariance = solved?.covariance(deviation * deviation);
     Some(Fit { homography, covariance, agrees })
+}
+
+/// How far the pairs that agree lie apart, in half widths.
+fn extent(pairs: &[Pair], agrees: &[bool], centred: Centred) -> f64 {
+    let agreeing = pairs.iter().zip(agrees).filter(|(_, agrees)| **agrees);
+    let places: Vec<(f64, f64)> = agreeing.map(|(pair, _)| centred.enter(pair.from)).collect();
+    let range = |pick: fn(&(f64, f64)) -> f64| {
+        let (least, most) =
+            places.iter().map(pick).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+        most - least
+    };
+    range(|place| place.0).max(range(|place| place.1))
 }
 
 /// The similarity through the two points of a trial; the same for the same trial of the same points.

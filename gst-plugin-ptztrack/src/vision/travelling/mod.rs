@@ -40,6 +40,8 @@ const MISPLACED_AT_REST: f32 = 0.2;
 const MISPLACED: f32 = 1.0;
 /// Foreground beyond this fraction of the picture is a new picture: lights, a cut.
 const NEW_PICTURE: f64 = 0.6;
+/// Where the motion of the camera is not known, more than this fraction says that it did not rest.
+const UNSEEN_MOTION: f64 = 0.3;
 
 /// Tells foreground from background, whether the camera turns or not.
 #[derive(Debug, Default)]
@@ -98,7 +100,7 @@ impl TravellingBackground {
         let how = self.comparison(motion, elapsed);
         self.lay(picture)?;
         self.compare(how);
-        let stale = self.changed() > NEW_PICTURE;
+        let stale = self.changed() > if motion.is_some() { NEW_PICTURE } else { UNSEEN_MOTION };
         if stale {
             self.start();
             self.lay(picture)?;
@@ -108,9 +110,8 @@ impl TravellingBackground {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
         let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
-        let holds = |x: usize, y: usize| {
-            held.is_some_and(|held| held.contains(Point { x: x as f64, y: y as f64 }))
-        };
+        let holds =
+            |x: usize, y: usize| held.is_some_and(|held| held.contains(Point { x: x as f64, y: y as f64 }));
         self.model.learn(&self.sampled, self.forth.spans(), how, holds);
         self.show();
         Ok(())
@@ -176,7 +177,11 @@ impl TravellingBackground {
             sampled
         });
         let model = &mut self.model;
-        model.shown.iter_mut().zip(&model.luma).for_each(|(shown, mean)| *shown = (mean.saturating_add(128) >> 8) as u8);
+        model
+            .shown
+            .iter_mut()
+            .zip(&model.luma)
+            .for_each(|(shown, mean)| *shown = (mean.saturating_add(128) >> 8) as u8);
         let shown = Luma::packed(&model.shown, model.size.0);
         let around = imgproc::get_structuring_element_def(imgproc::MORPH_RECT, core::Size::new(3, 3))?;
         let (mut low, mut high) = (Mat::default(), Mat::default());

@@ -125,12 +125,22 @@ impl Model {
                 }
             }
             let ranges = self.low[row.clone()].iter().zip(&self.high[row.clone()]);
-            let known = self.luma[row.clone()].iter().zip(&self.spread[row.clone()]).zip(&self.age[row.clone()]);
+            let known =
+                self.luma[row.clone()].iter().zip(&self.spread[row.clone()]).zip(&self.age[row.clone()]);
             let pixels = picture.luma[row.clone()].iter().zip(&self.row).zip(known.zip(ranges));
             for (out, ((&seen, &colour), (((&mean, &spread), &age), (&low, &high)))) in
                 self.likelihood[row.clone()].iter_mut().zip(pixels)
             {
-                *out = likelihood(seen, colour, mean, spread, age, high.saturating_sub(low), how.misplaced, line);
+                *out = likelihood(
+                    seen,
+                    colour,
+                    mean,
+                    spread,
+                    age,
+                    high.saturating_sub(low),
+                    how.misplaced,
+                    line,
+                );
             }
         }
     }
@@ -145,7 +155,8 @@ impl Model {
                     let off = |seen: u8, mean: u16| (f32::from(seen) - f32::from(mean) / 256.0).abs();
                     let luma = off(picture.luma[at], self.luma[at]);
                     let chroma = picture.chroma.as_ref().map_or(0.0, |chroma| {
-                        0.5 * (off(chroma[0][at], self.chroma[0][at]) + off(chroma[1][at], self.chroma[1][at]))
+                        0.5 * (off(chroma[0][at], self.chroma[0][at])
+                            + off(chroma[1][at], self.chroma[1][at]))
                     });
                     noise.note(self.shown[at], luma, chroma);
                 }
@@ -172,12 +183,13 @@ impl Model {
             alphas.clear();
             let seen = self.likelihood[row.clone()].iter().zip(&self.age[row.clone()]);
             // What is unknown is learned, too: it is 128 and no more.
-            alphas.extend(seen.map(|(&likelihood, &age)| {
-                if likelihood <= UNKNOWN { weights[usize::from(age)] } else { 0 }
-            }));
+            alphas.extend(seen.map(
+                |(&likelihood, &age)| {
+                    if likelihood <= UNKNOWN { weights[usize::from(age)] } else { 0 }
+                },
+            ));
             let pixels = self.luma[row.clone()].iter_mut().zip(&mut self.spread[row.clone()]);
-            for ((&seen, (mean, spread)), &alpha) in
-                picture.luma[row.clone()].iter().zip(pixels).zip(&alphas)
+            for ((&seen, (mean, spread)), &alpha) in picture.luma[row.clone()].iter().zip(pixels).zip(&alphas)
             {
                 let seen = u16::from(seen) << 8;
                 *spread = towards(*spread, seen.abs_diff(*mean), alpha);

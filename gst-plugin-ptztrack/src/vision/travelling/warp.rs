@@ -155,7 +155,8 @@ fn blend(source: &[u8], width: usize, shift: Shift, out: &mut [u8]) {
     let upper = source[..count].iter().zip(&source[right..right + count]);
     let lower = source[below..below + count].iter().zip(&source[below + right..below + right + count]);
     for (out, ((a, b), (c, d))) in out.iter_mut().zip(upper.zip(lower)) {
-        let sum = [a, b, c, d].into_iter().zip(weights).map(|(&p, weight)| u16::from(p) * weight).sum::<u16>();
+        let sum =
+            [a, b, c, d].into_iter().zip(weights).map(|(&p, weight)| u16::from(p) * weight).sum::<u16>();
         *out = ((sum + 128) >> 8) as u8;
     }
 }

@@ -1,0 +1,81 @@
+use opencv::core::{self, CV_8UC1, Mat, Scalar, Size};
+use opencv::imgproc;
+use opencv::prelude::*;
+
+use super::Luma;
+use super::morphology::clean;
+
+/// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
+/// unknown ...
+const WEAK: f64 = 136.0;
+/// ... and from which it makes one by itself.
+const STRONG: f64 = 240.0;
+/// Pixels that make a region, as a part of the picture: a few bright specks do not.
+const MIN_STRONG: f64 = 1.0 / 8000.0;
+
+/// The foreground as a mask of 255 and 0 from the likelihood of each pixel: what is likely, cleaned by opening and
+/// closing (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
+pub fn segment(likelihood: &Luma, open_size: usize, close_size: (usize, usize)) -> opencv::Result<Mat> {
+    let (mut smooth, mut mask, mut strong) = (Mat::default(), Mat::default(), Mat::default());
+    likelihood.with_mat(|likelihood| imgproc::blur_def(likelihood, &mut smooth, Size::new(3, 3)))?;
+    imgproc::threshold(&smooth, &mut mask, WEAK, 255.0, imgproc::THRESH_BINARY)?;
+    imgproc::threshold(&smooth, &mut strong, STRONG, 255.0, imgproc::THRESH_BINARY)?;
+    let needed = (MIN_STRONG * (likelihood.width() * likelihood.height()) as f64).ceil() as usize;
+    if (core::count_non_zero(&strong)? as usize) < needed {
+        return Mat::new_size_with_default(mask.size()?, CV_8UC1, Scalar::all(0.0));
+    }
+    clean(&mut mask, open_size, close_size)?;
+    keep_sure(&mut mask, &strong, needed)?;
+    Ok(mask)
+}
+
+/// Clears the connected parts of `mask` that hold fewer than `needed` pixels of `strong`.
+fn keep_sure(mask: &mut Mat, strong: &Mat, needed: usize) -> opencv::Result<()> {
+    let mut labels = Mat::default();
+    let count = imgproc::connected_components_def(mask, &mut labels)?;
+    let labels = labels.data_typed::<i32>()?;
+    let mut sure = vec![0_usize; count.max(1) as usize];
+    for (&label, &strong) in labels.iter().zip(strong.data_bytes()?) {
+        sure[label as usize] += usize::from(strong > 0);
+    }
+    for (&label, pixel) in labels.iter().zip(mask.data_bytes_mut()?) {
+        if sure[label as usize] < needed {
+            *pixel = 0;
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: (usize, usize) = (160, 100);
+
+    /// Likelihoods of 20 with boxes (left, top, width, height) of others; how many pixels are segmented.
+    fn segmented(boxes: &[((usize, usize, usize, usize), u8)]) -> i32 {
+        let mut likelihood = vec![20; SIZE.0 * SIZE.1];
+        for ((x, y, width, height), value) in boxes {
+            for row in likelihood.chunks_exact_mut(SIZE.0).skip(*y).take(*height) {
+                row[*x..x + width].fill(*value);
+            }
+        }
+        let mask = segment(&Luma::packed(&likelihood, SIZE.0), 3, (3, 7)).unwrap();
+        core::count_non_zero(&mask).unwrap()
+    }
+
+    #[test]
+    fn what_is_likely_counts_beside_what_is_sure() {
+        let (body, head) = ((50, 40, 12, 40), (53, 30, 6, 10));
+        assert_eq!(segmented(&[(body, 180)]), 0, "likely only");
+        let alone = segmented(&[(head, 255)]);
+        let both = segmented(&[(body, 180), (head, 255)]);
+        assert!(alone > 40 && both > 400, "{alone} {both}");
+    }
+
+    #[test]
+    fn specks_and_the_unknown_are_no_regions() {
+        assert_eq!(segmented(&[((20, 20, 1, 1), 255), ((90, 60, 2, 1), 255)]), 0);
+        assert_eq!(segmented(&[((0, 0, 160, 100), 128)]), 0);
+    }
+}
