@@ -457,6 +457,7 @@ fn a_short_buffer_passes_unseen_with_one_warning() {
 fn all_regions_or_the_longest_contour() {
     let boxes = [BOX, (100, 20, 30, 60)];
     let mut detector = Detector::learned(&grey());
+    detector.element.set_property_from_str("selection", "largest-perimeter");
     assert_eq!(detector.see(&boxes, 2), [Some(0), Some(1)]);
     detector.element.set_property_from_str("selection", "all");
     assert_eq!(detector.see(&boxes, 1), [Some(2)]);

@@ -129,10 +129,10 @@ pub enum Test {
 #[repr(i32)]
 pub enum Selection {
     /// The one of longest contour.
-    #[default]
     #[enum_value(name = "The region whose contour is longest", nick = "largest-perimeter")]
     LargestPerimeter,
     /// All.
+    #[default]
     #[enum_value(name = "All regions between min-area and max-area", nick = "all")]
     All,
 }

@@ -130,6 +130,7 @@ fn as_in_the_thesis(config: DetectorConfig) -> DetectorConfig {
         shed_trail: false,
         relearn_fraction: 1.0,
         confirm_pictures: 1,
+        choice: RegionChoice::LargestPerimeter,
         ..config
     }
 }

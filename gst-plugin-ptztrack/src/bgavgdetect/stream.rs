@@ -166,7 +166,7 @@ impl Stream {
         let view =
             self.scene.update(&picture, config.analysis_width, elapsed, None).map_err(StreamError::Scene)?;
         let size = (frame.width() as usize, frame.height() as usize);
-        let regions = self.detector.process_likelihood(&view.foreground, size, &config)?;
+        let regions = self.detector.process_likelihood(&view, size, elapsed, &config)?;
         let scene = SceneMeta {
             from_pts,
             camera_motion: view.camera_motion,

@@ -11,6 +11,8 @@ use super::contours::{Grid, fill_regions, regions};
 use super::morphology::clean;
 use super::persistence::Persistence;
 use super::reduce::{divisor, with_reduced};
+use super::region_tracks::RegionTracks;
+use super::scene_model::SceneView;
 use super::segmentation::segment;
 use super::zones::{Zones, zone_mask};
 use super::{Luma, LumaError};
@@ -93,6 +95,7 @@ pub struct Detector {
     background: Background,
     afterimage: Afterimage,
     persistence: Persistence,
+    tracks: RegionTracks,
     /// Pictures learned since the last start.
     learned: u32,
     frame: (usize, usize),
@@ -118,6 +121,7 @@ impl Detector {
         self.background.restart();
         self.afterimage.restart();
         self.persistence.restart();
+        self.tracks.restart();
         self.learned = 0;
         self.mask = Mat::default();
     }
@@ -145,15 +149,17 @@ impl Detector {
         found
     }
 
-    /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods, `foreground`: 0 to
-    /// 255 for each pixel of the picture reduced. Gives the moving regions, longest perimeter first, or `None` while
+    /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods in `scene`,
+    /// `elapsed` after the one before. Gives the moving regions, longest perimeter first, or `None` while
     /// the background is learned.
     pub fn process_likelihood(
         &mut self,
-        foreground: &Luma,
+        scene: &SceneView,
         frame: (usize, usize),
+        elapsed: Duration,
         config: &DetectorConfig,
     ) -> Result<Option<Vec<Region>>, DetectorError> {
+        let foreground = &scene.foreground;
         let divisor = (frame.0 / foreground.width().max(1)).max(1);
         if (self.frame, self.divisor) != (frame, divisor) {
             self.relearn();
@@ -167,7 +173,9 @@ impl Detector {
         let (open_size, close_size) = self.sizes(config);
         self.mask = segment(foreground, open_size, close_size)?;
         self.look_in_zones(config)?;
-        self.report(config).map(Some)
+        let mut found = self.found(config)?;
+        self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
+        Ok(Some(self.chosen(found, config)))
     }
 
     /// The same of the reduced picture.
@@ -221,18 +229,24 @@ impl Detector {
         } else {
             self.afterimage.restart();
         }
-        self.report(config)
+        let found = self.found(config)?;
+        Ok(self.chosen(found, config))
     }
 
-    /// The regions of `mask` that are reported.
-    fn report(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
+    /// The regions of `mask` that are neither too small nor too large, longest perimeter first.
+    fn found(&self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
         let mut found = regions(&self.mask, self.grid())?;
         found.retain(|region| (config.min_area..=config.max_area).contains(&region.area));
+        Ok(found)
+    }
+
+    /// Those that are reported.
+    fn chosen(&mut self, found: Vec<Region>, config: &DetectorConfig) -> Vec<Region> {
         let mut found = self.persistence.confirmed(found, config.confirm_pictures);
         if config.choice == RegionChoice::LargestPerimeter {
             found.truncate(1);
         }
-        Ok(found)
+        found
     }
 
     fn look_in_zones(&mut self, config: &DetectorConfig) -> opencv::Result<()> {

@@ -13,6 +13,7 @@ mod persistence;
 mod picture;
 mod presence;
 mod reduce;
+mod region_tracks;
 mod scene;
 mod scene_model;
 mod segmentation;
