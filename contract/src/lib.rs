@@ -24,6 +24,7 @@ mod error;
 mod events;
 mod geometry;
 mod homography;
+pub mod lock;
 #[cfg(feature = "gst")]
 mod messages;
 #[cfg(feature = "gst")]

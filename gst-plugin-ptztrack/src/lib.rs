@@ -8,7 +8,7 @@
 
 pub mod bgavgdetect;
 pub mod lkfeaturetrack;
-mod lock;
+use ptztrack_contract::lock;
 pub mod luma_source;
 mod pad_templates;
 pub mod ptzoverlay;

@@ -4,7 +4,7 @@
 //! in [`vapix`]; the control loop joins both.
 
 mod control_loop;
-mod lock;
+use ptztrack_contract::lock;
 pub mod vapixptzsink;
 
 /// What GStreamer asks of a plugin; private, as nobody calls it from Rust.

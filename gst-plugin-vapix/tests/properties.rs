@@ -92,6 +92,16 @@ fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
 }
 
 #[test]
+fn a_rotation_is_by_quarters() {
+    let rig = Rig::ready("http://192.168.0.90").with("rotation", 90u32).with("rotation", 45u32);
+    assert_eq!(rig.sink.property::<u32>("rotation"), 90);
+    match &rig.heard()[..] {
+        [Heard::Warning(text)] => assert!(text.contains("[0, 90, 180, 270]"), "{text}"),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
 fn a_duration_below_its_range_is_refused_with_the_range() {
     let rig = Rig::ready("http://192.168.0.90").with("timeout", 20_000_000u64);
     assert_eq!(rig.sink.property::<u64>("timeout"), 1_500_000_000);

@@ -29,6 +29,9 @@ pub struct Servo {
     target: Option<Target>,
 }
 
+/// No camera is taken to be later than this, whatever it shows: the longest delay that is looked for, and a step.
+const LONGEST_DELAY: Duration = Duration::from_millis(1600);
+
 #[derive(Debug)]
 struct Target {
     measurement: Measurement,
@@ -95,6 +98,7 @@ impl Servo {
         actuator: &ActuatorStatus,
         now: Duration,
     ) -> Option<f64> {
+        let measurement = self.settings.mounting.along_axes(measurement);
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => now,
             (Visibility::Predicted, Some(target)) => target.last_seen,
@@ -210,6 +214,15 @@ impl Servo {
         const LONGEST: Duration = Duration::from_secs(1);
         let since = self.target.as_ref()?.undecided_since?;
         Some(since + LONGEST).filter(|until| now < *until)
+    }
+
+    /// What holds whatever is measured and answered; asked after every step where debug assertions are on.
+    pub fn check_invariants(&self) {
+        self.controller.check_invariants();
+        let sum = self.calibration.delays().sum();
+        assert!(sum <= LONGEST_DELAY.max(self.settings.latency), "a delay of {sum:?}");
+        let fov_deg = self.fov_deg(None);
+        assert!(fov_deg > 0.0 && fov_deg < 180.0, "a field of view of {fov_deg} degrees");
     }
 
     /// What was set.

@@ -1,7 +1,7 @@
 use std::time::Duration;
 
 use crate::control::Home;
-use crate::estimation::Prediction;
+use crate::estimation::{Mounting, Prediction};
 use crate::model::{SoftLimits, SpeedCurve, SpeedMap};
 
 /// How the camera is moved.
@@ -46,6 +46,8 @@ pub struct ServoSettings {
     pub latency: Duration,
     /// Horizontal field of view in degrees; `None`: what the camera says.
     pub fov_deg: Option<f64>,
+    /// How the picture lies to the camera's axes.
+    pub mounting: Mounting,
     /// How the target's motion is carried forward.
     pub prediction: Prediction,
     /// The camera is stopped when the target was not seen for this long.
@@ -88,6 +90,7 @@ impl Default for ServoSettings {
             max_rate_hz: 10.0,
             latency: Duration::from_millis(200),
             fov_deg: None,
+            mounting: Mounting::default(),
             prediction: Prediction::default(),
             stale_timeout: Duration::from_secs(1),
             camera_speed_deg_s: 450.0,

@@ -1,8 +1,9 @@
 //! The servo's clock.
 
-use std::sync::{Mutex, PoisonError};
+use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
+use crate::lock::lock;
 use tokio::time::sleep;
 
 /// A clock that runs, or that is held by a stream whose time is not the world's. It never goes back.
@@ -70,7 +71,7 @@ impl Clock {
     }
 
     fn with<T>(&self, action: impl FnOnce(&mut State) -> T) -> T {
-        action(&mut self.state.lock().unwrap_or_else(PoisonError::into_inner))
+        action(&mut lock(&self.state))
     }
 }
 

@@ -8,13 +8,13 @@ use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 use servo::Measurement;
 
+use super::camera_task::{self, CameraTask, Predecessor};
 use super::clock::Clock;
-use super::news::camera_event;
+use super::events::camera_event;
 use super::picture::Picture;
 use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
-use super::worker::{self, Legacy, Worker};
 use crate::control_loop::Status;
 use crate::lock::lock;
 
@@ -38,16 +38,16 @@ struct Stream {
 }
 
 /// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
-/// order: `settings`, `worker`, so that changes come to the worker in the order in which they were made.
+/// order: `settings`, `worker`, so that changes come to the camera task in the order in which they were made.
 #[derive(Default)]
 pub struct VapixPtzSink {
     pub(super) settings: Mutex<Settings>,
-    pub(super) worker: Mutex<Option<Worker>>,
-    /// Of the workers so far, that may still be about to stop their cameras.
-    legacies: Mutex<Vec<Legacy>>,
+    pub(super) task: Mutex<Option<CameraTask>>,
+    /// Of the camera tasks so far, that may still be about to stop their cameras.
+    predecessors: Mutex<Vec<Predecessor>>,
     stream: Mutex<Stream>,
-    /// What upstream was not told yet; pushed by the streaming thread, so that the worker never waits for it.
-    pub(super) news: Mutex<Option<Status>>,
+    /// What upstream was not told yet; pushed by the streaming thread, so that the camera task never waits for it.
+    pub(super) status_to_push: Mutex<Option<Status>>,
 }
 
 #[glib::object_subclass]
@@ -61,7 +61,7 @@ impl ObjectImpl for VapixPtzSink {
     fn properties() -> &'static [glib::ParamSpec] {
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
-                .blurb("What it does and what it knows of the camera: state; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own ends camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
+                .blurb("What it does and what it knows of the camera: state; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own limits camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
                 .read_only()
                 .build();
             Property::all().iter().map(|property| property.spec.clone()).chain([stats]).collect()
@@ -93,7 +93,7 @@ impl ObjectImpl for VapixPtzSink {
 
     fn dispose(&self) {
         // There is one if the element was never brought to NULL.
-        self.finish_worker();
+        self.finish_task();
     }
 }
 
@@ -129,21 +129,21 @@ impl ElementImpl for VapixPtzSink {
         // Not in the base class' start() and stop(): those are at NULL to READY and back, and
         // what can be set in READY shall count.
         if transition == gst::StateChange::ReadyToPaused {
-            self.start_worker()?;
+            self.start_task()?;
         }
         if transition == gst::StateChange::PausedToPlaying {
-            self.with_worker(|worker| worker.inbox().heed(true));
+            self.with_task(|task| task.mailbox().accept_measurements(true));
         }
         let result = self.parent_change_state(transition);
         match transition {
             gst::StateChange::PlayingToPaused => {
                 // The base class may go on rendering: where it was PLAYING for so short a time that the streaming
                 // thread did not wake from its preroll, it takes the preroll for done and waits for none.
-                self.with_worker(|worker| worker.inbox().heed(false));
+                self.with_task(|task| task.mailbox().accept_measurements(false));
                 self.rest();
             }
-            gst::StateChange::PausedToReady => self.finish_worker(),
-            gst::StateChange::ReadyToPaused if result.is_err() => self.finish_worker(),
+            gst::StateChange::PausedToReady => self.finish_task(),
+            gst::StateChange::ReadyToPaused if result.is_err() => self.finish_task(),
             _ => {}
         }
         result
@@ -170,7 +170,7 @@ impl BaseSinkImpl for VapixPtzSink {
             gst::EventType::FlushStart => {
                 let handled = self.parent_event(event);
                 // After the parent, see above; and without a wait, as this is the seeking thread.
-                self.with_worker(|worker| drop(worker.inbox().rest()));
+                self.with_task(|task| drop(task.mailbox().rest()));
                 return handled;
             }
             _ => {}
@@ -179,12 +179,12 @@ impl BaseSinkImpl for VapixPtzSink {
     }
 
     fn render(&self, buffer: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
-        self.push_news();
+        self.push_status();
         let step = self.lockstep_time(buffer.pts());
         if let Some(time) = step {
             // What is still under way, as the first questions to the camera are, belongs to the time before.
             self.settle();
-            self.with_worker(|worker| worker.inbox().hold_at(time));
+            self.with_task(|task| task.mailbox().hold_at(time));
         }
         match TargetMeta::of(buffer) {
             Some(Ok(target)) => self.see(&target, buffer.pts()),
@@ -199,7 +199,7 @@ impl BaseSinkImpl for VapixPtzSink {
 }
 
 impl VapixPtzSink {
-    fn start_worker(&self) -> Result<(), gst::StateChangeError> {
+    fn start_task(&self) -> Result<(), gst::StateChangeError> {
         let (settings, refused) = {
             let mut settings = lock(&self.settings);
             let refused = settings.judge_limits();
@@ -216,10 +216,10 @@ impl VapixPtzSink {
         };
         *lock(&self.stream) = Stream { lockstep: settings.lockstep, ..Stream::default() };
         let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
-        *lock(&self.news) = None;
+        *lock(&self.status_to_push) = None;
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
-        let worker = Worker::start(client, settings.servo(), clock, move |event| {
+        let task = CameraTask::start(client, settings.servo(), clock, move |event| {
             if let Some(element) = element.upgrade() {
                 element.imp().happened(event);
             }
@@ -229,27 +229,27 @@ impl VapixPtzSink {
             gst::StateChangeError
         })?;
         {
-            let mut legacies = lock(&self.legacies);
-            legacies.retain(|legacy| !legacy.is_void() && !worker.succeed(legacy));
-            legacies.push(worker.legacy());
+            let mut predecessors = lock(&self.predecessors);
+            predecessors.retain(|predecessor| !predecessor.is_void() && !task.succeed(predecessor));
+            predecessors.push(task.predecessor());
         }
-        self.install(worker, &settings);
+        self.install(task, &settings);
         Ok(())
     }
 
-    fn finish_worker(&self) {
+    fn finish_task(&self) {
         // Waited for without the lock.
-        let worker = lock(&self.worker).take();
-        drop(worker);
+        let task = lock(&self.task).take();
+        drop(task);
     }
 
-    /// Leaves the target for the worker.
+    /// Leaves the target for the camera task.
     fn see(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) {
         let Some(picture) = lock(&self.stream).picture else { return };
         let age = self.age(target, pts);
-        self.with_worker(|worker| {
-            let inbox = worker.inbox();
-            inbox.see(Measurement {
+        self.with_task(|task| {
+            let mailbox = task.mailbox();
+            mailbox.see(Measurement {
                 visibility: target.state.into(),
                 id: target.id,
                 centroid: target.centroid,
@@ -258,7 +258,7 @@ impl VapixPtzSink {
                 ego_velocity: target.ego_velocity,
                 size: picture.size,
                 aspect: picture.aspect,
-                taken_at: inbox.now().saturating_sub(age),
+                taken_at: mailbox.now().saturating_sub(age),
             });
         });
     }
@@ -270,8 +270,8 @@ impl VapixPtzSink {
 
     /// Waits, not under the lock, until the camera has answered what is due.
     fn settle(&self) {
-        let settled = lock(&self.worker).as_ref().map(|worker| worker.inbox().settled());
-        // An error says that the worker is gone; it has told why.
+        let settled = lock(&self.task).as_ref().map(|task| task.mailbox().settled());
+        // An error says that the camera task is gone; it has told why.
         let _ = settled.map(|settled| settled.recv());
     }
 
@@ -292,16 +292,16 @@ impl VapixPtzSink {
     }
 
     fn rest(&self) {
-        // The wait is for the worker's answer, not under the lock that everybody else needs.
-        let rest = lock(&self.worker).as_ref().map(|worker| worker.inbox().rest());
-        if rest.is_some_and(|rest| !worker::wait_for(&rest, REST_WAIT)) {
-            gst::warning!(CAT, imp = self, "no stop confirmed within {REST_WAIT:?}; trying on");
+        // The wait is for the camera task's answer, not under the lock that everybody else needs.
+        let rest = lock(&self.task).as_ref().map(|task| task.mailbox().rest());
+        if rest.is_some_and(|rest| !camera_task::wait_for(&rest, REST_WAIT)) {
+            gst::warning!(CAT, imp = self, "no stop confirmed within {REST_WAIT:?}; retrying");
         }
     }
 
-    pub(super) fn with_worker(&self, action: impl FnOnce(&Worker)) {
-        if let Some(worker) = &*lock(&self.worker) {
-            action(worker);
+    pub(super) fn with_task(&self, action: impl FnOnce(&CameraTask)) {
+        if let Some(task) = &*lock(&self.task) {
+            action(task);
         }
     }
 
@@ -310,14 +310,14 @@ impl VapixPtzSink {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Format,
-                ("a target meta cannot be read ({err}); are all plugins of the same version?")
+                ("a target meta cannot be read ({err}); check that all plugins are of the same version")
             );
         }
     }
 
     /// Tells upstream what the camera does, if that has changed.
-    fn push_news(&self) {
-        let Some(status) = lock(&self.news).take() else { return };
+    fn push_status(&self) {
+        let Some(status) = lock(&self.status_to_push).take() else { return };
         let aspect = lock(&self.stream).picture.map(|picture| picture.aspect);
         let event = camera_event(&status, aspect);
         // Nobody upstream needs to care.
@@ -325,7 +325,7 @@ impl VapixPtzSink {
     }
 
     fn stats(&self) -> gst::Structure {
-        let statistics = lock(&self.worker).as_ref().map(Worker::statistics);
+        let statistics = lock(&self.task).as_ref().map(CameraTask::statistics);
         statistics.map_or_else(Statistics::stopped, |statistics| statistics.to_structure())
     }
 }

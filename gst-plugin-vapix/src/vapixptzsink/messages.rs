@@ -1,17 +1,17 @@
-//! What the worker tells, told to the user.
+//! What the camera task tells, told to the user.
 
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use ptztrack_contract::{CameraChange, CameraMessage, Times};
 
+use super::camera_task::Event;
 use super::imp::{CAT, VapixPtzSink};
-use super::worker::Event;
 use crate::control_loop::LoopEvent;
 use crate::lock::lock;
 use vapix::session::{ConnectionChange, ControlOwner, SessionEvent};
 
 impl VapixPtzSink {
-    /// Called by the worker.
+    /// Called by the camera task.
     pub(super) fn happened(&self, event: Event) {
         match event {
             Event::Exchanged { request, failure: None, round_trip } => {
@@ -27,64 +27,64 @@ impl VapixPtzSink {
             Event::Loop(LoopEvent::AtLimit) => {
                 self.post(
                     CameraChange::AtLimit,
-                    "the target is beyond the end of the camera's pan or tilt range, or of `pan-min` … `tilt-max`",
+                    "the target is beyond the camera's pan or tilt range, or beyond `pan-min`, `pan-max`, `tilt-min` or `tilt-max`",
                 );
             }
             Event::Loop(LoopEvent::Session(SessionEvent::LimitsUnkept)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera does not tell where it looks: `pan-min` … `tilt-max` cannot be kept. Set limits in the camera itself")
+                ("the camera does not report its position, so `pan-min`, `pan-max`, `tilt-min` and `tilt-max` cannot be enforced. Set limits in the camera itself")
             ),
             Event::Loop(LoopEvent::Oscillating(gain_scale)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 (
-                    "the camera swings to and fro about the target; its speed is lowered to {:.0} % until it is calm. Lower `gain`, or set `latency` and `camera-speed` right",
+                    "the camera oscillates about the target; the gain is lowered to {:.0} % until it is steady. Lower `gain`, or correct `latency` and `camera-speed`",
                     gain_scale * 100.0
                 )
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::TakenOver(ControlOwner::Operator))) => self.post(
                 CameraChange::TakenOver,
-                "somebody else moves the camera; it is not steered until nobody has moved it for `override-timeout`",
+                "somebody else is moving the camera; steering resumes once nobody has moved it for `override-timeout`",
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::TakenOver(ControlOwner::Queue))) => self.post(
                 CameraChange::TakenOver,
-                "somebody else is in control by the camera's control queue; it is not steered until our turn",
+                "somebody else has control in the camera's control queue; steering resumes when it is our turn",
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::Resumed)) => self.post(CameraChange::Resumed, "the camera is steered again"),
             Event::Loop(LoopEvent::Session(SessionEvent::Orphan)) => {
-                gst::warning!(CAT, imp = self, "the camera was already moving when it was met: stopping it");
+                gst::warning!(CAT, imp = self, "the camera was already moving when the connection was made: stopping it");
             }
             Event::Loop(LoopEvent::Session(SessionEvent::NoSuchPreset(name))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera tells of no preset `{name}`; it stays where it is. Correct `home`")
+                ("the camera has no preset `{name}`; it stays where it is. Correct `home`")
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::HomeRefused(err))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera does not go home: {err}; it stays where it is. Correct `home`")
+                ("the camera refuses to go home: {err}; it stays where it is. Correct `home`")
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::Mode(mode))) => gst::element_imp_info!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera is moved by mode `{}` now, the best of those that it takes; `mode` stays as it is set", mode.name())
+                ("the camera does not support the `mode` that is set; it is moved by mode `{}` instead", mode.name())
             ),
-            Event::Status(status) => *lock(&self.news) = Some(status),
+            Event::Status(status) => *lock(&self.status_to_push) = Some(status),
             Event::GaveUp { halted: true } => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
-                ("the camera has not confirmed its stop and may still be moving; as it refuses `user` and `password`, nothing more is sent: stop it by hand")
+                ("the camera has not confirmed its stop and may still be moving; because it refuses `user` and `password`, nothing more is sent: stop it by hand")
             ),
             Event::GaveUp { halted: false } => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
-                ("the camera has not confirmed its stop in time and may still be moving; trying on for a minute, or stop it by hand")
+                ("the camera has not confirmed its stop in time and may still be moving; retrying for a minute. Check it, and stop it by hand if need be")
             ),
             Event::Died(reason) => gst::element_imp_error!(
                 self,
                 gst::LibraryError::Failed,
-                ("the camera's task broke ({reason}); the camera may still be moving, trying on for a minute to stop it; restart the pipeline")
+                ("the task that talks to the camera failed ({reason}); the camera may still be moving, and stopping it is retried for a minute. Restart the pipeline")
             ),
         }
     }

@@ -84,18 +84,16 @@
 
 use glib::prelude::*;
 
+mod camera_task;
 mod clock;
-mod desk;
+mod events;
 mod imp;
-mod inbox;
 mod messages;
-mod news;
 mod picture;
 mod properties;
 mod setters;
 mod settings;
 mod statistics;
-mod worker;
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]

@@ -87,43 +87,46 @@ fn table() -> Vec<Property> {
             |_| None::<String>.to_value(),
             |s, value| { s.password = string(value).map(Secret::new); Ok(()) },
         ),
-        duration("timeout", AtStart, "Longest wait for one of the camera's answers, in nanoseconds, from 0.1 s to 60 s", millis(100)..=millis(60_000), |s| &mut s.timeout),
-        switch("insecure", AtStart, "With https believe any certificate: who sits on the wire can then take the camera", |s| &mut s.insecure),
+        duration("timeout", AtStart, "Longest wait for an answer from the camera, in nanoseconds, from 0.1 s to 60 s", millis(100)..=millis(60_000), |s| &mut s.timeout),
+        switch("insecure", AtStart, "With https, accept any certificate: anybody on the network path can then take over the camera", |s| &mut s.insecure),
         special(
-            text("ca-file", AtStart, "With https believe only certificates signed by an arbitration in this PEM file (unset: those the system trusts)"),
+            text("ca-file", AtStart, "With https, accept only certificates signed by an authority in this PEM file (unset: those the system trusts)"),
             |s| s.ca_file.to_value(),
             |s, value| { s.ca_file = string(value); Ok(()) },
         ),
         choice::<Mode, _>("mode", AtOnce, "How the camera is moved", |s| &mut s.servo.mode),
         number("gain", AtOnce, "Degrees per second for each degree off the middle, in 1/s", 0.0..=20.0, |s| &mut s.servo.gain),
-        number("dead-zone", AtOnce, "Offset from the middle at which a camera at rest stays at rest, as a part of the picture's width", 0.0..=0.5, |s| &mut s.servo.dead_zone),
+        number("dead-zone", AtOnce, "Offset from the middle within which a camera at rest stays at rest, as a fraction of the picture's width", 0.0..=0.5, |s| &mut s.servo.dead_zone),
         number("max-speed", AtOnce, "Pan and tilt never turn faster than this, in degrees per second", 0.1..=1000.0, |s| &mut s.servo.max_speed_deg_s),
-        number("max-acceleration", AtOnce, "By how much the speed of pan and tilt changes in a second at most, in degrees per second; a stop is at once", 1.0..=10_000.0, |s| &mut s.servo.max_acceleration_deg_s2),
-        number("max-rate", AtOnce, "Commands per second at most; stops are sent at once", 0.1..=50.0, |s| &mut s.servo.max_rate_hz),
-        duration("latency", AtOnce, "Delay of the camera: from the sending of a command until a picture that shows it arrives, in nanoseconds, up to 5 s", Duration::ZERO..=millis(5000), |s| &mut s.servo.latency),
-        optional_number("field-of-view", AtOnce, "Horizontal field of view zoomed out, in degrees (0: as the camera says)", 0.0..=179.0, |s| &mut s.servo.fov_deg),
-        choice::<Prediction, _>("prediction", AtOnce, "How the target's motion is carried forward", |s| &mut s.servo.prediction),
-        duration("stale-timeout", AtOnce, "The camera is stopped when the target was not seen for this long, in nanoseconds, from 50 ms to 60 s", millis(50)..=millis(60_000), |s| &mut s.servo.stale_timeout),
-        number("camera-speed", AtOnce, "What a camera that does not tell does at speed step 100, in degrees per second", 1.0..=1000.0, |s| &mut s.servo.camera_speed_deg_s),
-        choice::<SpeedCurve, _>("speed-curve", AtOnce, "How the speed of a camera that does not tell grows with the speed step", |s| &mut s.servo.speed_curve),
-        switch("learn", AtOnce, "Learn latency, field of view and speed map while following; what is set or told is where that begins", |s| &mut s.servo.learn),
-        switch("auto-zoom", AtOnce, "Zoom so that the target stays as tall as `target-height`, and out where it is not seen well", |s| &mut s.auto_zoom),
-        number("target-height", AtOnce, "Height that `auto-zoom` gives the target, as a part of the picture's", 0.05..=0.9, |s| &mut s.target_height),
-        number("pan-min", AsLimit, "The camera is turned no farther left than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.min),
-        number("pan-max", AsLimit, "The camera is turned no farther right than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.max),
-        number("tilt-min", AsLimit, "The camera is tilted no farther down than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.min),
-        number("tilt-max", AsLimit, "The camera is tilted no farther up than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.max),
+        number("max-acceleration", AtOnce, "Greatest change of pan and tilt speed, in degrees per second per second; a stop is immediate", 1.0..=10_000.0, |s| &mut s.servo.max_acceleration_deg_s2),
+        number("max-rate", AtOnce, "Commands per second at most; a stop is sent immediately", 0.1..=50.0, |s| &mut s.servo.max_rate_hz),
+        duration("latency", AtOnce, "Delay from sending a command until a picture that shows its effect arrives, in nanoseconds, up to 5 s", Duration::ZERO..=millis(5000), |s| &mut s.servo.latency),
+        optional_number("field-of-view", AtOnce, "Horizontal field of view when zoomed out, in degrees (0: as the camera reports)", 0.0..=179.0, |s| &mut s.servo.fov_deg),
+        switch("invert-pan", AtOnce, "Panning right turns the picture left: of a camera that hangs, for example", |s| &mut s.servo.mounting.invert_pan),
+        switch("invert-tilt", AtOnce, "Tilting up turns the picture down: of a camera that hangs, for example", |s| &mut s.servo.mounting.invert_tilt),
+        one_of("rotation", AtOnce, "By how many degrees the picture is turned clockwise when it arrives, relative to the pan axis: 0, 90, 180 or 270", &[0, 90, 180, 270], |s| &mut s.servo.mounting.rotation_deg),
+        choice::<Prediction, _>("prediction", AtOnce, "How the target's motion is extrapolated", |s| &mut s.servo.prediction),
+        duration("stale-timeout", AtOnce, "The camera is stopped when the target has not been seen for this long, in nanoseconds, from 50 ms to 60 s", millis(50)..=millis(60_000), |s| &mut s.servo.stale_timeout),
+        number("camera-speed", AtOnce, "Speed at speed step 100 of a camera that does not report its speeds, in degrees per second", 1.0..=1000.0, |s| &mut s.servo.camera_speed_deg_s),
+        choice::<SpeedCurve, _>("speed-curve", AtOnce, "How speed grows with the speed step for a camera that does not report its speeds", |s| &mut s.servo.speed_curve),
+        switch("learn", AtOnce, "Learn latency, field of view and speed map while following, starting from what is set or reported", |s| &mut s.servo.learn),
+        switch("auto-zoom", AtOnce, "Zoom to keep the target at `target-height`, and zoom out when it is not seen well", |s| &mut s.auto_zoom),
+        number("target-height", AtOnce, "Height at which `auto-zoom` keeps the target, as a fraction of the picture's height", 0.05..=0.9, |s| &mut s.target_height),
+        number("pan-min", AsLimit, "The camera turns no farther left than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.min),
+        number("pan-max", AsLimit, "The camera turns no farther right than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.max),
+        number("tilt-min", AsLimit, "The camera tilts no farther down than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.min),
+        number("tilt-max", AsLimit, "The camera tilts no farther up than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.max),
         zoom_steps("zoom-min", AsLimit, "`auto-zoom` zooms out no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.min),
         zoom_steps("zoom-max", AsLimit, "`auto-zoom` zooms in no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.max),
         special(
-            text("home", AtOnce, "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it was met), or the name of one of its presets (unset: where the last target was)"),
+            text("home", AtOnce, "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it connected), or the name of one of its presets (unset: it stays where the last target was)"),
             |s| s.servo.home.as_ref().map(ToString::to_string).to_value(),
             |s, value| { s.servo.home = string(value).filter(|text| !text.is_empty()).map(|text| text.parse()).transpose()?; Ok(()) },
         ),
-        duration("home-timeout", AtOnce, "The camera goes home when there was no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
-        switch("home-at-start", AtStart, "The camera goes home before the first target too, without waiting", |s| &mut s.servo.home_at_start),
-        duration("override-timeout", AtOnce, "Whoever else moves the camera keeps it until it was not moved for this long, in nanoseconds, up to a day (0: nobody is given way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.override_timeout),
-        switch("lockstep", AtStart, "Time is the stream's, and each buffer waits for the camera's answers: for simulated cameras", |s| &mut s.lockstep),
+        duration("home-timeout", AtOnce, "The camera goes home when there has been no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
+        switch("home-at-start", AtStart, "Go home on start-up too, without waiting for `home-timeout`", |s| &mut s.servo.home_at_start),
+        duration("override-timeout", AtOnce, "Somebody else who moves the camera keeps it until it has not been moved for this long, in nanoseconds, up to a day (0: never give way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.override_timeout),
+        switch("lockstep", AtStart, "Use the stream's time, and let each buffer wait for the camera's answers: for simulated cameras", |s| &mut s.lockstep),
     ]
 }
 
@@ -145,6 +148,30 @@ fn integer(name: &str, takes: Takes, blurb: &str, range: RangeInclusive<u32>, fi
     let builder = glib::ParamSpecUInt::builder(name).minimum(*range.start()).maximum(*range.end());
     let spec = mutable(builder.default_value(default_of(field)).blurb(blurb), takes).build();
     plain(spec, takes, field)
+}
+
+/// One of these numbers, which grow.
+fn one_of(
+    name: &'static str,
+    takes: Takes,
+    blurb: &str,
+    values: &'static [u32],
+    field: Field<u32>,
+) -> Property {
+    let builder = glib::ParamSpecUInt::builder(name).maximum(values.last().copied().unwrap_or(0));
+    let spec = mutable(builder.default_value(default_of(field)).blurb(blurb), takes).build();
+    converted(
+        (spec, takes),
+        field,
+        |value| value,
+        move |value| {
+            if values.contains(&value) {
+                Ok(value)
+            } else {
+                Err(format!("`{name}`={value} is none of {values:?}"))
+            }
+        },
+    )
 }
 
 fn number(name: &str, takes: Takes, blurb: &str, range: RangeInclusive<f64>, field: Field<f64>) -> Property {
@@ -171,7 +198,7 @@ fn optional_number(
     )
 }
 
-/// PointToPoint of the optical zoom, whole ones.
+/// Steps of the optical zoom, whole ones.
 fn zoom_steps(name: &str, takes: Takes, blurb: &str, field: Field<f64>) -> Property {
     let builder = glib::ParamSpecUInt::builder(name).minimum(1).maximum(9999);
     // Within 1 to 9999, whole.

@@ -3,48 +3,48 @@
 use glib::Value;
 use gst::subclass::prelude::*;
 
+use super::camera_task::CameraTask;
 use super::imp::VapixPtzSink;
 use super::properties::{Property, Takes};
 use super::settings::{Settings, environment};
-use super::worker::Worker;
 use crate::lock::lock;
 
 impl VapixPtzSink {
-    /// Sets a property. The worker hears of it before anybody else can change it again: it shall end with what is set.
+    /// Sets a property. The camera task hears of it before anybody else can change it again: it shall end with what is set.
     pub(super) fn change(&self, property: &Property, value: &Value) {
         let mut refused = Vec::new();
         {
             let mut settings = lock(&self.settings);
             refused.extend(property.set(&mut settings, value).err());
-            let worker = lock(&self.worker);
-            let inbox = worker.as_ref().map(Worker::inbox);
-            match (property.takes, inbox) {
-                // Until both are set, a pair of limits may well be crossed: it is judged when a worker starts.
+            let task = lock(&self.task);
+            let mailbox = task.as_ref().map(CameraTask::mailbox);
+            match (property.takes, mailbox) {
+                // Until both are set, a pair of limits may well be crossed: it is judged when a camera task starts.
                 (Takes::AtStart, _) | (_, None) => {}
-                (Takes::AtOnce, Some(inbox)) => inbox.configure(settings.servo()),
-                (Takes::AsLimit, Some(inbox)) => {
+                (Takes::AtOnce, Some(mailbox)) => mailbox.configure(settings.servo()),
+                (Takes::AsLimit, Some(mailbox)) => {
                     refused.extend(settings.judge_limits());
-                    inbox.configure(settings.servo());
+                    mailbox.configure(settings.servo());
                 }
-                (Takes::AsCredentials, Some(inbox)) => {
-                    inbox.set_credentials(settings.credentials(environment));
+                (Takes::AsCredentials, Some(mailbox)) => {
+                    mailbox.set_credentials(settings.credentials(environment));
                 }
             }
         }
         self.warn_of_refused(&refused);
     }
 
-    /// From here on the worker hears of changes; at first of those since it was started with `before`.
-    pub(super) fn install(&self, worker: Worker, before: &Settings) {
+    /// From here on the camera task hears of changes; at first of those since it was started with `before`.
+    pub(super) fn install(&self, task: CameraTask, before: &Settings) {
         let refused = {
             let mut settings = lock(&self.settings);
             let refused = settings.judge_limits();
-            worker.inbox().configure(settings.servo());
+            task.mailbox().configure(settings.servo());
             let credentials = settings.credentials(environment);
             if credentials != before.credentials(environment) {
-                worker.inbox().set_credentials(credentials);
+                task.mailbox().set_credentials(credentials);
             }
-            *lock(&self.worker) = Some(worker);
+            *lock(&self.task) = Some(task);
             refused
         };
         self.warn_of_refused(&refused);

@@ -37,7 +37,7 @@ impl Statistics {
         self.round_trip_average = (average * 7 + round_trip) / 8;
     }
 
-    /// The property's value while the worker runs.
+    /// The property's value while the camera task runs.
     pub fn to_structure(&self) -> gst::Structure {
         let state = match self {
             Self { halted: true, .. } => "refused",
@@ -49,7 +49,7 @@ impl Statistics {
         self.with_state(state)
     }
 
-    /// The property's value where there is no worker.
+    /// The property's value where there is no camera task.
     pub fn stopped() -> gst::Structure {
         Self::default().with_state("stopped")
     }

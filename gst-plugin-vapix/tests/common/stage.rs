@@ -47,6 +47,8 @@ pub struct Stage {
     /// What was on the bus so far.
     pub heard: Vec<Heard>,
     stepped: bool,
+    /// What the picture's way to the tracker makes of what it would say.
+    shown_as: Box<dyn Fn(TargetMeta) -> TargetMeta>,
 }
 
 /// Where a person is in one picture, in parts of it.
@@ -83,14 +85,19 @@ impl Stage {
     pub fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
         let rig = set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS)).play();
         let now = camera.status().time;
-        Self { camera, rig, now, heard: Vec::new(), stepped: true }
+        Self { camera, rig, now, heard: Vec::new(), stepped: true, shown_as: Box::new(|meta| meta) }
     }
 
     /// Time passes as everybody's, and pictures come when they come.
     pub fn by_the_clock(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
         let rig = set(Rig::ready(&camera.url())).play();
         let now = camera.status().time;
-        Self { camera, rig, now, heard: Vec::new(), stepped: false }
+        Self { camera, rig, now, heard: Vec::new(), stepped: false, shown_as: Box::new(|meta| meta) }
+    }
+
+    /// The tracker's pictures are mirrored, turned or the like: it says something else of the same.
+    pub fn show_as(&mut self, shown_as: impl Fn(TargetMeta) -> TargetMeta + 'static) {
+        self.shown_as = Box::new(shown_as);
     }
 
     /// Lets time pass until the next picture.
@@ -135,7 +142,7 @@ impl Stage {
         let step = |_| {
             self.step();
             let meta = self.tracked(self.now.saturating_sub(self.camera.video_delay()));
-            self.push(meta.as_ref());
+            self.push(meta.clone().map(&self.shown_as).as_ref());
             let meta = meta?;
             let offset = (meta.centroid.x - 0.5, meta.centroid.y - 0.5);
             Some(Shown { at: self.now, offset, height: meta.bounds.height })

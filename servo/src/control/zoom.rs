@@ -46,7 +46,7 @@ impl ZoomController {
     /// ... and that with which the view is widened when the target is not seen well.
     const WIDENING: f64 = 0.4;
 
-    /// A height this much off, as a logarithm, is let be while the zoom rests ...
+    /// A height this much off, as a logarithm, is tolerated while the zoom rests ...
     const START: f64 = 0.09;
 
     /// ... and while it moves.

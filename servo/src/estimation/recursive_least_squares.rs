@@ -1,4 +1,8 @@
-/// Recursive least squares with a prior: the weights of `N` features, each with how sure they are.
+/// Recursive least squares with forgetting (Åström and Wittenmark, *Adaptive Control*, 2nd ed., section 2.2): the weights
+/// of `N` regressors with their covariance, which is that of the prior at first. Forgetting adds a part of the prior's
+/// variance to the diagonal, up to the prior's itself (Kulhavý's stabilised forgetting): a regressor that is not excited
+/// becomes as uncertain as it was, and no more. A measurement beyond three standard deviations counts as one
+/// of three (Huber).
 #[derive(Debug, Clone)]
 pub(super) struct RecursiveLeastSquares<const N: usize> {
     weights: [f64; N],

@@ -100,7 +100,10 @@ impl Servo {
         }
         match actuator.mode {
             // What is wrong with the field of view made the angle of the place, and makes a place of it again.
-            Mode::Centre => centre(view.point_within(turn), measurement.size, jump.map(|jump| jump.factor)),
+            Mode::Centre => {
+                let place = self.settings.mounting.mirrored(view.point_within(turn));
+                centre(place, measurement.size, jump.map(|jump| jump.factor))
+            }
             _ => position.map_or(Actuation::Continue, |position| {
                 let speed = self.camera.capabilities.move_speed;
                 absolute(position + turn, speed, jump.map(|jump| jump.step))

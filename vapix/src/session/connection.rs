@@ -29,7 +29,7 @@ pub struct Connection {
 #[derive(Debug)]
 struct Fault {
     kind: FaultKind,
-    /// Discovered by a command: that queries are answered does not mend it.
+    /// Met by a command: that queries are answered does not mend it.
     of_command: bool,
     /// The kinds of this fault already reported: a camera that reboots shows several, in any order.
     reported: Vec<FaultKind>,
@@ -67,6 +67,12 @@ impl Connection {
 
     /// A fault that comes again within this time is reported only if it lasts longer.
     const QUIET: Duration = Duration::from_secs(10);
+
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(self.pause <= Self::LONGEST_PAUSE, "{self:?}");
+        assert!(self.fault.is_some() || self.retry_at.is_zero(), "a pause without a fault: {self:?}");
+    }
 
     /// Nothing may be sent before.
     pub fn retry_at(&self) -> Duration {

@@ -153,6 +153,13 @@ impl ControlQueue {
         self.held
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        let held = matches!(self.state, State::Outside | State::Waiting);
+        assert!(held || !self.held, "held by others, though it is no queue's turn: {self:?}");
+        assert!(!self.deaf || !self.lets_us(), "deaf in our own turn: {self:?}");
+    }
+
     fn exists(&self) -> bool {
         matches!(self.state, State::Outside | State::Waiting | State::InControl)
     }

@@ -40,6 +40,15 @@ impl Discovery {
     /// From a question without an answer to the next: time to see whether the camera is there at all.
     const PAUSE: Duration = Duration::from_secs(1);
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        for (index, pending) in self.pending.iter().enumerate() {
+            assert!(pending.tries < Self::TRIES, "asked too often: {self:?}");
+            let twice = self.pending.iter().skip(index + 1).any(|other| other.query == pending.query);
+            assert!(!twice, "to be asked twice: {self:?}");
+        }
+    }
+
     /// What to ask next, and when.
     pub fn next(&self) -> Option<(Query, Duration)> {
         self.pending.front().map(|pending| (pending.query, self.next_at))

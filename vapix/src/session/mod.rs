@@ -166,6 +166,15 @@ impl Session {
         self.connection.halted()
     }
 
+    /// What holds whatever the camera and its users do; asked after every step where debug assertions are on.
+    pub fn check_invariants(&self) {
+        self.connection.check_invariants();
+        self.discovery.check_invariants();
+        self.scheduler.check_invariants();
+        self.arbitration.queue.check_invariants();
+        self.modes.check_invariants();
+    }
+
     /// What happened since the last call.
     pub fn take_events(&mut self) -> Vec<SessionEvent> {
         mem::take(&mut self.events)

@@ -4,7 +4,7 @@ use servo::Mode;
 
 use crate::wire::{Command, Error, Parameters};
 
-/// Which modes to be moved a camera has: by what it tells of itself, and by what it refuses.
+/// Which modes a camera supports: by what it tells of itself, and by what it refuses.
 #[derive(Debug)]
 pub struct ModeSupport {
     /// How the camera is moved as far as anybody was told.
@@ -71,6 +71,12 @@ impl ModeSupport {
         let possible = |mode: &Mode| tells_position || *mode != Mode::Absolute || wanted == Mode::Absolute;
         let mut modes = std::iter::once(wanted).chain(Self::ORDER);
         modes.find(|mode| possible(mode) && !self.lacks(*mode, now)).unwrap_or(wanted)
+    }
+
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        let times = |mode| self.refused.iter().filter(|(refused, _)| *refused == mode).count();
+        assert!(Self::ORDER.into_iter().all(|mode| times(mode) <= 1), "refused twice: {self:?}");
     }
 
     /// When a move is worth sending: after two refusals in a row not before a third would count.

@@ -32,6 +32,10 @@ impl Session {
         if query_due <= now {
             return Next::Do(Request::Query(query));
         }
+        if cfg!(debug_assertions) {
+            self.check_invariants();
+            servo.check_invariants();
+        }
         let operator_until = self.arbitration.operator_until(now);
         let reasons = [due, Some(query_due), servo.stale_at(), operator_until, servo.undecided_until(now)];
         Next::Wait(reasons.into_iter().flatten().min())

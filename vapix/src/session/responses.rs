@@ -41,6 +41,10 @@ impl Session {
             (Request::Query(query), Ok(response)) => self.told(*query, response, servo, (sent, now)),
             (Request::Query(query), Err(err)) => self.not_told(*query, &err, servo, now),
         }
+        if cfg!(debug_assertions) {
+            self.check_invariants();
+            servo.check_invariants();
+        }
     }
 
     fn command_failed(&mut self, command: &Command, err: &Error, servo: &mut Servo, now: Duration) {

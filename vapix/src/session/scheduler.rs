@@ -138,6 +138,13 @@ impl Scheduler {
         self.doubt_until = Some(now + Self::DOUBT);
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(self.stop.is_stop(), "{} ends no move", self.stop);
+        let moves = self.accepted.is_some_and(|(command, _)| !command.is_stop());
+        assert!(self.may_move || !moves, "an accepted move is taken for rest: {self:?}");
+    }
+
     /// Whether the camera may be moving on our behalf.
     pub fn may_move(&self) -> bool {
         self.may_move

@@ -4,7 +4,7 @@ use std::time::Duration;
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum Error {
     /// The address is no camera address.
-    #[error("`{location}` is no camera address ({reason}); expected for example http://192.168.0.90")]
+    #[error("`{location}` is not a camera address ({reason}); expected something like http://192.168.0.90")]
     Location {
         /// The address, without user and password.
         location: String,
@@ -24,7 +24,7 @@ pub enum Error {
     #[error("the connection to the camera failed: {0}")]
     Broken(String),
     /// The camera wants credentials and none are set.
-    #[error("the camera asks for a user and a password, and none are set")]
+    #[error("the camera asks for a user and password, but none are set")]
     CredentialsMissing,
     /// The camera refused user and password. Nothing more is sent, so that the account is not locked.
     #[error("the camera refuses user `{user}` with this password")]
@@ -34,13 +34,13 @@ pub enum Error {
     },
     /// The camera asks again for user and password, which it accepted before for something else. To be asked rarely:
     /// it may count this as a wrong login.
-    #[error("the camera accepts user `{user}`, but not for this")]
+    #[error("the camera accepts user `{user}`, but does not permit this")]
     NotPermitted {
         /// The user that may not.
         user: String,
     },
     /// The camera wants a kind of authentication that is not spoken here.
-    #[error("the camera asks for an authentication that is not supported: {0}")]
+    #[error("the camera asks for an unsupported kind of authentication: {0}")]
     UnsupportedAuthentication(String),
     /// An HTTP status that is neither success nor a challenge.
     #[error("the camera answered HTTP {status} {reason}")]
@@ -54,13 +54,13 @@ pub enum Error {
     #[error("the camera answered `Error: {0}`")]
     Camera(String),
     /// The answer has another form than documented.
-    #[error("the camera's answer is not understood: {0}")]
+    #[error("the camera's answer was not understood: {0}")]
     Unexpected(String),
     /// The answer is longer than any answer of this kind.
     #[error("the camera's answer is longer than {0} bytes")]
     TooLong(usize),
     /// The camera's answer says that it cannot pan or tilt.
-    #[error("the camera has no pan, tilt and zoom: it answered a query with nothing")]
+    #[error("the camera has no pan, tilt and zoom: it gave an empty answer to a query")]
     NoPtz,
     /// The camera sends us elsewhere than to its own HTTPS.
     #[error("the camera redirects to {0}, which is not its own HTTPS")]
@@ -94,29 +94,29 @@ impl Error {
     pub fn advice(&self) -> &'static str {
         match self {
             Self::Location { .. } => "Correct `location`.",
-            Self::Redirected(_) => "Set `location` to the address that is meant; trying on.",
+            Self::Redirected(_) => "Set `location` to the right address; retrying.",
             Self::Tls(_) => "Check `ca-file`.",
             Self::Unreachable(_) => {
-                "Check `location`, the cable and, with https, the certificate (`ca-file`, `insecure`); trying on."
+                "Check `location`, the cable and, with https, the certificate (`ca-file`, `insecure`); retrying."
             }
-            Self::Timeout(_) | Self::Broken(_) => "Check camera and network; trying on.",
+            Self::Timeout(_) | Self::Broken(_) => "Check camera and network; retrying.",
             Self::CredentialsMissing => "Set `user` and `password`; nothing more is sent until then.",
             Self::BadCredentials { .. } => {
-                "Correct `user` or `password`; nothing more is sent until then, so that the account is not locked."
+                "Correct `user` or `password`; nothing more is sent until then, so as not to lock the account."
             }
             Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
             Self::NotPermitted { .. } => {
-                "Give this user the right to control PTZ, or set another `user` and `password`; trying on once a minute, so that the account is not locked."
+                "Give this user the right to control PTZ, or set another `user` and `password`; retrying once a minute, so as not to lock the account."
             }
-            Self::Status { status: 403, .. } => "Give this user the right to control PTZ; trying on.",
-            Self::Status { status: 500.., .. } => "It may be starting, or busy; trying on.",
+            Self::Status { status: 403, .. } => "Give this user the right to control PTZ; retrying.",
+            Self::Status { status: 500.., .. } => "It may be starting up or busy; retrying.",
             Self::Status { .. } | Self::Unexpected(_) | Self::TooLong(_) => {
-                "Check that `location` is an Axis camera with VAPIX; trying on."
+                "Check that `location` is an Axis camera with VAPIX; retrying."
             }
             Self::Camera(_) => {
-                "Check that `camera` has pan and tilt, and that its own settings let it be moved; trying on."
+                "Check that `camera` has pan and tilt, and that its settings allow it to be moved; retrying."
             }
-            Self::NoPtz => "Check `camera` and the camera's PTZ settings; trying on.",
+            Self::NoPtz => "Check `camera` and the camera's PTZ settings; retrying.",
         }
     }
 }

@@ -1,5 +1,8 @@
 //! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
 
+mod mailbox;
+mod state;
+
 use std::cell::Cell;
 use std::pin::pin;
 use std::sync::mpsc::Receiver;
@@ -9,9 +12,10 @@ use std::time::Duration;
 use once_cell::sync::OnceCell;
 use tokio::runtime::{Builder, Runtime};
 
+use self::mailbox::Mailbox;
+use self::state::TaskState;
 use super::clock::Clock;
-use super::desk::Desk;
-use super::inbox::Inbox;
+
 use super::statistics::Statistics;
 use crate::control_loop::{ControlLoop, LoopEvent, Status};
 use crate::lock::lock;
@@ -27,7 +31,7 @@ pub const FINISH_BUDGET: Duration = Duration::from_secs(2);
 
 /// A stop that was not confirmed by then goes on being tried for this long, with nobody waiting: the network may
 /// come back.
-pub const LAST_WILL: Duration = Duration::from_secs(60);
+pub const LAST_RETRIES: Duration = Duration::from_secs(60);
 
 /// Something the element tells the world.
 #[derive(Debug)]
@@ -43,7 +47,7 @@ pub enum Event {
         /// Whether nothing more may be sent either.
         halted: bool,
     },
-    /// The worker itself broke.
+    /// The camera task itself broke.
     Died(String),
 }
 
@@ -51,33 +55,33 @@ thread_local! {
     static IS_OURS: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Waits for the worker to answer; but not in the plugin's own thread, where nobody would: what is
+/// Waits for the camera task to answer; but not in the plugin's own thread, where nobody would: what is
 /// posted from there may make an application change the state, or drop the last reference, right there.
 pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
     !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
 }
 
 /// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
-const LAST_WILL_PAUSE: Duration = Duration::from_secs(1);
+const LAST_RETRIES_PAUSE: Duration = Duration::from_secs(1);
 
-/// A running worker; dropping it stops the camera and ends the worker, and waits for that within bounds.
+/// A running camera task; dropping it stops the camera and ends the camera task, and waits for that within bounds.
 #[derive(Debug)]
-pub struct Worker {
+pub struct CameraTask {
     camera: (Location, u32),
-    inbox: Arc<Inbox>,
+    mailbox: Arc<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
 }
 
-/// What is left of a worker that was dropped: it may outlive its time in order to stop the camera.
+/// What is left of a camera task that was dropped: it may outlive its time in order to stop the camera.
 #[derive(Debug)]
-pub struct Legacy {
+pub struct Predecessor {
     camera: (Location, u32),
-    inbox: Weak<Inbox>,
+    mailbox: Weak<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
 }
 
-impl Worker {
-    /// Starts; connecting happens in the background. `observer` is called from the worker's thread.
+impl CameraTask {
+    /// Starts; connecting happens in the background. `observer` is called from the camera task's thread.
     ///
     /// # Errors
     /// What keeps the client or the runtime from being made, in words.
@@ -91,53 +95,53 @@ impl Worker {
         let settings = Arc::new(Mutex::new(client.clone()));
         let client = Client::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
-        let inbox = Arc::new(Inbox::new(clock));
+        let mailbox = Arc::new(Mailbox::new(clock));
         let control = ControlLoop::new(servo);
         let (status, estimates, stop) =
             (control.status(Duration::ZERO), Some(control.estimates()), Some(control.stop()));
         let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
-        let desk = Desk::new(control, inbox.clone(), statistics.clone(), observer.clone());
-        let task = Task { client, settings: settings.clone(), desk };
+        let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
+        let task = Task { client, settings: settings.clone(), state };
         let running = runtime.spawn(task.run());
-        let worker = Self { camera, inbox, statistics };
-        let legacy = worker.legacy();
-        let inbox = worker.inbox.clone();
+        let task = Self { camera, mailbox, statistics };
+        let predecessor = task.predecessor();
+        let mailbox = task.mailbox.clone();
         runtime.spawn(async move {
             if let Err(err) = running.await {
-                inbox.close();
+                mailbox.close();
                 observer(Event::Died(err.to_string()));
                 let settings = lock(&settings).clone();
-                legacy.stop(settings, &inbox).await;
+                predecessor.stop(settings, &mailbox).await;
             }
         });
-        Ok(worker)
+        Ok(task)
     }
 
     /// Where to leave things for it.
-    pub fn inbox(&self) -> &Inbox {
-        &self.inbox
+    pub fn mailbox(&self) -> &Mailbox {
+        &self.mailbox
     }
 
     /// What will be left of it.
-    pub fn legacy(&self) -> Legacy {
-        Legacy {
+    pub fn predecessor(&self) -> Predecessor {
+        Predecessor {
             camera: self.camera.clone(),
-            inbox: Arc::downgrade(&self.inbox),
+            mailbox: Arc::downgrade(&self.mailbox),
             statistics: self.statistics.clone(),
         }
     }
 
     /// Sees to the camera in place of one that was dropped, if it is the same camera; returns whether it is.
-    pub fn succeed(&self, legacy: &Legacy) -> bool {
-        if legacy.camera != self.camera {
+    pub fn succeed(&self, predecessor: &Predecessor) -> bool {
+        if predecessor.camera != self.camera {
             return false;
         }
-        if let Some(inbox) = legacy.inbox.upgrade() {
-            inbox.quit();
+        if let Some(mailbox) = predecessor.mailbox.upgrade() {
+            mailbox.quit();
         }
-        if let Some(stop) = legacy.unconfirmed_stop() {
-            self.inbox.inherit(stop);
+        if let Some(stop) = predecessor.unconfirmed_stop() {
+            self.mailbox.inherit(stop);
         }
         true
     }
@@ -148,10 +152,10 @@ impl Worker {
     }
 }
 
-impl Legacy {
+impl Predecessor {
     /// Whether there is nothing left to do.
     pub fn is_void(&self) -> bool {
-        self.unconfirmed_stop().is_none() && self.inbox.strong_count() == 0
+        self.unconfirmed_stop().is_none() && self.mailbox.strong_count() == 0
     }
 
     fn unconfirmed_stop(&self) -> Option<Command> {
@@ -160,7 +164,7 @@ impl Legacy {
     }
 
     /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
-    async fn stop(&self, settings: ClientSettings, inbox: &Inbox) {
+    async fn stop(&self, settings: ClientSettings, mailbox: &Mailbox) {
         let Ok(mut client) = Client::new(settings) else { return };
         let stop = {
             let mut statistics = lock(&self.statistics);
@@ -169,26 +173,26 @@ impl Legacy {
             statistics.stop.unwrap_or(Command::Stop)
         };
         let tries = async {
-            while !inbox.take().quit {
+            while !mailbox.take().quit {
                 match client.send(&stop).await {
                     Ok(()) => {
                         lock(&self.statistics).status.moving = false;
                         break;
                     }
                     Err(err) if err.is_final() => break,
-                    Err(_) => tokio::time::sleep(LAST_WILL_PAUSE).await,
+                    Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
                 }
             }
         };
         // Whoever cannot be stopped by then is not to be by us.
-        let _ = tokio::time::timeout(LAST_WILL, tries).await;
+        let _ = tokio::time::timeout(LAST_RETRIES, tries).await;
     }
 }
 
-impl Drop for Worker {
+impl Drop for CameraTask {
     fn drop(&mut self) {
-        // Whether the camera came to rest the worker itself reports.
-        wait_for(&self.inbox.finish(), FINISH_BUDGET + STOP_GRACE);
+        // Whether the camera came to rest the camera task itself reports.
+        wait_for(&self.mailbox.finish(), FINISH_BUDGET + STOP_GRACE);
     }
 }
 
@@ -207,75 +211,75 @@ struct Task<O> {
     client: Client,
     /// For whoever must finish what the task has begun.
     settings: Arc<Mutex<ClientSettings>>,
-    desk: Desk<O>,
+    state: TaskState<O>,
 }
 
 impl<O: Fn(Event) + Send + Sync> Task<O> {
     async fn run(mut self) {
         loop {
-            self.desk.take_mail();
-            self.desk.check_deadline();
-            if self.desk.credentials.is_some() {
+            self.state.take_mail();
+            self.state.check_deadline();
+            if self.state.credentials.is_some() {
                 self.change_credentials().await;
             }
-            self.desk.publish();
-            if self.desk.is_over() {
+            self.state.publish();
+            if self.state.is_over() {
                 break;
             }
-            let now = self.desk.inbox.now();
-            match self.desk.control.next_request(now) {
+            let now = self.state.mailbox.now();
+            match self.state.control.next_request(now) {
                 Next::Do(request) => self.perform(request).await,
                 Next::Wait(until) => {
-                    let until = until.into_iter().chain(self.desk.deadline).min();
-                    self.desk.tell_settled();
+                    let until = until.into_iter().chain(self.state.deadline).min();
+                    self.state.tell_settled();
                     tokio::select! {
-                        () = self.desk.inbox.arrived() => {}
-                        () = self.desk.inbox.sleep_until(until) => {}
+                        () = self.state.mailbox.arrived() => {}
+                        () = self.state.mailbox.sleep_until(until) => {}
                     }
                 }
             }
         }
-        self.desk.give_up();
+        self.state.give_up();
     }
 
     /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
     /// may it answer.
     async fn change_credentials(&mut self) {
-        if let Some(stop) = self.desk.control.session().parting_stop() {
+        if let Some(stop) = self.state.control.session().parting_stop() {
             self.perform(Request::Command(stop)).await;
             // A password often follows on the user's heels.
-            self.desk.take_mail();
+            self.state.take_mail();
         }
-        if let Some(credentials) = self.desk.credentials.take() {
+        if let Some(credentials) = self.state.credentials.take() {
             lock(&self.settings).credentials.clone_from(&credentials);
             self.client.set_credentials(credentials);
-            self.desk.control.session_mut().credentials_changed();
+            self.state.control.session_mut().credentials_changed();
         }
     }
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
     async fn perform(&mut self, request: Request) {
-        let Self { client, desk, .. } = self;
-        let inbox = desk.inbox.clone();
-        let sent = inbox.now();
-        desk.control.sending(&request, sent);
-        let stop = desk.control.stop();
-        lock(&desk.statistics).stop = Some(stop);
+        let Self { client, state, .. } = self;
+        let mailbox = state.mailbox.clone();
+        let sent = mailbox.now();
+        state.control.sending(&request, sent);
+        let stop = state.control.stop();
+        lock(&state.statistics).stop = Some(stop);
         let mut exchange = pin!(exchange(client, &request));
         let mut give_up_at = None;
         loop {
-            let now = inbox.now();
-            give_up_at = desk.give_up_at(&request, give_up_at, now);
-            if desk.is_in_vain(&request, now) || give_up_at.is_some_and(|at| at <= now) {
-                return desk.abandoned(&request, sent);
+            let now = mailbox.now();
+            give_up_at = state.give_up_at(&request, give_up_at, now);
+            if state.is_in_vain(&request, now) || give_up_at.is_some_and(|at| at <= now) {
+                return state.abandoned(&request, sent);
             }
-            let stale_at = desk.control.stale_at().filter(|at| *at > now);
-            let until = [give_up_at, stale_at, desk.deadline].into_iter().flatten().min();
+            let stale_at = state.control.stale_at().filter(|at| *at > now);
+            let until = [give_up_at, stale_at, state.deadline].into_iter().flatten().min();
             tokio::select! {
                 biased;
-                answer = &mut exchange => return desk.answered(&request, answer, sent),
-                () = inbox.arrived() => desk.take_mail(),
-                () = inbox.sleep_until(until) => {}
+                answer = &mut exchange => return state.answered(&request, answer, sent),
+                () = mailbox.arrived() => state.take_mail(),
+                () = mailbox.sleep_until(until) => {}
             }
         }
     }
@@ -306,7 +310,7 @@ mod tests {
 
     const PATIENCE: Duration = Duration::from_secs(20);
 
-    fn start(camera: &VirtualCamera, observer: impl Fn(Event) + Clone + Send + Sync + 'static) -> Worker {
+    fn start(camera: &VirtualCamera, observer: impl Fn(Event) + Clone + Send + Sync + 'static) -> CameraTask {
         let (location, _) = Location::parse(&camera.url()).unwrap();
         let client = ClientSettings {
             location,
@@ -315,11 +319,11 @@ mod tests {
             timeout: Duration::from_secs(2),
             trust: Trust::System,
         };
-        Worker::start(client, ServoSettings::default(), Clock::running(), observer).unwrap()
+        CameraTask::start(client, ServoSettings::default(), Clock::running(), observer).unwrap()
     }
 
-    fn see(worker: &Worker) {
-        worker.inbox().see(Measurement::at(0.9, 0.5, worker.inbox().now()));
+    fn see(task: &CameraTask) {
+        task.mailbox().see(Measurement::at(0.9, 0.5, task.mailbox().now()));
     }
 
     fn camera() -> VirtualCamera {
@@ -330,10 +334,10 @@ mod tests {
     #[test]
     fn dropped_it_stops_the_camera() {
         let camera = camera();
-        let worker = start(&camera, |_| {});
-        see(&worker);
+        let task = start(&camera, |_| {});
+        see(&task);
         assert!(camera.wait_for(PATIENCE, |status| status.moving));
-        drop(worker);
+        drop(task);
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
     }
 
@@ -344,25 +348,25 @@ mod tests {
         for may_yet_move in [true, false] {
             let stop = Some(Command::Halt);
             let statistics = Arc::new(Mutex::new(Statistics { stop, may_yet_move, ..Statistics::default() }));
-            let legacy = Legacy { camera: camera.clone(), inbox: Weak::new(), statistics };
-            assert_eq!(legacy.unconfirmed_stop().is_some(), may_yet_move);
-            assert_eq!(legacy.is_void(), !may_yet_move);
+            let predecessor = Predecessor { camera: camera.clone(), mailbox: Weak::new(), statistics };
+            assert_eq!(predecessor.unconfirmed_stop().is_some(), may_yet_move);
+            assert_eq!(predecessor.is_void(), !may_yet_move);
         }
     }
 
     #[test]
     fn it_can_be_dropped_in_its_own_thread() {
         let camera = camera();
-        let worker = Arc::new(Mutex::new(None));
+        let task = Arc::new(Mutex::new(None));
         let (events, seen) = std::sync::mpsc::channel();
-        let held = worker.clone();
+        let held = task.clone();
         let started = start(&camera, move |event| {
             if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
                 drop(lock(&held).take());
             }
             let _ = events.send(format!("{event:?}"));
         });
-        let mut held = lock(&worker);
+        let mut held = lock(&task);
         see(held.insert(started));
         drop(held);
         // Until the task, and with it the observer, is gone.
@@ -377,13 +381,13 @@ mod tests {
     fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
         let camera = camera();
         let (died, death) = std::sync::mpsc::channel();
-        let worker = start(&camera, move |event| match event {
+        let task = start(&camera, move |event| match event {
             Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => panic!("provoked"),
             Event::Died(_) => died.send(()).unwrap(),
             _ => {}
         });
-        let settled = worker.inbox().settled();
-        see(&worker);
+        let settled = task.mailbox().settled();
+        see(&task);
         death.recv_timeout(PATIENCE).unwrap();
         let is_stop = |query: &str| query.ends_with("continuouspantiltmove=0,0");
         let mut seen = 0;
@@ -393,7 +397,7 @@ mod tests {
         }
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
         assert_ne!(settled.recv_timeout(PATIENCE), Err(RecvTimeoutError::Timeout));
-        assert_eq!(worker.inbox().settled().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
-        assert_eq!(worker.inbox().finish().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(task.mailbox().settled().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(task.mailbox().finish().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
     }
 }

@@ -1,8 +1,8 @@
-//! The one way locks are taken.
+//! The one way both plugins take locks.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 /// Locks even where a panic elsewhere poisoned it: one fault must not take the other threads with it.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -1,14 +1,15 @@
-//! What the streaming thread leaves for the worker. Nothing here ever waits for the network.
+//! What the streaming thread leaves for the camera task. Nothing here ever waits for the network.
 
 use std::mem;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
+use crate::lock::lock;
 use tokio::sync::Notify;
 
-use super::clock::Clock;
+use crate::vapixptzsink::clock::Clock;
 use servo::{Measurement, ServoSettings};
 use vapix::wire::{Command, Credentials};
 
@@ -32,26 +33,26 @@ pub struct Mail {
     pub quit: bool,
 }
 
-/// A letter box with one place for each kind of mail.
+/// A mailbox with one place for each kind of mail.
 #[derive(Debug)]
-pub struct Inbox {
+pub struct Mailbox {
     mail: Mutex<Mail>,
     /// Whether nobody is there any more to answer; who waits then is not kept waiting.
     closed: AtomicBool,
     /// Whether nobody is to be followed, as the element is not PLAYING.
-    blind: AtomicBool,
+    paused: AtomicBool,
     arrived: Notify,
     clock: Clock,
     overtaken: AtomicU64,
 }
 
-impl Inbox {
+impl Mailbox {
     /// `clock` is that of everything that is timed here and in the servo.
     pub fn new(clock: Clock) -> Self {
         Self {
             mail: Mutex::default(),
             closed: AtomicBool::new(false),
-            blind: AtomicBool::new(false),
+            paused: AtomicBool::new(false),
             arrived: Notify::new(),
             clock,
             overtaken: AtomicU64::new(0),
@@ -63,7 +64,7 @@ impl Inbox {
         self.clock.now()
     }
 
-    /// Lets that time stand at `time` until the next call. Nobody is woken: [`Inbox::settled`] does that.
+    /// Lets that time stand at `time` until the next call. Nobody is woken: [`Mailbox::settled`] does that.
     pub fn hold_at(&self, time: Duration) {
         self.clock.hold_at(time);
     }
@@ -80,7 +81,7 @@ impl Inbox {
     pub fn see(&self, measurement: Measurement) {
         let mut mail = self.mail();
         // Read under the lock, so that no picture is left behind those that `rest` makes void.
-        if self.blind.load(Ordering::Relaxed) {
+        if self.paused.load(Ordering::Relaxed) {
             return;
         }
         if mail.measurement.replace(measurement).is_some() {
@@ -91,9 +92,9 @@ impl Inbox {
     }
 
     /// Whether pictures are heeded from here on; at first they are.
-    pub fn heed(&self, pictures: bool) {
+    pub fn accept_measurements(&self, pictures: bool) {
         let _mail = self.mail();
-        self.blind.store(!pictures, Ordering::Relaxed);
+        self.paused.store(!pictures, Ordering::Relaxed);
     }
 
     /// Asks for rest; what was seen before is void. The receiver hears when the camera is at rest.
@@ -115,7 +116,7 @@ impl Inbox {
         self.rest()
     }
 
-    /// Asks for an end at once, stop or not: another worker is about to see to the camera.
+    /// Asks for an end at once, stop or not: another camera task is about to see to the camera.
     pub fn quit(&self) {
         self.mail().quit = true;
         self.arrived.notify_one();
@@ -174,6 +175,6 @@ impl Inbox {
     }
 
     fn mail(&self) -> MutexGuard<'_, Mail> {
-        self.mail.lock().unwrap_or_else(PoisonError::into_inner)
+        lock(&self.mail)
     }
 }

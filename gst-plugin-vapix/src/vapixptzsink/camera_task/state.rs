@@ -1,22 +1,22 @@
-//! What the worker's task does between two exchanges: takes the mail, keeps count, tells the news.
+//! What the camera task's task does between two exchanges: takes what came in, keeps count, tells the news.
 
 use std::mem;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use super::inbox::{Inbox, Mail};
-use super::statistics::Statistics;
-use super::worker::{Event, FINISH_BUDGET, LAST_WILL, STOP_GRACE};
+use super::mailbox::{Mail, Mailbox};
+use super::{Event, FINISH_BUDGET, LAST_RETRIES, STOP_GRACE};
 use crate::control_loop::{ControlLoop, Status};
 use crate::lock::lock;
+use crate::vapixptzsink::statistics::Statistics;
 use vapix::session::{Request, Response};
 use vapix::wire::{Credentials, Error};
 
 /// Everything but the client, which is lent out while a request is in flight.
-pub struct Desk<O> {
+pub struct TaskState<O> {
     pub control: ControlLoop,
-    pub inbox: Arc<Inbox>,
+    pub mailbox: Arc<Mailbox>,
     pub statistics: Arc<Mutex<Statistics>>,
     observer: O,
     last_status: Status,
@@ -29,17 +29,17 @@ pub struct Desk<O> {
     gave_up: bool,
 }
 
-impl<O: Fn(Event)> Desk<O> {
+impl<O: Fn(Event)> TaskState<O> {
     /// Nothing has come in yet.
     pub fn new(
         control: ControlLoop,
-        inbox: Arc<Inbox>,
+        mailbox: Arc<Mailbox>,
         statistics: Arc<Mutex<Statistics>>,
         observer: O,
     ) -> Self {
         Self {
             control,
-            inbox,
+            mailbox,
             statistics,
             observer,
             last_status: Status::default(),
@@ -55,16 +55,16 @@ impl<O: Fn(Event)> Desk<O> {
     pub fn is_over(&self) -> bool {
         self.deadline.is_some_and(|deadline| {
             let done = self.control.session().stays_at_rest() && !self.control.session().is_queued();
-            done || self.control.session().halted() || deadline <= self.inbox.now()
+            done || self.control.session().halted() || deadline <= self.mailbox.now()
         })
     }
 
-    /// When the time for a confirmed stop is over, nobody waits for it any more; it is tried on for a while.
+    /// When the time for a confirmed stop is over, nobody waits for it any more; it is retried for a while.
     pub fn check_deadline(&mut self) {
-        let now = self.inbox.now();
+        let now = self.mailbox.now();
         if !self.gave_up && self.deadline.is_some_and(|deadline| deadline <= now) {
             self.give_up();
-            self.deadline = Some(now + LAST_WILL);
+            self.deadline = Some(now + LAST_RETRIES);
         }
     }
 
@@ -77,8 +77,8 @@ impl<O: Fn(Event)> Desk<O> {
 
     pub fn take_mail(&mut self) {
         let Mail { credentials, servo, orphan, rest, measurement, waiting, settling, finish, quit } =
-            self.inbox.take();
-        let now = self.inbox.now();
+            self.mailbox.take();
+        let now = self.mailbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(servo) = servo {
             self.control.configure(servo);
@@ -130,13 +130,13 @@ impl<O: Fn(Event)> Desk<O> {
     }
 
     pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Duration) {
-        let now = self.inbox.now();
+        let now = self.mailbox.now();
         self.count(request, answer.as_ref().err().cloned(), now.saturating_sub(sent));
         self.control.on_response(request, answer, sent, now);
     }
 
     pub fn abandoned(&mut self, request: &Request, sent: Duration) {
-        let now = self.inbox.now();
+        let now = self.mailbox.now();
         let waited = now.saturating_sub(sent);
         self.count(request, Some(Error::Timeout(waited)), waited);
         self.control.abandoned(request, now);
@@ -159,11 +159,11 @@ impl<O: Fn(Event)> Desk<O> {
 
     /// Tells what has changed: reports and status; and those who wait for rest.
     pub fn publish(&mut self) {
-        let status = self.control.status(self.inbox.now());
+        let status = self.control.status(self.mailbox.now());
         let (estimates, stop) = (Some(self.control.estimates()), Some(self.control.stop()));
         let (may_yet_move, halted) =
             (!self.control.session().stays_at_rest(), self.control.session().halted());
-        let coalesced = self.control.overtaken() + self.inbox.overtaken();
+        let coalesced = self.control.overtaken() + self.mailbox.overtaken();
         {
             let mut statistics = lock(&self.statistics);
             (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
@@ -219,18 +219,18 @@ mod tests {
     /// What the world was told.
     type Told = Receiver<Event>;
 
-    /// A desk at one second of its time.
-    fn desk() -> (Desk<impl Fn(Event)>, Told) {
+    /// A task at one second of its time.
+    fn state() -> (TaskState<impl Fn(Event)>, Told) {
         let (events, told) = std::sync::mpsc::channel();
-        let inbox = Arc::new(Inbox::new(Clock::held()));
-        inbox.hold_at(ms(1000));
+        let mailbox = Arc::new(Mailbox::new(Clock::held()));
+        mailbox.hold_at(ms(1000));
         let control = ControlLoop::new(ServoSettings::default());
-        (Desk::new(control, inbox, Arc::default(), move |event| drop(events.send(event))), told)
+        (TaskState::new(control, mailbox, Arc::default(), move |event| drop(events.send(event))), told)
     }
 
-    impl<O: Fn(Event)> Desk<O> {
+    impl<O: Fn(Event)> TaskState<O> {
         fn see(&mut self, visibility: Visibility) {
-            self.inbox.see(Measurement { visibility, ..Measurement::at(0.9, 0.5, self.inbox.now()) });
+            self.mailbox.see(Measurement { visibility, ..Measurement::at(0.9, 0.5, self.mailbox.now()) });
             self.take_mail();
         }
 
@@ -240,11 +240,11 @@ mod tests {
             at: Duration,
             answer: impl Fn(&Command) -> Result<Response, Error>,
         ) -> Vec<Command> {
-            self.inbox.hold_at(at);
+            self.mailbox.hold_at(at);
             self.take_mail();
             self.check_deadline();
             let mut sent = Vec::new();
-            let now = self.inbox.now();
+            let now = self.mailbox.now();
             while let Next::Do(request) = self.control.next_request(now) {
                 let answer = match &request {
                     Request::Command(command) => {
@@ -265,7 +265,7 @@ mod tests {
         fn end_in_doubt(&mut self) -> Receiver<()> {
             self.see(Visibility::Seen);
             self.serve_at(ms(1000), |_| timeout());
-            let rest = self.inbox.finish();
+            let rest = self.mailbox.finish();
             assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [Command::Halt]);
             assert!(self.control.session().is_at_rest());
             rest
@@ -278,42 +278,42 @@ mod tests {
 
     #[test]
     fn at_the_end_too_an_unanswered_move_is_stopped_twice_and_nobody_waits_for_that() {
-        let (mut desk, told) = desk();
-        let rest = desk.end_in_doubt();
+        let (mut state, told) = state();
+        let rest = state.end_in_doubt();
         assert_eq!(rest.try_recv(), Ok(()));
-        assert!(!desk.is_over() && lock(&desk.statistics).may_yet_move);
-        assert_eq!(desk.serve_at(ms(5000), |_| Ok(Response::Accepted)), []);
-        assert!(!desk.is_over());
-        assert_eq!(desk.serve_at(ms(9000), |_| Ok(Response::Accepted)), [Command::Halt]);
-        assert!(desk.is_over() && !lock(&desk.statistics).may_yet_move);
+        assert!(!state.is_over() && lock(&state.statistics).may_yet_move);
+        assert_eq!(state.serve_at(ms(5000), |_| Ok(Response::Accepted)), []);
+        assert!(!state.is_over());
+        assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [Command::Halt]);
+        assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
         assert!(!gave_up(&told));
     }
 
     #[test]
     fn a_second_stop_that_is_not_confirmed_is_not_tried_for_ever() {
-        let (mut desk, told) = desk();
-        desk.end_in_doubt();
+        let (mut state, told) = state();
+        state.end_in_doubt();
         let mut now = ms(5000);
-        while now < ms(2000) + FINISH_BUDGET + LAST_WILL {
-            desk.serve_at(now, |_| timeout());
-            assert!(!desk.is_over());
+        while now < ms(2000) + FINISH_BUDGET + LAST_RETRIES {
+            state.serve_at(now, |_| timeout());
+            assert!(!state.is_over());
             now += ms(1000);
         }
-        desk.serve_at(now + ms(5000), |_| timeout());
-        assert!(desk.is_over() && !gave_up(&told));
+        state.serve_at(now + ms(5000), |_| timeout());
+        assert!(state.is_over() && !gave_up(&told));
     }
 
     #[test]
     fn only_a_stop_that_still_waits_has_a_move_abandoned() {
-        let (mut desk, _) = desk();
-        desk.see(Visibility::Seen);
-        assert_eq!(desk.give_up_at(&MOVE, None, ms(1000)), None);
-        desk.see(Visibility::Gone);
-        let at = desk.give_up_at(&MOVE, None, ms(1000));
+        let (mut state, _) = state();
+        state.see(Visibility::Seen);
+        assert_eq!(state.give_up_at(&MOVE, None, ms(1000)), None);
+        state.see(Visibility::Gone);
+        let at = state.give_up_at(&MOVE, None, ms(1000));
         assert_eq!(at, Some(ms(1000) + STOP_GRACE));
-        assert_eq!(desk.give_up_at(&MOVE, at, ms(1400)), at);
-        desk.see(Visibility::Seen);
-        assert_eq!(desk.give_up_at(&MOVE, at, ms(1450)), None);
-        assert_eq!(desk.give_up_at(&Request::Command(Command::Halt), None, ms(1450)), None);
+        assert_eq!(state.give_up_at(&MOVE, at, ms(1400)), at);
+        state.see(Visibility::Seen);
+        assert_eq!(state.give_up_at(&MOVE, at, ms(1450)), None);
+        assert_eq!(state.give_up_at(&Request::Command(Command::Halt), None, ms(1450)), None);
     }
 }
