@@ -146,7 +146,7 @@ impl Servo {
         }
         let tolerated = (Self::OSCILLATION_ZONES * self.settings.dead_zone).max(Self::OSCILLATION_LEAST);
         let tolerated_deg = self.zone_deg(view, tolerated);
-        // Told by the commands it would be no witness against them.
+        // Derived from the commands it would say nothing of whether they are right.
         let by_itself = measurement.ego_velocity.map_or(PanTilt::default(), |_| self.estimator.pace());
         let error = self.estimator.error();
         self.controller.oscillation.see(error, by_itself, tolerated_deg, measurement.taken_at)

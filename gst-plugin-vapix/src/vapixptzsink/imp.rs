@@ -38,7 +38,7 @@ struct Stream {
 }
 
 /// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
-/// order: `settings`, `worker`, so that changes come to the camera task in the order in which they were made.
+/// order: `settings`, `task`, so that changes come to the camera task in the order in which they were made.
 #[derive(Default)]
 pub struct VapixPtzSink {
     pub(super) settings: Mutex<Settings>,

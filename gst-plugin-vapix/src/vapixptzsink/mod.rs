@@ -3,12 +3,11 @@
 //! # vapixptzsink
 //!
 //! Steers an Axis pan-tilt-zoom camera so that the target stays in the middle of the picture
-//! (thesis 3.6). Takes the video with the target meta that `lkfeaturetrack` attaches; the pixels
-//! themselves are not looked at, so that any raw video in any memory will do.
+//! (thesis 3.6). Takes the video with the target meta that `lkfeaturetrack` attaches; it never reads the
+//! pixels, so any raw video in any memory will do.
 //!
-//! Nothing here waits for the network in the streaming thread: the newest target is left for a task
-//! that talks to the camera, with one request in flight, the newest target first and at most
-//! `max-rate` commands a second. `sync` and `async` are off by default: a late target is worth
+//! The streaming thread never waits for the network: it leaves the newest target for a task that talks to
+//! the camera, with one request in flight and at most `max-rate` commands a second. All durations are nanoseconds. `sync` and `async` are off by default: a late target is worth
 //! nothing, and a pipeline must not wait for this sink to preroll.
 //!
 //! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a
@@ -30,11 +29,15 @@
 //! ## What it learns
 //! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
 //! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
-//! `field-of-view`, and `camera-speed` with `speed-curve` are only where that begins; `learn=false` keeps to them.
+//! `field-of-view`, and `camera-speed` with `speed-curve` are only the starting point; `learn=false` keeps them as set.
 //! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the
 //! steps 1 to 100), and the camera's own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What
 //! the camera told of itself is one line of INFO.
-//! A loop that swings about its target all the same is calmed by less gain, with a warning.
+//! A loop that oscillates all the same is calmed by lowering the gain, with a warning.
+//!
+//! ## Mounting
+//! `rotation` is for pictures that arrive turned clockwise; `invert-pan` and `invert-tilt` are for a camera that hangs, or
+//! whose axis turns the picture the other way. Positions, limits and `home` stay those that the camera reports.
 //!
 //! ## Zoom and limits
 //! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
@@ -46,21 +49,20 @@
 //! with a warning, from READY to PAUSED and while playing, and stays as it was.
 //!
 //! ## Modes
-//! `mode` is what is wished. A camera whose parameters say that it does not take the words of that mode, or that
-//! refuses them while it answers everything else, is moved by the best mode of those it does take: an info message
-//! says so, `stats` has it as `mode`, the property stays as it is. A refused mode is tried again every minute, and
-//! when `mode` changes.
+//! A camera that does not support `mode`, by its parameters or because it refuses such commands while it answers
+//! everything else, is moved by the best mode it does support: an info message says so, and `stats` has it as
+//! `mode`; the property stays as it is. A refused mode is retried every minute, and when `mode` changes.
 //!
 //! ## Home
 //! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the
-//! name of a preset, or `start`, where it looked when it was met; with `home-at-start` before the first target too.
+//! name of a preset, or `start`, where it looked when it connected; with `home-at-start` on start-up too.
 //! All but a preset is kept within the limits that are set.
 //!
 //! ## Operators
 //! An operator comes first. When the camera's position contradicts what it was told, or its control queue says
-//! that it is somebody else's turn, it is not steered until nobody has moved it for `override-timeout`, or until
-//! our turn. Only a turn that no command explains, of more than 1.5 degrees, counts; zooming by hand does only with
-//! `auto-zoom`. A camera that is found moving at the start is stopped: whoever set it going may not be there any more.
+//! that it is somebody else's turn, steering pauses until nobody has moved it for `override-timeout`, or until it is
+//! our turn. Only a turn of more than 1.5 degrees that no command explains counts; zooming by hand counts only with
+//! `auto-zoom`. A camera that is found moving at the start is stopped: whoever started the move may be gone.
 //!
 //! ## Messages and events
 //! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,

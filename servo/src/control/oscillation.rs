@@ -2,8 +2,8 @@ use std::time::Duration;
 
 use crate::model::PanTilt;
 
-/// Notices a loop that swings about its target, as one does whose delays or speeds are not what they are
-/// taken for, and lowers the gain until it is calm.
+/// Notices a loop that oscillates about its target, as one does whose delays or speeds are wrong, and lowers the gain
+/// until it is steady.
 #[derive(Debug)]
 pub struct OscillationGuard {
     pan: HalfCycles,
@@ -28,11 +28,11 @@ impl OscillationGuard {
     const LOWEST: f64 = 0.2;
     const RAISE: f64 = 1.2;
 
-    /// After so long without a swing a little more is dared.
+    /// After so long without an oscillation the gain is raised a little.
     const CALM: Duration = Duration::from_secs(30);
 
     /// Takes the error of a picture, and the target's own rate, where the background tells that; what each axis
-    /// is `tolerated_deg` is no swing. Returns whether the gain was lowered by this.
+    /// is `tolerated_deg` does not count. Returns whether the gain was lowered by this.
     pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: PanTilt, at: Duration) -> bool {
         let swings = [
             self.pan.see(error.pan, target.pan, tolerated_deg.pan, at),

@@ -112,7 +112,7 @@ impl TargetEstimator {
     fn foresee(&mut self, measurement: &Measurement, view: &View) {
         self.target_rate.coast(measurement.taken_at, self.expected_rate(Duration::ZERO));
         // Who does not see the background cannot tell how the camera's turns move a hidden target in the
-        // picture: there the last sight and the commands since know better.
+        // picture: there the last measurement and the commands since know better.
         if measurement.ego_velocity.is_some() {
             self.place(measurement, view);
         }

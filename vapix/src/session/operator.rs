@@ -13,8 +13,7 @@ pub struct CommandedMotion<'a> {
 
 /// Tells from the positions a camera reports whether somebody else moves it.
 ///
-/// A hand that is taken for the camera's own noise costs a moment of quarrel; one that is seen where there is none
-/// costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn or zoom
+/// An operator who is missed is fought for a moment; one who is seen where there is none costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn or zoom
 /// of an axis in a direction that it was not told, of more than any noise, and still there when asked again.
 #[derive(Debug, Default)]
 pub struct OperatorDetector {

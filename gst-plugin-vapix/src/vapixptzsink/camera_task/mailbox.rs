@@ -6,9 +6,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Mutex, MutexGuard};
 use std::time::Duration;
 
-use crate::lock::lock;
 use tokio::sync::Notify;
 
+use crate::lock::lock;
 use crate::vapixptzsink::clock::Clock;
 use servo::{Measurement, ServoSettings};
 use vapix::wire::{Command, Credentials};
@@ -20,7 +20,7 @@ pub struct Mail {
     pub servo: Option<ServoSettings>,
     /// What ends the move in which a predecessor left the camera.
     pub orphan: Option<Command>,
-    /// Forget the target and stop; before `sight`.
+    /// Forget the target and stop; before `measurement`.
     pub rest: bool,
     pub measurement: Option<Measurement>,
     /// Who waits for the camera to be at rest.

@@ -1,4 +1,4 @@
-//! What the camera task's task does between two exchanges: takes what came in, keeps count, tells the news.
+//! What the camera's task does between two exchanges: takes what came in, keeps count, reports changes.
 
 use std::mem;
 use std::sync::mpsc::SyncSender;
