@@ -52,8 +52,11 @@ mod tests {
 
     const SIZE: (usize, usize) = (160, 100);
 
-    /// Likelihoods of 20 with boxes (left, top, width, height) of others; how many pixels are segmented.
-    fn segmented(boxes: &[((usize, usize, usize, usize), u8)]) -> i32 {
+    /// Left, top, width, height in pixels.
+    type Pixels = (usize, usize, usize, usize);
+
+    /// Likelihoods of 20 with boxes of others; how many pixels are segmented.
+    fn segmented(boxes: &[(Pixels, u8)]) -> i32 {
         let mut likelihood = vec![20; SIZE.0 * SIZE.1];
         for ((x, y, width, height), value) in boxes {
             for row in likelihood.chunks_exact_mut(SIZE.0).skip(*y).take(*height) {
