@@ -1,43 +1,35 @@
 //! SECTION:element-bgavgdetect
 //!
-//! Finds what moves in the picture of a camera at rest, by background subtraction with the averaging
-//! method (thesis 3.2 to 3.4): running mean of every pixel, foreground by `test`, opening, closing,
-//! contours. Attaches a `PtzMotionMeta` to every frame that was looked at (no regions: nothing moved) and
-//! a region of interest named `motion` for each region. Pixels pass untouched and uncopied.
+//! Finds what moves, whether the camera rests or turns, by background subtraction (thesis 3.2 to 3.4): running mean
+//! and spread of every pixel, foreground by their difference, opening, closing, contours. Attaches to every frame a
+//! `PtzMotionMeta` (no regions: nothing moved), a region of interest named `motion` for each region, and a
+//! `PtzSceneMeta` with the motion of the camera, the reduced picture, the likelihood of foreground and the mean of the
+//! background. Pixels pass untouched and uncopied.
 //!
 //! ## The background
-//! The mean follows the picture with weight `alpha` for pictures that come `alpha-interval` apart. For
-//! other distances, measured by timestamps, the weight is scaled: 1 − (1 − α)^(distance/interval). So the
-//! frame rate, a variable one too, does not change what is found. `alpha-interval=0` gives every picture
-//! the weight `alpha`, as the thesis has it: at 25 frames a second, only the edges of a walker are found.
+//! It travels with the camera: the motion of the picture is measured once a frame on the frame reduced to
+//! `analysis-width`, and the background is carried along (Yi et al., CVPR Workshops 2013). What was just turned into view
+//! is learned within four frames. What stays the same becomes background after 6 s, except where a tracker says that its
+//! target is.
 //!
-//! With `test=relative`, a pixel is foreground when it differs from the mean of the pictures before by
-//! `threshold` of that mean or more (thesis 3.3); with `test=spread`, when it differs by more than
-//! `spread-factor` standard deviations of the last `window` pictures (thesis 3.2). In both, a difference
-//! below `noise-floor` grey levels never counts.
-//!
-//! ## Learning
-//! The background is learned from `warm-up` pictures, during which nothing is reported, after: start, new
-//! caps, a flush, time that runs backwards, a DISCONT or gap of more than `max-gap` (a leaky queue marks
-//! whatever follows a dropped frame as DISCONT, which is no reason to learn anew), more than
-//! `relearn-fraction` of the picture in the foreground, waking, and rest of the camera.
-//!
-//! It sleeps while a tracker downstream says by its event that it follows a target, and does not look
-//! while a servo says that the camera moves, and for `settle-time` after. Without such events it always looks.
+//! Where the camera's motion cannot be seen and the picture shows another place, and after: start, new caps, a flush, time
+//! that runs backwards, a DISCONT or gap of more than `max-gap` (a leaky queue marks whatever follows a dropped frame as
+//! DISCONT, which is no reason to learn anew), the background is learned anew. Nothing is reported in the first `warm-up`
+//! frames of a stream.
 //!
 //! ## Regions
-//! Wide pictures are reduced to `analysis-width` first. The closing is upright, as people are: it joins
-//! head and legs and not neighbours. The mean keeps a trail of whoever walked through; with `shed-trail`, a
-//! region is cut to where the picture has changed within the last 100 ms; one in which hardly anything
-//! changed stands and is left as it is. A region is reported in the `confirm-frames`th
-//! picture in a row that shows it; `selection` says which. Pixels outside `zones` or in `exclude-zones`
-//! are never foreground; both are polygons separated by `;`, each of three or more points `x,y` separated
-//! by spaces, with x and y from 0 (left, top) to 1 (right, bottom).
+//! The closing is upright, as people are: it joins head and legs and not neighbours. A region is reported in the
+//! `confirm-frames`th picture in a row that shows it, with a number, its velocity and how far it has travelled against
+//! the background; `selection` says which. Pixels outside `zones` or in `exclude-zones` are never foreground; both are
+//! polygons separated by `;`, each of three or more points `x,y` separated by spaces, with x and y from 0 (left, top) to
+//! 1 (right, bottom).
 //!
 //! ## Profiles
-//! `profile=thesis` takes the steps of the thesis alone: no noise floor, no shedding of trails, no learning anew, every
-//! picture at its own size and of the same weight, a region reported as soon as it is seen, and, where no size is given,
-//! a square closing. It overrides the properties of these steps.
+//! `profile=thesis` takes the steps of the thesis alone, for a camera at rest: `alpha`, `test`, `threshold`,
+//! `spread-factor` and `window` are those of its equations 3.1 to 3.3, every picture is looked at in its own size and has
+//! the same weight, a region is reported as soon as it is seen, and the closing is square where no size is given. It
+//! sleeps while a tracker downstream says that it follows a target and while a servo says that the camera moves, and for
+//! `settle-time` after, and then learns anew from `warm-up` pictures. These properties do nothing in the other profile.
 //!
 //! ## Messages
 //! An element message `ptztrack-motion` with `change` (`start`, `end`), `timestamp`, `running-time`,

@@ -123,6 +123,23 @@ fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>
     if columns == 0 || rows == 0 || width == 0 {
         return;
     }
+    if samples.step == 1 && (width, height) == (columns, rows) {
+        for (y, out) in out.chunks_exact_mut(width).enumerate() {
+            out.copy_from_slice(samples.bytes.row(y));
+        }
+        return;
+    }
+    if (width, height) == (2 * columns, 2 * rows) {
+        for (y, out) in out.chunks_exact_mut(2 * width).enumerate() {
+            let (upper, lower) = out.split_at_mut(width);
+            let values = samples.bytes.row(y).iter().skip(samples.first).step_by(samples.step);
+            for (pair, &value) in upper.as_chunks_mut::<2>().0.iter_mut().zip(values) {
+                *pair = [value; 2];
+            }
+            lower.copy_from_slice(upper);
+        }
+        return;
+    }
     let span = |at: usize, count: usize, of: usize| {
         let (first, next) = (at * of / count, (at + 1) * of / count);
         (first.min(of - 1), next.max(first + 1).min(of))

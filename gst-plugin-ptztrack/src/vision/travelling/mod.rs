@@ -252,3 +252,6 @@ fn canvas_box(bounds: Rect, size: (usize, usize), to_picture: &Homography) -> Re
     };
     to_picture.inverse().map_or(pixels, |back| moved(pixels, &back))
 }
+
+#[cfg(test)]
+mod tests;

@@ -9,7 +9,7 @@ const BLOCK: usize = 8;
 const PARTS: i32 = 16;
 
 /// Where a block's pixels come from: whole pixels and sixteenths.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 struct Shift {
     x: i32,
     y: i32,
@@ -23,6 +23,8 @@ pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
     shifts: Vec<Shift>,
+    /// Side of the blocks; the whole width where all move alike.
+    side: usize,
     /// For every row, from where to where it is covered by the source.
     spans: Vec<(usize, usize)>,
 }
@@ -43,6 +45,8 @@ impl Warp {
             let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
             Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) }
         }));
+        let alike = self.shifts.windows(2).all(|pair| pair[0] == pair[1]);
+        self.side = if alike { size.0 } else { BLOCK };
         let spans = (0..size.1).map(|y| self.span(y)).collect();
         self.spans = spans;
     }
@@ -66,10 +70,10 @@ impl Warp {
 
     /// The blocks of a row: from where to where each is covered, and its shift.
     fn pieces(&self, y: usize) -> impl Iterator<Item = ((usize, usize), Shift)> + '_ {
-        let columns = self.size.0.div_ceil(BLOCK);
-        let shifts = &self.shifts[y / BLOCK * columns..][..columns];
+        let (columns, count) = (self.size.0.div_ceil(BLOCK), self.size.0.div_ceil(self.side));
+        let shifts = &self.shifts[y / BLOCK * columns..][..count];
         shifts.iter().enumerate().map(move |(index, shift)| {
-            let (start, end) = (index * BLOCK, ((index + 1) * BLOCK).min(self.size.0));
+            let (start, end) = (index * self.side, ((index + 1) * self.side).min(self.size.0));
             let (width, height) = (self.source.0 as i32, self.source.1 as i32);
             let row = y as i32 + shift.y;
             if row < 0 || row + i32::from(shift.part_y > 0) >= height {

@@ -1,0 +1,137 @@
+use std::time::Duration;
+
+use ptztrack_contract::{CameraMotion, Homography, Rect};
+
+use super::TravellingBackground;
+use crate::vision::picture::{Picture, Reduced};
+use crate::vision::synthetic::{Canvas, texture};
+
+const SIZE: (usize, usize) = (160, 120);
+const STEP: Duration = Duration::from_millis(40);
+const PERSON: (f64, f64, f64, f64) = (70.0, 30.0, 20.0, 60.0);
+
+/// The world seen by a camera that has moved by (`x`, `y`) pixels.
+fn seen(x: f64, y: f64, seed: u32) -> Canvas {
+    Canvas::seen(SIZE, &Homography::translation(x, y), room).noisy(2.0, seed)
+}
+
+/// A light room of half the texture's contrast.
+fn room(x: f64, y: f64) -> f64 {
+    80.0 + 0.5 * texture(1, x, y)
+}
+
+fn with_person(mut picture: Canvas, (x, y, width, height): (f64, f64, f64, f64)) -> Canvas {
+    picture.paint((x, y, width, height), |u, v| 20.0 + 0.2 * texture(5, u, v));
+    picture
+}
+
+fn look(background: &mut TravellingBackground, picture: &Canvas, shift: Option<(f64, f64)>) {
+    let mut reduced = Reduced::default();
+    reduced.fill(&Picture { luma: picture.luma(), chroma: None }, SIZE);
+    let motion = shift.map(|(x, y)| CameraMotion {
+        homography: Homography::translation(x / SIZE.0 as f64, y / SIZE.1 as f64),
+        ..CameraMotion::default()
+    });
+    background.update(&reduced, motion.as_ref(), STEP).expect("OpenCV");
+}
+
+/// One that has seen the empty room for a second.
+fn learned() -> TravellingBackground {
+    let mut background = TravellingBackground::default();
+    for seed in 0..25 {
+        look(&mut background, &seen(0.0, 0.0, seed), Some((0.0, 0.0)));
+    }
+    background
+}
+
+/// Which part of a box is more likely foreground than not.
+fn foreground(background: &TravellingBackground, (x, y, width, height): (f64, f64, f64, f64)) -> f64 {
+    let likelihood = background.foreground().expect("seen");
+    let part = likelihood.crop(x as usize, y as usize, width as usize, height as usize);
+    let count = (0..part.height()).flat_map(|y| part.row(y)).filter(|value| **value > 128).count();
+    count as f64 / (part.width() * part.height()) as f64
+}
+
+const ALL: (f64, f64, f64, f64) = (0.0, 0.0, 160.0, 120.0);
+
+#[test]
+fn an_empty_room_at_rest_is_background() {
+    let mut background = learned();
+    look(&mut background, &seen(0.0, 0.0, 99), Some((0.0, 0.0)));
+    assert!(foreground(&background, ALL) < 0.005, "{}", foreground(&background, ALL));
+}
+
+#[test]
+fn somebody_is_foreground_and_leaves_no_trail() {
+    let mut background = learned();
+    for step in 0..20 {
+        let person = (20.0 + 4.0 * f64::from(step), 30.0, 20.0, 60.0);
+        look(&mut background, &with_person(seen(0.0, 0.0, step), person), Some((0.0, 0.0)));
+        assert!(foreground(&background, person) > 0.85, "{step}");
+        assert!(foreground(&background, ALL) < 1.1 * 20.0 * 60.0 / (160.0 * 120.0), "{step}");
+    }
+}
+
+#[test]
+fn a_turning_camera_tells_somebody_from_the_room() {
+    let mut background = learned();
+    // They stay where they are in the picture: the camera follows.
+    for step in 1..40 {
+        let at = -3.3 * f64::from(step);
+        look(&mut background, &with_person(seen(at, 0.0, step as u32), PERSON), Some((-3.3, 0.0)));
+        let person = foreground(&background, PERSON);
+        let beside = foreground(&background, (0.0, 0.0, 60.0, 120.0));
+        assert!(person > 0.6 && beside < 0.03, "{step}: {person} {beside}");
+    }
+}
+
+#[test]
+fn a_new_border_is_unknown_and_then_known() {
+    let mut background = learned();
+    look(&mut background, &seen(-10.0, 0.0, 1), Some((-10.0, 0.0)));
+    let border = |background: &TravellingBackground| {
+        let likelihood = background.foreground().expect("seen");
+        likelihood.row(60)[154..158].iter().map(|value| u32::from(*value)).sum::<u32>() / 4
+    };
+    assert!((100..=140).contains(&border(&background)), "{}", border(&background));
+    for seed in 2..10 {
+        look(&mut background, &seen(-10.0, 0.0, seed), Some((0.0, 0.0)));
+    }
+    assert!(border(&background) < 60, "{}", border(&background));
+}
+
+#[test]
+fn what_stands_becomes_background_unless_it_is_protected() {
+    let stands = |protected: bool| {
+        let mut background = learned();
+        for seed in 0..250 {
+            let (x, y, width, height) = PERSON;
+            let bounds = Rect { x: x / 160.0, y: y / 120.0, width: width / 160.0, height: height / 120.0 };
+            background.protect(protected.then_some(bounds));
+            look(&mut background, &with_person(seen(0.0, 0.0, seed), PERSON), Some((0.0, 0.0)));
+        }
+        foreground(&background, (74.0, 34.0, 12.0, 52.0))
+    };
+    assert!(stands(false) < 0.1);
+    assert!(stands(true) > 0.8);
+}
+
+#[test]
+fn lights_switched_off_are_no_motion() {
+    let mut background = learned();
+    let dark = |seed| Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| 0.4 * room(x, y)).noisy(2.0, seed);
+    for seed in 0..10 {
+        look(&mut background, &dark(seed), Some((0.0, 0.0)));
+        assert!(foreground(&background, ALL) < 0.02);
+    }
+}
+
+#[test]
+fn an_unknown_motion_is_rest_where_the_picture_says_so_and_a_new_world_where_not() {
+    let mut background = learned();
+    look(&mut background, &with_person(seen(0.0, 0.0, 50), PERSON), None);
+    assert!(foreground(&background, PERSON) > 0.85);
+    let elsewhere = Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| 0.5 * texture(77, x, y));
+    look(&mut background, &elsewhere, None);
+    assert!(background.foreground().expect("seen").bytes().iter().all(|value| *value == 128));
+}
