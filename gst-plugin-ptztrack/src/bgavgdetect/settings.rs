@@ -134,3 +134,21 @@ fn as_in_the_thesis(config: DetectorConfig) -> DetectorConfig {
         ..config
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_thesis_has_none_of_our_steps_and_keeps_what_it_leaves_open() {
+        let thesis = Settings { profile: Profile::Thesis, threshold: 0.2, ..Settings::default() }.detector();
+        assert_eq!((thesis.analysis_width, thesis.alpha_interval), (0, Duration::ZERO));
+        assert_eq!((thesis.open_size, thesis.close_size), (Some(3), Some(3)));
+        assert_eq!((thesis.shed_trail, thesis.relearn_fraction, thesis.confirm_pictures), (false, 1.0, 1));
+        let test = ForegroundTest::Relative { threshold: 0.2 };
+        assert_eq!(thesis.criterion, Criterion { test, noise_floor: 0.0 });
+        let larger = Settings { profile: Profile::Thesis, close_size: 9, ..Settings::default() };
+        assert_eq!(larger.detector().close_size, Some(9));
+        assert_ne!(Settings::default().detector(), thesis);
+    }
+}

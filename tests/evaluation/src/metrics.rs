@@ -46,7 +46,7 @@ pub struct Metrics {
     /// Mean of d_gc from then on.
     pub mean_dgc_centred: Option<f64>,
     /// How often the person was lost.
-    pub losses: usize,
+    pub losses: Option<usize>,
     /// From the first counted picture to the first true positive, seconds.
     pub time_to_acquire_s: Option<f64>,
     /// Whether it was still the same person after every full occlusion; `None` without one.
@@ -83,7 +83,7 @@ impl Metrics {
             var_dgp: variance(&dgp),
             centred_after_s: centred_after_s(frames),
             mean_dgc_centred: mean_dgc_centred(frames),
-            losses: losses(frames).len(),
+            losses: Some(losses(frames).len()),
             time_to_acquire_s: time_to_acquire_s(frames),
             identity_kept: identity_kept(frames),
             identity_switches: identity_switches(frames),

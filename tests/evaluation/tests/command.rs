@@ -62,7 +62,7 @@ fn a_lesser_processor_gives_the_same_figures() {
         assert!(output.status.success(), "{output:?}");
         let figures = fs::read_to_string(out.join("results.csv")).unwrap();
         let frames =
-            out.join("frames/seed4-mjpeg-160x120-detected-video100ms-command60ms/test-37-ptztrack.csv");
+            out.join("frames/room/seed4-mjpeg-160x120-detected-video100ms-command60ms/test-37-ptztrack.csv");
         let frames = fs::read_to_string(frames).unwrap();
         fs::remove_dir_all(&out).unwrap();
         (figures, frames)

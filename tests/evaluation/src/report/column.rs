@@ -97,7 +97,7 @@ pub const DGC_CENTRED: Column =
     Column { key: "mean_dgc_centred", heading: "d_gc then", decimals: 3, value: |m| m.mean_dgc_centred };
 /// How often the person was lost.
 pub const LOSSES: Column =
-    Column { key: "losses", heading: "losses", decimals: 2, value: |m| Some(m.losses as f64) };
+    Column { key: "losses", heading: "losses", decimals: 2, value: |m| m.losses.map(|losses| losses as f64) };
 /// Time to acquire.
 pub const ACQUIRE: Column = Column {
     key: "time_to_acquire_s",
