@@ -45,7 +45,7 @@ pub struct Metrics {
     pub centred_after_s: Option<f64>,
     /// Mean of d_gc from then on.
     pub mean_dgc_centred: Option<f64>,
-    /// How often the person was lost.
+    /// How often the person was lost; `None` where there was nobody to follow.
     pub losses: Option<usize>,
     /// From the first counted picture to the first true positive, seconds.
     pub time_to_acquire_s: Option<f64>,
@@ -83,7 +83,7 @@ impl Metrics {
             var_dgp: variance(&dgp),
             centred_after_s: centred_after_s(frames),
             mean_dgc_centred: mean_dgc_centred(frames),
-            losses: Some(losses(frames).len()),
+            losses: frames.iter().any(|frame| frame.truth.is_some()).then(|| losses(frames).len()),
             time_to_acquire_s: time_to_acquire_s(frames),
             identity_kept: identity_kept(frames),
             identity_switches: identity_switches(frames),

@@ -38,7 +38,7 @@ fn scene() -> Scene {
 }
 
 fn experiment(tracker: TrackerName) -> Experiment {
-    Experiment { size: (480, 360), ..Experiment::new(scene(), tracker, 1) }
+    Experiment { size: (480, 360), first_box: FirstBox::Given, ..Experiment::new(scene(), tracker, 1) }
 }
 
 #[track_caller]

@@ -6,7 +6,7 @@ use std::{fmt::Write, fs, path::PathBuf};
 use evaluation::{
     Experiment, Scene, SceneError, Target, Whom,
     metrics::Metrics,
-    record::{Codec, Run, TrackerName},
+    record::{Codec, FirstBox, Run, TrackerName},
     report,
 };
 use gst::prelude::*;
@@ -93,7 +93,11 @@ fn recording(name: &str) -> (PathBuf, PathBuf) {
 
 #[track_caller]
 fn run(scene: &Scene, tracker: TrackerName) -> Run {
-    let run = evaluation::run(&Experiment { size: (320, 240), ..Experiment::new(scene.clone(), tracker, 1) });
+    let run = evaluation::run(&Experiment {
+        size: (320, 240),
+        first_box: FirstBox::Given,
+        ..Experiment::new(scene.clone(), tracker, 1)
+    });
     assert_eq!(run.error, None);
     run
 }
