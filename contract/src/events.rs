@@ -4,7 +4,8 @@ use crate::ContractError;
 use crate::codec::{self, Reader};
 use crate::{Rect, TargetState};
 
-/// Tracker to detector: so that the detector sleeps while the target is followed (thesis, figure 3.1)
+/// Tracker to detector: so that where the target stands nothing becomes background; with `profile=thesis` the detector
+/// sleeps while the target is followed (figure 3.1)
 /// and relearns when it wakes. Sent on every change of state.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerEvent {

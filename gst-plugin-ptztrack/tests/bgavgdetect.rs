@@ -485,6 +485,7 @@ fn mask_shows_the_foreground_and_foreground_the_region() {
         let boxes = [BOX, (100, 20, 30, 60)];
         let mut detector = Detector::new(&info(format, 161, 121));
         detector.element.set_property_from_str("output", "mask");
+        detector.element.set_property_from_str("selection", "largest-perimeter");
         detector.see(&[], 3);
         let mask = info(VideoFormat::Gray8, 161, 121);
         let buffer = detector.buffer(&boxes);

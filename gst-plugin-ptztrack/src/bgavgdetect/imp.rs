@@ -205,7 +205,7 @@ impl ElementImpl for BgAvgDetect {
             gst::subclass::ElementMetadata::new(
                 "Motion detector by background averaging",
                 "Filter/Analyzer/Video",
-                "Finds what moves in the picture of a camera at rest",
+                "Finds what moves, the camera at rest or turning",
                 env!("CARGO_PKG_AUTHORS"),
             )
         });

@@ -50,9 +50,9 @@
 //! ```text
 //! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=foreground ! compositor background=checker ! videoconvert ! autovideosink
 //! ```
-//! Everything that moves in the left half, but not where the trees are:
+//! Everything that moves in the right half, but not where the trees are:
 //! ```text
-//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect selection=all zones="0,0 0.5,0 0.5,1 0,1" exclude-zones="0,0 0.2,0 0.2,0.3; 0.3,0 0.5,0 0.5,0.2" ! fakesink
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect selection=all zones="0.5,0 1,0 1,1 0.5,1" exclude-zones="0.5,0 0.7,0 0.7,0.3; 0.8,0 1,0 1,0.2" ! fakesink
 //! ```
 //! The thesis as written:
 //! ```text

@@ -18,6 +18,9 @@ pub enum ForegroundTest {
     },
 }
 
+/// Half a grey level, 8.8: less is rounding, and no difference. A fraction of a black mean is less still.
+const ROUNDING: u16 = 128;
+
 /// What one picture is tested with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criterion {
@@ -63,7 +66,7 @@ impl Background {
             self.spread = None;
         }
         let weights = Weights::new(if first { 1.0 } else { weight });
-        let floor = (criterion.noise_floor * 256.0) as u16;
+        let floor = ((criterion.noise_floor * 256.0) as u16).max(ROUNDING);
         match criterion.test {
             ForegroundTest::Relative { threshold } => {
                 self.spread = None;
