@@ -7,7 +7,8 @@ use clap::Parser;
 use crate::{
     experiment::{Experiment, Scene},
     footage::{SceneError, Whom},
-    record::{Codec, Delays, FirstBox, TestId, TrackerName},
+    record::{Codec, Delays, FirstBox, Suite, TestId, TrackerName},
+    suite::hard,
     trackers::missing,
 };
 
@@ -18,6 +19,10 @@ pub struct Args {
     /// Tests by number, `7` or `1-6`; all 72 unless given
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
     pub test: Vec<Tests>,
+    /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests have
+    /// codecs and delays of their own
+    #[arg(long, value_parser = suite, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time"])]
+    pub suite: Option<Suite>,
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
     pub tracker: Vec<Trackers>,
@@ -150,6 +155,15 @@ impl FromStr for Trackers {
     }
 }
 
+fn suite(text: &str) -> Result<Suite, String> {
+    let suite: Suite = text.parse()?;
+    if suite == Suite::Hard {
+        Ok(suite)
+    } else {
+        Err(format!("`{suite}` is run without --suite; there is hard"))
+    }
+}
+
 fn size(text: &str) -> Result<(u32, u32), String> {
     let sides =
         text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
@@ -260,6 +274,17 @@ impl Args {
         experiments
     }
 
+    fn hard(&self, trackers: &[TrackerName]) -> Vec<Experiment> {
+        let mut experiments = Vec::new();
+        for (&name, seed) in
+            trackers.iter().flat_map(|name| self.seeds().into_iter().map(move |seed| (name, seed)))
+        {
+            let Some(scene) = Scene::room(TestId(1), seed) else { continue };
+            experiments.extend(hard::experiments(name, seed, &self.experiment(scene, name, seed)));
+        }
+        experiments
+    }
+
     /// Everything asked for, tracker after tracker.
     ///
     /// # Errors
@@ -267,6 +292,9 @@ impl Args {
     pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
         if self.matrix {
             return Ok(self.matrix(trackers));
+        }
+        if self.suite == Some(Suite::Hard) {
+            return Ok(self.hard(trackers));
         }
         let scenes = self.scenes()?;
         let mut experiments = Vec::new();

@@ -15,6 +15,9 @@ use crate::{
 /// VAPIX compression that the virtual camera uses unless asked for another.
 const COMPRESSION: u32 = 30;
 
+/// What a narrow line carries: kilobits a second.
+const LOW_KBIT_S: u32 = 250;
+
 /// The element that makes JPEGs as the virtual camera does.
 pub(crate) fn jpeg_encoder() -> String {
     format!("jpegenc quality={}", 100 - COMPRESSION)
@@ -30,6 +33,14 @@ impl Codec {
                 2 + COMPRESSION / 10
             ),
             Self::Raw => "identity".into(),
+            Self::Mpeg4Low => format!(
+                "avenc_mpeg4 name=encoder gop-size=25 pass=cbr bitrate={} ! avdec_mpeg4 max-threads=1",
+                1000 * LOW_KBIT_S
+            ),
+            Self::H264Low => format!(
+                "x264enc name=encoder tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max=50 \
+                 bitrate={LOW_KBIT_S} ! video/x-h264,profile=constrained-baseline ! avdec_h264 max-threads=1"
+            ),
         }
     }
 
@@ -37,13 +48,15 @@ impl Codec {
     pub(crate) fn attach(self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match self {
             Self::Mjpeg | Self::Raw => Ok(()),
-            Self::Mpeg4 => keep_times(&pipeline.pad("encoder", "sink")?, &pipeline.pad("encoder", "src")?),
+            Self::Mpeg4 | Self::Mpeg4Low | Self::H264Low => {
+                keep_times(&pipeline.pad("encoder", "sink")?, &pipeline.pad("encoder", "src")?)
+            }
         }
     }
 }
 
 /// `avenc_mpeg4` of GStreamer 1.22 gives all pictures the same time, in a segment of its own that begins a thousand
-/// hours later. They leave in the order in which they came, as there are no bidirectional ones.
+/// hours later, as `x264enc`'s does. They leave in the order in which they came, as there are no bidirectional ones.
 fn keep_times(sink: &gst::Pad, source: &gst::Pad) -> Result<(), PipelineError> {
     let times = Arc::new(Mutex::new(VecDeque::new()));
     let entering = times.clone();

@@ -15,6 +15,9 @@ pub(crate) fn exposure(number: u32, period: Duration) -> Duration {
     number * period + period / 2
 }
 
+/// The part of what is ever in view that counts as all of it, where the whole person never is.
+const NEARLY: f64 = 0.9;
+
 /// What pictures are of.
 #[derive(Debug, Clone)]
 pub enum Place {
@@ -103,6 +106,8 @@ pub struct Experiment {
     pub seed: u64,
     /// How late everything is.
     pub delays: Delays,
+    /// Further properties of the servo, as on a `gst-launch-1.0` line.
+    pub servo: &'static str,
     /// Who draws the first box.
     pub first_box: FirstBox,
     /// Whether it is one of a series over the delay.
@@ -123,6 +128,7 @@ impl Experiment {
             size: (640, 480),
             seed,
             delays: Delays::default(),
+            servo: "",
             first_box: FirstBox::Detected,
             sweep: false,
             real_time: false,
@@ -150,17 +156,22 @@ impl Experiment {
     }
 
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
-    /// was never moved; `None` where there is none. With nobody to follow all pictures count.
+    /// was never moved, or with as much of it as ever is, nearly, where the view is too narrow; `None` where the person is
+    /// never there. With nobody to follow all pictures count.
     pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
         if self.scene.target == Target::Nobody {
             return Some(0);
         }
         let (period, home) = (camera.frame_period(), camera.home());
-        let whole = |number: &u32| {
-            let people = camera.ground_truth_from(&home, exposure(*number, period), self.size);
-            self.scene.split(people).0.is_some_and(|person| person.bounds.part_inside(self.size) >= 1.0)
+        let inside = |number: u32| {
+            let people = camera.ground_truth_from(&home, exposure(number, period), self.size);
+            self.scene.split(people).0.map_or(0.0, |person| person.bounds.part_inside(self.size))
         };
-        self.pictures(period).find(whole)
+        let whole = self.pictures(period).find(|number| inside(*number) >= 1.0);
+        whole.or_else(|| {
+            let most = self.pictures(period).map(inside).fold(0.0, f64::max);
+            self.pictures(period).find(|number| most > 0.0 && inside(*number) >= NEARLY * most)
+        })
     }
 
     /// What can be said of picture `number` before anybody tracked in it, and who is there; `first` is the first that

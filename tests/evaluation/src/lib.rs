@@ -30,6 +30,7 @@ pub mod record;
 pub mod report;
 mod still;
 pub mod store;
+pub mod suite;
 mod trackers;
 
 pub use batch::run_all;

@@ -1,7 +1,7 @@
 //! One experiment in virtual time: camera and pipeline take turns, and nobody looks at a clock.
 //!
 //! Picture n is exposed n and a half frame periods after the camera's start and reaches the pipeline when it is as old
-//! as the video delay; the camera's time is that of its arrival. The pipeline finishes it, with every command that it
+//! as the video delay (jitter and stalls of the camera's network included); the camera's time is that of its arrival. The pipeline finishes it, with every command that it
 //! leads to sent over HTTP and answered, before the camera's time goes on.
 
 use std::{
@@ -91,6 +91,8 @@ struct Stage<'a> {
     counted: u64,
     /// Where the camera looked in the picture before.
     looked: Option<Pose>,
+    /// When the picture before came.
+    arrived: Duration,
 }
 
 impl<'a> Stage<'a> {
@@ -98,7 +100,8 @@ impl<'a> Stage<'a> {
         let camera = experiment.camera(settings, Clock::Stepped)?;
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
-        let sink = film::beside(&tracker.sink(&camera.url(), "lockstep=true timeout=60000000000"), film);
+        let servo = format!("lockstep=true timeout=60000000000 {}", experiment.servo);
+        let sink = film::beside(&tracker.sink(&camera.url(), &servo), film);
         let (codec, elements) = (experiment.codec.description(), tracker.description());
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;
@@ -108,14 +111,17 @@ impl<'a> Stage<'a> {
             film::attach(pipeline.bin(), tracker.cue(), &info)?;
         }
         pipeline.start()?;
-        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0, looked: None })
+        let (looked, arrived) = (None, Duration::ZERO);
+        Ok(Self { experiment, pipeline, camera, tracker, info, counted: 0, looked, arrived })
     }
 
     /// Takes picture `number` and sends it through.
     fn picture(&mut self, number: u32, first: u32) -> Result<(FrameRecord, Picture), RunError> {
         let (period, size) = (self.camera.frame_period(), self.experiment.size);
         let exposure = experiment::exposure(number, period);
-        let arrival = exposure + self.experiment.delays.video;
+        // Those that were held back come at once, but one after the other.
+        let arrival = self.camera.arrival(exposure).max(self.arrived + Duration::from_millis(1));
+        self.arrived = arrival;
         self.camera.advance_to(arrival);
         let (witnessed, people) = self.experiment.witness(&self.camera, number, first);
         let phase = Phase::of(number >= first, number > first);

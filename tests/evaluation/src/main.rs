@@ -7,7 +7,7 @@ use std::{
 };
 
 use clap::Parser;
-use evaluation::{cli::Args, gallery, report, store::Store};
+use evaluation::{cli::Args, gallery, report, store::Store, suite};
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -46,6 +46,11 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     let report = report::write(&runs, &left_out, &args.out)?;
     for note in &report.notes {
         tell(io::stderr(), format_args!("evaluate: {note}"))?;
+    }
+    let hard = suite::summary::summary(&runs);
+    if !hard.is_empty() {
+        std::fs::write(args.out.join("hard.md"), &hard)?;
+        tell(io::stdout(), format_args!("{hard}"))?;
     }
     let page = args.out.join("index.html");
     tell(io::stdout(), format_args!("{}\nall of it: {}", report.summary, page.display()))?;

@@ -123,6 +123,10 @@ named! {
         Mpeg4 = "mpeg4",
         /// Nothing: as the camera or the recording has them.
         Raw = "raw",
+        /// MPEG-4 part 2 at a low bit rate.
+        Mpeg4Low = "mpeg4-low",
+        /// H.264 at a low bit rate.
+        H264Low = "h264-low",
     }
 }
 

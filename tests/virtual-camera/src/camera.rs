@@ -15,6 +15,7 @@ use crate::{
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
+    imaging::{self, NoiseFilter, Sway},
     kinematics::{Head, Limits, Optics, Pose, within_a_turn},
     picture::Picture,
     rtsp::RtspServer,
@@ -53,6 +54,7 @@ pub(crate) struct Camera {
     stopping: AtomicBool,
     state: Mutex<State>,
     changed: Condvar,
+    noise_filter: Mutex<NoiseFilter>,
     pub fault: tokio::sync::watch::Sender<Fault>,
 }
 
@@ -73,7 +75,10 @@ impl Camera {
     fn new(settings: Settings) -> Result<Self, Error> {
         let world = world::open(&settings)?;
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
-        let memory = settings.video.delay + world.shutter(settings.video.exposure) + Duration::from_secs(2);
+        let memory = settings.video.longest_delay()
+            + world.shutter(settings.video.exposure)
+            + imaging::MEMORY
+            + Duration::from_secs(2);
         let limits = settings.kinematics.limits_in(world.limits());
         let head =
             Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
@@ -95,6 +100,7 @@ impl Camera {
             stopping: AtomicBool::new(false),
             state: Mutex::new(state),
             changed: Condvar::new(),
+            noise_filter: Mutex::default(),
             fault: tokio::sync::watch::Sender::new(Fault::None),
         })
     }
@@ -277,7 +283,12 @@ impl Camera {
     fn pose_at(&self, time: Duration) -> Pose {
         let mut state = lock(&self.state);
         state.device.head.advance(self.now());
-        state.device.head.pose_at(time)
+        self.settings.imaging.shaken(state.device.head.pose_at(time), time)
+    }
+
+    /// When the picture leaves that was exposed at `exposure`.
+    pub fn arrival(&self, exposure: Duration) -> Duration {
+        self.settings.video.arrival(exposure)
     }
 
     /// The picture whose exposure began at `time`, not later than now.
@@ -285,7 +296,18 @@ impl Camera {
         let opening = self.pose_at(time);
         let duration = self.world.shutter(self.settings.video.exposure);
         let closing = self.pose_at(time + duration);
-        self.world.render(&Exposure { time, opening, closing, duration }, size)
+        let mut picture = self.world.render(&Exposure { time, opening, closing, duration }, size)?;
+        let imaging = &self.settings.imaging;
+        let sway = if imaging.hunting > 0.0 { self.sway(time, &opening) } else { Sway::default() };
+        imaging.process(&mut picture, time, &sway, &mut lock(&self.noise_filter));
+        Ok(picture)
+    }
+
+    /// What is left at `time` of the turns before it.
+    fn sway(&self, time: Duration, pose: &Pose) -> Sway {
+        let state = lock(&self.state);
+        let head = &state.device.head;
+        Sway::new(time, head.optics().fov_deg(pose.zoom_step), |time| head.pose_at(time))
     }
 
     /// Of the picture whose exposure began at `time`: who is in it.
@@ -306,6 +328,11 @@ impl Camera {
     /// When the picture leaves the sensor that leaves the camera now.
     pub fn newest_exposure(&self) -> Duration {
         self.now().saturating_sub(self.settings.video.delay)
+    }
+
+    /// Exposures before this have arrived, however late pictures come.
+    pub fn oldest_pending(&self) -> Duration {
+        self.now().saturating_sub(self.settings.video.longest_delay())
     }
 
     /// Lets stepped time go on by itself: nobody steps any more, and what is being set up still needs a picture.
@@ -452,7 +479,12 @@ impl VirtualCamera {
         Duration::from_secs_f64(1.0 / self.camera.frame_rate())
     }
 
-    /// From light on the sensor to data on the wire.
+    /// When the picture is on the wire that was exposed at a time since the start.
+    pub fn arrival(&self, exposure: Duration) -> Duration {
+        self.camera.arrival(exposure)
+    }
+
+    /// From light on the sensor to data on the wire, jitter apart.
     pub fn video_delay(&self) -> Duration {
         self.camera.settings.video.delay
     }

@@ -4,9 +4,12 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Auth, FootageSettings, Kinematics, Moves, Pose, PtzApi, RoomSettings, Settings, SpeedMap,
-    SyntheticSettings, Video, World,
+    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, Pose, PtzApi, RoomSettings, Settings,
+    SpeedMap, Stall, SyntheticSettings, Video, World,
 };
+
+/// From one stall of the pictures to the next.
+const STALL_EVERY: Duration = Duration::from_secs(7);
 
 /// A virtual Axis pan-tilt-zoom camera on loopback.
 ///
@@ -28,6 +31,19 @@ pub struct Options {
     /// Which of the thesis' tests the room shows, again and again: light, occlusion, speed, direction and subject
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=72))]
     room_test: Option<u32>,
+    /// What people in the room do instead of a test: nobody, cross, cross-alike, part, overtake, stop-and-go, sit, approach, run
+    /// or wander
+    #[arg(long, value_name = "ACTION", value_parser = action)]
+    action: Option<Action>,
+    /// What happens in the room by itself: door, film, sun, switch, draught
+    #[arg(long, value_name = "EVENT", value_delimiter = ',', value_parser = event)]
+    events: Vec<Event>,
+    /// Let low sun cast people's shadows on the room's floor
+    #[arg(long)]
+    cast_shadows: bool,
+    /// Let the room's floor reflect people
+    #[arg(long)]
+    reflecting_floor: bool,
     /// Another room, other clothes, another way to walk; 1 is the reference world
     #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
@@ -76,9 +92,37 @@ pub struct Options {
     #[arg(long, default_value_t = 100.0, value_name = "MS", value_parser = not_negative)]
     video_delay: f64,
 
+    /// By how much more pictures come late at most, in milliseconds, changing twice a second
+    #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
+    video_jitter: f64,
+    /// Hold all pictures back for so many milliseconds, every seven seconds
+    #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
+    video_stall: f64,
+    /// How strongly exposure, white balance and focus swing after a turn, 0 to 1
+    #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = share)]
+    hunting: f64,
+    /// Change between day (colour) and night (grey) every so many seconds
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    night: Option<f64>,
+    /// Burn a clock and a logo into the picture
+    #[arg(long)]
+    overlay: bool,
+    /// By how many degrees the mast sways to either side
+    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", value_parser = not_negative)]
+    vibration: f64,
+    /// Noise filter over time: the part of the picture before that stays where little changes, 0 to 0.95
+    #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = filter_share)]
+    noise_filter: f64,
+
     /// From a command's arrival to the first movement, in milliseconds
     #[arg(long, default_value_t = 60.0, value_name = "MS", value_parser = not_negative)]
     command_delay: f64,
+    /// By how much later a command acts at most, in milliseconds; each has its own
+    #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
+    command_jitter: f64,
+    /// Play between motor and camera, in degrees
+    #[arg(long, default_value_t = 0.0, value_name = "DEGREES", value_parser = not_negative)]
+    backlash: f64,
     /// Time that ptz.cgi takes for a request, in milliseconds
     #[arg(long, default_value_t = 10.0, value_name = "MS", value_parser = not_negative)]
     service_time: f64,
@@ -196,6 +240,16 @@ impl TryFrom<Options> for Settings {
                 compression: options.compression,
                 delay: milliseconds(options.video_delay),
                 exposure: milliseconds(options.exposure),
+                jitter: milliseconds(options.video_jitter),
+                stall: (options.video_stall > 0.0)
+                    .then(|| Stall { every: STALL_EVERY, lasts: milliseconds(options.video_stall) }),
+            },
+            imaging: Imaging {
+                hunting: options.hunting,
+                night: options.night.map(Duration::from_secs_f64),
+                overlay: options.overlay,
+                vibration_deg: options.vibration,
+                noise_filter: options.noise_filter,
             },
             presets: options.presets,
             user: options.user,
@@ -207,7 +261,7 @@ impl TryFrom<Options> for Settings {
 
 impl Options {
     fn world(&self) -> Result<World, String> {
-        let for_room = self.room_test.is_some() || self.seed.is_some();
+        let for_room = self.room_test.is_some() || self.seed.is_some() || self.action.is_some();
         let name = self.world.unwrap_or(match (&self.footage, for_room) {
             (Some(_), _) => WorldName::Footage,
             (None, true) => WorldName::Room,
@@ -217,7 +271,7 @@ impl Options {
             return Err("--footage is for --world footage".into());
         }
         if for_room && name != WorldName::Room {
-            return Err("--room-test and --seed are for --world room".into());
+            return Err("--room-test, --action and --seed are for --world room".into());
         }
         Ok(match name {
             WorldName::Footage => World::Footage(self.recording()?),
@@ -241,7 +295,14 @@ impl Options {
     fn room(&self) -> Result<RoomSettings, String> {
         let test = RoomSettings::test(self.room_test.unwrap_or(1), self.seed.unwrap_or(1));
         let test = test.ok_or("--room-test is from 1 to 72")?;
-        Ok(RoomSettings { repeats: !self.once, ..test })
+        Ok(RoomSettings {
+            action: self.action.unwrap_or_default(),
+            events: self.events.clone(),
+            shadows: self.cast_shadows,
+            reflections: self.reflecting_floor,
+            repeats: !self.once,
+            ..test
+        })
     }
 
     fn home(&self, world: &World) -> Pose {
@@ -262,6 +323,8 @@ impl Options {
             },
             acceleration_deg_s2: self.acceleration,
             command_delay: milliseconds(self.command_delay),
+            command_jitter: milliseconds(self.command_jitter),
+            backlash_deg: self.backlash,
             endless_pan: self.endless_pan,
             ..Kinematics::default()
         };
@@ -293,12 +356,36 @@ fn preset(text: &str) -> Result<(String, Pose), String> {
     read().ok_or_else(|| "must be like Gate=10,-5,3868".into())
 }
 
+/// One of several by its name.
+fn named<T: Copy>(known: &[(T, &str)], text: &str) -> Result<T, String> {
+    known.iter().find(|(_, name)| *name == text).map(|(one, _)| *one).ok_or_else(|| {
+        let names: Vec<_> = known.iter().map(|(_, name)| *name).collect();
+        format!("must be one of {}", names.join(", "))
+    })
+}
+
+fn action(text: &str) -> Result<Action, String> {
+    named(&Action::ALL, text)
+}
+
+fn event(text: &str) -> Result<Event, String> {
+    named(&Event::ALL, text)
+}
+
 fn not_negative(text: &str) -> Result<f64, String> {
     number(text, 0.0..=1e6)
 }
 
 fn positive(text: &str) -> Result<f64, String> {
     number(text, 0.01..=1e6)
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=1.0)
+}
+
+fn filter_share(text: &str) -> Result<f64, String> {
+    number(text, 0.0..=0.95)
 }
 
 fn field_of_view(text: &str) -> Result<f64, String> {
@@ -362,6 +449,13 @@ mod tests {
         assert_eq!(room("--room-test 44"), repeated(44, 1));
         assert_eq!(room("--seed 9 --room-test 7"), repeated(7, 9));
         assert!(!room("--world room --once").repeats);
+        assert_eq!(room("--action cross-alike --seed 2").action, Action::CrossAlike);
+        assert!(settings("--action fly").is_err());
+        let busy = room("--world room --events door,sun --cast-shadows --reflecting-floor");
+        assert_eq!(
+            (busy.events, busy.shadows, busy.reflections),
+            (vec![Event::Door, Event::Sun], true, true)
+        );
         let home = settings("--world room --zoom 500").unwrap().home.unwrap();
         assert_eq!(home, Pose { zoom_step: 500.0, ..repeated(1, 1).home() });
         assert!(matches!(settings("").unwrap().world, World::Synthetic(_)));

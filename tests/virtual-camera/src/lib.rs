@@ -19,6 +19,7 @@ mod clock;
 mod encode;
 mod geometry;
 mod http;
+mod imaging;
 mod kinematics;
 mod pace;
 mod picture;
@@ -36,16 +37,17 @@ mod world;
 pub use camera::VirtualCamera;
 pub use encode::EncodeError;
 pub use geometry::{Matrix, aim, project};
+pub use imaging::Imaging;
 pub use kinematics::{
     Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
 };
 pub use picture::{Picture, Plane};
-pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Video, World};
+pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette};
 pub use world::{
-    Change, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings, Subject,
-    SyntheticSettings, Waypoint, read_mot,
+    Action, Change, Event, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings,
+    Subject, SyntheticSettings, Waypoint, read_mot,
 };
 
 /// Why a camera does not start.

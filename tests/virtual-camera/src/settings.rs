@@ -3,7 +3,9 @@
 use std::{fmt, path::PathBuf, time::Duration};
 
 use crate::{
+    imaging::Imaging,
     kinematics::{Kinematics, Pose},
+    seeded::Seeded,
     world::{RoomSettings, SyntheticSettings},
 };
 
@@ -142,9 +144,50 @@ pub struct Video {
     pub compression: u32,
     /// From light on the sensor to data on the wire.
     pub delay: Duration,
+    /// By how much more, at most, pictures come late; that changes twice a second.
+    pub jitter: Duration,
+    /// Whether nothing comes at all now and then.
+    pub stall: Option<Stall>,
     /// How long the shutter is open in good light: what moves in the picture meanwhile is blurred. In dim light it is
     /// open longer.
     pub exposure: Duration,
+}
+
+/// A network that stands still now and then; what it held back comes all at once.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stall {
+    /// From one beginning to the next; the first is so long after the camera's start.
+    pub every: Duration,
+    /// For how long.
+    pub lasts: Duration,
+}
+
+impl Video {
+    /// When the picture comes that was exposed at a time; of two pictures the later one never comes first.
+    pub(crate) fn arrival(&self, exposure: Duration) -> Duration {
+        let usual = exposure + self.delay + self.jitter.mul_f64(lateness(exposure));
+        let held = self.stall.filter(|stall| !stall.every.is_zero()).and_then(|stall| {
+            let begun = exposure.as_nanos() / stall.every.as_nanos();
+            let since = exposure.as_nanos() % stall.every.as_nanos();
+            let within = begun > 0 && since < stall.lasts.as_nanos();
+            within.then(|| exposure - Duration::from_nanos(since as u64) + stall.lasts + self.delay)
+        });
+        held.map_or(usual, |held| held.max(usual))
+    }
+
+    /// The longest that it takes a picture to come.
+    pub(crate) fn longest_delay(&self) -> Duration {
+        self.delay + self.jitter + self.stall.map_or(Duration::ZERO, |stall| stall.lasts)
+    }
+}
+
+/// How late a picture is, 0 to 1: values by chance half a second apart, straight lines between them, so that a later
+/// picture never overtakes.
+fn lateness(exposure: Duration) -> f64 {
+    let place = exposure.as_secs_f64() * 2.0;
+    let (whole, share) = (place.floor(), place.fract());
+    let at = |index: f64| Seeded::new(index as u64).fork(0x1a7e).unit();
+    at(whole) + (at(whole + 1.0) - at(whole)) * share
 }
 
 impl Default for Video {
@@ -154,6 +197,8 @@ impl Default for Video {
             frame_rate: None,
             compression: 30,
             delay: Duration::from_millis(100),
+            jitter: Duration::ZERO,
+            stall: None,
             exposure: Duration::from_micros(16_667),
         }
     }
@@ -192,6 +237,8 @@ pub struct Settings {
     pub kinematics: Kinematics,
     /// What it sends.
     pub video: Video,
+    /// What it does to its pictures.
+    pub imaging: Imaging,
     /// Named places to go to, besides `Home`; numbered from 2.
     pub presets: Vec<(String, Pose)>,
     /// Whether it has a control queue (`PTZ.Various.V1.CtlQueueing`): who is first in it moves the camera, and must
@@ -222,6 +269,7 @@ impl Default for Settings {
             world: World::Synthetic(SyntheticSettings::default()),
             kinematics: Kinematics::default(),
             video: Video::default(),
+            imaging: Imaging::default(),
             presets: Vec::new(),
             control_queue: None,
             queue_lets_stop: false,
@@ -249,6 +297,27 @@ impl fmt::Debug for Settings {
             .field("world", &self.world)
             .field("kinematics", &self.kinematics)
             .field("video", &self.video)
+            .field("imaging", &self.imaging)
+            .field("home", &self.home)
             .finish_non_exhaustive()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_come_in_order_and_those_held_back_at_once() {
+        let ms = Duration::from_millis;
+        let stall = Some(Stall { every: ms(7000), lasts: ms(600) });
+        let video = Video { jitter: ms(250), stall, ..Video::default() };
+        let times: Vec<_> =
+            (0..500).map(|number| (ms(40 * number), video.arrival(ms(40 * number)))).collect();
+        assert!(times.windows(2).all(|pair| pair[0].1 <= pair[1].1));
+        let late: Vec<_> = times.iter().map(|(exposure, arrival)| *arrival - *exposure).collect();
+        assert!(late.iter().all(|late| (ms(100)..=ms(700)).contains(late)));
+        assert!(late.iter().any(|late| *late > ms(650)));
+        assert_eq!(Video::default().arrival(ms(300)), ms(400));
     }
 }

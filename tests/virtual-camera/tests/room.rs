@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use common::{PATIENCE, client, get};
 use virtual_camera::{
-    Bounds, Clock, GroundTruth, Mask, Pose, RoomSettings, Settings, Video, VirtualCamera, World,
+    Action, Bounds, Clock, GroundTruth, Mask, Pose, RoomSettings, Settings, Video, VirtualCamera, World,
 };
 
 const SIZE: (u32, u32) = (320, 240);
@@ -52,7 +52,11 @@ fn the_person_comes_in_after_two_seconds_and_the_lens_is_the_rooms() {
 fn the_truth_leads_the_camera_to_the_person() {
     let test = 7;
     let time = Duration::from_secs(5);
-    let (pan_deg, tilt_deg) = truth_at(&room(test, 1, None), time).direction_deg.unwrap();
+    let camera = room(test, 1, None);
+    let (pan_deg, tilt_deg) = truth_at(&camera, time).direction_deg.unwrap();
+    // At the edge of a wide view perspective stretches a silhouette: who looks there sees more exactly where its middle is.
+    let towards = Pose { pan_deg, tilt_deg, ..Pose::default() };
+    let (pan_deg, tilt_deg) = camera.ground_truth_from(&towards, time, SIZE)[0].direction_deg.unwrap();
     for zoom_step in [1.0, 1500.0] {
         let camera = room(test, 1, Some(Pose { pan_deg, tilt_deg, zoom_step }));
         let truth = truth_at(&camera, time);
@@ -128,4 +132,73 @@ async fn who_looks_away_sees_nobody_and_is_not_in_the_overview() {
     let report = get(&client(), &camera, "/api/status").await.1;
     assert!(report.contains("\"outline\":[]") && report.contains("\"pan_deg\":165.0"), "{report}");
     assert_eq!(camera.ground_truth(Duration::ZERO, SIZE), []);
+}
+
+/// A camera that looks where somebody does something, the way of test 1 apart.
+fn acting(action: Action, seed: u64) -> VirtualCamera {
+    let world = World::Room(RoomSettings { action, ..RoomSettings::test(1, seed).unwrap() });
+    let video = Video { size: Some(SIZE), ..Video::default() };
+    VirtualCamera::start(Settings { world, video, clock: Clock::Stepped, ..Settings::default() }).unwrap()
+}
+
+/// Everybody at times so many milliseconds apart, in a picture that holds the whole way.
+fn everybody(action: Action, seed: u64, step_ms: u64) -> Vec<Vec<GroundTruth>> {
+    let camera = acting(action, seed);
+    let room = RoomSettings { action, ..RoomSettings::test(1, seed).unwrap() };
+    let ahead = Pose { tilt_deg: -12.0, ..Pose::default() };
+    let times =
+        (0..).map(|step| step * Duration::from_millis(step_ms)).take_while(|time| *time < room.duration());
+    times.map(|time| camera.ground_truth_from(&ahead, time, SIZE)).collect()
+}
+
+#[test]
+fn two_who_cross_hide_one_another_once() {
+    for seed in 1..3 {
+        for action in [Action::Cross, Action::CrossAlike] {
+            let moments = everybody(action, seed, 60);
+            assert!(moments.iter().all(|people| people.iter().all(|one| [1, 2].contains(&one.id))));
+            let both = moments.iter().filter(|people| people.len() == 2).count();
+            assert!(both * 2 > moments.len(), "{both}");
+            let hidden = |people: &[GroundTruth]| people.iter().any(|one| one.unhidden < 0.6);
+            let times = moments.windows(2).filter(|pair| !hidden(&pair[0]) && hidden(&pair[1])).count();
+            assert_eq!(times, 1, "{action:?} {seed}");
+            // They change sides.
+            let side = |people: &[GroundTruth]| {
+                let x = |id| people.iter().find(|one| one.id == id).map(|one| one.centroid.0);
+                x(1).zip(x(2)).map(|(one, other)| one < other)
+            };
+            let sides: Vec<bool> = moments.iter().filter_map(|people| side(people)).collect();
+            assert_ne!(sides.first(), sides.last());
+        }
+    }
+}
+
+#[test]
+fn two_who_part_are_close_at_first_and_far_apart_in_the_end() {
+    for seed in 1..4 {
+        let apart: Vec<f64> = everybody(Action::Part, seed, 400)
+            .iter()
+            .filter_map(|people| {
+                let [one, other] = &people[..] else { return None };
+                let (a, b) = (one.position_m?, other.position_m?);
+                Some((a[0] - b[0]).hypot(a[2] - b[2]))
+            })
+            .collect();
+        assert!(apart[0] < 1.0 && *apart.last().unwrap() > 3.0, "{apart:?}");
+    }
+}
+
+#[test]
+fn nobody_is_nobody_and_somebody_alone_is_one() {
+    for action in [Action::StopAndGo, Action::Sit, Action::Approach, Action::Run] {
+        let moments = everybody(action, 2, 200);
+        assert!(moments.iter().all(|people| people.len() <= 1), "{action:?}");
+        assert!((40..220).contains(&moments.len()), "{action:?} {}", moments.len());
+    }
+    let camera = acting(Action::Nobody, 1);
+    for second in [0, 60, 599] {
+        let (time, home) = (Duration::from_secs(second), camera.home());
+        assert!(camera.ground_truth_from(&home, time, SIZE).is_empty());
+    }
+    assert_eq!(RoomSettings { action: Action::Nobody, ..RoomSettings::default() }.duration().as_secs(), 600);
 }

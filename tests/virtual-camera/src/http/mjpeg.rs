@@ -62,7 +62,7 @@ fn stream(camera: &Arc<Camera>, wish: Wish, end: &End, encoder: &JpegEncoder, cl
         let exposure = pace.next_exposure();
         let over = end.after.is_some_and(|after| exposure.saturating_sub(first) > after)
             || end.pictures.is_some_and(|pictures| sent >= pictures);
-        if over || client.is_closed() || !camera.wait_until(exposure + camera.settings.video.delay) {
+        if over || client.is_closed() || !camera.wait_until(camera.arrival(exposure)) {
             return;
         }
         let picture =
@@ -75,7 +75,7 @@ fn stream(camera: &Arc<Camera>, wish: Wish, end: &End, encoder: &JpegEncoder, cl
             Err(mpsc::error::TrySendError::Full(_)) => {}
             Err(mpsc::error::TrySendError::Closed(_)) => return,
         }
-        pace.advance(camera.newest_exposure());
+        pace.advance(camera.oldest_pending());
     }
 }
 

@@ -7,7 +7,7 @@ use super::{
     motor::{Drive, Motor},
     within_a_turn,
 };
-use crate::geometry;
+use crate::{geometry, seeded::Seeded};
 
 /// The head moves in steps of this length: fine enough for 450 °/s, and the same result however it is asked.
 const STEP: Duration = Duration::from_millis(2);
@@ -99,6 +99,10 @@ pub struct Head {
     unlimited: bool,
     move_speed: f64,
     pending: VecDeque<(u64, Motion)>,
+    /// Commands that ever came.
+    commands: u64,
+    /// Where the camera itself looks, behind the play of the gears.
+    view: Pose,
     history: VecDeque<Snapshot>,
     memory: Duration,
 }
@@ -120,9 +124,12 @@ impl Head {
             unlimited: false,
             move_speed: 100.0,
             pending: VecDeque::new(),
+            commands: 0,
+            view: home,
             history: VecDeque::new(),
             memory,
         };
+        head.view = head.pose();
         head.remember();
         head
     }
@@ -130,8 +137,12 @@ impl Head {
     /// A command that arrives `at` this time: it acts after the command delay.
     pub fn command(&mut self, at: Duration, motion: Motion) {
         self.advance(at);
-        let acts = (at + self.kinematics.command_delay).as_nanos().div_ceil(STEP.as_nanos());
-        self.pending.push_back((acts as u64, motion));
+        self.commands += 1;
+        let late = self.kinematics.command_jitter.mul_f64(Seeded::new(self.commands).unit());
+        let acts = (at + self.kinematics.command_delay + late).as_nanos().div_ceil(STEP.as_nanos()) as u64;
+        // They act in the order in which they came.
+        let acts = self.pending.back().map_or(acts, |&(before, _)| acts.max(before));
+        self.pending.push_back((acts, motion));
     }
 
     /// Lets time pass until `to`; time already past stays as it was.
@@ -161,6 +172,12 @@ impl Head {
         for motor in [&mut self.pan, &mut self.tilt, &mut self.zoom] {
             motor.step(STEP.as_secs_f64());
         }
+        let play = self.kinematics.backlash_deg / 2.0;
+        self.view = Pose {
+            pan_deg: self.view.pan_deg.clamp(self.pan.position - play, self.pan.position + play),
+            tilt_deg: self.view.tilt_deg.clamp(self.tilt.position - play, self.tilt.position + play),
+            zoom_step: self.zoom.position,
+        };
         self.ticks += 1;
     }
 
@@ -264,10 +281,15 @@ impl Head {
         }
     }
 
+    /// The same, with where the camera itself looks.
+    fn seen(&self) -> Snapshot {
+        Snapshot { pose: self.view, ..self.now() }
+    }
+
     /// Where it looked at a time not longer ago than its memory.
     pub fn pose_at(&self, time: Duration) -> Pose {
         let after = self.history.partition_point(|past| past.time < time);
-        let later = self.history.get(after).copied().unwrap_or_else(|| self.now());
+        let later = self.history.get(after).copied().unwrap_or_else(|| self.seen());
         let Some(earlier) = after.checked_sub(1).and_then(|before| self.history.get(before)) else {
             return later.pose;
         };
@@ -283,7 +305,7 @@ impl Head {
     }
 
     fn remember(&mut self) {
-        let now = self.now();
+        let now = self.seen();
         self.history.push_back(now);
         while self.history.get(1).is_some_and(|past| past.time + self.memory < now.time) {
             self.history.pop_front();
@@ -324,6 +346,37 @@ mod tests {
 
     fn ms(milliseconds: u64) -> Duration {
         Duration::from_millis(milliseconds)
+    }
+
+    #[test]
+    fn play_is_taken_up_before_the_camera_turns_back() {
+        let kinematics = Kinematics { backlash_deg: 0.3, ..Kinematics::default() };
+        let optics = Optics { wide_fov_deg: 55.2, max_magnification: 18.0 };
+        let limits = Limits { pan_deg: (-180.0, 180.0), tilt_deg: (-90.0, 20.0) };
+        let mut head = Head::new(kinematics, optics, limits, Pose::default(), Duration::from_secs(2));
+        let to = |pan_deg| Motion::Absolute { pan_deg: Some(pan_deg), tilt_deg: None, zoom_step: None };
+        head.command(ms(0), to(10.0));
+        head.advance(ms(2000));
+        assert!((head.now().pose.pan_deg - 10.0).abs() < 1e-9);
+        assert!((head.pose_at(ms(2000)).pan_deg - 9.85).abs() < 1e-9);
+        head.command(ms(2000), to(9.8));
+        head.advance(ms(3000));
+        assert!((head.pose_at(ms(3000)).pan_deg - 9.85).abs() < 1e-9, "within the play");
+        head.command(ms(3000), to(9.0));
+        head.advance(ms(5000));
+        assert!((head.pose_at(ms(5000)).pan_deg - 9.15).abs() < 1e-9);
+    }
+
+    #[test]
+    fn late_commands_act_in_order() {
+        let kinematics = Kinematics { command_jitter: ms(245), ..Kinematics::default() };
+        let mut head = Head { kinematics, ..head() };
+        for number in 0..20 {
+            head.command(ms(10 * number), Motion::Speed(1.0 + number as f64));
+        }
+        head.advance(ms(1000));
+        assert_eq!(head.move_speed(), 20.0);
+        assert!(head.is_at_rest());
     }
 
     #[test]

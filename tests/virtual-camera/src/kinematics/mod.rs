@@ -78,6 +78,10 @@ pub struct Kinematics {
     pub acceleration_deg_s2: f64,
     /// From a command's arrival to the first movement.
     pub command_delay: Duration,
+    /// By how much later, at most, a command acts; each has its own.
+    pub command_jitter: Duration,
+    /// Play between motor and camera, pan and tilt, in degrees: positions told are the motor's.
+    pub backlash_deg: f64,
     /// How far it turns; `None` is as far as there is a world to see.
     pub limits: Option<Limits>,
     /// Pan turns round and round; its limits are told as -180 and 180 degrees, which are no ends then.
@@ -112,6 +116,8 @@ impl Default for Kinematics {
             },
             acceleration_deg_s2: 400.0,
             command_delay: Duration::from_millis(60),
+            command_jitter: Duration::ZERO,
+            backlash_deg: 0.0,
             limits: None,
             endless_pan: false,
             max_magnification: None,

@@ -32,7 +32,7 @@ impl Codec {
             Self::Mpeg4 => format!(
                 "avenc_mpeg4 name=encoder gop-size={} pass=quant quantizer={} ! rtpmp4vpay config-interval=1 pt=96",
                 Self::key_interval(wish),
-                2 + wish.compression / 10
+                quantizer(wish.compression)
             ),
             Self::Jpeg => format!("jpegenc quality={} ! rtpjpegpay pt=26", 100 - wish.compression.min(99)),
         };
@@ -53,4 +53,9 @@ impl Codec {
         let share = (100.0 - f64::from(wish.compression.min(95))) / 100.0;
         (pixels * 0.2 * share).max(64_000.0) as u64
     }
+}
+
+/// MPEG-4's quantizer at a VAPIX compression: 2 (best) to 31.
+fn quantizer(compression: u32) -> u32 {
+    (2 + compression / 10 + compression.saturating_sub(50) / 3).min(31)
 }

@@ -117,7 +117,7 @@ fn feed(camera: &Arc<Camera>, source: &glib::WeakRef<gst_app::AppSrc>, wish: Wis
     let mut origin = None;
     loop {
         let exposure = pace.next_exposure();
-        if !camera.wait_until(exposure + camera.settings.video.delay) {
+        if !camera.wait_until(camera.arrival(exposure)) {
             return;
         }
         let buffer = camera.picture(exposure, wish.size).ok().and_then(|picture| picture.to_buffer(&info));
@@ -133,6 +133,6 @@ fn feed(camera: &Arc<Camera>, source: &glib::WeakRef<gst_app::AppSrc>, wish: Wis
         if source.push_buffer(buffer).is_err() {
             return;
         }
-        pace.advance(camera.newest_exposure());
+        pace.advance(camera.oldest_pending());
     }
 }

@@ -15,7 +15,7 @@ pub use footage::FootageError;
 pub use mot::{MotError, People, read as read_mot};
 use panorama::Panorama;
 pub use panorama::Person;
-pub use room::{Change, Lighting, Occlusion, RoomSettings, Subject};
+pub use room::{Action, Change, Event, Lighting, Occlusion, RoomSettings, Subject};
 pub use synthetic::{SyntheticSettings, Waypoint};
 
 use crate::{

@@ -1,5 +1,8 @@
-//! A made-up room around the camera, with one person walking in it.
+//! A made-up room around the camera, with people walking in it.
 
+mod action;
+mod effects;
+mod event;
 pub(crate) mod light;
 mod raster;
 mod scene;
@@ -9,5 +12,7 @@ pub(crate) mod view;
 mod walker;
 mod world;
 
+pub use action::Action;
+pub use event::Event;
 pub use settings::{Change, Lighting, Occlusion, RoomSettings, Subject};
 pub(crate) use world::Room;

@@ -2,8 +2,12 @@
 
 use std::time::Duration;
 
-use super::walker::Walk;
+use super::{action::Action, event::Event, walker::Walk};
 use crate::kinematics::Pose;
+
+/// How long nobody is there where nobody comes, and where the camera looks then.
+const NOBODY_THERE: Duration = Duration::from_secs(600);
+const STRAIGHT_AHEAD: Pose = Pose { pan_deg: 0.0, tilt_deg: -13.0, zoom_step: 1.0 };
 
 /// How much light there is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -60,6 +64,14 @@ pub struct RoomSettings {
     pub direction: Change,
     /// Who walks.
     pub subject: Subject,
+    /// What goes on instead of a test; of a test's settings light and subject count in any case.
+    pub action: Action,
+    /// What happens besides.
+    pub events: Vec<Event>,
+    /// Whether low sun lets people cast long shadows.
+    pub shadows: bool,
+    /// Whether the floor reflects people.
+    pub reflections: bool,
     /// Whether the person walks the same way again after the end of it, for ever.
     pub repeats: bool,
 }
@@ -74,6 +86,10 @@ impl Default for RoomSettings {
             speed: Change::Fixed,
             direction: Change::Fixed,
             subject: Subject::A,
+            action: Action::Test,
+            events: Vec::new(),
+            shadows: false,
+            reflections: false,
             repeats: false,
         }
     }
@@ -91,6 +107,10 @@ impl RoomSettings {
             occlusion: [Occlusion::None, Occlusion::Partial, Occlusion::Full][index / 6 % 3],
             speed: change(index / 18),
             direction: change(index / 36),
+            action: Action::Test,
+            events: Vec::new(),
+            shadows: false,
+            reflections: false,
             repeats: false,
         })
     }
@@ -107,17 +127,20 @@ impl RoomSettings {
     /// nothing else differs between them (thesis 5.1).
     pub fn way(&self) -> u64 {
         let plain = Self { lighting: Lighting::Optimal, occlusion: Occlusion::None, ..self.clone() };
-        u64::from(plain.number())
+        match self.action {
+            Action::Test => u64::from(plain.number()),
+            action => action.way(),
+        }
     }
 
     /// From the start of the world, empty for two seconds, to the end of the person's way.
     pub fn duration(&self) -> Duration {
-        Duration::from_secs_f64(Walk::new(self).duration())
+        Walk::new(self).map_or(NOBODY_THERE, |walk| Duration::from_secs_f64(walk.duration()))
     }
 
     /// Where the camera looks at first: the person comes in at the side of the widest view.
     pub fn home(&self) -> Pose {
-        Walk::new(self).home()
+        Walk::new(self).map_or(STRAIGHT_AHEAD, |walk| walk.home())
     }
 }
 

@@ -1,13 +1,14 @@
-//! Scene, person and sensor together: a world for the camera.
+//! Scene, people and sensor together: a world for the camera.
 
 use std::{sync::Arc, time::Duration};
 
 use super::{
+    effects::Effects,
     scene::{Scene, Style},
     sensor::{Sensor, soften},
     settings::RoomSettings,
     view::View,
-    walker::{BodyPose, MOMENTS, Walker},
+    walker::{BodyPose, MOMENTS, Walker, obstacles},
 };
 use crate::{
     geometry::{Pinhole, aim},
@@ -35,24 +36,35 @@ const MEASURED: f64 = 400.0;
 /// Stream of chance of the sensor.
 const SENSOR: u64 = 0x5e25;
 
-/// A room with a person in it.
+/// A room with people in it.
 pub(crate) struct Room {
     scene: Scene,
-    walker: Walker,
+    /// The person to be followed first.
+    walkers: Vec<Walker>,
+    effects: Effects,
     sensor: Sensor,
     optics: Optics,
     view_size: (u32, u32),
 }
 
+/// Somebody at a moment.
+struct Body<'a> {
+    /// From 1; 1 is to be followed.
+    id: u32,
+    walker: &'a Walker,
+    pose: BodyPose,
+}
+
 impl Room {
     pub fn new(room: &RoomSettings, settings: &Settings) -> Self {
         let seeded = Seeded::new(room.seed);
-        let walker = Walker::new(room);
-        let obstacle = walker.obstacle(room);
+        let walkers = Walker::all(room);
+        let obstacles = obstacles(&walkers, room);
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         Self {
-            scene: Scene::new(room.seed, obstacle.as_slice()),
-            walker,
+            scene: Scene::new(room.seed, &obstacles, &room.events),
+            walkers,
+            effects: Effects::new(room),
             sensor: Sensor::new(
                 room.lighting,
                 Style::of(room.seed).night,
@@ -63,8 +75,14 @@ impl Room {
         }
     }
 
-    fn body_at(&self, time: Duration) -> BodyPose {
-        self.walker.pose_at(time.as_secs_f64())
+    /// Everybody at a time, the farthest from the camera first.
+    fn bodies_at<'a>(&'a self, time: Duration) -> Vec<Body<'a>> {
+        let body =
+            |(id, walker): (u32, &'a Walker)| Body { id, walker, pose: walker.pose_at(time.as_secs_f64()) };
+        let mut bodies: Vec<_> = (1..).zip(&self.walkers).map(body).collect();
+        let away = |body: &Body| body.pose.place[0].hypot(body.pose.place[2]);
+        bodies.sort_by(|one, other| away(other).total_cmp(&away(one)));
+        bodies
     }
 
     fn view(&self, pose: &Pose, size: (u32, u32)) -> View {
@@ -81,39 +99,56 @@ impl Room {
         seen: impl Fn(f64) -> View,
     ) -> Picture {
         let time = exposure.time.as_secs_f64();
-        let body = self.body_at(exposure.time);
+        let bodies = self.bodies_at(exposure.time);
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
         self.scene.draw_shell(view, &mut canvas);
-        self.walker.draw_shadow(&body, view, &mut canvas);
-        self.scene.draw_pieces(view, &mut canvas);
+        bodies.iter().for_each(|body| body.walker.draw_shadow(&body.pose, view, &mut canvas));
+        let people: Vec<_> = bodies.iter().map(|body| (body.walker, &body.pose)).collect();
+        self.effects.on_floor(&people, time, view, &self.scene.light, &mut canvas);
+        self.scene.draw_pieces(time, view, &mut canvas);
         motion_blur(&mut canvas, sweep.0, sweep.1);
         let views = std::array::from_fn(|moment| seen((moment as f64 + 0.5) / MOMENTS as f64));
-        if let Some(layer) =
-            self.walker.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light)
-        {
-            let close = layer.view(view);
-            let mut unhidden = Plane::filled(close.size.0, close.size.1, 255);
-            self.scene.hide(body.place, &close, &mut unhidden);
-            layer.over(&mut canvas, unhidden, sweep);
+        // Who is nearer is laid over who is farther away.
+        for Body { walker, pose, .. } in &bodies {
+            let layer = walker.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light);
+            if let Some(layer) = layer {
+                let close = layer.view(view);
+                let mut unhidden = Plane::filled(close.size.0, close.size.1, 255);
+                self.scene.hide(pose.place, time, &close, &mut unhidden);
+                layer.over(&mut canvas, unhidden, sweep);
+            }
         }
+        self.effects.switch(time, &mut canvas);
         canvas.planes.iter_mut().for_each(soften);
         self.sensor.expose(&mut canvas, self.frame_at(exposure.time), time);
         canvas
     }
 
-    /// What of the body is seen through a view: all of it, and what nothing hides.
-    fn body(&self, body: &BodyPose, view: &View) -> [Plane; 2] {
-        let mut whole = Plane::filled(view.size.0, view.size.1, 0);
-        self.walker.silhouette(body, view, &mut whole);
+    /// What is seen through a view of the first of `bodies`, which the others are nearer than: all of it, and what
+    /// nothing hides.
+    fn shape(&self, bodies: &[Body], time: Duration, view: &View) -> [Plane; 2] {
+        let mut shapes = bodies.iter().map(|body| {
+            let mut shape = Plane::filled(view.size.0, view.size.1, 0);
+            body.walker.silhouette(&body.pose, view, &mut shape);
+            shape
+        });
+        let whole = shapes.next().unwrap_or_else(|| Plane::filled(view.size.0, view.size.1, 0));
         let mut unhidden = whole.clone();
-        self.scene.hide(body.place, view, &mut unhidden);
+        if let Some(body) = bodies.first() {
+            self.scene.hide(body.pose.place, time.as_secs_f64(), view, &mut unhidden);
+        }
+        for nearer in shapes {
+            let hidden = unhidden.data.iter_mut().zip(nearer.data).filter(|(_, nearer)| *nearer > 0);
+            hidden.for_each(|(pixel, _)| *pixel = 0);
+        }
         [whole, unhidden]
     }
 
-    /// The person in a view, inside of it or not; `None` unless all of them is ahead of the camera.
-    fn person(&self, time: Duration, pose: &Pose, size: (u32, u32)) -> Option<Sighting> {
-        let (body, view) = (self.body_at(time), self.view(pose, size));
-        let [left, top, right, bottom] = self.walker.bounds(&body, &view)?;
+    /// The first of `bodies`, which the others are nearer than, in a view, inside of it or not; `None` unless all of them
+    /// is ahead of the camera.
+    fn person(&self, bodies: &[Body], time: Duration, pose: &Pose, size: (u32, u32)) -> Option<Sighting> {
+        let (body, view) = (bodies.first()?, self.view(pose, size));
+        let [left, top, right, bottom] = body.walker.bounds(&body.pose, &view)?;
         let bounds = Bounds { left, top, width: right - left, height: bottom - top };
         // A picture of the body alone, with a pixel around it.
         let scale = (MEASURED / bounds.width.max(bounds.height)).min(1.0);
@@ -124,7 +159,7 @@ impl Room {
         };
         let length = |length: f64| (length * scale).ceil() as usize + 2;
         let close = view.through(pinhole, (length(bounds.width), length(bounds.height)));
-        let [whole, unhidden] = self.body(&body, &close);
+        let [whole, unhidden] = self.shape(bodies, time, &close);
         let place = |column: usize, row: usize| {
             ((column as f64 - 0.5) / scale + left, (row as f64 - 0.5) / scale + top)
         };
@@ -143,13 +178,13 @@ impl Room {
         let ray = |place: f64, centre: f64| (place - 0.5 - centre) / view.pinhole.focal;
         let (x, y) = (ray(centroid.0, view.pinhole.centre_x), ray(centroid.1, view.pinhole.centre_y));
         let truth = GroundTruth {
-            id: 1,
+            id: body.id,
             bounds,
             centroid,
             visible: share(Weight::of(&unhidden, inside)),
             unhidden: share(Weight::of(&unhidden, |_, _| true)),
             in_view: share(Weight::of(&whole, inside)),
-            position_m: Some(body.place),
+            position_m: Some(body.pose.place),
             direction_deg: Some(aim(pose, x, y)),
         };
         let pixel = 1.0 / scale;
@@ -225,12 +260,21 @@ impl World for Room {
     }
 
     fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
-        self.person(exposure.time, &exposure.opening, size).into_iter().collect()
+        let (bodies, time) = (self.bodies_at(exposure.time), exposure.time);
+        let person = |first| self.person(&bodies[first..], time, &exposure.opening, size);
+        let mut people: Vec<_> = (0..bodies.len()).filter_map(person).collect();
+        people.sort_by_key(|person| person.truth.id);
+        people
     }
 
     fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask> {
-        let [_, unhidden] = self.body(&self.body_at(exposure.time), &self.view(&exposure.opening, size));
-        Some(mask(unhidden))
+        let (bodies, view) = (self.bodies_at(exposure.time), self.view(&exposure.opening, size));
+        let mut seen = Plane::filled(view.size.0, view.size.1, 0);
+        for first in 0..bodies.len() {
+            let [_, unhidden] = self.shape(&bodies[first..], exposure.time, &view);
+            seen.data.iter_mut().zip(unhidden.data).for_each(|(pixel, one)| *pixel = one.max(*pixel));
+        }
+        Some(mask(seen))
     }
 
     fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {

@@ -125,6 +125,7 @@ impl Hall {
             (Obstacle::Furniture, 0) => painter.sideboard(at, seeded),
             (Obstacle::Furniture, 1) => painter.sofa(at, seeded),
             (Obstacle::Furniture, _) => painter.counter(at, seeded),
+            (Obstacle::Sofa, _) => painter.sofa(at, seeded),
             (Obstacle::Screen, 0) => painter.screen(at, seeded),
             (Obstacle::Screen, _) => painter.pillar(at, &painter.wall(Wall::Plaster, self.style.wall)),
         }

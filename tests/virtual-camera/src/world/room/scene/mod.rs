@@ -4,6 +4,7 @@ mod furniture;
 mod hall;
 mod lighting;
 mod look;
+mod moving;
 mod paint;
 mod solid;
 mod standing;
@@ -12,13 +13,17 @@ mod style;
 mod things;
 mod walls;
 
+use std::{borrow::Cow, collections::BTreeMap};
+
 use furniture::Piece;
 use hall::Hall;
+use moving::Moving;
 pub(super) use solid::Solid;
 use stuff::Painter;
 pub(super) use style::Style;
 
 use super::{
+    event::Event,
     light::Light,
     raster::{Surface, cover},
     view::{Canvas, Vector, View},
@@ -32,6 +37,8 @@ pub(super) enum Obstacle {
     Furniture,
     /// Something as high as a person, or the room.
     Screen,
+    /// To sit down on.
+    Sofa,
 }
 
 /// Nobody reaches higher, in metres.
@@ -43,13 +50,16 @@ pub(super) struct Scene {
     shell: Vec<Surface>,
     /// What stands in the room, in the order of drawing.
     pieces: Vec<Piece>,
+    /// Those of them that move, by their place in that order.
+    moving: BTreeMap<usize, Moving>,
     /// The light it stands in.
     pub light: Light,
 }
 
 impl Scene {
-    /// The room of a seed. `obstacles` stand on the floor where their boxes are; what they are is up to the seed.
-    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Self {
+    /// The room of a seed with what `events` need. `obstacles` stand on the floor where their boxes are; what they are is
+    /// up to the seed.
+    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event]) -> Self {
         let (seeded, style) = (Seeded::new(seed), Style::of(seed));
         let painter = Painter::new(seeded.fork(1));
         let mut hall = Hall::new(style, &mut seeded.fork(2));
@@ -58,9 +68,15 @@ impl Scene {
         for &(kind, solid) in obstacles {
             pieces.extend(hall.obstacle(kind, solid, &painter, &mut choice));
         }
+        let things = events.iter().flat_map(|event| moving::things(*event, &painter, &seeded.fork(5)));
+        let (own, movings): (Vec<_>, Vec<_>) = things.unzip();
+        let solids: Vec<Solid> = own.iter().map(|piece| piece.solid).collect();
+        pieces.extend(own);
         let mut pieces = in_order(pieces);
         lighting::light(&hall, &mut shell, &mut pieces);
-        Self { shell, pieces, light: hall.light }
+        let place = |solid: &Solid| pieces.iter().position(|piece| piece.solid == *solid);
+        let moving = solids.iter().zip(movings).filter_map(|(solid, moving)| Some((place(solid)?, moving?)));
+        Self { moving: moving.collect(), shell, pieces, light: hall.light }
     }
 
     /// Draws walls, floor and ceiling, and what hangs there.
@@ -68,16 +84,30 @@ impl Scene {
         self.shell.iter().for_each(|surface| surface.draw(view, canvas));
     }
 
-    /// Draws all that stands in the room.
-    pub fn draw_pieces(&self, view: &View, canvas: &mut Canvas) {
-        self.pieces.iter().flat_map(|piece| &piece.surfaces).for_each(|surface| surface.draw(view, canvas));
+    /// What stands in the room as it is at a time in seconds.
+    fn standing(&self, time: f64) -> impl Iterator<Item = (&Solid, Cow<'_, [Surface]>)> {
+        self.pieces.iter().enumerate().map(move |(index, piece)| {
+            let surfaces =
+                self.moving.get(&index).map_or(Cow::Borrowed(piece.surfaces.as_slice()), |moving| {
+                    Cow::Owned(moving.surfaces(&piece.surfaces, time))
+                });
+            (&piece.solid, surfaces)
+        })
     }
 
-    /// Takes out of `mask` (of the size of the view) what is hidden by what stands before a person with these feet.
-    pub fn hide(&self, feet: Vector, view: &View, mask: &mut Plane) {
+    /// Draws all that stands in the room, as it is at a time in seconds.
+    pub fn draw_pieces(&self, time: f64, view: &View, canvas: &mut Canvas) {
+        for (_, surfaces) in self.standing(time) {
+            surfaces.iter().for_each(|surface| surface.draw(view, canvas));
+        }
+    }
+
+    /// Takes out of `mask` (of the size of the view) what is hidden by what stands before a person with these feet,
+    /// at a time in seconds.
+    pub fn hide(&self, feet: Vector, time: f64, view: &View, mask: &mut Plane) {
         let head = [feet[0], feet[1] + TALLEST, feet[2]];
-        for piece in self.pieces.iter().filter(|piece| piece.solid.hides(&[feet, head])) {
-            for surface in &piece.surfaces {
+        for (_, surfaces) in self.standing(time).filter(|(solid, _)| solid.hides(&[feet, head])) {
+            for surface in surfaces.iter() {
                 cover(&surface.polygon(view), view.size, |covered| {
                     let line = &mut mask.data[covered.row * view.size.0..][..view.size.0];
                     line[covered.whole.clone()].fill(0);

@@ -11,7 +11,7 @@ const UP: Vector = [0.0, 1.0, 0.0];
 pub(super) const DOWN: Vector = [0.0, -1.0, 0.0];
 
 /// A box upright on something, turned about its upright axis.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Solid {
     /// Middle of its bottom.
     pub base: Vector,

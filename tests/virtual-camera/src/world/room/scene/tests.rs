@@ -13,12 +13,12 @@ fn view(pan_deg: f64, tilt_deg: f64, fov_deg: f64) -> View {
 fn picture(scene: &Scene, view: &View) -> Canvas {
     let mut canvas = Canvas::grey(320, 240, 0);
     scene.draw_shell(view, &mut canvas);
-    scene.draw_pieces(view, &mut canvas);
+    scene.draw_pieces(0.0, view, &mut canvas);
     canvas
 }
 
 fn scene(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Scene {
-    Scene::new(seed, obstacles)
+    Scene::new(seed, obstacles, &[])
 }
 
 fn spread(plane: &Plane) -> f64 {
@@ -94,7 +94,7 @@ fn a_screen_hides_who_is_behind_it_and_nobody_else() {
         for &(x, y) in &figure {
             mask.data[y * 320 + x] = 255;
         }
-        room.hide(feet, &view, &mut mask);
+        room.hide(feet, 0.0, &view, &mut mask);
         figure.iter().filter(|&&(x, y)| mask.data[y * 320 + x] == 255).count()
     };
     // Behind it on the line of sight through its middle, beside it, and in front of it.
@@ -125,7 +125,7 @@ fn what_fills_a_room_hides_nobody_on_the_way() {
             let feet = [x, 0.0, z];
             let view = view(f64::atan2(x, z).to_degrees(), -16.0, 30.0);
             let mut mask = Plane::filled(320, 240, 255);
-            room.hide(feet, &view, &mut mask);
+            room.hide(feet, 0.0, &view, &mut mask);
             for height in [0.05, 0.5, 1.8] {
                 let ((column, row), _) = view.pixel(add(feet, [0.0, height, 0.0])).unwrap();
                 assert_eq!(mask.data[row as usize * 320 + column as usize], 255, "seed {seed}: {feet:?}");
@@ -153,4 +153,27 @@ fn half_of_the_rooms_are_full_and_by_night_only_lamps_stand_out() {
         }
     } // As many of the ones as of the others.
     assert!(things[1] > 3 * things[0] / 2, "{things:?}");
+}
+
+#[test]
+fn what_moves_moves_and_nothing_else_does() {
+    let picture = |scene: &Scene, time: f64| {
+        let (view, mut canvas) = (view(0.0, -10.0, 55.0), Canvas::grey(320, 240, 0));
+        scene.draw_shell(&view, &mut canvas);
+        scene.draw_pieces(time, &view, &mut canvas);
+        canvas
+    };
+    let still = scene(1, &[]);
+    assert_eq!(picture(&still, 0.0), picture(&still, 60.0));
+    for event in [Event::Door, Event::Film, Event::Draught] {
+        let scene = Scene::new(1, &[], &[event]);
+        let pictures: Vec<_> = (0..300).map(|second| picture(&scene, f64::from(second) * 0.7)).collect();
+        assert!(pictures.windows(2).any(|pair| pair[0] != pair[1]), "{event:?}");
+        assert_eq!(pictures[7], picture(&scene, 7.0 * 0.7), "{event:?}");
+        let changed = |a: &Canvas, b: &Canvas| {
+            a.planes[0].data.iter().zip(&b.planes[0].data).filter(|(a, b)| a.abs_diff(**b) > 20).count()
+        };
+        let most = pictures.iter().map(|other| changed(&pictures[0], other)).max().unwrap();
+        assert!((100..12_000).contains(&most), "{event:?} {most}");
+    }
 }

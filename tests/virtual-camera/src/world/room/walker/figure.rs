@@ -135,6 +135,7 @@ impl Build {
     pub fn cadence(&self, speed: f64, turning: f64) -> f64 {
         let usual = super::walk::SPEED;
         let walking = usual / self.stride * (speed.max(0.0) / usual).sqrt();
-        walking.hypot(turning / 2.1).min(1.3)
+        let most = if speed > 2.5 { 1.45 } else { 1.3 };
+        walking.hypot(turning / 2.1).min(most)
     }
 }

@@ -34,6 +34,16 @@ pub(crate) struct Patch {
     pub columns: usize,
 }
 
+impl Patch {
+    /// The same skin elsewhere, by place and normal of each vertex.
+    pub fn moved(mut self, to: impl Fn(Vector, Vector) -> (Vector, Vector)) -> Self {
+        for vertex in &mut self.vertices {
+            (vertex.place, vertex.normal) = to(vertex.place, vertex.normal);
+        }
+        self
+    }
+}
+
 /// How finely skins are cut: corners of a ring, and steps between two rings.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Detail {

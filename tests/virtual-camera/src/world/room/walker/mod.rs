@@ -1,6 +1,7 @@
-//! The person who walks through the room: their way, their gait, their body and clothes, and how they are drawn.
+//! The people who walk through the room: their ways, their gait, their bodies and clothes, and how they are drawn.
 
 mod body;
+mod cast;
 mod clothes;
 mod figure;
 mod fill;
@@ -10,14 +11,17 @@ mod mesh;
 mod obstruction;
 mod paint;
 mod pattern;
+mod route;
 mod walk;
 mod wardrobe;
 
 pub(crate) use gait::BodyPose;
 pub(crate) use layer::{Layer, MOMENTS};
+pub(super) use obstruction::obstacles;
 pub(crate) use walk::Walk;
 
 use self::{
+    cast::Role,
     clothes::Outfit,
     figure::Build,
     gait::Gait,
@@ -25,16 +29,23 @@ use self::{
     paint::Moment,
 };
 use super::{
+    action::Action,
     light::Light,
-    scene::{Obstacle, Solid, Style},
-    settings::RoomSettings,
-    view::{Canvas, View, add, scale},
+    scene::Style,
+    settings::{RoomSettings, Subject},
+    view::{Canvas, Vector, View, add, scale},
 };
 use crate::{picture::Plane, seeded::Seeded};
 
 /// Streams of chance: who somebody is depends on the seed and the subject alone, how they step off on the way too.
 const PERSON: u64 = 0xb0d7;
 const STEP: u64 = 0x57e9;
+
+/// Body and clothes of the subject of a seed.
+fn person(settings: &RoomSettings, subject: Subject) -> (Build, Outfit) {
+    let mut chance = Seeded::new(settings.seed).fork(PERSON).fork(subject as u64);
+    (Build::of(subject, &mut chance), Outfit::of(subject, Style::of(settings.seed).wall, &mut chance))
+}
 
 /// One person on their way.
 pub(crate) struct Walker {
@@ -45,14 +56,36 @@ pub(crate) struct Walker {
 }
 
 impl Walker {
-    pub fn new(settings: &RoomSettings) -> Self {
-        let root = Seeded::new(settings.seed);
-        let mut person = root.fork(PERSON).fork(settings.subject as u64);
-        let build = Build::of(settings.subject, &mut person);
-        let outfit = Outfit::of(settings.subject, Style::of(settings.seed).wall, &mut person);
-        let phase = root.fork(STEP).fork(settings.way()).unit();
-        let gait = Gait::new(Walk::new(settings), build.clone(), phase);
-        Self { build, outfit, gait, repeats: settings.repeats }
+    /// Everybody in a room, the person to be followed first.
+    pub fn all(settings: &RoomSettings) -> Vec<Self> {
+        match settings.action {
+            Action::Test => vec![Self::of_test(settings)],
+            _ => {
+                let cast = cast::cast(settings);
+                cast.iter().enumerate().map(|(number, role)| Self::in_role(settings, number, role)).collect()
+            }
+        }
+    }
+
+    /// The person of a test of the thesis.
+    fn of_test(settings: &RoomSettings) -> Self {
+        let (build, outfit) = person(settings, settings.subject);
+        Self::walking(settings, build, outfit, Walk::of_test(settings), 0)
+    }
+
+    /// Somebody of an action, by their number from 0.
+    fn in_role(settings: &RoomSettings, number: usize, role: &Role) -> Self {
+        let (build, outfit) = person(settings, role.subject);
+        // Who wears another's clothes is not their twin.
+        let own =
+            Build::of(role.subject, &mut Seeded::new(settings.seed).fork(PERSON).fork(100 + number as u64));
+        let build = if role.clothes == number { build } else { own };
+        Self::walking(settings, build, outfit, Walk::along(&role.way), number)
+    }
+
+    fn walking(settings: &RoomSettings, build: Build, outfit: Outfit, walk: Walk, number: usize) -> Self {
+        let phase = Seeded::new(settings.seed).fork(STEP).fork(settings.way() + 1000 * number as u64).unit();
+        Self { gait: Gait::new(walk, build.clone(), phase), build, outfit, repeats: settings.repeats }
     }
 
     /// The way of the person, once.
@@ -87,6 +120,29 @@ impl Walker {
         }
     }
 
+    /// Sets every pixel of `mask`, of the view's size, on which the body throws its shadow on the floor, light falling along
+    /// `direction`, to 255.
+    pub fn cast_shadow(&self, pose: &BodyPose, direction: Vector, view: &View, mask: &mut Plane) {
+        let on_floor = |place: Vector| {
+            let [x, _, z] = add(place, scale(direction, -place[1] / direction[1]));
+            ([x, 0.0, z], [0.0, 1.0, 0.0])
+        };
+        let patches =
+            self.patches(pose, view).into_iter().map(|patch| patch.moved(|place, _| on_floor(place)));
+        paint::mark(&patches.collect::<Vec<_>>(), view, mask);
+    }
+
+    /// The body as a floor like a mirror shows it.
+    pub fn reflection(&self, pose: &BodyPose, view: &View, light: &Light) -> Option<Layer> {
+        let below = |[x, y, z]: Vector| [x, -y, z];
+        let mirrored = |patch: Patch| patch.moved(|place, normal| (below(place), below(normal)));
+        let moments: [Moment; MOMENTS] = std::array::from_fn(|_| Moment {
+            patches: self.patches(pose, view).into_iter().map(mirrored).collect(),
+            view: view.clone(),
+        });
+        paint::paint(&moments, &self.outfit.cloths, light)
+    }
+
     /// Sets every pixel of `mask`, of the view's size, that shows the body to 255.
     pub fn silhouette(&self, pose: &BodyPose, view: &View, mask: &mut Plane) {
         paint::mark(&self.patches(pose, view), view, mask);
@@ -102,11 +158,6 @@ impl Walker {
             bounds = [bounds[0].min(x), bounds[1].min(y), bounds[2].max(x), bounds[3].max(y)];
         }
         Some(bounds)
-    }
-
-    /// What must stand in the way, if anything.
-    pub(super) fn obstacle(&self, settings: &RoomSettings) -> Option<(Obstacle, Solid)> {
-        obstruction::obstacle(self, settings)
     }
 
     fn patches(&self, pose: &BodyPose, view: &View) -> Vec<Patch> {

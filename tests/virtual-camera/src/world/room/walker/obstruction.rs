@@ -2,11 +2,12 @@
 
 use super::{
     super::{
+        action::Action,
         scene::{Obstacle, Solid},
         settings::{Occlusion, RoomSettings},
         view::CAMERA,
     },
-    Walker, body,
+    Walker, body, cast,
     mesh::Detail,
 };
 use crate::seeded::Seeded;
@@ -20,6 +21,22 @@ const LEGS_HIDDEN: f64 = 2.6;
 const STEP: f64 = 0.02;
 /// How far from the camera it stands, as a part of the person's distance.
 const NEARNESS: f64 = 0.76;
+
+/// What must stand in the room for what people do in it, `walkers` being all of them.
+pub(in super::super) fn obstacles(walkers: &[Walker], settings: &RoomSettings) -> Vec<(Obstacle, Solid)> {
+    match (settings.action, walkers.first()) {
+        (Action::Test, Some(walker)) => obstacle(walker, settings).into_iter().collect(),
+        _ => cast::seat(settings).map(sofa).into_iter().collect(),
+    }
+}
+
+/// A sofa behind whoever sits down with their feet at a place of the floor, facing the camera.
+fn sofa((x, z): (f64, f64)) -> (Obstacle, Solid) {
+    let (azimuth, size) = (x.atan2(z), [1.7, 0.8, 0.85]);
+    let away = x.hypot(z) + 0.12 + size[2] / 2.0;
+    let base = [away * azimuth.sin(), 0.0, away * azimuth.cos()];
+    (Obstacle::Sofa, Solid { base, size, yaw_deg: -azimuth.to_degrees() })
+}
 
 /// What must stand in the way of `walker`, if anything.
 pub(super) fn obstacle(walker: &Walker, settings: &RoomSettings) -> Option<(Obstacle, Solid)> {

@@ -16,7 +16,7 @@ fn tests(seed: u64) -> impl Iterator<Item = RoomSettings> {
 }
 
 fn walker(number: u32, seed: u64) -> Walker {
-    Walker::new(&RoomSettings::test(number, seed).unwrap())
+    Walker::of_test(&RoomSettings::test(number, seed).unwrap())
 }
 
 fn looking(pose: &Pose, fov_deg: f64, size: (u32, u32)) -> View {
@@ -54,7 +54,7 @@ fn lamps() -> Light {
 fn light_and_occlusion_change_nothing_else() {
     for plain in (1..=72).filter_map(|number| RoomSettings::test(number, 3)) {
         let twin = RoomSettings { lighting: Lighting::Optimal, occlusion: Occlusion::None, ..plain.clone() };
-        let (plain, twin) = (Walker::new(&plain), Walker::new(&twin));
+        let (plain, twin) = (Walker::of_test(&plain), Walker::of_test(&twin));
         for time in [0.0, 3.3, 6.1, 9.7] {
             assert_eq!(plain.walk().at(time), twin.walk().at(time));
             assert_eq!(plain.pose_at(time).place, twin.pose_at(time).place);
@@ -70,7 +70,7 @@ fn light_and_occlusion_change_nothing_else() {
 #[test]
 fn speed_and_acceleration_stay_human() {
     for settings in tests(1) {
-        let walk = Walk::new(&settings);
+        let walk = Walk::of_test(&settings);
         let step = 0.02;
         let place = |time: f64| {
             let now = walk.at(time);
@@ -100,7 +100,7 @@ fn speed_and_acceleration_stay_human() {
 #[test]
 fn fixed_speed_is_the_same_all_the_way() {
     for settings in tests(2) {
-        let walk = Walk::new(&settings);
+        let walk = Walk::of_test(&settings);
         let speeds: Vec<f64> = (0..100)
             .map(|part| walk.at(2.0 + (walk.duration() - 2.0) * f64::from(part) / 100.0).speed)
             .collect();
@@ -117,7 +117,7 @@ fn fixed_speed_is_the_same_all_the_way() {
 #[test]
 fn turning_round_takes_its_time_and_ends_the_other_way() {
     for settings in tests(1) {
-        let walk = Walk::new(&settings);
+        let walk = Walk::of_test(&settings);
         let (first, last) = (walk.at(0.0).heading, walk.at(walk.duration()).heading);
         let turning = (0..2000).filter(|&step| walk.at(f64::from(step) * 0.01).turning.abs() > 0.1).count()
             as f64
@@ -134,7 +134,7 @@ fn turning_round_takes_its_time_and_ends_the_other_way() {
 #[test]
 fn the_way_sweeps_more_than_a_quarter_circle_inside_the_hall() {
     for settings in (1..4).flat_map(tests) {
-        let walk = Walk::new(&settings);
+        let walk = Walk::of_test(&settings);
         assert!((9.0..18.0).contains(&walk.duration()), "{} {settings:?}", walk.duration());
         let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
         for step in 0..(walk.duration() * 25.0) as u32 {
@@ -150,7 +150,7 @@ fn the_way_sweeps_more_than_a_quarter_circle_inside_the_hall() {
 #[test]
 fn the_person_comes_in_at_different_heights_of_the_picture() {
     let middle = |settings: &RoomSettings| {
-        let walker = Walker::new(settings);
+        let walker = Walker::of_test(settings);
         let view = looking(&settings.home(), 55.0, (640, 480));
         let [_, top, _, bottom] = walker.bounds(&walker.pose_at(2.4), &view).unwrap();
         (top + bottom) / 2.0
@@ -163,7 +163,7 @@ fn the_person_comes_in_at_different_heights_of_the_picture() {
 #[test]
 fn the_person_comes_into_the_first_view_at_two_seconds() {
     for settings in tests(1).step_by(11) {
-        let walker = Walker::new(&settings);
+        let walker = Walker::of_test(&settings);
         let view = looking(&settings.home(), 55.0, (640, 480));
         let part = |time: f64| {
             let [left, top, right, bottom] = walker.bounds(&walker.pose_at(time), &view).unwrap();
@@ -286,8 +286,8 @@ fn who_moves_is_blurred_along_their_way_and_nobody_else() {
 #[test]
 fn the_obstacle_spans_the_time_wanted() {
     for settings in [14, 16, 31, 50, 69].map(|number| RoomSettings::test(number, 1).unwrap()) {
-        let walker = Walker::new(&settings);
-        let (_, solid) = walker.obstacle(&settings).unwrap();
+        let walker = Walker::of_test(&settings);
+        let (_, solid) = obstruction::obstacle(&walker, &settings).unwrap();
         let front = solid.base[0].hypot(solid.base[2]) - solid.size[2] / 2.0;
         let half = (solid.size[0] / 2.0 / front).atan();
         let hidden = frames(&walker).filter(|&time| {
@@ -307,7 +307,8 @@ fn the_obstacle_spans_the_time_wanted() {
     }
     assert!([1, 7, 13, 20].into_iter().all(|number| {
         let settings = RoomSettings::test(number, 2).unwrap();
-        Walker::new(&settings).obstacle(&settings).is_some() == (settings.occlusion != Occlusion::None)
+        obstruction::obstacle(&Walker::of_test(&settings), &settings).is_some()
+            == (settings.occlusion != Occlusion::None)
     }));
 }
 
@@ -331,7 +332,7 @@ fn the_same_seed_is_the_same_person_and_another_is_another() {
 #[test]
 fn repeating_begins_again() {
     let settings = RoomSettings { repeats: true, ..RoomSettings::default() };
-    let walker = Walker::new(&settings);
+    let walker = Walker::of_test(&settings);
     let duration = walker.walk().duration();
     assert_eq!(walker.pose_at(3.0).place, walker.pose_at(3.0 + duration).place);
 }

@@ -2,9 +2,13 @@
 
 use std::f64::consts::PI;
 
-use super::super::{
-    settings::{Change, RoomSettings},
-    view::CAMERA,
+use super::{
+    super::{
+        action::Action,
+        settings::{Change, RoomSettings},
+        view::CAMERA,
+    },
+    cast, route,
 };
 use crate::{kinematics::Pose, seeded::Seeded};
 
@@ -23,13 +27,13 @@ const DEPARTURE: f64 = 0.8;
 /// How far the way has gone when the person's middle passes the edge of the first view, in metres.
 const TO_THE_EDGE: f64 = 1.7;
 /// Steps of the table a second.
-const RATE: f64 = 250.0;
+pub(super) const RATE: f64 = 250.0;
 /// Height of the middle of a person, in metres.
 const MIDDLE: f64 = 0.87;
 /// Half of the widest view, in degrees.
 const HALF_VIEW_DEG: f64 = 27.5;
 /// How far above or below the middle of the first view somebody comes in, in degrees; all of them is in it still.
-const ENTRY_DEG: f64 = 9.0;
+pub(super) const ENTRY_DEG: f64 = 9.0;
 /// Stream of chance for that.
 const ENTRY: u64 = 0xe27e;
 
@@ -46,6 +50,8 @@ pub(crate) struct Moment {
     pub speed: f64,
     /// Radians per second.
     pub turning: f64,
+    /// 0 upright, 1 seated.
+    pub seated: f64,
 }
 
 /// The way of a test.
@@ -61,7 +67,24 @@ pub(crate) struct Walk {
 }
 
 impl Walk {
-    pub fn new(settings: &RoomSettings) -> Self {
+    /// The way of the person to be followed; `None` where there is nobody.
+    pub fn new(settings: &RoomSettings) -> Option<Self> {
+        match settings.action {
+            Action::Test => Some(Self::of_test(settings)),
+            _ => cast::cast(settings).first().map(|role| Self::along(&role.way)),
+        }
+    }
+
+    /// A way by waypoints.
+    pub(super) fn along(way: &route::Way) -> Self {
+        let (moments, duration) = route::follow(way);
+        let far = |moment: &Moment| (moment.x - way.start.0).hypot(moment.z - way.start.1) < TO_THE_EDGE;
+        let at_the_edge = moments.partition_point(far) as f64 / RATE;
+        Self { moments, duration, side: -way.start.0.signum(), at_the_edge, above_deg: way.above_deg }
+    }
+
+    /// The way of a test of the thesis.
+    pub(super) fn of_test(settings: &RoomSettings) -> Self {
         let mut chance = Seeded::new(settings.seed).fork(0x3a1c).fork(settings.way());
         let above_deg = chance.fork(ENTRY).range(-ENTRY_DEG, ENTRY_DEG);
         let side = chance.pick(&[-1.0, 1.0]);
@@ -88,6 +111,7 @@ impl Walk {
             heading: between(before.heading, after.heading),
             speed: between(before.speed, after.speed),
             turning: between(before.turning, after.turning),
+            seated: between(before.seated, after.seated),
         }
     }
 
@@ -223,7 +247,7 @@ impl Plan {
     /// The way itself, up to the person's standing still.
     fn walked(&self, x: f64, z: f64, heading: f64, side: f64) -> Vec<Moment> {
         let steps = ((self.duration() + SPEED / BRISK) * RATE).ceil() as usize + 1;
-        let mut now = Moment { x, z, heading, speed: self.speed(0.0), turning: 0.0 };
+        let mut now = Moment { x, z, heading, speed: self.speed(0.0), turning: 0.0, seated: 0.0 };
         let mut moments = vec![now];
         for step in 0..steps {
             let (middle, end) = ((step as f64 + 0.5) / RATE, (step as f64 + 1.0) / RATE);
@@ -237,6 +261,7 @@ impl Plan {
                 heading: now.heading + turned,
                 speed: self.speed(end),
                 turning: -side * self.turning(end),
+                seated: 0.0,
             };
             moments.push(now);
         }

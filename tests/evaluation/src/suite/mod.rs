@@ -1,0 +1,4 @@
+//! Sets of tests besides the thesis' 72.
+
+pub mod hard;
+pub mod summary;

@@ -1,0 +1,234 @@
+//! Who is in the room, and the ways they take where the room does not play a test of the thesis.
+
+use std::f64::consts::PI;
+
+use super::{
+    super::{
+        action::Action,
+        settings::{RoomSettings, Subject},
+    },
+    route::{Leg, Leg::*, Way},
+    walk::ENTRY_DEG,
+};
+use crate::seeded::Seeded;
+
+/// Metres per second of ordinary walking, of somebody slow, of somebody in a hurry, and of running.
+const SPEED: f64 = 1.4;
+const SLOW: f64 = 1.0;
+const FAST: f64 = 1.9;
+const RUN: f64 = 4.0;
+/// When those who walk set off, in seconds: as in the tests.
+const DEPARTURE: f64 = 0.8;
+/// How long somebody wanders, in seconds.
+const WANDERING: f64 = 180.0;
+/// The part of the floor in which they walk: from side to side and ahead of the camera, in metres.
+const FLOOR: ((f64, f64), (f64, f64)) = ((-4.2, 4.2), (4.9, 6.9));
+
+/// Somebody in the room.
+#[derive(Debug, Clone)]
+pub(super) struct Role {
+    pub subject: Subject,
+    /// Whose clothes they wear: their number, from 0.
+    pub clothes: usize,
+    pub way: Way,
+}
+
+/// Everybody of an action that is not a test, the one to be followed first.
+pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
+    let mut chance = Seeded::new(settings.seed).fork(0xca57).fork(settings.action.way());
+    let stage = Stage::new(&mut chance);
+    let alone = |way| vec![(way, 0)];
+    let ways = match settings.action {
+        Action::Test | Action::Nobody => Vec::new(),
+        Action::Cross => stage.cross(&mut chance, 1),
+        Action::CrossAlike => stage.cross(&mut chance, 0),
+        Action::Part => stage.part(&mut chance),
+        Action::Overtake => stage.overtake(&mut chance),
+        Action::StopAndGo => alone(stage.stop_and_go(&mut chance)),
+        Action::Sit => alone(stage.sit(&mut chance)),
+        Action::Approach => alone(stage.approach(&mut chance)),
+        Action::Run => alone(stage.run()),
+        Action::Wander => alone(stage.wander(&mut chance)),
+    };
+    let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
+    let subjects: Vec<_> = std::iter::once(settings.subject).chain(others).collect();
+    let role = |(way, clothes): (Way, usize)| Role { subject: subjects[clothes], clothes, way };
+    ways.into_iter().map(role).collect()
+}
+
+/// Where the sofa stands that somebody sits down on, (x, z) of the sitter's feet before it.
+pub(super) fn seat(settings: &RoomSettings) -> Option<(f64, f64)> {
+    let mut chance = Seeded::new(settings.seed).fork(0xca57).fork(settings.action.way());
+    let stage = Stage::new(&mut chance);
+    (settings.action == Action::Sit).then(|| stage.seat())
+}
+
+/// From which side to which the way leads, and how far ahead of the camera.
+struct Stage {
+    /// 1 from left to right, -1 the other way.
+    side: f64,
+    /// Metres ahead of the camera.
+    lane: f64,
+    /// How far above the middle of the first view somebody comes in, in degrees.
+    above_deg: f64,
+}
+
+impl Stage {
+    fn new(chance: &mut Seeded) -> Self {
+        Self {
+            side: chance.pick(&[-1.0, 1.0]),
+            lane: chance.range(5.3, 6.0),
+            above_deg: chance.range(-ENTRY_DEG, ENTRY_DEG),
+        }
+    }
+
+    /// Where somebody starts out of sight on a lane, and where they leave the room.
+    fn start(&self, lane: f64) -> (f64, f64) {
+        (-self.side * lane * 51f64.to_radians().tan(), lane)
+    }
+
+    fn end(&self, lane: f64) -> (f64, f64) {
+        (self.side * lane * 47f64.to_radians().tan(), lane)
+    }
+
+    /// A place so far from the middle of the lane, along the way.
+    fn at(&self, along: f64, lane: f64) -> (f64, f64) {
+        (self.side * along, lane)
+    }
+
+    fn way(&self, start: (f64, f64), departure: f64, legs: Vec<Leg>) -> Way {
+        let heading = match legs.first() {
+            Some(Past(to, _) | To(to, _)) => (to.0 - start.0).atan2(to.1 - start.1),
+            _ => self.side * PI / 2.0,
+        };
+        Way { start, heading, departure, above_deg: self.above_deg, legs }
+    }
+
+    fn across(&self, lane: f64, speed: f64) -> Way {
+        self.way(self.start(lane), DEPARTURE, vec![Past(self.end(lane), speed)])
+    }
+
+    /// The other comes nearer the camera or farther away.
+    fn cross(&self, chance: &mut Seeded, clothes: usize) -> Vec<(Way, usize)> {
+        let other = self.lane + chance.pick(&[-0.55, 0.65]);
+        let back = Self { side: -self.side, lane: other, ..*self };
+        let meets = back.way(
+            back.start(other),
+            DEPARTURE + chance.range(0.0, 0.8),
+            vec![Past(back.end(other), SPEED)],
+        );
+        vec![(self.across(self.lane, SPEED), 0), (meets, clothes)]
+    }
+
+    /// Side by side, the other half a step ahead; then one of the two turns off and goes back behind them.
+    fn part(&self, chance: &mut Seeded) -> Vec<(Way, usize)> {
+        let (lane, other) = (self.lane, self.lane + chance.pick(&[-0.6, 0.6]));
+        let begin = self.start(other);
+        let beside = (begin.0 + self.side * 0.35, other);
+        let parting = chance.range(-0.8, 0.8);
+        let leaves = if other > lane { 7.2 } else { 4.8 };
+        let straight = |start, lane| self.way(start, DEPARTURE, vec![Past(self.end(lane), SPEED)]);
+        let off = |start, lane: f64, away: f64| {
+            let legs = vec![
+                Past(self.at(parting, lane), SPEED),
+                Past(self.at(parting + 0.6, (lane + away) / 2.0), SPEED),
+                Past(self.at(parting, away), SPEED),
+                Past((begin.0, away), SPEED),
+            ];
+            self.way(start, DEPARTURE, legs)
+        };
+        // Who turns off goes to the side that the other is not on.
+        if chance.unit() < 0.5 {
+            let away = if other > lane { 4.8 } else { 7.2 };
+            vec![(off(self.start(lane), lane, away), 0), (straight(beside, other), 1)]
+        } else {
+            vec![(straight(self.start(lane), lane), 0), (off(beside, other, leaves), 1)]
+        }
+    }
+
+    fn overtake(&self, chance: &mut Seeded) -> Vec<(Way, usize)> {
+        let other = self.lane + chance.pick(&[-0.55, 0.6]);
+        let length = self.end(self.lane).0 - self.start(self.lane).0;
+        // They are level half-way: the slow one has gone for so long.
+        let level = length.abs() / 2.0 / SLOW - length.abs() / 2.0 / FAST;
+        let faster = self.way(self.start(other), DEPARTURE + level, vec![Past(self.end(other), FAST)]);
+        vec![(self.across(self.lane, SLOW), 0), (faster, 1)]
+    }
+
+    fn stop_and_go(&self, chance: &mut Seeded) -> Way {
+        let mut legs = Vec::new();
+        for along in [-2.6, -0.1, 2.4] {
+            legs.push(To(self.at(along + chance.range(-0.4, 0.4), self.lane), SPEED));
+            legs.push(Stand(chance.range(1.5, 5.0)));
+        }
+        legs.push(Past(self.end(self.lane), SPEED));
+        self.way(self.start(self.lane), DEPARTURE, legs)
+    }
+
+    fn seat(&self) -> (f64, f64) {
+        self.at(0.3, self.lane)
+    }
+
+    fn sit(&self, chance: &mut Seeded) -> Way {
+        let seat = self.seat();
+        // Looks at the camera, more or less.
+        let facing = seat.0.atan2(seat.1) + PI + chance.range(-0.1, 0.1);
+        let legs = vec![
+            To(seat, SPEED),
+            Face(facing),
+            Sit(chance.range(4.0, 7.0)),
+            Past(self.end(self.lane), SPEED),
+        ];
+        self.way(self.start(self.lane), DEPARTURE, legs)
+    }
+
+    fn approach(&self, chance: &mut Seeded) -> Way {
+        let along = chance.range(-0.6, 0.6);
+        // Both on one line of sight.
+        let far = self.at(along, 6.9);
+        let near = (far.0 * 3.0 / 6.9, 3.0);
+        let legs = vec![
+            Past(self.at(along - 1.2, 6.7), SPEED),
+            Past((far.0 * 0.95, 6.5), SPEED),
+            To(near, SPEED),
+            Stand(chance.range(0.3, 1.5)),
+            To(far, SPEED),
+            Past(self.end(6.4), SPEED),
+        ];
+        self.way(self.start(6.4), DEPARTURE, legs)
+    }
+
+    fn run(&self) -> Way {
+        let legs = vec![
+            Past(self.at(-5.0, self.lane), 2.0),
+            Past(self.at(4.6, self.lane), RUN),
+            Past(self.at(5.0, self.lane + 0.7), SPEED),
+            Past(self.at(4.0, self.lane + 0.9), SPEED),
+            Past(self.at(-4.6, self.lane + 0.7), RUN),
+        ];
+        self.way(self.start(self.lane), DEPARTURE, legs)
+    }
+
+    fn wander(&self, chance: &mut Seeded) -> Way {
+        let mut place = self.at(-3.5, self.lane);
+        let (mut legs, mut seconds) = (vec![Past(place, SPEED)], 3.0);
+        while seconds < WANDERING {
+            let ((left, right), (near, far)) = FLOOR;
+            let next = (chance.range(left, right), chance.range(near, far));
+            let (length, speed) = ((next.0 - place.0).hypot(next.1 - place.1), chance.range(0.7, 1.7));
+            if length < 1.2 {
+                continue;
+            }
+            let pause = chance.range(0.5, 4.0);
+            if chance.unit() < 0.3 {
+                legs.extend([To(next, speed), Stand(pause)]);
+                seconds += pause + 1.0;
+            } else {
+                legs.push(Past(next, speed));
+            }
+            seconds += length / speed + 0.4;
+            place = next;
+        }
+        self.way(self.start(self.lane), DEPARTURE, legs)
+    }
+}
