@@ -4,9 +4,9 @@ use crate::ContractError;
 use crate::codec::{self, Reader};
 use crate::{Rect, TargetState};
 
-/// Tracker to detector: so that where the target stands nothing becomes background; with `profile=thesis` the detector
-/// sleeps while the target is followed (figure 3.1)
-/// and relearns when it wakes. Sent on every change of state.
+/// Tracker to detector: what it does, and where the target is, so that the detector does not take somebody who stands
+/// for background; with `profile=thesis` it sleeps while the target is followed (thesis, figure 3.1). Sent on every
+/// change of state, and with every picture while there is a target.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrackerEvent {
     /// What the tracker does now.

@@ -11,11 +11,12 @@ use gst_video::subclass::prelude::*;
 use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
 use ptztrack_contract::{CameraEvent, MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
 
+use super::scene_source::SceneSource;
 use super::{Profile, Selection, buffer};
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
-use crate::vision;
+use crate::vision::{self, Observation};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("lkfeaturetrack", gst::DebugColorFlags::empty(), Some("Feature point tracker"))
@@ -47,7 +48,7 @@ impl Default for Settings {
             selection: Selection::default(),
             roi_type: MOTION_ROI.to_owned(),
             confirm_frames: 3,
-            coast_time_ns: 1_500_000_000,
+            coast_time_ns: 3_000_000_000,
             manual_size: 0.25,
             message_interval_ns: 0,
             stationary_timeout_ns: 0,
@@ -72,7 +73,7 @@ impl Settings {
             confirm_frames: self.confirm_frames,
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             manual_size: self.manual_size,
-            must_move: self.roi_type == MOTION_ROI,
+            must_travel: self.profile == Profile::Robust && self.roi_type == MOTION_ROI,
             limits: vision::Limits {
                 stationary_s: limit_s(self.stationary_timeout_ns),
                 tracked_s: limit_s(self.max_tracking_time_ns),
@@ -96,7 +97,8 @@ enum Command {
 /// What the streaming thread keeps from frame to frame.
 struct Stream {
     info: VideoInfo,
-    luma: LumaSource,
+    source: LumaSource,
+    scene: SceneSource,
     tracker: vision::Tracker,
     state: TargetState,
     /// Running time of the last frame.
@@ -110,7 +112,8 @@ impl Stream {
     fn new(info: VideoInfo, config: vision::Config) -> Self {
         Self {
             info,
-            luma: LumaSource::default(),
+            source: LumaSource::default(),
+            scene: SceneSource::default(),
             tracker: vision::Tracker::new(config),
             state: TargetState::Searching,
             last_time: None,
@@ -288,6 +291,7 @@ impl BaseTransformImpl for LkFeatureTrack {
             && let Some(stream) = lock(&self.stream).as_mut()
         {
             stream.tracker.interrupt();
+            stream.scene.restart();
             stream.last_time = None;
         }
         self.parent_sink_event(event)
@@ -405,19 +409,31 @@ impl LkFeatureTrack {
         buffer: &gst::BufferRef,
         step: gst::ClockTime,
     ) -> Result<vision::Report, String> {
+        let mut fault = None;
         let detections = buffer::detections(buffer, &stream.info, &settings.roi_type).unwrap_or_else(|err| {
-            self.warn_once(stream, &format!("the detector's meta cannot be read: {err}"));
+            fault = Some(format!("the detector's meta cannot be read: {err}"));
             Vec::new()
         });
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &stream.info)
             .map_err(|err| format!("the frame cannot be mapped: {err}"))?;
-        let luma =
-            stream.luma.luma(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
-        let report = stream.tracker.process(&luma, step.seconds_f64(), &detections);
-        Ok(report.unwrap_or_else(|err| {
-            self.warn_once(stream, &format!("tracking failed: {err}"));
+        let picture =
+            stream.source.picture(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
+        let mut seen = Observation::from(picture.luma);
+        if settings.profile == Profile::Robust {
+            match stream.scene.look(buffer, &picture, step.into()) {
+                Ok(Ok(scene)) => seen.scene = Some(scene),
+                Ok(Err(err)) => fault = Some(format!("the detector's scene cannot be read: {err}")),
+                Err(err) => fault = Some(format!("camera motion cannot be measured: {err}")),
+            }
+        }
+        let report = stream.tracker.process(&seen, step.seconds_f64(), &detections).unwrap_or_else(|err| {
+            fault = Some(format!("tracking failed: {err}"));
             lost(stream.state)
-        }))
+        });
+        if let Some(fault) = fault {
+            self.warn_once(stream, &fault);
+        }
+        Ok(report)
     }
 
     /// Tells the bus and upstream what changed.
@@ -440,7 +456,8 @@ impl LkFeatureTrack {
             stream.since_message = gst::ClockTime::ZERO;
             self.post(report, TargetChange::Position, times);
         }
-        if std::mem::replace(&mut stream.state, report.state) != report.state {
+        // While there is a target the detector must know where, so that it does not take it for background.
+        if std::mem::replace(&mut stream.state, report.state) != report.state || has_target {
             let event = TrackerEvent { state: report.state, bounds: has_target.then_some(report.bounds) };
             // Nobody has to listen.
             let _ = self.obj().sink_pad().push_event(event.to_event());

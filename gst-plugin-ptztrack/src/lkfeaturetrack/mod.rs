@@ -67,6 +67,7 @@ use glib::prelude::*;
 mod buffer;
 #[allow(missing_docs, reason = "the derived property accessors are described by their blurbs")]
 mod imp;
+mod scene_source;
 
 /// Which detection becomes the target.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]

@@ -1,4 +1,24 @@
 //! Everything that computes on pictures: plain types, tested by themselves.
+//!
+//! A picture's way: `camera_motion` and the background that travels with it (`scene_model`) → moving regions
+//! (`detector`) → figure and ground near the target → target (`tracker`).
+//!
+//! ## Equations of the thesis
+//!
+//! | equation | what it says | where |
+//! |---|---|---|
+//! | 3.1 | running mean of every pixel | `background` |
+//! | 3.2 | variance over the last pictures | `background` |
+//! | 3.3 | what lies far from the mean is foreground | `background` |
+//! | 3.4, 3.5 | dilation and erosion | `morphology` (OpenCV) |
+//! | 3.6, 3.7 | gradient matrix and corner strength; here its smaller eigenvalue (Shi and Tomasi) | `tracker/corners` (OpenCV) |
+//! | 3.8 to 3.11 | optical flow by least squares | `tracker/flow`, `camera_motion/flow` (OpenCV) |
+//! | 3.12 | mean-shift vector | `tracker/grey_histogram` (OpenCV) |
+//! | 3.13 to 3.15 | moments, centre of mass | `tracker/grey_histogram`; of the figure in `tracker/figure` |
+//! | 3.16 | average over one second | `TargetEstimator` of crate `servo` |
+//!
+//! Equation 3.16 as printed averages centroids, which would lag half a second behind; the text beside it speaks of "the
+//! object's speed and direction", so rates are averaged.
 
 mod afterimage;
 mod background;
@@ -9,6 +29,7 @@ mod draw;
 mod duty;
 mod luma;
 mod morphology;
+mod observation;
 mod persistence;
 mod picture;
 mod presence;
@@ -31,6 +52,7 @@ pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, Patch, Shape, draw, text_width};
 pub use duty::Duty;
 pub use luma::{Luma, LumaError};
+pub use observation::Observation;
 pub use picture::{Chroma, Picture, Reduced, Samples};
 pub use presence::Presence;
 pub use scene::{FrameSize, Parts, Seen, Spot, scene};

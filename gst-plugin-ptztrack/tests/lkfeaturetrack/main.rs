@@ -53,10 +53,11 @@ fn nothing_to_follow_is_silence() {
 #[test]
 fn the_contour_of_the_motion_meta_is_used() {
     let mut bench = Bench::new(|_| ());
-    let bounds = Rect::from_pixels((60, 80, 32, 72), 320, 240);
     let mut last = None;
-    for _ in 0..3 {
-        let mut buffer = gst::Buffer::from_mut_slice(picture(Some((60, 80)), None));
+    let mut bounds = Rect::default();
+    for x in [50, 55, 60] {
+        bounds = Rect::from_pixels((x, 80, 32, 72), 320, 240);
+        let mut buffer = gst::Buffer::from_mut_slice(picture(Some((x as i32, 80)), None));
         let region = Region { bounds, contour: vec![bounds.centre(); 3], ..Region::default() };
         let whole = Region { contour: Vec::new(), ..region.clone() };
         // The contour of the first has no area, so no corner; the largest is taken, and it is the second.

@@ -1,4 +1,5 @@
-//! Corners worth following (thesis 3.5.1): Shi and Tomasi's smaller eigenvalue, ranked, outliers rejected.
+//! Corners worth following (thesis 3.5.1, equations 3.6 and 3.7): Shi and Tomasi's smaller eigenvalue, ranked, outliers
+//! rejected.
 
 use opencv::core::{CV_8UC1, Mat, Point, Point2f, Rect2f, Scalar, Vector};
 use opencv::imgproc;

@@ -1,4 +1,4 @@
-//! Sparse pyramidal Lucas-Kanade (thesis 3.5.2) between two patches, with its tests.
+//! Sparse pyramidal Lucas-Kanade (thesis 3.5.2, equations 3.8 to 3.11) between two patches, with its tests.
 
 use opencv::core::{Point2f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vector};
 use opencv::video;

@@ -54,19 +54,21 @@ pub(super) fn length(vector: Point2f) -> f32 {
     vector.x.hypot(vector.y)
 }
 
-/// The median: 0 of nothing.
-pub(super) fn median(values: &mut [f32]) -> f32 {
-    if values.is_empty() {
-        return 0.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
-}
-
-/// The median of each coordinate.
-pub(super) fn median_vector(vectors: impl Iterator<Item = Point2f>) -> Point2f {
-    let (mut x, mut y): (Vec<f32>, Vec<f32>) = vectors.map(|vector| (vector.x, vector.y)).unzip();
-    Point2f::new(median(&mut x), median(&mut y))
+/// The median of each coordinate by weight: half of the weight lies on either side.
+pub(super) fn weighted_median(vectors: impl Iterator<Item = (Point2f, f32)>) -> Point2f {
+    let vectors: Vec<_> = vectors.collect();
+    let of = |part: fn(&Point2f) -> f32| {
+        let mut values: Vec<_> = vectors.iter().map(|(vector, weight)| (part(vector), *weight)).collect();
+        values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let half = values.iter().map(|(_, weight)| weight).sum::<f32>() / 2.0;
+        let mut sum = 0.0;
+        let middle = values.iter().find(|(_, weight)| {
+            sum += weight;
+            sum >= half
+        });
+        middle.map_or(0.0, |(value, _)| *value)
+    };
+    Point2f::new(of(|vector| vector.x), of(|vector| vector.y))
 }
 
 /// The mean of some vectors: `None` of nothing.
@@ -126,11 +128,11 @@ mod tests {
     }
 
     #[test]
-    fn median_resists_outliers() {
-        let flow = [(1.0, 2.0), (1.1, 2.1), (0.9, 1.9), (90.0, -90.0), (1.0, 2.0)];
-        let middle = median_vector(flow.into_iter().map(|(x, y)| Point2f::new(x, y)));
-        assert_eq!(middle, Point2f::new(1.0, 2.0));
-        assert_eq!(median(&mut []), 0.0);
+    fn the_weight_decides_the_median() {
+        let vectors = [(1.0, 0.1), (1.0, 0.1), (1.0, 0.1), (5.0, 0.9)];
+        let median = weighted_median(vectors.into_iter().map(|(x, weight)| (Point2f::new(x, -x), weight)));
+        assert_eq!(median, Point2f::new(5.0, -5.0));
+        assert_eq!(weighted_median([].into_iter()), Point2f::default());
     }
 
     #[test]

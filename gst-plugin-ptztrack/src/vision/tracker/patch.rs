@@ -4,10 +4,17 @@ use opencv::core::{BORDER_CONSTANT, BORDER_REFLECT_101, Mat, Point2f, Rect2f, Si
 use opencv::prelude::*;
 use opencv::{imgproc, video};
 
+use super::geometry::grown;
 use crate::vision::Luma;
 
 /// Pyramid levels above the full one: 2^4 times the window is far more than a target moves in a frame.
 const LEVELS: i32 = 4;
+
+/// Pixels of the patch that a target has at most: a larger one is looked at more coarsely.
+const MAX_AREA: f32 = 40_000.0;
+/// What is seen around the box, as a share of its sides, and at least, in pixels of the patch.
+const MARGIN_SHARE: f32 = 0.3;
+const MIN_MARGIN: f32 = 40.0;
 
 /// A window of the picture. Two of them can be compared wherever each lies, as long as both are of
 /// one size: where the camera pans, the second is cut where the first one's content is expected.
@@ -149,6 +156,13 @@ impl Patch {
         let half = (self.step as f32 - 1.0) / 2.0;
         Point2f::new(self.x as f32 + half, self.y as f32 + half)
     }
+}
+
+/// Where optical flow for a target looks: around it, at a step that bounds the number of pixels.
+pub(super) fn cut_around(luma: &Luma, bounds: Rect2f) -> Cut {
+    let step = (bounds.area() / MAX_AREA).sqrt().round().max(1.0);
+    let margin = (MARGIN_SHARE * bounds.width.max(bounds.height)).max(MIN_MARGIN * step);
+    Cut::new(luma, grown(bounds, margin), step as usize)
 }
 
 fn smooth(mat: &Mat, step: usize, width: usize, height: usize) -> opencv::Result<Mat> {

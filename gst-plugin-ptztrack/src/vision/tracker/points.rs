@@ -3,7 +3,7 @@
 use opencv::core::Point2f;
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{length, mean, median, median_vector};
+use super::geometry::{length, mean, weighted_median};
 
 /// Share of a point's travel against the background that is remembered from frame to frame.
 const MEMORY: f32 = 0.8;
@@ -17,8 +17,10 @@ const PROBATION: u32 = 4;
 const PATIENCE: u32 = 2;
 /// Fewer points cannot tell an outlier.
 const MIN_CONSENSUS: usize = 3;
-/// A target comes nearer or goes away by less than this from one frame to the next.
-const MAX_GROWTH: f32 = 0.03;
+/// Pixels from one frame to the next that tell a walker from the wall.
+const MEASURABLE_STEP: f32 = 1.0;
+/// A point less likely to lie on the figure lies on the wall.
+const GROUND_WEIGHT: f32 = 0.25;
 
 /// One point that is followed.
 #[derive(Debug, Clone, Copy)]
@@ -42,8 +44,6 @@ impl Tracked {
 pub(super) struct Consensus {
     /// Frame pixels, camera motion included.
     pub motion: Point2f,
-    /// Growth of the distances between the points.
-    pub growth: f32,
     /// Share of the target's points that were found again and agree.
     pub share: f32,
 }
@@ -107,45 +107,69 @@ impl Points {
 
     /// Moves every point to where it was found (`None`: lost), while the background moves as `ego`.
     ///
-    /// `height` is the target's: its limbs move against it by a share of that. `None` where too few points
-    /// are left to tell how the target moved.
-    pub fn advance(&mut self, found: &[Option<Point2f>], ego: EgoMotion, height: f32) -> Option<Consensus> {
+    /// A point counts by how likely it lies on the figure. Where some move with the background and others against it,
+    /// as the target was `expected` to (pixels against the background), those are the target's. `height` is the
+    /// target's: its limbs move against it by a share of that. `None` where too few points are left to tell how the
+    /// target moved.
+    pub fn advance(
+        &mut self,
+        found: &[Option<Point2f>],
+        ego: EgoMotion,
+        expected: Point2f,
+        height: f32,
+        figure: impl Fn(Point2f) -> f32,
+    ) -> Option<Consensus> {
         self.rejected.clear();
-        let before = self.points.iter().filter(|point| point.member).count();
         let old: Vec<Tracked> = std::mem::take(&mut self.points);
+        let before: f32 = old.iter().filter(|point| point.member).map(|point| figure(point.position)).sum();
         let mut moves = Vec::new();
         for (point, place) in old.into_iter().zip(found) {
             match place {
-                Some(place) => moves.push((point, *place)),
+                Some(place) => moves.push((point, *place, figure(point.position))),
                 None => self.rejected.push(point.position),
             }
         }
-        let members = || moves.iter().filter(|(point, _)| point.member);
-        if members().count() < MIN_CONSENSUS {
-            self.rejected.extend(moves.iter().map(|(_, place)| *place));
+        let members: Vec<_> = moves.iter().filter(|(point, ..)| point.member).copied().collect();
+        if members.len() < MIN_CONSENSUS {
+            self.rejected.extend(moves.iter().map(|(_, place, _)| *place));
             return None;
         }
-        let middle = median_vector(members().map(|(point, place)| *place - point.position));
-        let own = middle - ego.at(median_vector(members().map(|(point, _)| point.position)));
-        let tolerance = 1.5 + 0.02 * height + 0.25 * length(own);
-        let agrees = |point: &Tracked, place: Point2f| length(place - point.position - middle) <= tolerance;
-        let agreeing: Vec<(Point2f, Point2f)> = members()
-            .filter(|(point, place)| agrees(point, *place))
-            .map(|(point, place)| (point.position, *place))
+        let tolerance = 1.5 + 0.02 * height + 0.25 * length(expected);
+        let own = |(point, place, _): &(Tracked, Point2f, f32)| *place - ego.apply(point.position);
+        let movers: Vec<_> = members
+            .iter()
+            .filter(|point| {
+                let own = own(point);
+                length(own - expected) <= tolerance && length(own) > BACKGROUND_SHARE * length(expected)
+            })
+            .copied()
             .collect();
-        if agreeing.len() < MIN_CONSENSUS {
+        let measurable = length(expected) > MEASURABLE_STEP;
+        let voters = if measurable && movers.len() >= MIN_CONSENSUS { &movers } else { &members };
+        let middle =
+            weighted_median(voters.iter().map(|(point, place, weight)| (*place - point.position, *weight)));
+        let tolerance = 1.5 + 0.02 * height + 0.25 * length(middle - ego.at(members[0].0.position));
+        let agrees = |point: &Tracked, place: Point2f| length(place - point.position - middle) <= tolerance;
+        let agreeing: Vec<_> =
+            voters.iter().filter(|(point, place, _)| agrees(point, *place)).copied().collect();
+        let weight: f32 = agreeing.iter().map(|(.., weight)| weight).sum();
+        if agreeing.len() < MIN_CONSENSUS || weight <= f32::EPSILON {
             return None;
         }
-        let motion = mean(agreeing.iter().map(|(from, to)| *to - *from))?;
-        self.travel = self.travel * MEMORY + own;
-        for (point, place) in moves {
-            let disagreements = if agrees(&point, place) { 0 } else { point.disagreements + 1 };
-            let travel = point.travel * MEMORY + (place - point.position - ego.at(point.position));
+        let sum = agreeing.iter().fold(Point2f::default(), |sum, (point, place, weight)| {
+            sum + (*place - point.position) * *weight
+        });
+        let motion = sum / weight;
+        let anchor = mean(agreeing.iter().map(|(point, ..)| point.position))?;
+        self.travel = self.travel * MEMORY + (motion - ego.at(anchor));
+        for (point, place, weight) in moves {
+            let disagrees = !agrees(&point, place) || weight < GROUND_WEIGHT;
+            let disagreements = if disagrees { point.disagreements + 1 } else { 0 };
+            let travel = point.travel * MEMORY + (place - ego.apply(point.position));
             let point = Tracked { position: place, travel, age: point.age + 1, disagreements, ..point };
             self.settle(point, tolerance);
         }
-        let share = agreeing.len() as f32 / before.max(1) as f32;
-        Some(Consensus { motion, growth: growth(&agreeing), share })
+        Some(Consensus { motion, share: weight / before.max(f32::EPSILON) })
     }
 
     /// The thesis: all points that are found again count, and their mean is the motion. `None` once none is left.
@@ -163,7 +187,7 @@ impl Points {
             }
         }
         let share = motions.len() as f32 / before.len().max(1) as f32;
-        Some(Consensus { motion: mean(motions.into_iter())?, growth: 1.0, share })
+        Some(Consensus { motion: mean(motions.into_iter())?, share })
     }
 
     /// Keeps, promotes or rejects one point.
@@ -181,26 +205,6 @@ impl Points {
         point.member |= point.age >= PROBATION && point.disagreements == 0;
         self.points.push(point);
     }
-}
-
-/// The median growth of the distances between points: blind to the odd point that slides.
-fn growth(pairs: &[(Point2f, Point2f)]) -> f32 {
-    const MIN_PAIRS: usize = 10;
-    // Points close together say more about noise than about size.
-    const MIN_DISTANCE: f32 = 8.0;
-    let mut ratios = Vec::new();
-    for (index, (from, to)) in pairs.iter().enumerate() {
-        for (other_from, other_to) in &pairs[..index] {
-            let before = length(*from - *other_from);
-            if before > MIN_DISTANCE {
-                ratios.push(length(*to - *other_to) / before);
-            }
-        }
-    }
-    if ratios.len() < MIN_PAIRS {
-        return 1.0;
-    }
-    median(&mut ratios).clamp(1.0 - MAX_GROWTH, 1.0 + MAX_GROWTH)
 }
 
 #[cfg(test)]
@@ -226,7 +230,7 @@ mod tests {
         for _ in 0..frames {
             let found: Vec<_> =
                 points.positions().into_iter().map(|point| Some(point + motion(point))).collect();
-            last = points.advance(&found, ego, 75.0);
+            last = points.advance(&found, ego, Point2f::default(), 75.0, |_| 1.0);
         }
         last
     }
@@ -237,7 +241,6 @@ mod tests {
         let consensus = walk(&mut points, 1, still(), |_| Point2f::new(3.0, -1.0)).expect("agree");
         assert!(length(consensus.motion - Point2f::new(3.0, -1.0)) < 1e-3);
         assert_eq!((consensus.share, points.len()), (1.0, 20));
-        assert!((consensus.growth - 1.0).abs() < 1e-3);
     }
 
     #[test]
@@ -252,13 +255,37 @@ mod tests {
     }
 
     #[test]
-    fn growth_is_measured_and_limited() {
+    fn points_on_the_wall_do_not_count() {
         let mut points = Points::on_target(body());
-        let middle = Point2f::new(115.0, 110.0);
-        let consensus = walk(&mut points, 1, still(), |p| (p - middle) * 0.02).expect("agree");
-        assert!((consensus.growth - 1.02).abs() < 1e-3);
-        let consensus = walk(&mut points, 1, still(), |p| (p - middle) * 0.04).expect("agree");
-        assert!(consensus.growth <= 1.0 + MAX_GROWTH);
+        // Three of four columns lie on the wall, which the map knows; the fourth walks.
+        let figure = |point: Point2f| if point.x > 125.0 { 0.9 } else { 0.05 };
+        let mut last = None;
+        for step in 0..3 {
+            let walks = |point: Point2f| point.x > 125.0 + 3.0 * step as f32;
+            let found: Vec<_> = points
+                .positions()
+                .into_iter()
+                .map(|point| Some(point + Point2f::new(if walks(point) { 3.0 } else { 0.0 }, 0.0)))
+                .collect();
+            last = points.advance(&found, still(), Point2f::default(), 75.0, |point| {
+                figure(point - Point2f::new(3.0 * step as f32, 0.0))
+            });
+        }
+        assert!((last.expect("agree").motion.x - 3.0).abs() < 0.1, "{last:?}");
+        assert_eq!(points.len(), 5);
+    }
+
+    #[test]
+    fn a_mover_wins_over_the_wall_where_it_goes_on_as_expected() {
+        let mut points = Points::on_target(body());
+        let found: Vec<_> = points
+            .positions()
+            .into_iter()
+            .map(|point| Some(point + Point2f::new(if point.x > 125.0 { 4.0 } else { 0.0 }, 0.0)))
+            .collect();
+        let consensus =
+            points.advance(&found, still(), Point2f::new(4.0, 0.0), 75.0, |_| 0.5).expect("agree");
+        assert!((consensus.motion.x - 4.0).abs() < 0.1, "{consensus:?}");
     }
 
     #[test]
@@ -289,7 +316,7 @@ mod tests {
         let mut found: Vec<_> =
             points.positions().into_iter().map(|p| Some(p + Point2f::new(3.0, 0.0))).collect();
         found[0] = found[0].map(|p| p + Point2f::new(-12.0, 0.0));
-        let consensus = points.advance(&found, still(), 75.0).expect("agree");
+        let consensus = points.advance(&found, still(), Point2f::default(), 75.0, |_| 1.0).expect("agree");
         assert!((consensus.motion.x - 3.0).abs() < 1e-3);
         assert!(points.len() < count);
     }
@@ -307,7 +334,7 @@ mod tests {
     fn too_few_points_tell_nothing() {
         let mut points = Points::on_target(body());
         let found: Vec<_> = (0..20).map(|n| (n < 2).then_some(Point2f::new(1.0, 1.0))).collect();
-        assert_eq!(points.advance(&found, still(), 75.0), None);
+        assert_eq!(points.advance(&found, still(), Point2f::default(), 75.0, |_| 1.0), None);
         assert_eq!(points.rejected().len(), 20);
     }
 }

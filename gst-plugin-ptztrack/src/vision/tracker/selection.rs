@@ -1,9 +1,12 @@
 //! Which detection becomes the target.
 
+use std::collections::VecDeque;
+
 use opencv::core::{Point2f, Rect2f};
 
+use super::ego_motion::EgoMotion;
 use super::geometry::{Frame, centre, grown, length, overlap, share_inside};
-use super::given_up::GivenUp;
+use super::suppressed_regions::SuppressedRegions;
 
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are no target.
 const MIN_SIDE: f32 = 6.0;
@@ -18,6 +21,12 @@ const EDGE_WAIT_S: f64 = 1.2;
 const EDGE: f32 = 2.0;
 /// How long what was released is not taken again, seconds.
 const RELEASE_HOLD_S: f64 = 3.0;
+/// Seconds over which the way of a detection is looked at.
+const WAY_S: f64 = 1.0;
+/// Who goes somewhere has moved both sides of the box by this share of its width, or has come nearer by this share of
+/// their height.
+const TRAVELLED: f32 = 0.25;
+const APPROACHED: f32 = 0.12;
 
 /// How the target is chosen among the detections.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -48,9 +57,33 @@ struct Candidate {
     frames: u32,
     missed: u32,
     age_s: f64,
+    /// Its boxes of the last second, carried along with the background, and how old they are in seconds.
+    way: VecDeque<(Rect2f, f64)>,
 }
 
 impl Candidate {
+    fn new(sighting: Sighting) -> Self {
+        let way = VecDeque::from([(sighting.bounds, 0.0)]);
+        Self { sighting, frames: 1, missed: 0, age_s: 0.0, way }
+    }
+
+    /// Goes with the background into the next frame; where nobody knows how that moved, the way so far says nothing.
+    fn carry(&mut self, ego: Option<EgoMotion>, dt_s: f64) {
+        self.missed += 1;
+        self.age_s += dt_s;
+        match ego {
+            Some(ego) => {
+                self.sighting.bounds = ego.apply_to(self.sighting.bounds);
+                self.way.iter_mut().for_each(|(bounds, age_s)| {
+                    *bounds = ego.apply_to(*bounds);
+                    *age_s += dt_s;
+                });
+                self.way.retain(|(_, age_s)| *age_s <= WAY_S);
+            }
+            None => self.way.clear(),
+        }
+    }
+
     /// Takes the next sighting; the edges of a detection flicker, so its velocity is smoothed.
     fn continue_with(&mut self, sighting: Sighting, dt_s: f64) {
         const SMOOTHING: f32 = 0.5;
@@ -60,6 +93,22 @@ impl Candidate {
         self.sighting = Sighting { velocity: old + (velocity - old) * SMOOTHING, ..sighting };
         self.frames += 1;
         self.missed = 0;
+        self.way.push_back((self.sighting.bounds, 0.0));
+    }
+
+    /// Whether it went somewhere: a screen, a curtain, a door, a lamp change as much as a person does, but stay.
+    fn travels(&self) -> bool {
+        let now = self.sighting.bounds;
+        self.way.iter().any(|(then, _)| {
+            let (left, right) = (now.x - then.x, now.br().x - then.br().x);
+            let (top, bottom) = (now.y - then.y, now.br().y - then.br().y);
+            let both = |a: f32, b: f32| if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 };
+            let least = TRAVELLED * now.width.min(then.width);
+            let nearer = (now.height / then.height.max(1.0) - 1.0).abs() >= APPROACHED
+                && bottom * left < 0.0
+                && bottom * right > 0.0;
+            both(left, right) >= least || both(top, bottom) >= least || nearer
+        })
     }
 }
 
@@ -67,22 +116,23 @@ impl Candidate {
 #[derive(Default)]
 pub(super) struct Selection {
     /// Who is not chosen until they move.
-    pub given_up: GivenUp,
+    pub suppressed: SuppressedRegions,
     candidates: Vec<Candidate>,
     released: Option<(Rect2f, f64)>,
 }
 
 impl Selection {
-    /// Forgets all detections.
-    pub fn clear(&mut self) {
+    /// Forgets everything: another stream begins.
+    pub fn reset(&mut self) {
         self.candidates.clear();
+        self.suppressed.clear();
     }
 
     /// The detection at `bounds` was taken: the others are forgotten.
     pub fn take(&mut self, bounds: Rect2f) {
         let seen = self.candidates.iter().filter(|candidate| candidate.missed == 0);
-        self.given_up.free(bounds, seen.map(|candidate| candidate.sighting.bounds));
-        self.clear();
+        self.suppressed.free(bounds, seen.map(|candidate| candidate.sighting.bounds));
+        self.candidates.clear();
     }
 
     /// What is at `bounds` was let go on purpose: it is not chosen again for a while.
@@ -90,12 +140,11 @@ impl Selection {
         self.released = Some((bounds, RELEASE_HOLD_S));
     }
 
-    /// Takes the detections of one frame, `dt_s` after the last.
-    pub fn update(&mut self, sightings: Vec<Sighting>, frame: Frame, dt_s: f64) {
-        for candidate in &mut self.candidates {
-            candidate.missed += 1;
-            candidate.age_s += dt_s;
-        }
+    /// Takes the detections of one frame, `dt_s` after the last; `ego` is how the background moved since, where that is
+    /// known.
+    pub fn update(&mut self, sightings: Vec<Sighting>, ego: Option<EgoMotion>, frame: Frame, dt_s: f64) {
+        self.suppressed.carry(ego);
+        self.candidates.iter_mut().for_each(|candidate| candidate.carry(ego, dt_s));
         for sighting in sightings.into_iter().filter(|sighting| is_sound(sighting, frame)) {
             let same = self
                 .candidates
@@ -106,7 +155,7 @@ impl Selection {
                 .max_by(|(a, _), (b, _)| a.total_cmp(b));
             match same {
                 Some((_, candidate)) => candidate.continue_with(sighting, dt_s),
-                None => self.candidates.push(Candidate { sighting, frames: 1, missed: 0, age_s: 0.0 }),
+                None => self.candidates.push(Candidate::new(sighting)),
             }
         }
         self.candidates.retain(|candidate| candidate.missed <= PATIENCE);
@@ -125,15 +174,23 @@ impl Selection {
         });
     }
 
-    /// The detection to follow now, seen in at least `confirm_frames` frames and in this one.
-    pub fn choose(&self, choice: Choice, confirm_frames: u32, frame: Frame) -> Option<&Sighting> {
+    /// The detection to follow now, seen in at least `confirm_frames` frames and in this one, and going somewhere where
+    /// it `must_travel`.
+    pub fn choose(
+        &self,
+        choice: Choice,
+        confirm_frames: u32,
+        must_travel: bool,
+        frame: Frame,
+    ) -> Option<&Sighting> {
         let ready = self.candidates.iter().filter(|candidate| {
             let bounds = candidate.sighting.bounds;
             candidate.missed == 0
                 && candidate.frames >= confirm_frames
                 && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
                 && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
-                && !self.given_up.holds(bounds)
+                && !self.suppressed.holds(bounds)
+                && (!must_travel || candidate.travels())
         });
         let by = |value: fn(&Candidate, Frame) -> f64| {
             let best = move |candidate: &&Candidate| value(candidate, frame);
@@ -188,6 +245,7 @@ mod tests {
 
     const FRAME: Frame = Frame { width: 640.0, height: 480.0 };
     const DT: f64 = 0.1;
+    const STILL: Option<EgoMotion> = None;
 
     fn at(x: f32, y: f32, width: f32, height: f32) -> Sighting {
         Sighting {
@@ -200,7 +258,7 @@ mod tests {
     fn seen(frames: usize, sightings: &[Sighting]) -> Selection {
         let mut selection = Selection::default();
         for _ in 0..frames {
-            selection.update(sightings.to_vec(), FRAME, DT);
+            selection.update(sightings.to_vec(), STILL, FRAME, DT);
         }
         selection
     }
@@ -211,9 +269,9 @@ mod tests {
         for _ in 0..3 {
             let all =
                 [at(300.0, 200.0, 20.0, 50.0), at(30.0, 30.0, 60.0, 120.0), at(400.0, 220.0, 30.0, 60.0)];
-            selection.update(all.to_vec(), FRAME, DT);
+            selection.update(all.to_vec(), STILL, FRAME, DT);
         }
-        let x = |choice| selection.choose(choice, 3, FRAME).map(|sighting| sighting.bounds.x);
+        let x = |choice| selection.choose(choice, 3, false, FRAME).map(|sighting| sighting.bounds.x);
         assert_eq!(x(Choice::Largest), Some(30.0));
         assert_eq!(x(Choice::First), Some(300.0));
         assert_eq!(x(Choice::NearestCentre), Some(300.0));
@@ -222,29 +280,60 @@ mod tests {
 
     #[test]
     fn a_flicker_is_not_chosen() {
-        assert!(seen(2, &[at(100.0, 100.0, 40.0, 90.0)]).choose(Choice::Largest, 3, FRAME).is_none());
+        assert!(seen(2, &[at(100.0, 100.0, 40.0, 90.0)]).choose(Choice::Largest, 3, false, FRAME).is_none());
         let mut selection = Selection::default();
         for n in 0..9 {
-            selection.update(vec![at(50.0 * n as f32, 100.0, 20.0, 30.0)], FRAME, DT);
+            selection.update(vec![at(50.0 * n as f32, 100.0, 20.0, 30.0)], STILL, FRAME, DT);
         }
-        assert!(selection.choose(Choice::Largest, 3, FRAME).is_none());
+        assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_none());
     }
 
     #[test]
     fn half_a_person_at_the_edge_is_awaited_but_not_for_ever() {
         let edge = [at(0.0, 100.0, 30.0, 90.0)];
-        assert!(seen(5, &edge).choose(Choice::Largest, 3, FRAME).is_none());
-        assert!(seen(16, &edge).choose(Choice::Largest, 3, FRAME).is_some());
+        assert!(seen(5, &edge).choose(Choice::Largest, 3, false, FRAME).is_none());
+        assert!(seen(16, &edge).choose(Choice::Largest, 3, false, FRAME).is_some());
     }
 
     #[test]
     fn the_velocity_of_a_detection_is_known() {
         let mut selection = Selection::default();
         for n in 0..8 {
-            selection.update(vec![at(100.0 + 6.0 * n as f32, 100.0, 30.0, 60.0)], FRAME, DT);
+            selection.update(vec![at(100.0 + 6.0 * n as f32, 100.0, 30.0, 60.0)], STILL, FRAME, DT);
         }
-        let velocity = selection.choose(Choice::Largest, 3, FRAME).expect("confirmed").velocity;
+        let velocity = selection.choose(Choice::Largest, 3, false, FRAME).expect("confirmed").velocity;
         assert!((velocity.x - 60.0).abs() < 1.0 && velocity.y.abs() < 1e-3, "{velocity:?}");
+    }
+
+    /// Whether what looks like `path` at each frame is chosen within two seconds, where it must travel.
+    fn chosen(ego: EgoMotion, path: impl Fn(f32) -> Sighting) -> bool {
+        let mut selection = Selection::default();
+        (0..20).any(|n| {
+            selection.update(vec![path(n as f32)], Some(ego), FRAME, DT);
+            selection.choose(Choice::Largest, 3, true, FRAME).is_some()
+        })
+    }
+
+    #[test]
+    fn a_walker_travels_whatever_the_camera_does() {
+        for pan in [0.0, -4.0, 7.0] {
+            let ego = EgoMotion::translation(Point2f::new(pan, 0.0));
+            assert!(chosen(ego, |n| at(300.0 + (4.0 + pan) * n, 100.0, 40.0, 90.0)), "{pan}");
+        }
+        assert!(
+            chosen(EgoMotion::default(), |n| at(300.0 - 0.5 * n, 100.0, 40.0 + n, 90.0 + 2.0 * n)),
+            "nearer"
+        );
+    }
+
+    #[test]
+    fn what_changes_but_stays_does_not_travel() {
+        let still = EgoMotion::default();
+        assert!(!chosen(still, |_| at(300.0, 100.0, 60.0, 40.0)), "a screen");
+        assert!(!chosen(still, |n| at(300.0, 100.0, 40.0 + 4.0 * n, 200.0)), "a door");
+        assert!(!chosen(still, |n| at(300.0 + 5.0 * (n % 2.0), 100.0, 60.0, 200.0)), "a curtain");
+        let pan = EgoMotion::translation(Point2f::new(6.0, 0.0));
+        assert!(!chosen(pan, |n| at(200.0 + 6.0 * n, 100.0, 60.0, 40.0)), "a screen, the camera turning");
     }
 
     #[test]
@@ -257,7 +346,7 @@ mod tests {
             at(10.0, 10.0, f32::INFINITY, 60.0),
             at(10.0, 10.0, -30.0, -60.0),
         ];
-        assert!(seen(20, &absurd).choose(Choice::Largest, 1, FRAME).is_none());
+        assert!(seen(20, &absurd).choose(Choice::Largest, 1, false, FRAME).is_none());
     }
 
     #[test]
@@ -265,12 +354,12 @@ mod tests {
         let one = [at(300.0, 200.0, 30.0, 60.0)];
         let mut selection = seen(4, &one);
         selection.release(one[0].bounds);
-        selection.update(one.to_vec(), FRAME, DT);
-        assert!(selection.choose(Choice::Largest, 3, FRAME).is_none());
+        selection.update(one.to_vec(), STILL, FRAME, DT);
+        assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_none());
         for _ in 0..40 {
-            selection.update(one.to_vec(), FRAME, DT);
+            selection.update(one.to_vec(), STILL, FRAME, DT);
         }
-        assert!(selection.choose(Choice::Largest, 3, FRAME).is_some());
+        assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_some());
     }
 
     #[test]

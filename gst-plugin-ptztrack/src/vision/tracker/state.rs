@@ -1,14 +1,12 @@
 use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, Vector};
 
+use super::dwell_time::{DwellTime, Limits};
 use super::ego_motion::EgoMotion;
 use super::geometry::{Frame, around};
-use super::patience::Limits;
-use super::proof::MotionProof;
 use super::selection::{Choice, Selection, Sighting};
-use super::steps::Profile;
-use super::target::{Sight, Target};
-use crate::vision::Luma;
+use super::target::{Follow, Robust, Sight, Thesis};
+use crate::vision::Observation;
 
 /// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
 const MIN_DT_S: f64 = 1e-3;
@@ -16,6 +14,18 @@ const MIN_DT_S: f64 = 1e-3;
 const MAX_DT_S: f64 = 2.0;
 /// Width of a box made by a click, as a share of its height: a standing person.
 const PERSON_ASPECT: f32 = 0.4;
+/// How long after a loss the same person gets the same number, seconds.
+const KNOWN_S: f64 = 10.0;
+
+/// How a target is followed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Profile {
+    /// Thesis 3.5 as written: corners, optical flow, mean of the points, mean-shift.
+    Thesis,
+    /// With all that tells a person from the wall behind: see [`super`].
+    #[default]
+    Robust,
+}
 
 /// How a [`Tracker`] works. Changes hold from the next target or frame on.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,9 +40,9 @@ pub struct Config {
     pub coast_s: f64,
     /// Height, in frame heights, of the box that is made around a place selected by hand.
     pub manual_size: f64,
-    /// Whether a detection that was chosen must soon be seen to move against the background, or is lost: right for
-    /// a motion detector, wrong for one that finds people who stand.
-    pub must_move: bool,
+    /// Whether a detection is chosen only once it has travelled across the background: right for a motion detector,
+    /// wrong for one that finds people who stand.
+    pub must_travel: bool,
     /// How long a target is followed at most.
     pub limits: Limits,
 }
@@ -71,10 +81,18 @@ pub struct Report {
     pub features: Vec<Feature>,
 }
 
+/// Somebody who is followed.
+struct Target {
+    id: u64,
+    follow: Box<dyn Follow>,
+    dwell: DwellTime,
+}
+
 enum Phase {
     Searching,
-    Tracking(Box<Target>),
-    Occluded(Box<Target>, f64),
+    Tracking(Target),
+    /// And for how many seconds.
+    Occluded(Target, f64),
 }
 
 enum Command {
@@ -89,6 +107,8 @@ pub struct Tracker {
     selection: Selection,
     command: Option<Command>,
     camera_rests: bool,
+    /// Whom it lost, and how many seconds ago.
+    lost: Option<(Target, f64)>,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
     last_id: u64,
@@ -103,6 +123,7 @@ impl Tracker {
             selection: Selection::default(),
             command: None,
             camera_rests: true,
+            lost: None,
             size: None,
             last_id: 0,
         }
@@ -138,34 +159,38 @@ impl Tracker {
     ///
     /// # Errors
     /// Where OpenCV fails, which no picture should make it do. The target is gone then.
-    pub fn process(&mut self, luma: &Luma, dt_s: f64, detections: &[Detection]) -> opencv::Result<Report> {
+    pub fn process(
+        &mut self,
+        seen: &Observation,
+        dt_s: f64,
+        detections: &[Detection],
+    ) -> opencv::Result<Report> {
         let dt_s = if dt_s.is_finite() { dt_s.max(MIN_DT_S) } else { f64::INFINITY };
-        let frame = Frame { width: luma.width().max(1) as f32, height: luma.height().max(1) as f32 };
+        let size = (seen.luma.width(), seen.luma.height());
+        let frame = Frame { width: size.0.max(1) as f32, height: size.1.max(1) as f32 };
         let mut changes = Vec::new();
-        let size = Some((luma.width(), luma.height()));
-        let same_stream = std::mem::replace(&mut self.size, size) == size && dt_s <= MAX_DT_S;
+        let same_stream = self.size.replace(size) == Some(size) && dt_s <= MAX_DT_S;
         if !same_stream {
             // Another picture, or one from another time: nothing that was remembered holds.
-            self.selection.clear();
-            self.selection.given_up.clear();
+            self.selection.reset();
+            self.lost = None;
         }
-        self.selection.given_up.watch(luma, self.camera_rests)?;
-        self.watch(detections, frame, dt_s);
+        self.watch(seen, detections, frame, dt_s);
         let command = self.command.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
         let mut report = Report::default();
         if !same_stream {
             if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
-                report = self.report(TargetState::Lost, Some(target), frame);
+                report = report_of(TargetState::Lost, target, frame);
                 changes.push(TargetChange::Lost);
                 phase = Phase::Searching;
             }
         } else {
-            phase = self.follow(phase, luma, dt_s, frame, &mut report, &mut changes)?;
+            phase = self.follow(phase, seen, dt_s, frame, &mut report, &mut changes)?;
         }
         phase = match command {
             Some(Command::Select(place)) => {
-                self.take_over(phase, luma, place, frame, &mut report, &mut changes)?
+                self.take_over(phase, seen, place, frame, &mut report, &mut changes)?
             }
             Some(Command::Release) => {
                 self.let_go(phase, ReleaseReason::Request, frame, &mut report, &mut changes)
@@ -173,26 +198,29 @@ impl Tracker {
             None => phase,
         };
         if matches!(phase, Phase::Searching) && changes.is_empty() {
-            phase = self.acquire_chosen(luma, frame, &mut report, &mut changes)?;
+            phase = self.acquire_chosen(seen, frame, &mut report, &mut changes)?;
         }
         self.phase = phase;
         Ok(Report { changes, ..report })
     }
 
-    /// Keeps account of the detections while no target is followed.
-    fn watch(&mut self, detections: &[Detection], frame: Frame, dt_s: f64) {
+    /// Keeps account of what the detector sees, whether a target is followed or not.
+    fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
+        self.lost =
+            self.lost.take().map(|(target, ago_s)| (target, ago_s + dt_s)).filter(|(_, s)| *s <= KNOWN_S);
         let sightings = detections.iter().map(|detection| Sighting {
             bounds: frame.rect_to_pixels(detection.bounds),
             contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
             velocity: Point2f::default(),
         });
-        self.selection.update(sightings.collect(), frame, dt_s);
+        let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        self.selection.update(sightings.collect(), ego, frame, dt_s);
     }
 
     fn follow(
         &mut self,
         phase: Phase,
-        luma: &Luma,
+        seen: &Observation,
         dt_s: f64,
         frame: Frame,
         report: &mut Report,
@@ -203,70 +231,53 @@ impl Tracker {
             Phase::Tracking(target) => (target, None),
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
-        let before = target.bounds;
+        let before = target.follow.estimate().bounds;
         let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
+        let sightings: Vec<_> = self.selection.current().cloned().collect();
         let sight = match hidden_s {
-            None => target.follow(luma, dt_s as f32)?,
-            Some(_) => self.look_for(&mut target, luma, dt_s as f32)?,
+            None => target.follow.follow(seen, dt_s as f32, &sightings)?,
+            Some(_) => target.follow.coast(seen, dt_s as f32, &sightings)?,
         };
-        let sight = if target.proof.failed() { Sight::Gone } else { sight };
-        let (state, phase_of): (_, fn(Box<Target>, f64) -> Phase) = match sight {
-            Sight::Seen => (TargetState::Tracking, |target, _| Phase::Tracking(target)),
-            Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => (TargetState::Occluded, Phase::Occluded),
-            Sight::Hidden | Sight::Gone => (TargetState::Lost, |_, _| Phase::Searching),
+        let state = match sight {
+            Sight::Seen => TargetState::Tracking,
+            Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => TargetState::Occluded,
+            Sight::Hidden | Sight::Gone => TargetState::Lost,
         };
         match (state, hidden_s) {
             (TargetState::Tracking, Some(_)) => changes.push(TargetChange::Reacquired),
             (TargetState::Occluded, None) => changes.push(TargetChange::Occluded),
-            (TargetState::Lost, _) => {
-                changes.push(TargetChange::Lost);
-                self.selection.clear();
-            }
+            (TargetState::Lost, _) => changes.push(TargetChange::Lost),
             _ => {}
         }
-        if let (TargetState::Occluded, Some(hidden_s)) = (state, hidden_s) {
-            target.confidence *= (1.0 - dt_s / (coast_s - hidden_s + 2.0 * dt_s)).max(0.0) as f32;
+        target.dwell.pass(dt_s);
+        let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        if let (Sight::Seen, Some(ego)) = (sight, ego) {
+            target.dwell.watch(before, target.follow.estimate().bounds, ego, dt_s);
         }
-        target.patience.pass(dt_s);
-        if let (Sight::Seen, Some(ego)) = (sight, self.ego(&target)) {
-            target.patience.watch(before, target.bounds, ego, dt_s);
+        *report = report_of(state, &target, frame);
+        let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
+        if let Some(reason) = exhausted {
+            self.selection.suppressed.add(target.follow.estimate().bounds);
+            return Ok(self.let_go(Phase::Tracking(target), reason, frame, report, changes));
         }
-        let exhausted = target.patience.exhausted(self.config.limits);
-        *report = self.report(state, Some(&target), frame);
-        let bounds = target.bounds;
-        let phase = phase_of(target, hidden_s.unwrap_or(0.0));
-        match exhausted {
-            Some(reason) if state != TargetState::Lost => {
-                self.selection.given_up.add(luma, bounds)?;
-                Ok(self.let_go(phase, reason, frame, report, changes))
+        Ok(match state {
+            TargetState::Tracking => Phase::Tracking(target),
+            TargetState::Occluded => {
+                let left = (1.0 - hidden_s.unwrap_or(0.0) / coast_s.max(dt_s)).max(0.0);
+                report.confidence *= left;
+                Phase::Occluded(target, hidden_s.unwrap_or(0.0))
             }
-            _ => Ok(phase),
-        }
-    }
-
-    /// How the background moved, as seen or, where it cannot be, as the camera says.
-    fn ego(&self, target: &Target) -> Option<EgoMotion> {
-        target.ego().or(self.camera_rests.then(EgoMotion::default))
-    }
-
-    /// Looks for a hidden target where it should be and where a detector saw something.
-    fn look_for(&self, target: &mut Target, luma: &Luma, dt_s: f32) -> opencv::Result<Sight> {
-        let sight = target.coast(luma, dt_s)?;
-        if sight != Sight::Hidden {
-            return Ok(sight);
-        }
-        for sighting in self.selection.current() {
-            if target.recognise(luma, sighting)? {
-                return Ok(Sight::Seen);
+            _ => {
+                self.lost = Some((target, 0.0));
+                Phase::Searching
             }
-        }
-        Ok(Sight::Hidden)
+        })
     }
 
     fn take_over(
         &mut self,
         old: Phase,
-        luma: &Luma,
+        seen: &Observation,
         place: Point,
         frame: Frame,
         report: &mut Report,
@@ -279,7 +290,8 @@ impl Tracker {
             .cloned()
             .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), ..Sighting::default() });
         let old = self.let_go(old, ReleaseReason::Request, frame, report, changes);
-        match Target::acquire(luma, &sighting, self.config.profile.steps())? {
+        self.lost = None;
+        match self.acquire(seen, &sighting)? {
             Some(target) => Ok(self.begin(target, frame, report, changes)),
             None => Ok(old),
         }
@@ -301,9 +313,9 @@ impl Tracker {
         if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
             if reason != ReleaseReason::Stationary {
                 // It may move, and would be taken again at once.
-                self.selection.release(target.bounds);
+                self.selection.release(target.follow.estimate().bounds);
             }
-            *report = self.report(TargetState::Searching, Some(&target), frame);
+            *report = report_of(TargetState::Searching, &target, frame);
             report.features.clear();
             report.released = Some(reason);
             changes.push(TargetChange::Released);
@@ -313,20 +325,34 @@ impl Tracker {
 
     fn acquire_chosen(
         &mut self,
-        luma: &Luma,
+        seen: &Observation,
         frame: Frame,
         report: &mut Report,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
-        let chosen = self.selection.choose(self.config.choice, self.config.confirm_frames, frame);
+        let Config { choice, confirm_frames, must_travel, .. } = self.config;
+        let chosen = self.selection.choose(choice, confirm_frames, must_travel, frame).cloned();
         let Some(sighting) = chosen else { return Ok(Phase::Searching) };
-        match Target::acquire(luma, sighting, self.config.profile.steps())? {
-            Some(mut target) => {
-                target.proof = MotionProof::new(self.config.must_move);
-                Ok(self.begin(target, frame, report, changes))
-            }
+        match self.acquire(seen, &sighting)? {
+            Some(target) => Ok(self.begin(target, frame, report, changes)),
             None => Ok(Phase::Searching),
         }
+    }
+
+    /// Takes up what was sighted: under its old number where it is who was lost. `None` where it cannot be followed.
+    fn acquire(&mut self, seen: &Observation, sighting: &Sighting) -> opencv::Result<Option<Target>> {
+        let follow: Option<Box<dyn Follow>> = match self.config.profile {
+            Profile::Thesis => Thesis::acquire(&seen.luma, sighting)?.map(|target| Box::new(target) as _),
+            Profile::Robust => Robust::acquire(seen, sighting)?.map(|target| Box::new(target) as _),
+        };
+        let Some(follow) = follow else { return Ok(None) };
+        let known = match self.lost.take() {
+            Some((lost, _)) if lost.follow.resembles(seen, sighting)? => Some(lost.id),
+            _ => None,
+        };
+        let id = known.unwrap_or(self.last_id + 1);
+        self.last_id = self.last_id.max(id);
+        Ok(Some(Target { id, follow, dwell: DwellTime::default() }))
     }
 
     fn begin(
@@ -336,31 +362,31 @@ impl Tracker {
         report: &mut Report,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
-        self.last_id += 1;
-        self.selection.take(target.bounds);
+        self.selection.take(target.follow.estimate().bounds);
         changes.push(TargetChange::Acquired);
-        *report = self.report(TargetState::Tracking, Some(&target), frame);
-        Phase::Tracking(Box::new(target))
+        *report = report_of(TargetState::Tracking, &target, frame);
+        Phase::Tracking(target)
     }
+}
 
-    fn report(&self, state: TargetState, target: Option<&Target>, frame: Frame) -> Report {
-        let Some(target) = target else { return Report::default() };
-        let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
-        let kept = target.points.members().into_iter().map(feature(true));
-        let rejected = target.points.rejected().iter().copied().map(feature(false));
-        let ego = target.ego_velocity;
-        Report {
-            state,
-            changes: Vec::new(),
-            released: None,
-            id: self.last_id,
-            bounds: frame.rect(target.bounds),
-            centroid: frame.point(target.centroid),
-            velocity: frame.vector(target.own_velocity + ego.unwrap_or_default()),
-            ego_velocity: ego.map(|ego| frame.vector(ego)),
-            confidence: f64::from(target.confidence),
-            features: kept.chain(rejected).collect(),
-        }
+fn report_of(state: TargetState, target: &Target, frame: Frame) -> Report {
+    let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
+    let points = target.follow.points();
+    let kept = points.members().into_iter().map(feature(true));
+    let rejected = points.rejected().iter().copied().map(feature(false));
+    let estimate = target.follow.estimate();
+    let ego = estimate.ego_velocity;
+    Report {
+        state,
+        changes: Vec::new(),
+        released: None,
+        id: target.id,
+        bounds: frame.rect(estimate.bounds),
+        centroid: frame.point(estimate.centroid),
+        velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
+        ego_velocity: ego.map(|ego| frame.vector(ego)),
+        confidence: f64::from(estimate.confidence),
+        features: kept.chain(rejected).collect(),
     }
 }
 
@@ -383,196 +409,4 @@ impl Default for Report {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::super::synthetic::{Picture, Scene};
-    use super::*;
-
-    const SIZE: (usize, usize) = (480, 320);
-    const PERSON: (f32, f32) = (40.0, 90.0);
-    const DT: f64 = 0.1;
-
-    fn config() -> Config {
-        Config {
-            profile: Profile::Robust,
-            choice: Choice::Largest,
-            confirm_frames: 1,
-            coast_s: 1.5,
-            manual_size: 0.3,
-            must_move: false,
-            limits: Limits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
-        }
-    }
-
-    /// The street moved by `pan` with people of their own textures at these places.
-    fn street(pan: (f32, f32), people: &[(f32, f32, u32)]) -> Picture {
-        let mut picture = Scene::new(SIZE.0, SIZE.1).background(pan);
-        for (x, y, texture) in people {
-            picture.paint(Rect2f::new(*x, *y, PERSON.0, PERSON.1), *texture);
-        }
-        picture
-    }
-
-    fn following(profile: Profile, picture: &Picture, x: f32, y: f32) -> Tracker {
-        following_with(Config { profile, ..config() }, picture, x, y)
-    }
-
-    fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Tracker {
-        let mut tracker = Tracker::new(config);
-        let (width, height) = (SIZE.0 as f64, SIZE.1 as f64);
-        let bounds = Rect {
-            x: f64::from(x) / width,
-            y: f64::from(y) / height,
-            width: f64::from(PERSON.0) / width,
-            height: f64::from(PERSON.1) / height,
-        };
-        let report = tracker
-            .process(&picture.luma(), DT, &[Detection { bounds, contour: Vec::new() }])
-            .expect("acquire");
-        assert_eq!(report.changes, [TargetChange::Acquired]);
-        tracker
-    }
-
-    fn step(tracker: &mut Tracker, picture: &Picture) -> Report {
-        tracker.process(&picture.luma(), DT, &[]).expect("follow")
-    }
-
-    #[track_caller]
-    fn assert_at(report: &Report, x: f32, y: f32) {
-        assert_near(report, x, y, 8.0);
-    }
-
-    #[track_caller]
-    fn assert_near(report: &Report, x: f32, y: f32, tolerance: f32) {
-        assert_eq!((report.state, report.id), (TargetState::Tracking, 1), "{:?}", report.bounds);
-        let off =
-            ((report.bounds.x * SIZE.0 as f64) as f32 - x, (report.bounds.y * SIZE.1 as f64) as f32 - y);
-        assert!(off.0.abs().max(off.1.abs()) < tolerance, "{off:?} pixels off");
-    }
-
-    #[test]
-    fn a_walker_is_followed() {
-        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(80.0, 100.0, 7)]), 80.0, 100.0);
-        for n in 1..30 {
-            let x = 80.0 + 8.5 * n as f32;
-            assert_at(&step(&mut tracker, &street((0.0, 0.0), &[(x, 100.0, 7)])), x, 100.0);
-        }
-    }
-
-    #[test]
-    fn a_detection_that_never_moves_is_lost_and_a_chosen_one_is_not() {
-        let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
-        let lost_within = |chosen: bool| {
-            let must_move = Config { must_move: true, ..config() };
-            let mut tracker = following_with(must_move, &picture, 200.0, 100.0);
-            if chosen {
-                tracker.select(Point { x: 220.0 / SIZE.0 as f64, y: 145.0 / SIZE.1 as f64 });
-            }
-            (1..40).find(|_| step(&mut tracker, &picture).state == TargetState::Lost)
-        };
-        assert_eq!(lost_within(true), None);
-        assert!((14..20).contains(&lost_within(false).expect("lost")));
-    }
-
-    #[test]
-    fn the_thesis_follows_a_walker_before_an_even_wall() {
-        let wall = |x| {
-            let mut picture = Scene::new(SIZE.0, SIZE.1).flat(240);
-            picture.paint(Rect2f::new(x, 100.0, PERSON.0, PERSON.1), 7);
-            picture
-        };
-        let mut tracker = following(Profile::Thesis, &wall(80.0), 80.0, 100.0);
-        for n in 1..30 {
-            let x = 80.0 + 8.5 * n as f32;
-            assert_near(&step(&mut tracker, &wall(x)), x, 100.0, 12.0);
-        }
-    }
-
-    #[test]
-    fn the_panning_camera_does_not_drag_the_walker() {
-        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(200.0, 100.0, 7)]), 200.0, 100.0);
-        for n in 1..30 {
-            // The camera keeps the walker in the middle: only the street moves.
-            let (pan, x) = (-9.0 * n as f32, 200.0 + (n % 3) as f32);
-            let report = step(&mut tracker, &street((pan, 0.0), &[(x, 100.0, 7)]));
-            assert_at(&report, x, 100.0);
-            let ego = report.ego_velocity.expect("textured").x * SIZE.0 as f64 * DT;
-            assert!((ego + 9.0).abs() < 0.5, "{ego}");
-        }
-    }
-
-    #[test]
-    fn somebody_standing_is_kept_under_a_camera_that_starts_to_pan() {
-        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(200.0, 100.0, 7)]), 200.0, 100.0);
-        let mut pan = 0.0;
-        for n in 1..30 {
-            pan -= if n > 10 { 7.0 } else { 0.0 };
-            let report = step(&mut tracker, &street((pan, 0.0), &[(200.0 + pan, 100.0, 7)]));
-            assert_at(&report, 200.0 + pan, 100.0);
-        }
-    }
-
-    #[test]
-    fn a_large_motion_of_the_whole_picture_is_followed() {
-        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(60.0, 100.0, 7)]), 60.0, 100.0);
-        let mut x = 60.0;
-        for speed in [12.0, 28.0, 44.0, 60.0, 60.0] {
-            x += speed;
-            let report = step(&mut tracker, &street((x - 60.0, 0.0), &[(x, 100.0, 7)]));
-            assert_at(&report, x, 100.0);
-        }
-    }
-
-    #[test]
-    fn two_who_cross_are_not_confused() {
-        let mut tracker = following(
-            Profile::Robust,
-            &street((0.0, 0.0), &[(60.0, 100.0, 7), (360.0, 104.0, 99)]),
-            60.0,
-            100.0,
-        );
-        let mut last = Report::default();
-        for n in 1..34 {
-            let (x, other) = (60.0 + 9.0 * n as f32, 360.0 - 9.0 * n as f32);
-            // The other passes in front.
-            last = step(&mut tracker, &street((0.0, 0.0), &[(x, 100.0, 7), (other, 104.0, 99)]));
-        }
-        assert_at(&last, 60.0 + 9.0 * 33.0, 100.0);
-    }
-
-    #[test]
-    fn hidden_for_a_second_and_found_again() {
-        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
-        let mut changes = Vec::new();
-        let mut last = Report::default();
-        for n in 1..40 {
-            let mut picture = street((0.0, 0.0), &[(40.0 + 8.0 * n as f32, 100.0, 7)]);
-            picture.paint(Rect2f::new(150.0, 0.0, 110.0, 320.0), 4321);
-            last = step(&mut tracker, &picture);
-            changes.extend(last.changes.iter().copied());
-        }
-        assert_eq!(changes, [TargetChange::Occluded, TargetChange::Reacquired]);
-        assert_at(&last, 40.0 + 8.0 * 39.0, 100.0);
-    }
-
-    #[test]
-    fn the_same_pictures_give_the_same_answers() {
-        let run = || {
-            let mut tracker =
-                following(Profile::Robust, &street((0.0, 0.0), &[(80.0, 100.0, 7)]), 80.0, 100.0);
-            (1..8)
-                .map(|n| step(&mut tracker, &street((0.0, 0.0), &[(80.0 + 7.0 * n as f32, 100.0, 7)])))
-                .collect::<Vec<_>>()
-        };
-        assert_eq!(run(), run());
-    }
-
-    #[test]
-    fn a_long_gap_is_a_loss() {
-        let picture = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
-        for gap in [3.0, f64::NAN, f64::INFINITY] {
-            let mut tracker = following(Profile::Robust, &picture, 80.0, 100.0);
-            let report = tracker.process(&picture.luma(), gap, &[]).expect("follow");
-            assert_eq!(report.changes, [TargetChange::Lost], "{gap}");
-        }
-    }
-}
+mod tests;

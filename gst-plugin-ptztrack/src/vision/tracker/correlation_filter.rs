@@ -8,13 +8,15 @@
 //! of the target.
 
 use opencv::core::{
-    BORDER_REPLICATE, CV_32F, DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Point2f,
-    Rect2f, Size, Vec2f,
+    BORDER_REPLICATE, CV_32F, DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Rect2f, Size,
+    Vec2f,
 };
 use opencv::imgproc;
 use opencv::prelude::*;
 
-use super::geometry::{centre, scaled};
+use super::figure::{CONTEXT, Grid, Halves};
+use super::geometry::scaled;
+use super::sample::sample;
 use crate::vision::Luma;
 
 /// Side of a cell in pixels of the template.
@@ -23,8 +25,6 @@ const CELL: usize = 4;
 const CELLS: f32 = 512.0;
 /// Orientations told apart, without sign: a dark coat before a bright wall may pass a dark one.
 const ORIENTATIONS: usize = 8;
-/// What is seen around the target, in widths and heights of it: also how far it is looked for.
-const CONTEXT: (f32, f32) = (2.4, 1.6);
 /// Width of the desired answer, as a share of the target's size.
 const SHARPNESS: f32 = 0.1;
 /// Regularisation of the ridge regression.
@@ -35,84 +35,124 @@ const GREY_WEIGHT: f32 = 0.35;
 type Complex = Vec2f;
 type Spectrum = Vec<Complex>;
 
-/// What the filter answers.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Answer {
-    /// From the middle of the box to where the target is, frame pixels.
-    pub offset: Point2f,
-    /// About 1 for the picture it was trained on, about 0 for another.
-    pub peak: f32,
+/// How much of the ground is learned beside the figure: edges against it help to find the place, but must not decide.
+const GROUND_SHARE: f32 = 0.15;
+
+/// What the filter answers: one value for each displacement in whole cells, about 1 where the picture is the one that it
+/// was trained on, about 0 where it is another. The filter is linear, so the two halves of the body answer apart.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Response {
+    columns: usize,
+    rows: usize,
+    values: [Vec<f32>; 2],
+}
+
+impl Response {
+    /// The answers of upper and lower body for a target that is so many cells right of and below the middle of the box.
+    pub fn at(&self, (x, y): (i32, i32)) -> Halves {
+        let wrap = |place: i32, size: usize| place.rem_euclid(size as i32) as usize;
+        let index = wrap(y, self.rows) * self.columns + wrap(x, self.columns);
+        Halves { upper: self.values[0][index], lower: self.values[1][index] }
+    }
 }
 
 /// A trained filter.
 #[derive(Clone)]
-pub(super) struct Appearance {
+pub(super) struct CorrelationFilter {
     columns: usize,
     rows: usize,
     window: Vec<f32>,
     label: Spectrum,
-    template: Vec<Spectrum>,
+    /// Of upper and lower body, a spectrum a channel.
+    template: [Vec<Spectrum>; 2],
     filter: Spectrum,
 }
 
-impl Appearance {
-    /// Learns what is in `bounds`.
-    pub fn new(luma: &Luma, bounds: Rect2f) -> opencv::Result<Self> {
+impl CorrelationFilter {
+    /// A filter for a target of that shape, which has learned nothing yet.
+    pub fn new(bounds: Rect2f) -> opencv::Result<Self> {
         let (columns, rows) = grid(bounds);
-        let mut appearance = Self {
+        let mut filter = Self {
             columns,
             rows,
             window: hann(columns, rows),
             label: Vec::new(),
-            template: Vec::new(),
+            template: Default::default(),
             filter: Vec::new(),
         };
-        appearance.label = appearance.spectrum(&label(columns, rows))?;
-        let (template, filter) = appearance.train(luma, bounds)?;
-        Ok(Self { template, filter, ..appearance })
+        filter.label = filter.spectrum(&label(columns, rows))?;
+        Ok(filter)
     }
 
-    /// Looks for the target around `bounds`, at its size. It is expected in the middle, with a deviation of
-    /// `spread` times its sides: of two that look alike the nearer one is meant.
-    pub fn look(&self, luma: &Luma, bounds: Rect2f, spread: f32) -> opencv::Result<Answer> {
-        let seen = self.describe(luma, bounds)?;
-        let mut response = correlate(&seen, &self.template);
-        response.iter_mut().zip(&self.filter).for_each(|(value, filter)| *value = product(*value, *filter));
-        let response = self.inverse(&response)?;
-        let (offset, peak) = self.peak(&response, spread);
-        let cell = CELL as f32;
-        let across = bounds.width * CONTEXT.0 / (self.columns as f32 * cell);
-        let down = bounds.height * CONTEXT.1 / (self.rows as f32 * cell);
-        let offset = Point2f::new(offset.x * cell * across, offset.y * cell * down);
-        Ok(Answer { offset, peak })
+    /// Cells across and down.
+    pub fn grid(&self) -> Grid {
+        Grid { columns: self.columns, rows: self.rows }
     }
 
-    /// Learns what is in `bounds` now; `rate` 0 to 1 is the weight against all that was seen before.
-    pub fn learn(&mut self, luma: &Luma, bounds: Rect2f, rate: f32) -> opencv::Result<()> {
-        let (template, filter) = self.train(luma, bounds)?;
-        for (old, new) in self.template.iter_mut().zip(&template) {
+    /// Looks for the target around `bounds`, at its size.
+    pub fn respond(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Response> {
+        let seen = self.spectra(&self.describe(luma, bounds)?)?;
+        let answer = |template: &[Spectrum]| {
+            let mut response = correlate(&seen, template);
+            response
+                .iter_mut()
+                .zip(&self.filter)
+                .for_each(|(value, filter)| *value = product(*value, *filter));
+            self.inverse(&response)
+        };
+        let values = [answer(&self.template[0])?, answer(&self.template[1])?];
+        Ok(Response { columns: self.columns, rows: self.rows, values })
+    }
+
+    /// Learns what is in `bounds` now, as far as `figure` (a share for each cell) belongs to the target: so the filter
+    /// knows the person and not the wall (after CSR-DCF, Lukežič et al., "Discriminative Correlation Filter with Channel
+    /// and Spatial Reliability", CVPR 2017, whose solver is left out). `rate` 0 to 1 is the weight against all that was
+    /// seen before.
+    pub fn learn(&mut self, luma: &Luma, bounds: Rect2f, figure: &[f32], rate: f32) -> opencv::Result<()> {
+        let channels = self.describe(luma, bounds)?;
+        let template = [self.masked(&channels, figure, 0)?, self.masked(&channels, figure, 1)?];
+        let whole: Vec<Spectrum> = template[0].iter().zip(&template[1]).map(|(a, b)| sum(a, b)).collect();
+        let power = correlate(&whole, &whole);
+        let filter: Spectrum =
+            self.label.iter().zip(power).map(|(label, power)| *label / (power[0] + RIDGE)).collect();
+        if self.filter.is_empty() {
+            (self.template, self.filter) = (template, filter);
+            return Ok(());
+        }
+        for (old, new) in self.template.iter_mut().flatten().zip(template.iter().flatten()) {
             blend(old, new, rate);
         }
         blend(&mut self.filter, &filter, rate);
         Ok(())
     }
 
-    fn train(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<(Vec<Spectrum>, Spectrum)> {
-        let template = self.describe(luma, bounds)?;
-        let power = correlate(&template, &template);
-        let filter = self.label.iter().zip(power).map(|(label, power)| *label / (power[0] + RIDGE));
-        Ok((template, filter.collect()))
+    /// Spectra of the upper (0) or lower (1) half of the figure in `channels`.
+    fn masked(&self, channels: &[Vec<f32>], figure: &[f32], half: usize) -> opencv::Result<Vec<Spectrum>> {
+        let masked = channels.iter().map(|channel| {
+            let cells = channel.iter().zip(figure).enumerate();
+            let value = |(index, (value, share)): (usize, (&f32, &f32))| {
+                let here = usize::from(2 * (index / self.columns) >= self.rows) == half;
+                let weight = GROUND_SHARE + (1.0 - GROUND_SHARE) * share;
+                if here { value * weight } else { 0.0 }
+            };
+            cells.map(value).collect::<Vec<f32>>()
+        });
+        self.spectra(&masked.collect::<Vec<_>>())
     }
 
-    /// Spectra of the features around `bounds`.
-    fn describe(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Vec<Spectrum>> {
+    fn spectra(&self, channels: &[Vec<f32>]) -> opencv::Result<Vec<Spectrum>> {
+        channels.iter().map(|channel| self.spectrum(channel)).collect()
+    }
+
+    /// The features around `bounds`, one plane each.
+    fn describe(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Vec<Vec<f32>>> {
         let (width, height) = (self.columns * CELL, self.rows * CELL);
         let grey = sample(luma, scaled(bounds, CONTEXT.0, CONTEXT.1), width, height)?;
         let mut channels = features(&grey, self.columns, self.rows)?;
         for channel in &mut channels {
             channel.iter_mut().zip(&self.window).for_each(|(value, weight)| *value *= weight);
         }
-        channels.iter().map(|channel| self.spectrum(channel)).collect()
+        Ok(channels)
     }
 
     fn spectrum(&self, values: &[f32]) -> opencv::Result<Spectrum> {
@@ -130,30 +170,6 @@ impl Appearance {
         opencv::core::dft(&plane, &mut values, DFT_INVERSE | DFT_SCALE | DFT_REAL_OUTPUT, 0)?;
         Ok(values.data_typed::<f32>()?.to_vec())
     }
-
-    /// Place (in cells, wrapped around 0) and height of the response's peak, finer than a cell.
-    fn peak(&self, response: &[f32], spread: f32) -> (Point2f, f32) {
-        let wrap = |cell: usize, size: usize| {
-            if cell > size / 2 { cell as f32 - size as f32 } else { cell as f32 }
-        };
-        let (across, down) =
-            (spread * self.columns as f32 / CONTEXT.0, spread * self.rows as f32 / CONTEXT.1);
-        let expected = |cell: usize| {
-            let x = wrap(cell % self.columns, self.columns) / across;
-            let y = wrap(cell / self.columns, self.rows) / down;
-            response[cell] * (-0.5 * (x * x + y * y)).exp()
-        };
-        let best = (0..response.len()).max_by(|&a, &b| expected(a).total_cmp(&expected(b))).unwrap_or(0);
-        let (x, y) = (best % self.columns, best / self.columns);
-        let at = |x: usize, y: usize| response[(y % self.rows) * self.columns + x % self.columns];
-        let (left, right) = (at(x + self.columns - 1, y), at(x + 1, y));
-        let (above, below) = (at(x, y + self.rows - 1), at(x, y + 1));
-        let place = Point2f::new(
-            wrap(x, self.columns) + vertex(left, response[best], right),
-            wrap(y, self.rows) + vertex(above, response[best], below),
-        );
-        (place, response[best])
-    }
 }
 
 /// Columns and rows of cells for a target of that shape; even, and never too few to correlate.
@@ -164,7 +180,7 @@ fn grid(bounds: Rect2f) -> (usize, usize) {
 }
 
 /// Where the parabola through three neighbouring values peaks, -0.5 to 0.5 from the middle one.
-fn vertex(before: f32, middle: f32, after: f32) -> f32 {
+pub(super) fn vertex(before: f32, middle: f32, after: f32) -> f32 {
     let curvature = before - 2.0 * middle + after;
     if curvature < -1e-6 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }
@@ -185,27 +201,6 @@ fn label(columns: usize, rows: usize) -> Vec<f32> {
     let square = |index: usize, size: usize| (index.min(size - index) as f32).powi(2);
     let value = |x, y| (-0.5 * (square(x, columns) + square(y, rows)) / (sigma * sigma)).exp();
     (0..rows).flat_map(|y| (0..columns).map(move |x| value(x, y))).collect()
-}
-
-/// `area` of the frame at `width` x `height`, the border repeated where it leaves the frame.
-fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> opencv::Result<Mat> {
-    // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
-    let fine = (area.width / width as f32).round().clamp(1.0, 3.0);
-    let size = Size::new((width as f32 * fine) as i32, (height as f32 * fine) as i32);
-    let (across, down) = (area.width / size.width as f32, area.height / size.height as f32);
-    let middle = centre(area);
-    let corner =
-        middle - Point2f::new(area.width - across, area.height - down) / 2.0 - Point2f::new(0.5, 0.5);
-    let matrix = Mat::from_slice_2d(&[[across, 0.0, corner.x], [0.0, down, corner.y]])?;
-    let flags = imgproc::INTER_LINEAR | imgproc::WARP_INVERSE_MAP;
-    let mut grey = Mat::default();
-    luma.with_mat(|mat| {
-        imgproc::warp_affine(mat, &mut grey, &matrix, size, flags, BORDER_REPLICATE, Default::default())
-    })?;
-    let mut coarse = Mat::default();
-    let size = Size::new(width as i32, height as i32);
-    imgproc::resize(&grey, &mut coarse, size, 0.0, 0.0, imgproc::INTER_AREA)?;
-    Ok(coarse)
 }
 
 /// Normalised histograms of oriented gradients of each cell, and its grey: one plane for each.
@@ -296,6 +291,10 @@ fn product(a: Complex, b: Complex) -> Complex {
     Complex::from([a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]])
 }
 
+fn sum(a: &[Complex], b: &[Complex]) -> Spectrum {
+    a.iter().zip(b).map(|(a, b)| *a + *b).collect()
+}
+
 fn blend(old: &mut [Complex], new: &[Complex], rate: f32) {
     for (old, new) in old.iter_mut().zip(new) {
         *old = *old * (1.0 - rate) + *new * rate;
@@ -304,50 +303,91 @@ fn blend(old: &mut [Complex], new: &[Complex], rate: f32) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::synthetic::Scene;
+    use super::super::synthetic::{Picture, Scene};
     use super::*;
     use proptest::prelude::*;
 
     const PERSON: Rect2f = Rect2f { x: 120.0, y: 70.0, width: 40.0, height: 90.0 };
 
-    fn person_at(x: f32, y: f32) -> super::super::synthetic::Picture {
+    fn person_at(x: f32, y: f32) -> Picture {
         let mut picture = Scene::new(320, 240).background((0.0, 0.0));
         picture.paint(Rect2f { x, y, ..PERSON }, 7);
         picture
+    }
+
+    /// The figure fills the box.
+    fn figure(grid: Grid) -> Vec<f32> {
+        let inside = |place: usize, count: usize, context: f32| {
+            (((place as f32 + 0.5) / count as f32 - 0.5) * context).abs() < 0.5
+        };
+        (0..grid.columns * grid.rows)
+            .map(|index| {
+                let (x, y) = (index % grid.columns, index / grid.columns);
+                if inside(x, grid.columns, CONTEXT.0) && inside(y, grid.rows, CONTEXT.1) { 1.0 } else { 0.0 }
+            })
+            .collect()
+    }
+
+    fn trained(luma: &Luma) -> CorrelationFilter {
+        let mut filter = CorrelationFilter::new(PERSON).expect("filter");
+        let figure = figure(filter.grid());
+        filter.learn(luma, PERSON, &figure, 1.0).expect("learn");
+        filter
+    }
+
+    /// Cells from the middle, and value, of the best answer within reach.
+    fn peak(response: &Response) -> ((i32, i32), f32) {
+        let places = (-7..=7).flat_map(|x| (-7..=7).map(move |y| (x, y)));
+        places
+            .map(|place| (place, response.at(place).sum()))
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .expect("some")
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(12))]
         #[test]
         fn finds_the_person_nearby(dx in -16.0_f32..16.0, dy in -16.0_f32..16.0) {
-            let appearance = Appearance::new(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("learn");
+            let filter = trained(&person_at(PERSON.x, PERSON.y).luma());
             let moved = person_at(PERSON.x + dx, PERSON.y + dy);
-            let answer = appearance.look(&moved.luma(), PERSON, 1.0).expect("look");
-            prop_assert!((answer.offset.x - dx).abs() < 2.0 && (answer.offset.y - dy).abs() < 2.0, "{answer:?}");
-            prop_assert!(answer.peak > 0.25, "{answer:?}");
+            let ((x, y), value) = peak(&filter.respond(&moved.luma(), PERSON).expect("respond"));
+            let grid = filter.grid();
+            let cell = (PERSON.width * CONTEXT.0 / grid.columns as f32, PERSON.height * CONTEXT.1 / grid.rows as f32);
+            prop_assert!((x as f32 * cell.0 - dx).abs() < cell.0 && (y as f32 * cell.1 - dy).abs() < cell.1, "{x} {y}");
+            prop_assert!(value > 0.2, "{value}");
         }
     }
 
     #[test]
     fn knows_the_person_from_another() {
-        let appearance = Appearance::new(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("learn");
-        let same = appearance.look(&person_at(PERSON.x, PERSON.y).luma(), PERSON, 1.0).expect("look");
+        let filter = trained(&person_at(PERSON.x, PERSON.y).luma());
+        let same = peak(&filter.respond(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("respond")).1;
         let mut other = Scene::new(320, 240).background((33.0, 57.0));
         other.paint(PERSON, 1234);
-        let other = appearance.look(&other.luma(), PERSON, 1.0).expect("look");
-        assert!(same.peak > 0.9, "{same:?}");
-        assert!(other.peak < 0.3, "{other:?}");
+        let other = peak(&filter.respond(&other.luma(), PERSON).expect("respond")).1;
+        assert!(same > 0.6 && other < 0.5 * same, "{same} {other}");
+    }
+
+    #[test]
+    fn the_wall_behind_is_not_learned() {
+        // Trained on the person; then the same wall with nobody before it.
+        let filter = trained(&person_at(PERSON.x, PERSON.y).luma());
+        let same = peak(&filter.respond(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("respond")).1;
+        let wall = Scene::new(320, 240).background((0.0, 0.0));
+        let alone = peak(&filter.respond(&wall.luma(), PERSON).expect("respond")).1;
+        assert!(alone < 0.4 * same, "{same} {alone}");
     }
 
     #[test]
     fn learning_takes_over() {
-        let mut appearance = Appearance::new(&person_at(PERSON.x, PERSON.y).luma(), PERSON).expect("learn");
+        let mut filter = trained(&person_at(PERSON.x, PERSON.y).luma());
         let mut other = Scene::new(320, 240).background((33.0, 57.0));
         other.paint(PERSON, 1234);
+        let figure = figure(filter.grid());
         for _ in 0..10 {
-            appearance.learn(&other.luma(), PERSON, 0.5).expect("learn");
+            filter.learn(&other.luma(), PERSON, &figure, 0.5).expect("learn");
         }
-        assert!(appearance.look(&other.luma(), PERSON, 1.0).expect("look").peak > 0.8);
+        assert!(peak(&filter.respond(&other.luma(), PERSON).expect("respond")).1 > 0.5);
     }
 
     #[test]
@@ -359,8 +399,10 @@ mod tests {
             Rect2f::new(5.0, 5.0, 1.0, 1.0),
             Rect2f::new(0.0, 0.0, 900.0, 3.0),
         ] {
-            let appearance = Appearance::new(&picture.luma(), bounds).expect("learn");
-            assert!(appearance.look(&picture.luma(), bounds, 1.0).expect("look").peak.is_finite());
+            let mut filter = CorrelationFilter::new(bounds).expect("filter");
+            let figure = figure(filter.grid());
+            filter.learn(&picture.luma(), bounds, &figure, 1.0).expect("learn");
+            assert!(filter.respond(&picture.luma(), bounds).expect("respond").at((0, 0)).sum().is_finite());
         }
     }
 }

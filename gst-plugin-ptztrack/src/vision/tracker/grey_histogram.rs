@@ -1,8 +1,6 @@
-//! Centre of mass by mean-shift over the back-projected grey histogram (thesis 3.5.3, Comaniciu).
+//! Centre of mass by mean-shift over the back-projected grey histogram (thesis 3.5.3, equations 3.12 to 3.15; Comaniciu).
 
-use opencv::core::{
-    CV_8UC1, Mat, Point2f, Rect, Rect2f, Scalar, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS,
-};
+use opencv::core::{Mat, Point2f, Rect, Rect2f, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS};
 use opencv::prelude::*;
 use opencv::{imgproc, video};
 
@@ -20,20 +18,13 @@ const REACH: i32 = 2;
 
 /// Share of each grey level on the target: the look-up table from pixel to probability.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct GreyModel {
+pub(super) struct GreyHistogram {
     shares: [f32; BINS],
 }
 
-impl GreyModel {
+impl GreyHistogram {
     /// Counts the surroundings of `points` in the patch; `None` where no point lies in it.
-    ///
-    /// With `background` (the target's box) the shares are divided by how common a grey is outside of
-    /// the box too, so that what the street looks like does not pull.
-    pub fn new(
-        patch: &Patch,
-        points: &[Point2f],
-        background: Option<Rect2f>,
-    ) -> opencv::Result<Option<Self>> {
+    pub fn new(patch: &Patch, points: &[Point2f]) -> opencv::Result<Option<Self>> {
         let mut target = [0.0; BINS];
         for point in points {
             count(patch, *point, &mut target)?;
@@ -43,10 +34,6 @@ impl GreyModel {
             return Ok(None);
         }
         target.iter_mut().for_each(|share| *share /= total);
-        if let Some(bounds) = background {
-            let outside = outside(patch, bounds)?;
-            target.iter_mut().zip(outside).for_each(|(share, other)| *share /= *share + other + 1e-3);
-        }
         Ok(Some(Self { shares: target }))
     }
 
@@ -111,27 +98,6 @@ fn count(patch: &Patch, point: Point2f, counts: &mut [f32; BINS]) -> opencv::Res
     Ok(())
 }
 
-/// Shares of the greys of the patch outside the box.
-fn outside(patch: &Patch, bounds: Rect2f) -> opencv::Result<[f32; BINS]> {
-    let mut mask = Mat::new_size_with_default(patch.grey().size()?, CV_8UC1, Scalar::all(255.0))?;
-    if let Some(window) = pixels(patch, bounds) {
-        imgproc::rectangle(&mut mask, window, Scalar::all(0.0), imgproc::FILLED, imgproc::LINE_8, 0)?;
-    }
-    let mut histogram = Mat::default();
-    let greys = opencv::core::Vector::<Mat>::from_iter([patch.grey().clone()]);
-    imgproc::calc_hist_def(
-        &greys,
-        &vec![0].into(),
-        &mask,
-        &mut histogram,
-        &vec![BINS as i32].into(),
-        &vec![0.0, 256.0].into(),
-    )?;
-    let counts = histogram.data_typed::<f32>()?;
-    let total: f32 = counts.iter().sum::<f32>().max(1.0);
-    Ok(std::array::from_fn(|bin| counts.get(bin).map_or(0.0, |count| count / total)))
-}
-
 /// Where mass was found, kept near the middle of the box: limbs and shadows pull, a camera should not swing.
 pub(super) fn near_the_middle(mass: Point2f, bounds: Rect2f, share: f32) -> Point2f {
     let middle = centre(bounds);
@@ -175,22 +141,18 @@ mod tests {
     fn the_window_climbs_onto_the_target() {
         let patch = square();
         let on_square = [Point2f::new(48.0, 38.0), Point2f::new(52.0, 44.0)];
-        for background in [None, Some(Rect2f::new(38.0, 28.0, 24.0, 24.0))] {
-            let model =
-                GreyModel::new(&patch, &on_square, background).expect("counts").expect("points inside");
-            let start = Rect2f::new(28.0, 22.0, 24.0, 24.0);
-            let mass = model.centre_of_mass(&patch, start).expect("shift").expect("mass");
-            assert!((mass.x - 49.5).abs() < 1.0 && (mass.y - 39.5).abs() < 1.0, "{mass:?}");
-        }
+        let model = GreyHistogram::new(&patch, &on_square).expect("counts").expect("points inside");
+        let start = Rect2f::new(28.0, 22.0, 24.0, 24.0);
+        let mass = model.centre_of_mass(&patch, start).expect("shift").expect("mass");
+        assert!((mass.x - 49.5).abs() < 1.0 && (mass.y - 39.5).abs() < 1.0, "{mass:?}");
     }
 
     #[test]
     fn no_points_and_no_window_are_no_model_and_no_mass() {
         let patch = square();
         let outside = [Point2f::new(-60.0, 900.0)];
-        assert_eq!(GreyModel::new(&patch, &outside, None).expect("counts"), None);
-        let model =
-            GreyModel::new(&patch, &[Point2f::new(48.0, 38.0)], None).expect("counts").expect("inside");
+        assert_eq!(GreyHistogram::new(&patch, &outside).expect("counts"), None);
+        let model = GreyHistogram::new(&patch, &[Point2f::new(48.0, 38.0)]).expect("counts").expect("inside");
         let away = Rect2f::new(500.0, 22.0, 24.0, 24.0);
         assert_eq!(model.centre_of_mass(&patch, away).expect("shift"), None);
     }

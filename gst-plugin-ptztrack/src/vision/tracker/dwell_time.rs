@@ -1,4 +1,4 @@
-//! How long a target is followed.
+//! How long a target is followed, and stands.
 
 use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::ReleaseReason;
@@ -24,11 +24,11 @@ pub struct Limits {
     pub tracked_s: f64,
 }
 
-/// What a target has used up of the patience with it.
+/// How long a target was followed, and stood still.
 ///
 /// Whether it stands is asked of the world, not of the picture: the motion of the background is taken off.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Patience {
+pub(super) struct DwellTime {
     tracked_s: f64,
     still_s: f64,
     /// From its average place, in its widths.
@@ -37,7 +37,7 @@ pub(super) struct Patience {
     growth: f32,
 }
 
-impl Patience {
+impl DwellTime {
     /// Takes a frame, `dt_s` seconds after the last one, in which the target was seen or not.
     pub fn pass(&mut self, dt_s: f64) {
         self.tracked_s += dt_s;
@@ -50,7 +50,8 @@ impl Patience {
         let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
         let own = centre(after) - ego.apply(centre(before));
         self.offset = (self.offset + own / after.width.max(1.0)) * keep;
-        self.growth = (self.growth + (after.height / (before.height * ego.scale())).ln()) * keep;
+        self.growth =
+            (self.growth + (after.height / (before.height * ego.scale_at(centre(before)))).ln()) * keep;
         // What is not a number fails as well, and is forgotten.
         let stands = length(self.offset) <= REACH && self.growth.abs() <= GROWTH;
         *self = if stands {
@@ -72,7 +73,6 @@ impl Patience {
 
 #[cfg(test)]
 mod tests {
-    use super::super::ego_motion::estimate;
     use super::super::geometry::around;
     use super::*;
     use proptest::prelude::*;
@@ -84,7 +84,7 @@ mod tests {
     /// Whether a target is given up as standing within `seconds`, its middle in pixels and its size by time, in a
     /// picture that moves as `ego` every frame.
     fn given_up(seconds: f32, ego: EgoMotion, path: impl Fn(f32) -> (Point2f, f32)) -> bool {
-        let mut patience = Patience::default();
+        let mut dwell = DwellTime::default();
         let box_at = |time| {
             let (middle, size) = path(time);
             around(middle, WIDTH * size, 2.25 * WIDTH * size)
@@ -93,13 +93,13 @@ mod tests {
         (1..=(seconds / DT as f32) as usize).any(|frame| {
             let (before, now) = (box_at((frame - 1) as f32 * DT as f32), box_at(frame as f32 * DT as f32));
             // The camera carries the box from where the picture had it; its own way comes on top.
-            let scale = ego.scale() * now.height / before.height;
+            let scale = ego.scale_at(centre(carried)) * now.height / before.height;
             let middle = ego.apply(centre(carried)) + (centre(now) - centre(before));
             let after = around(middle, carried.width * scale, carried.height * scale);
-            patience.pass(DT);
-            patience.watch(carried, after, ego, DT);
+            dwell.pass(DT);
+            dwell.watch(carried, after, ego, DT);
             carried = after;
-            patience.exhausted(LIMITS).is_some()
+            dwell.exhausted(LIMITS).is_some()
         })
     }
 
@@ -122,9 +122,7 @@ mod tests {
     #[test]
     fn who_stands_is_given_up_under_a_camera_that_zooms() {
         for zoom in [0.99, 1.01] {
-            let corners = (0..36).map(|n| Point2f::new(100.0 * (n % 6) as f32, 80.0 * (n / 6) as f32));
-            let pairs: Vec<_> = corners.map(|corner| (corner, corner * zoom)).collect();
-            let ego = estimate(&pairs).expect("plenty of points");
+            let ego = EgoMotion::zoom(zoom);
             assert!(given_up(11.0, ego, |_| along(0.0)), "{zoom}");
             assert!(!given_up(11.0, ego, |time| (Point2f::default(), (0.1 * time).exp())), "{zoom}");
         }
@@ -140,27 +138,27 @@ mod tests {
     #[test]
     fn the_time_of_tracking_counts_however_it_moves() {
         let limits = Limits { stationary_s: f64::INFINITY, tracked_s: 2.0 };
-        let mut patience = Patience::default();
+        let mut dwell = DwellTime::default();
         for frame in 0..8 {
-            patience.pass(0.25);
+            dwell.pass(0.25);
             let (before, after) = (60.0 * frame as f32, 60.0 * (frame + 1) as f32);
             let at = |x| around(Point2f::new(x, 0.0), WIDTH, 90.0);
-            patience.watch(at(before), at(after), EgoMotion::default(), 0.25);
-            assert_eq!(patience.exhausted(limits), None);
+            dwell.watch(at(before), at(after), EgoMotion::default(), 0.25);
+            assert_eq!(dwell.exhausted(limits), None);
         }
-        patience.pass(0.25);
-        assert_eq!(patience.exhausted(limits), Some(ReleaseReason::MaxTrackingTime));
+        dwell.pass(0.25);
+        assert_eq!(dwell.exhausted(limits), Some(ReleaseReason::MaxTrackingTime));
     }
 
     #[test]
     fn nonsense_is_forgotten() {
-        let mut patience = Patience::default();
-        patience.watch(Rect2f::default(), Rect2f::default(), EgoMotion::default(), f64::INFINITY);
+        let mut dwell = DwellTime::default();
+        dwell.watch(Rect2f::default(), Rect2f::default(), EgoMotion::default(), f64::INFINITY);
         let person = around(Point2f::default(), WIDTH, 90.0);
         for _ in 0..20 {
-            patience.watch(person, person, EgoMotion::default(), 1.0);
+            dwell.watch(person, person, EgoMotion::default(), 1.0);
         }
-        assert_eq!(patience.exhausted(LIMITS), Some(ReleaseReason::Stationary));
+        assert_eq!(dwell.exhausted(LIMITS), Some(ReleaseReason::Stationary));
     }
 
     proptest! {

@@ -1,0 +1,168 @@
+//! Colours of figure and ground: how much likelier a colour is on the target than beside it.
+//!
+//! Histograms of both as in Staple (Bertinetto et al., "Staple: Complementary Learners for Real-Time Tracking", CVPR
+//! 2016), of the upper and the lower body each. Brightness and colour are counted apart, so that the few hundred cells of
+//! one picture fill them; grey video has brightness alone.
+
+/// Bins of brightness, and of each of the two colour differences.
+const GREYS: usize = 16;
+const TINTS: usize = 13;
+/// Width of a colour difference's bin: clothes and walls rarely lie further than 40 from grey.
+const TINT_WIDTH: i32 = 6;
+/// Share that a bin has where nothing was counted.
+const FLOOR: f32 = 0.005;
+/// What brightness, and what tint, may say at most, as a natural logarithm of odds.
+const LARGEST: f32 = 1.5;
+
+/// One cell's colour: Y, U, V.
+pub(super) type Colour = [u8; 3];
+
+/// Shares of brightnesses and tints; each sums to 1 once something was counted.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Histogram {
+    greys: [f32; GREYS],
+    tints: [f32; TINTS * TINTS],
+}
+
+impl Default for Histogram {
+    fn default() -> Self {
+        Self { greys: [0.0; GREYS], tints: [0.0; TINTS * TINTS] }
+    }
+}
+
+impl Histogram {
+    /// Of weighted colours; `None` where the weights are nil.
+    pub fn of(colours: impl Iterator<Item = (Colour, f32)>) -> Option<Self> {
+        let mut counted = Self::default();
+        let mut total = 0.0;
+        for (colour, weight) in colours {
+            // Half of the weight to the bin, half to its nearer neighbour by brightness: noise moves it to and fro.
+            let (low, high, share) = grey_bins(colour[0]);
+            counted.greys[low] += weight * (1.0 - share);
+            counted.greys[high] += weight * share;
+            counted.tints[tint_bin(colour)] += weight;
+            total += weight;
+        }
+        (total > f32::EPSILON).then(|| counted.scaled(1.0 / total))
+    }
+
+    fn scaled(mut self, factor: f32) -> Self {
+        self.greys.iter_mut().chain(&mut self.tints).for_each(|share| *share *= factor);
+        self
+    }
+
+    /// Moves to `other` by `rate`, 0 to 1.
+    pub fn blend(&mut self, other: &Self, rate: f32) {
+        let mix = |old: &mut f32, new: &f32| *old += (*new - *old) * rate;
+        self.greys.iter_mut().zip(&other.greys).for_each(|(old, new)| mix(old, new));
+        self.tints.iter_mut().zip(&other.tints).for_each(|(old, new)| mix(old, new));
+    }
+}
+
+/// The two bins that a brightness lies between, and the share of the second.
+fn grey_bins(grey: u8) -> (usize, usize, f32) {
+    let place = (f32::from(grey) / 256.0 * GREYS as f32 - 0.5).max(0.0);
+    let low = place as usize;
+    (low, (low + 1).min(GREYS - 1), place - low as f32)
+}
+
+fn tint_bin([_, u, v]: Colour) -> usize {
+    let bin = |tint: u8| {
+        let middle = TINTS as i32 / 2;
+        let offset = (i32::from(tint) - 128 + TINT_WIDTH / 2).div_euclid(TINT_WIDTH);
+        (offset + middle).clamp(0, TINTS as i32 - 1) as usize
+    };
+    bin(u) * TINTS + bin(v)
+}
+
+/// Upper and lower body against what is beside them.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct ColourModel {
+    /// Upper body, lower body.
+    figure: [Histogram; 2],
+    ground: Histogram,
+}
+
+impl ColourModel {
+    pub fn new(figure: [Histogram; 2], ground: Histogram) -> Self {
+        Self { figure, ground }
+    }
+
+    /// Logarithm of the odds that a cell of that colour belongs to the target; `lower` 0 (upper body) to 1 (lower).
+    pub fn log_odds(&self, colour: Colour, lower: f32) -> f32 {
+        let (low, high, share) = grey_bins(colour[0]);
+        let tint = tint_bin(colour);
+        let grey = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
+        let either = |of: &dyn Fn(&Histogram) -> f32| {
+            of(&self.figure[0]) * (1.0 - lower) + of(&self.figure[1]) * lower
+        };
+        let odds =
+            |figure: f32, ground: f32| ((figure + FLOOR) / (ground + FLOOR)).ln().clamp(-LARGEST, LARGEST);
+        odds(either(&grey), grey(&self.ground)) + odds(either(&|h| h.tints[tint]), self.ground.tints[tint])
+    }
+
+    /// Learns what is figure (upper and lower body) and ground now; what was not seen stays as it is.
+    pub fn learn(
+        &mut self,
+        figure: [Option<Histogram>; 2],
+        figure_rate: f32,
+        ground: Option<Histogram>,
+        ground_rate: f32,
+    ) {
+        for (old, new) in self.figure.iter_mut().zip(&figure) {
+            if let Some(new) = new {
+                old.blend(new, figure_rate);
+            }
+        }
+        if let Some(new) = ground {
+            self.ground.blend(&new, ground_rate);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RED: Colour = [90, 110, 190];
+    const DARK: Colour = [40, 128, 128];
+    const WALL: Colour = [150, 126, 130];
+
+    fn of(colour: Colour) -> Histogram {
+        Histogram::of([(colour, 1.0)].into_iter()).expect("counted")
+    }
+
+    fn model() -> ColourModel {
+        ColourModel::new([of(RED), of(DARK)], of(WALL))
+    }
+
+    #[test]
+    fn each_half_knows_its_own_colour() {
+        let model = model();
+        assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(DARK, 1.0) > 1.0);
+        assert!(model.log_odds(WALL, 0.0) < -1.0 && model.log_odds(WALL, 1.0) < -1.0);
+        assert!(model.log_odds(RED, 1.0) < model.log_odds(RED, 0.0));
+    }
+
+    #[test]
+    fn nothing_counted_is_no_histogram() {
+        assert_eq!(Histogram::of([(RED, 0.0)].into_iter()), None);
+    }
+
+    #[test]
+    fn grey_video_is_told_apart_by_brightness() {
+        let grey = |level| [level, 128, 128];
+        let model = ColourModel::new([of(grey(60)), of(grey(60))], of(grey(160)));
+        assert!(model.log_odds(grey(60), 0.5) > 1.0 && model.log_odds(grey(160), 0.5) < -1.0);
+    }
+
+    #[test]
+    fn what_is_learned_takes_over_and_what_is_hidden_stays() {
+        let mut model = model();
+        for _ in 0..30 {
+            model.learn([Some(of(WALL)), None], 0.2, Some(of(RED)), 0.2);
+        }
+        assert!(model.log_odds(WALL, 0.0) > 1.0 && model.log_odds(RED, 0.0) < -1.0);
+        assert!(model.log_odds(DARK, 1.0) > 1.0, "the lower half was not seen");
+    }
+}

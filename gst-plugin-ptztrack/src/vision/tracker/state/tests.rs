@@ -1,0 +1,187 @@
+use super::super::synthetic::{Picture, Scene};
+use super::*;
+use crate::vision::{self, SceneModel};
+use std::time::Duration;
+
+const SIZE: (usize, usize) = (480, 320);
+const PERSON: (f32, f32) = (40.0, 90.0);
+const DT: f64 = 0.1;
+
+fn config() -> Config {
+    Config {
+        profile: Profile::Robust,
+        choice: Choice::Largest,
+        confirm_frames: 1,
+        coast_s: 1.5,
+        manual_size: 0.3,
+        must_travel: false,
+        limits: Limits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
+    }
+}
+
+/// A tracker behind what sees the whole picture.
+struct Chain {
+    scene: SceneModel,
+    tracker: Tracker,
+}
+
+impl Chain {
+    fn process(&mut self, picture: &Picture, dt_s: f64, detections: &[Detection]) -> Report {
+        let luma = picture.luma();
+        let whole = vision::Picture { luma, chroma: None };
+        let elapsed = Duration::try_from_secs_f64(dt_s).unwrap_or_default();
+        let scene = self.scene.update(&whole, 320, elapsed, None).expect("scene");
+        let seen = Observation { luma, scene: Some(scene) };
+        self.tracker.process(&seen, dt_s, detections).expect("track")
+    }
+}
+
+/// The street moved by `pan` with people of their own textures at these places.
+fn street(pan: (f32, f32), people: &[(f32, f32, u32)]) -> Picture {
+    let mut picture = Scene::new(SIZE.0, SIZE.1).background(pan);
+    for (x, y, texture) in people {
+        picture.paint(Rect2f::new(*x, *y, PERSON.0, PERSON.1), *texture);
+    }
+    picture
+}
+
+fn following(profile: Profile, picture: &Picture, x: f32, y: f32) -> Chain {
+    following_with(Config { profile, ..config() }, picture, x, y)
+}
+
+fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Chain {
+    let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config) };
+    let (width, height) = (SIZE.0 as f64, SIZE.1 as f64);
+    let bounds = Rect {
+        x: f64::from(x) / width,
+        y: f64::from(y) / height,
+        width: f64::from(PERSON.0) / width,
+        height: f64::from(PERSON.1) / height,
+    };
+    let report = chain.process(picture, DT, &[Detection { bounds, contour: Vec::new() }]);
+    assert_eq!(report.changes, [TargetChange::Acquired]);
+    chain
+}
+
+fn step(chain: &mut Chain, picture: &Picture) -> Report {
+    chain.process(picture, DT, &[])
+}
+
+#[track_caller]
+fn assert_at(report: &Report, x: f32, y: f32) {
+    assert_near(report, x, y, 8.0);
+}
+
+#[track_caller]
+fn assert_near(report: &Report, x: f32, y: f32, tolerance: f32) {
+    assert_eq!((report.state, report.id), (TargetState::Tracking, 1), "{:?}", report.bounds);
+    let off = ((report.bounds.x * SIZE.0 as f64) as f32 - x, (report.bounds.y * SIZE.1 as f64) as f32 - y);
+    assert!(off.0.abs().max(off.1.abs()) < tolerance, "{off:?} pixels off");
+}
+
+#[test]
+fn a_walker_is_followed() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(80.0, 100.0, 7)]), 80.0, 100.0);
+    for n in 1..30 {
+        let x = 80.0 + 8.5 * n as f32;
+        assert_at(&step(&mut tracker, &street((0.0, 0.0), &[(x, 100.0, 7)])), x, 100.0);
+    }
+}
+
+#[test]
+fn the_thesis_follows_a_walker_before_an_even_wall() {
+    let wall = |x| {
+        let mut picture = Scene::new(SIZE.0, SIZE.1).flat(240);
+        picture.paint(Rect2f::new(x, 100.0, PERSON.0, PERSON.1), 7);
+        picture
+    };
+    let mut tracker = following(Profile::Thesis, &wall(80.0), 80.0, 100.0);
+    for n in 1..30 {
+        let x = 80.0 + 8.5 * n as f32;
+        assert_near(&step(&mut tracker, &wall(x)), x, 100.0, 12.0);
+    }
+}
+
+#[test]
+fn the_panning_camera_does_not_drag_the_walker() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(200.0, 100.0, 7)]), 200.0, 100.0);
+    for n in 1..30 {
+        // The camera keeps the walker in the middle: only the street moves.
+        let (pan, x) = (-9.0 * n as f32, 200.0 + (n % 3) as f32);
+        let report = step(&mut tracker, &street((pan, 0.0), &[(x, 100.0, 7)]));
+        assert_at(&report, x, 100.0);
+        let ego = report.ego_velocity.expect("textured").x * SIZE.0 as f64 * DT;
+        assert!((ego + 9.0).abs() < 0.5, "{ego}");
+    }
+}
+
+#[test]
+fn somebody_standing_is_kept_under_a_camera_that_starts_to_pan() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(200.0, 100.0, 7)]), 200.0, 100.0);
+    let mut pan = 0.0;
+    for n in 1..30 {
+        pan -= if n > 10 { 7.0 } else { 0.0 };
+        let report = step(&mut tracker, &street((pan, 0.0), &[(200.0 + pan, 100.0, 7)]));
+        assert_at(&report, 200.0 + pan, 100.0);
+    }
+}
+
+#[test]
+fn a_large_motion_of_the_whole_picture_is_followed() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(60.0, 100.0, 7)]), 60.0, 100.0);
+    let mut x = 60.0;
+    for speed in [12.0, 28.0, 44.0, 60.0, 60.0] {
+        x += speed;
+        let report = step(&mut tracker, &street((x - 60.0, 0.0), &[(x, 100.0, 7)]));
+        assert_at(&report, x, 100.0);
+    }
+}
+
+#[test]
+fn two_who_cross_are_not_confused() {
+    let mut tracker =
+        following(Profile::Robust, &street((0.0, 0.0), &[(60.0, 100.0, 7), (360.0, 104.0, 99)]), 60.0, 100.0);
+    let mut last = Report::default();
+    for n in 1..34 {
+        let (x, other) = (60.0 + 9.0 * n as f32, 360.0 - 9.0 * n as f32);
+        // The other passes in front.
+        last = step(&mut tracker, &street((0.0, 0.0), &[(x, 100.0, 7), (other, 104.0, 99)]));
+    }
+    assert_at(&last, 60.0 + 9.0 * 33.0, 100.0);
+}
+
+#[test]
+fn hidden_for_a_second_and_found_again() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
+    let mut changes = Vec::new();
+    let mut last = Report::default();
+    for n in 1..40 {
+        let mut picture = street((0.0, 0.0), &[(40.0 + 8.0 * n as f32, 100.0, 7)]);
+        picture.paint(Rect2f::new(150.0, 0.0, 110.0, 320.0), 4321);
+        last = step(&mut tracker, &picture);
+        changes.extend(last.changes.iter().copied());
+    }
+    assert_eq!(changes, [TargetChange::Occluded, TargetChange::Reacquired]);
+    assert_at(&last, 40.0 + 8.0 * 39.0, 100.0);
+}
+
+#[test]
+fn the_same_pictures_give_the_same_answers() {
+    let run = || {
+        let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(80.0, 100.0, 7)]), 80.0, 100.0);
+        (1..8)
+            .map(|n| step(&mut tracker, &street((0.0, 0.0), &[(80.0 + 7.0 * n as f32, 100.0, 7)])))
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(run(), run());
+}
+
+#[test]
+fn a_long_gap_is_a_loss() {
+    let picture = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
+    for gap in [3.0, f64::NAN, f64::INFINITY] {
+        let mut tracker = following(Profile::Robust, &picture, 80.0, 100.0);
+        let report = tracker.process(&picture, gap, &[]);
+        assert_eq!(report.changes, [TargetChange::Lost], "{gap}");
+    }
+}

@@ -1,0 +1,80 @@
+//! One target and how it is followed: with all cues, or as the thesis does it.
+
+mod robust;
+mod thesis;
+
+use opencv::core::{Point2f, Rect2f};
+
+pub(super) use robust::Robust;
+pub(super) use thesis::Thesis;
+
+use super::geometry::{Frame, share_inside};
+use super::points::Points;
+use super::selection::Sighting;
+use crate::vision::{Luma, Observation};
+
+/// Part of the box that must be in the picture.
+const MIN_INSIDE: f32 = 0.35;
+/// Window for lost points in the second attempt; the pyramids are built for it.
+const GROWN_WINDOW: i32 = 25;
+/// Points followed at most: more cost time and add nothing to their median.
+const MAX_POINTS: usize = 64;
+
+/// What one step saw of the target.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Sight {
+    /// It was followed.
+    Seen,
+    /// It is hidden, or something else is in its place.
+    Hidden,
+    /// It is no longer in the picture.
+    Gone,
+}
+
+/// What is known of a target. All pixels are of the picture.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Estimate {
+    pub bounds: Rect2f,
+    pub centroid: Point2f,
+    /// 0 to 1.
+    pub confidence: f32,
+    /// Motion against the background, pixels per second.
+    pub own_velocity: Point2f,
+    /// Motion of the background at the target, pixels per second; `None` where it could not be seen.
+    pub ego_velocity: Option<Point2f>,
+}
+
+/// A way to follow one target from picture to picture.
+pub(super) trait Follow: Send {
+    /// Follows the target into the next picture, `dt_s` later; `sightings` are what the detector saw in it.
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
+
+    /// Looks for a hidden target where it should be by now, and where the detector saw something.
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
+
+    /// Whether `sighting` is the same person, wherever it is.
+    fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool>;
+
+    /// What is known of the target now.
+    fn estimate(&self) -> &Estimate;
+
+    /// Its points.
+    fn points(&self) -> &Points;
+}
+
+/// Whether too little of the box is left in the picture.
+fn is_gone(bounds: Rect2f, luma: &Luma) -> bool {
+    let frame = Frame { width: luma.width() as f32, height: luma.height() as f32 };
+    share_inside(bounds, frame.bounds()) < MIN_INSIDE
+}
+
+/// A window that sees a part of the body, not the street on both sides of it.
+fn window_for(bounds: Rect2f, step: usize) -> i32 {
+    let side = bounds.width.min(bounds.height) / step as f32;
+    2 * (side / 6.0).clamp(4.0, 8.0) as i32 + 1
+}
+
+/// Distance between points so that some sixty fit onto the target.
+fn spacing(bounds: Rect2f) -> f32 {
+    (bounds.area() / (2.0 * MAX_POINTS as f32)).sqrt().max(2.0)
+}

@@ -1,0 +1,599 @@
+//! A target followed by all that tells it from the wall: motion against the background, colour, silhouette, the
+//! correlation filter, and the points that lie on its figure.
+
+use opencv::core::{Point2f, Rect2f};
+
+use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
+use crate::vision::tracker::colour::ColourModel;
+use crate::vision::tracker::corners::{self, Search};
+use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
+use crate::vision::tracker::ego_motion::EgoMotion;
+use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, Shape};
+use crate::vision::tracker::flow::Flow;
+use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
+use crate::vision::tracker::grey_histogram::near_the_middle;
+use crate::vision::tracker::patch::{Patch, cut_around};
+use crate::vision::tracker::points::{Consensus, Points};
+use crate::vision::tracker::presence::Presence;
+use crate::vision::tracker::selection::Sighting;
+use crate::vision::{Luma, Observation};
+
+/// Cells of the map of figure and ground in one of the filter's, across and down.
+const FINER: usize = 2;
+/// How far around its expected place the target is looked for in one picture, cells of the filter.
+const REACH: i32 = 4;
+/// Deviation of the target from there, in sides of it: where the points agree, and where nothing but its motion tells.
+const SPREAD: f32 = 0.2;
+const WIDE_SPREAD: f32 = 0.6;
+/// Grey levels of mean absolute difference from which a point is lost, and pixels it may be off going forth and back.
+const MAX_RESIDUAL: f32 = 25.0;
+const MAX_RETURN_ERROR: f32 = 0.8;
+/// Share of the points that must agree for them to be believed alone.
+const BELIEVED_SHARE: f32 = 0.5;
+/// New points are looked for when fewer than this share of them is left, every so many pictures.
+const REPLENISH_SHARE: f32 = 0.7;
+const REPLENISH_PICTURES: u32 = 4;
+/// With fewer points the target starts with new ones.
+const MIN_MEMBERS: usize = 4;
+/// How likely a corner must lie on the figure to be followed.
+const ON_FIGURE: f32 = 0.6;
+/// Share of what is usually seen of the target from which it is learned, and found again after it was hidden.
+const LEARNT: f32 = 0.7;
+const FOUND: f32 = 0.65;
+/// How fast what the target looks like is learned, per second, and never more in one picture.
+const LEARNING_PER_S: f32 = 0.8;
+const MAX_LEARNING: f32 = 0.08;
+/// The ground beside the target changes as fast as the camera turns.
+const GROUND_LEARNING_PER_S: f32 = 4.0;
+/// Weight of the filter beside the fit of the silhouette, which counts the more the more it usually says.
+const FILTER_WEIGHT: f32 = 0.25;
+/// What the filter answers to anything, as a share of its answer to the target.
+const FILTER_NOISE: f32 = 0.35;
+/// Nobody changes their velocity faster than this, in heights of them per second squared: about 7 m/s².
+const ACCELERATION: f32 = 4.0;
+/// Deviation of the points' motion, pixels and shares of the height: limbs swing.
+const POINT_NOISE: (f32, f32) = (1.0, 0.015);
+/// What is taken for usual of the filter before it was asked, and of the silhouette at least.
+const FIRST_RESPONSE: Halves = Halves { upper: 0.25, lower: 0.25 };
+const LEAST_FIT: f32 = 0.02;
+const LEAST_RESPONSE: f32 = 0.05;
+const LEAST_LEVEL: f32 = 0.05;
+/// What the better half of the body is worth without the other.
+const HALF: f32 = 0.9;
+/// Time constant of the smoothed velocity, seconds: a stride is longer.
+const VELOCITY_TIME_S: f32 = 0.35;
+/// How much larger or smaller a box is tried, and what is then made of it.
+const TRIED_GROWTH: f32 = 0.06;
+const GROWTH_GAIN: f32 = 0.5;
+/// How far a side of the box goes outwards in one picture where there is figure beyond it, in sizes of the box.
+const WIDENING: f32 = 0.03;
+/// The box never grows or shrinks further than this from its first size.
+const MAX_GROWTH: f32 = 4.0;
+/// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
+const YOUNG_S: f32 = 1.0;
+/// How far the centre of mass may lie from the middle of the box, as a share of its sides.
+const CENTROID_REACH: f32 = 0.15;
+/// How much farther, in heights of it a second, a hidden target may be than its last motion took it.
+const HIDDEN_SPREAD_PER_S: f32 = 0.8;
+/// Pictures in a row in which a hidden target must be seen.
+const SEEN_AGAIN: u32 = 2;
+
+/// What is usually seen of the target while it is there.
+#[derive(Debug, Clone, Copy)]
+struct Usual {
+    fit: Halves,
+    /// How much of the silhouette is figure, by motion and colour alone.
+    level: Halves,
+    response: Halves,
+}
+
+impl Usual {
+    /// Share of the usual silhouette that is seen of either half, from 0 to about 1.
+    fn silhouette(self, fit: Halves) -> Halves {
+        fit.with(self.fit, |seen, usual| (seen / usual).clamp(0.0, 1.2))
+    }
+
+    /// Who stood out from the background stands out still, or is not there: whatever the looks say, known wall is wall.
+    fn stands_out(self, level: Halves) -> Halves {
+        level.with(self.level, |seen, usual| (seen / usual).clamp(0.0, 1.0))
+    }
+
+    /// Share of all that is usually seen of either half.
+    fn shares(self, fit: Halves, level: Halves, response: Halves) -> Halves {
+        let looks = response.with(self.response, |seen, usual| {
+            ((seen / usual - FILTER_NOISE) / (1.0 - FILTER_NOISE)).clamp(0.02, 1.2)
+        });
+        // Both must speak for it: somebody else moves as well, and the wall may look like anybody.
+        let usual = self.fit.mean().max(0.0);
+        let weight = usual / (usual + FILTER_WEIGHT);
+        let both = self.silhouette(fit).with(looks, |fit, looks| fit.powf(weight) * looks.powf(1.0 - weight));
+        both.with(self.stands_out(level), |both, stands_out| both * stands_out)
+    }
+
+    fn learn(&mut self, fit: Halves, level: Halves, response: Halves, rate: f32) {
+        let mix = |least: f32| move |old: f32, new: f32| (old + (new - old) * rate).max(least);
+        self.fit = self.fit.with(fit, mix(LEAST_FIT));
+        self.level = self.level.with(level, mix(LEAST_LEVEL));
+        self.response = self.response.with(response, mix(LEAST_RESPONSE));
+    }
+}
+
+/// Of a whole body: one half is enough, as a table may hide the other.
+fn of_whole(shares: Halves) -> f32 {
+    (HALF * shares.upper.max(shares.lower)).max(shares.mean())
+}
+
+/// The best place of the target around a box.
+#[derive(Debug, Clone, Copy)]
+struct Place {
+    bounds: Rect2f,
+    fit: Halves,
+    level: Halves,
+    response: Halves,
+    /// Share of what is usually seen of either half of the target.
+    shares: Halves,
+    /// Of the whole target.
+    share: f32,
+}
+
+impl Place {
+    /// Whether nothing hides a half of the body: only then is there something to learn.
+    fn is_unhidden(&self) -> bool {
+        self.shares.upper.min(self.shares.lower) >= FOUND
+    }
+}
+
+/// A target followed by all cues.
+pub(in super::super) struct Robust {
+    estimate: Estimate,
+    points: Points,
+    patch: Patch,
+    filter: CorrelationFilter,
+    grid: Grid,
+    shape: Shape,
+    colours: Option<ColourModel>,
+    /// Figure and ground in the last picture.
+    map: FigureMap,
+    usual: Usual,
+    presence: Presence,
+    ego: EgoMotion,
+    first_size: (f32, f32),
+    age_s: f32,
+    hidden_s: f32,
+    seen_in_a_row: u32,
+    pictures: u32,
+    pictures_since_replenished: u32,
+}
+
+impl Robust {
+    /// Takes up what was sighted; `None` where it has no corner.
+    pub fn acquire(seen: &Observation, sighting: &Sighting) -> opencv::Result<Option<Self>> {
+        let bounds = sighting.bounds;
+        let patch = Patch::cut(&seen.luma, cut_around(&seen.luma, bounds), GROWN_WINDOW)?;
+        if patch.is_empty() {
+            return Ok(None);
+        }
+        let filter = CorrelationFilter::new(bounds)?;
+        let grid = Grid { columns: filter.grid().columns * FINER, rows: filter.grid().rows * FINER };
+        let shape = Shape::upright(grid);
+        let cells = Cells::observe(seen, bounds, grid)?;
+        let map = FigureMap::new(&cells, &cells.evidence(None), &shape);
+        let mut target = Self {
+            estimate: Estimate {
+                bounds,
+                centroid: centre(bounds),
+                confidence: 1.0,
+                own_velocity: sighting.velocity,
+                ego_velocity: None,
+            },
+            points: Points::default(),
+            patch,
+            filter,
+            grid,
+            shape,
+            colours: None,
+            map,
+            usual: Usual { fit: Halves::default(), level: Halves::default(), response: FIRST_RESPONSE },
+            presence: Presence::default(),
+            ego: EgoMotion::default(),
+            first_size: (bounds.width, bounds.height),
+            age_s: 0.0,
+            hidden_s: 0.0,
+            seen_in_a_row: 0,
+            pictures: 0,
+            pictures_since_replenished: 0,
+        };
+        if let ([Some(upper), Some(lower)], Some(ground)) = cells.histograms(&target.map) {
+            target.colours = Some(ColourModel::new([upper, lower], ground));
+        }
+        let (_, evidence) = target.look_closely(seen)?;
+        // Who was already there when the picture was first seen does not stand out from the background.
+        let fit = target.shape.fit(&evidence, (0, 0), 1.0);
+        target.usual.fit = fit.with(fit, |fit, _| fit.max(LEAST_FIT));
+        target.usual.level = target.shape.level(&evidence, (0, 0));
+        target.filter.learn(&seen.luma, bounds, &target.map.reduced(FINER), 1.0)?;
+        let corners = target.corners()?;
+        let found = corners::reject_outliers(corners, 2.0);
+        target.points = Points::on_target(found.kept);
+        target.points.reject(found.rejected);
+        Ok((target.points.len() > 0).then_some(target))
+    }
+
+    /// The map of figure and ground around the box as it is now.
+    fn look_closely(&mut self, seen: &Observation) -> opencv::Result<(Cells, Evidence)> {
+        let cells = Cells::observe(seen, self.estimate.bounds, self.grid)?;
+        let evidence = cells.evidence(self.colours.as_ref());
+        self.map = FigureMap::new(&cells, &evidence, &self.shape);
+        Ok((cells, evidence))
+    }
+
+    fn watch_background(&mut self, seen: &Observation, dt_s: f32) {
+        let ego = EgoMotion::of(seen);
+        self.ego = ego.unwrap_or_default();
+        self.estimate.ego_velocity = ego.map(|ego| ego.at(centre(self.estimate.bounds)) / dt_s);
+        self.age_s += dt_s;
+        self.pictures += 1;
+    }
+
+    fn follow_points(
+        &mut self,
+        luma: &Luma,
+        expected: Point2f,
+    ) -> opencv::Result<(Patch, Option<Consensus>)> {
+        let bounds = self.estimate.bounds;
+        let shift = self.ego.at(centre(bounds)) + expected;
+        let next = Patch::cut(luma, self.patch.as_cut().moved(luma, shift), GROWN_WINDOW)?;
+        let starts = self.points.positions();
+        let guesses: Vec<Point2f> = starts.iter().map(|start| self.ego.apply(*start) + expected).collect();
+        let flow = Flow {
+            window: window_for(bounds, self.patch.step()),
+            grown_window: GROWN_WINDOW,
+            max_residual: MAX_RESIDUAL,
+            max_return_error: Some(MAX_RETURN_ERROR),
+        };
+        let found = flow.follow(&self.patch, &next, &starts, &guesses)?;
+        let map = &self.map;
+        let consensus = self.points.advance(&found, self.ego, expected, bounds.height, |point| map.at(point));
+        Ok((next, consensus))
+    }
+
+    /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
+    fn locate(&self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
+        let cells = Cells::observe(seen, bounds, self.grid)?;
+        let evidence = cells.evidence(self.colours.as_ref());
+        let response = self.filter.respond(&seen.luma, bounds)?;
+        let cell = cells.cell() * FINER as f32;
+        let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
+        let score = |(x, y): (i32, i32)| {
+            let (u, v) = (x as f32 / across, y as f32 / down);
+            self.agreement(&evidence, &response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
+        };
+        let places = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
+        let (mut best, mut height) = ((0, 0), f32::NEG_INFINITY);
+        for place in places {
+            let value = score(place);
+            if value > height {
+                (best, height) = (place, value);
+            }
+        }
+        let (x, y) = best;
+        let finer = Point2f::new(
+            vertex(score((x - 1, y)), height, score((x + 1, y))),
+            vertex(score((x, y - 1)), height, score((x, y + 1))),
+        );
+        let offset = Point2f::new((x as f32 + finer.x) * cell.x, (y as f32 + finer.y) * cell.y);
+        let fit = self.shape.fit(&evidence, (x * FINER as i32, y * FINER as i32), 1.0);
+        let answer = response.at(best);
+        let level = self.shape.level(&evidence, (x * FINER as i32, y * FINER as i32));
+        let shares = self.usual.shares(fit, level, answer);
+        Ok(Place { bounds: bounds + offset, fit, level, response: answer, shares, share: of_whole(shares) })
+    }
+
+    /// What filter and silhouette say together of a displacement in cells of the filter.
+    fn agreement(&self, evidence: &Evidence, response: &Response, (x, y): (i32, i32)) -> f32 {
+        let moved = (x * FINER as i32, y * FINER as i32);
+        let looks = 0.5 * response.at((x, y)).sum() / self.usual.response.sum();
+        looks.max(0.0) + self.shape.fit(evidence, moved, 1.0).mean().max(0.0)
+    }
+
+    /// Takes a place over as the target's own.
+    fn settle(&mut self, seen: &Observation, place: &Place, start: Point2f, dt_s: f32) -> opencv::Result<()> {
+        self.estimate.bounds = place.bounds;
+        let own = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
+        if place.share >= LEARNT {
+            self.estimate.own_velocity +=
+                (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+        }
+        let (cells, evidence) = self.look_closely(seen)?;
+        if place.is_unhidden() {
+            self.learn(seen, place, &cells, &evidence, dt_s)?;
+        }
+        self.remember(&seen.luma)?;
+        let bounds = self.estimate.bounds;
+        let mass = self.map.centre_of_mass(bounds).unwrap_or_else(|| centre(bounds));
+        self.estimate.centroid = near_the_middle(mass, bounds, CENTROID_REACH);
+        let body = scaled(bounds, 1.2, 1.1);
+        self.points.retain(|point| in_ellipse(body, point));
+        self.replenish(place.share >= LEARNT)
+    }
+
+    /// Learns looks, silhouette and colours as they are now, and tries another size.
+    fn learn(
+        &mut self,
+        seen: &Observation,
+        place: &Place,
+        cells: &Cells,
+        evidence: &Evidence,
+        dt_s: f32,
+    ) -> opencv::Result<()> {
+        let rate = (LEARNING_PER_S * dt_s).min(MAX_LEARNING);
+        self.usual.learn(place.fit, place.level, place.response, rate);
+        self.widen(evidence.beyond(self.grid));
+        self.shape.learn(&self.map, rate);
+        let (figure, ground) = cells.histograms(&self.map);
+        let ground_rate = (GROUND_LEARNING_PER_S * dt_s).min(0.5);
+        match (&mut self.colours, &figure, &ground) {
+            (Some(colours), ..) => colours.learn(figure, rate, ground, ground_rate),
+            (None, [Some(upper), Some(lower)], Some(ground)) => {
+                self.colours = Some(ColourModel::new([upper.clone(), lower.clone()], ground.clone()));
+            }
+            _ => (),
+        }
+        match self.pictures % 4 {
+            1 => self.try_size(seen, evidence, 1.0 + TRIED_GROWTH),
+            3 => self.try_size(seen, evidence, 1.0 / (1.0 + TRIED_GROWTH)),
+            _ => self.filter.learn(&seen.luma, self.estimate.bounds, &self.map.reduced(FINER), 2.0 * rate),
+        }
+    }
+
+    fn try_size(&mut self, seen: &Observation, evidence: &Evidence, growth: f32) -> opencv::Result<()> {
+        let bounds = self.estimate.bounds;
+        let respond =
+            |bounds| self.filter.respond(&seen.luma, bounds).map(|response| response.at((0, 0)).sum());
+        let (now, other) = (respond(bounds)?, respond(scaled(bounds, growth, growth))?);
+        let fit = |scale| self.shape.fit(evidence, (0, 0), scale).mean();
+        let usual = self.usual.response.sum();
+        if other / usual + fit(growth) > now / usual + fit(1.0) {
+            self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
+        }
+        Ok(())
+    }
+
+    /// Moves the sides outwards beyond which there is figure too: the detector may have seen only a part of the target.
+    fn widen(&mut self, beyond: [f32; 4]) {
+        let bounds = self.estimate.bounds;
+        let step = |probability: f32, size: f32| if probability >= ON_FIGURE { WIDENING * size } else { 0.0 };
+        let [left, top, right, bottom] = beyond;
+        let (left, right) = (step(left, bounds.width), step(right, bounds.width));
+        let (top, bottom) = (step(top, bounds.height), step(bottom, bounds.height));
+        self.estimate.bounds = Rect2f::new(
+            bounds.x - left,
+            bounds.y - top,
+            bounds.width + left + right,
+            bounds.height + top + bottom,
+        );
+        self.grow(1.0);
+    }
+
+    /// Keeps the pixels around the box for the next picture.
+    fn remember(&mut self, luma: &Luma) -> opencv::Result<()> {
+        let wanted = cut_around(luma, self.estimate.bounds);
+        if self.patch.as_cut() != wanted {
+            self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
+        }
+        Ok(())
+    }
+
+    fn replenish(&mut self, sure: bool) -> opencv::Result<()> {
+        self.pictures_since_replenished += 1;
+        if !sure {
+            // What is there now may be whoever passes in front.
+            return Ok(());
+        }
+        if self.points.members().len() < MIN_MEMBERS {
+            return self.seed();
+        }
+        let few = (self.points.len() as f32) < REPLENISH_SHARE * MAX_POINTS as f32;
+        if few && self.pictures_since_replenished >= REPLENISH_PICTURES {
+            self.pictures_since_replenished = 0;
+            let corners = self.corners()?;
+            self.points.propose(corners);
+        }
+        Ok(())
+    }
+
+    /// Starts with new points after the old ones were lost.
+    fn seed(&mut self) -> opencv::Result<()> {
+        self.points = Points::default();
+        self.points = Points::on_target(self.corners()?);
+        Ok(())
+    }
+
+    /// Corners on the figure.
+    fn corners(&self) -> opencv::Result<Vec<Point2f>> {
+        let bounds = self.estimate.bounds;
+        let body = corners::ellipse(scaled(bounds, 0.95, 1.0));
+        let taken = self.points.positions();
+        let count = MAX_POINTS.saturating_sub(taken.len());
+        let search = Search { contour: &body, taken: &taken, count, distance: spacing(bounds) };
+        let mut found = corners::find(&self.patch, &search)?;
+        found.retain(|corner| self.map.at(*corner) >= ON_FIGURE);
+        Ok(found)
+    }
+
+    /// Moves the box as the camera and its own velocity take it.
+    fn carry(&mut self, own: Point2f) {
+        let middle = centre(self.estimate.bounds);
+        self.estimate.bounds += self.ego.at(middle) + own;
+        self.grow(self.ego.scale_at(middle));
+    }
+
+    fn grow(&mut self, growth: f32) {
+        let bounds = self.estimate.bounds;
+        let limit = |size: f32, first: f32| size.clamp(first / MAX_GROWTH, first * MAX_GROWTH);
+        self.estimate.bounds = around(
+            centre(bounds),
+            limit(bounds.width * growth, self.first_size.0),
+            limit(bounds.height * growth, self.first_size.1),
+        );
+    }
+
+    /// A young target's box grows with the region that the detector sees it in.
+    fn adopt(&mut self, sightings: &[Sighting]) {
+        let bounds = self.estimate.bounds;
+        let middle = centre(bounds);
+        let own = sightings.iter().find(|sighting| {
+            let region = sighting.bounds;
+            region.contains(middle)
+                && region.width <= 2.0 * bounds.width
+                && region.height <= 2.0 * bounds.height
+        });
+        if let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) {
+            let mix = |old: f32, new: f32| old + 0.3 * (new - old);
+            let size = (mix(bounds.width, region.width), mix(bounds.height, region.height));
+            let place = middle + (centre(region) - middle) * 0.3;
+            self.estimate.bounds = around(place, size.0, size.1);
+            self.first_size = size;
+        }
+    }
+
+    /// The best of what the detector saw within reach that looks like the target.
+    fn recognise(
+        &self,
+        seen: &Observation,
+        sightings: &[Sighting],
+        reach: f32,
+    ) -> opencv::Result<Option<Place>> {
+        let bounds = self.estimate.bounds;
+        let mut best: Option<Place> = None;
+        for sighting in sightings {
+            let place = self.box_in(sighting.bounds);
+            if length(centre(place) - centre(bounds)) > reach {
+                continue;
+            }
+            // Half hidden or turned it may look unlike what the filter knows; colours, motion and place must do.
+            let place = self.locate(seen, place, WIDE_SPREAD)?;
+            let shares = self
+                .usual
+                .silhouette(place.fit)
+                .with(self.usual.stands_out(place.level), |fit, stands_out| fit * stands_out);
+            let place = Place { share: of_whole(shares), ..place };
+            if place.share >= FOUND && best.is_none_or(|best| place.share > best.share) {
+                best = Some(place);
+            }
+        }
+        Ok(best)
+    }
+
+    /// The target's box in a region, which may show a part of it only or somebody else too: as near to where it is
+    /// expected as the region allows, heads level.
+    fn box_in(&self, region: Rect2f) -> Rect2f {
+        let bounds = self.estimate.bounds;
+        let middle = centre(bounds);
+        let x = middle.x.clamp(region.x, region.x + region.width);
+        let y = if region.height > 0.7 * bounds.height {
+            region.y + bounds.height / 2.0
+        } else {
+            middle.y.clamp(region.y, region.y + region.height)
+        };
+        around(Point2f::new(x, y), bounds.width, bounds.height)
+    }
+
+    /// The best place where a hidden target may be by now.
+    fn search(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
+        let bounds = self.estimate.bounds;
+        let reach = bounds.height * (0.5 + HIDDEN_SPREAD_PER_S * self.hidden_s);
+        let mut best = self.recognise(seen, sightings, reach)?;
+        for sideways in [0.0, -0.6, 0.6] {
+            let place = bounds + Point2f::new(sideways * bounds.width, 0.0);
+            let place = self.locate(seen, place, WIDE_SPREAD)?;
+            if place.share >= LEARNT && best.is_none_or(|best| place.share > best.share) {
+                best = Some(place);
+            }
+        }
+        Ok(best)
+    }
+}
+
+impl Follow for Robust {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
+        self.watch_background(seen, dt_s);
+        let expected = self.estimate.own_velocity * dt_s;
+        let (next, consensus) = self.follow_points(&seen.luma, expected)?;
+        let start = centre(self.estimate.bounds);
+        let carried = self.ego.at(start) + expected;
+        self.carry(expected);
+        let trust = consensus.map_or(0.0, |consensus| {
+            // Points on whoever passes in front agree too; but no person turns so quickly.
+            let height = self.estimate.bounds.height;
+            let deviation = POINT_NOISE.0 + POINT_NOISE.1 * height + ACCELERATION * height * dt_s * dt_s;
+            let innovation = length(consensus.motion - carried) / deviation;
+            (consensus.share / BELIEVED_SHARE).min(1.0) * (-0.125 * innovation * innovation).exp()
+        });
+        if let Some(consensus) = consensus {
+            // The fewer points agree, the more counts where it was going.
+            self.estimate.bounds += (consensus.motion - carried) * trust;
+        }
+        self.patch = next;
+        self.adopt(sightings);
+        let spread = WIDE_SPREAD + (SPREAD - WIDE_SPREAD) * trust;
+        let mut place = self.locate(seen, self.estimate.bounds, spread)?;
+        if place.share < FOUND
+            && let Some(beside) = self.recognise(seen, sightings, self.estimate.bounds.height)?
+        {
+            place = beside;
+        }
+        // The less is seen of it, the more counts where it was going.
+        let gain = ((place.share - FOUND / 2.0) / (LEARNT - FOUND / 2.0)).clamp(0.0, 1.0);
+        let predicted = self.estimate.bounds;
+        place.bounds = predicted + (centre(place.bounds) - centre(predicted)) * gain;
+        self.presence.update(place.share, dt_s);
+        self.estimate.confidence = self.presence.confidence() * place.share.min(1.0);
+        if !self.presence.is_here() {
+            self.hidden_s = 0.0;
+            self.seen_in_a_row = 0;
+            self.remember(&seen.luma)?;
+            self.estimate.centroid = centre(self.estimate.bounds);
+            return Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Hidden });
+        }
+        self.settle(seen, &place, start, dt_s)?;
+        Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
+    }
+
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
+        self.watch_background(seen, dt_s);
+        self.hidden_s += dt_s;
+        self.carry(self.estimate.own_velocity * dt_s);
+        let found = self.search(seen, sightings)?;
+        self.seen_in_a_row = if found.is_some() { self.seen_in_a_row + 1 } else { 0 };
+        if let Some(place) = found {
+            self.estimate.bounds = place.bounds;
+        }
+        self.estimate.centroid = centre(self.estimate.bounds);
+        self.remember(&seen.luma)?;
+        if is_gone(self.estimate.bounds, &seen.luma) {
+            return Ok(Sight::Gone);
+        }
+        if self.seen_in_a_row < SEEN_AGAIN {
+            return Ok(Sight::Hidden);
+        }
+        self.presence = Presence::default();
+        self.look_closely(seen)?;
+        self.seed()?;
+        Ok(Sight::Seen)
+    }
+
+    fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
+        let bounds = self.estimate.bounds;
+        let place = around(centre(sighting.bounds), bounds.width, bounds.height);
+        Ok(self.locate(seen, place, WIDE_SPREAD)?.share >= FOUND)
+    }
+
+    fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    fn points(&self) -> &Points {
+        &self.points
+    }
+}

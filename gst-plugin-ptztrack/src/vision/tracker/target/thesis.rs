@@ -1,0 +1,127 @@
+//! Thesis 3.5 as written: corners in the contour, Lucas-Kanade in a patch, the mean of the points, mean-shift.
+
+use opencv::core::{Point2f, Rect2f};
+
+use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
+use crate::vision::tracker::corners::{self, Search};
+use crate::vision::tracker::flow::Flow;
+use crate::vision::tracker::geometry::{around, centre, mean};
+use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
+use crate::vision::tracker::patch::{Patch, cut_around};
+use crate::vision::tracker::points::Points;
+use crate::vision::tracker::selection::Sighting;
+use crate::vision::{Luma, Observation};
+
+/// Standard deviations that a first corner may lie from the mean of all: "a 20% range from the standard deviation".
+const DEVIATION_RANGE: f32 = 1.2;
+/// Grey levels of mean absolute difference from which a point is lost.
+const MAX_RESIDUAL: f32 = 20.0;
+/// How far the centre of mass may lie from the middle of the box, as a share of its sides.
+const CENTROID_REACH: f32 = 0.5;
+/// Time constant of the velocity that says where to look next, seconds.
+const VELOCITY_TIME_S: f32 = 0.35;
+
+/// A target followed by its points alone.
+pub(in super::super) struct Thesis {
+    estimate: Estimate,
+    points: Points,
+    patch: Patch,
+    greys: Option<GreyHistogram>,
+}
+
+impl Thesis {
+    /// Takes up what was sighted; `None` where it has no corner.
+    pub fn acquire(luma: &Luma, sighting: &Sighting) -> opencv::Result<Option<Self>> {
+        let bounds = sighting.bounds;
+        let patch = Patch::cut(luma, cut_around(luma, bounds), GROWN_WINDOW)?;
+        if patch.is_empty() {
+            return Ok(None);
+        }
+        let body =
+            if sighting.contour.len() >= 3 { sighting.contour.clone() } else { corners::ellipse(bounds) };
+        let search = Search { contour: &body, taken: &[], count: MAX_POINTS, distance: spacing(bounds) };
+        let found = corners::reject_outliers(corners::find(&patch, &search)?, DEVIATION_RANGE);
+        if found.kept.is_empty() {
+            return Ok(None);
+        }
+        let greys = GreyHistogram::new(&patch, &found.kept)?;
+        let mut points = Points::on_target(found.kept);
+        points.reject(found.rejected);
+        let estimate = Estimate {
+            bounds,
+            centroid: centre(bounds),
+            confidence: 1.0,
+            own_velocity: sighting.velocity,
+            ego_velocity: None,
+        };
+        let mut target = Self { estimate, points, patch, greys };
+        target.estimate.centroid = target.centre_of_mass()?;
+        Ok(Some(target))
+    }
+
+    fn centre_of_mass(&self) -> opencv::Result<Point2f> {
+        let bounds: Rect2f = self.estimate.bounds;
+        let Some(greys) = &self.greys else { return Ok(centre(bounds)) };
+        let mass = greys.centre_of_mass(&self.patch, bounds)?.unwrap_or_else(|| centre(bounds));
+        Ok(near_the_middle(mass, bounds, CENTROID_REACH))
+    }
+}
+
+impl Follow for Thesis {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &[Sighting]) -> opencv::Result<Sight> {
+        let luma = &seen.luma;
+        let expected = self.estimate.own_velocity * dt_s;
+        let start = centre(self.estimate.bounds);
+        let next = Patch::cut(luma, self.patch.as_cut().moved(luma, expected), GROWN_WINDOW)?;
+        let starts = self.points.positions();
+        let guesses: Vec<Point2f> = starts.iter().map(|start| *start + expected).collect();
+        let flow = Flow {
+            window: window_for(self.estimate.bounds, self.patch.step()),
+            grown_window: GROWN_WINDOW,
+            max_residual: MAX_RESIDUAL,
+            max_return_error: None,
+        };
+        let found = flow.follow(&self.patch, &next, &starts, &guesses)?;
+        let consensus = self.points.average(&found);
+        self.patch = next;
+        if let Some(consensus) = consensus {
+            self.estimate.bounds += consensus.motion;
+            self.estimate.confidence = consensus.share;
+        }
+        let bounds = self.estimate.bounds;
+        if is_gone(bounds, luma) {
+            return Ok(Sight::Gone);
+        }
+        if consensus.is_none() {
+            return Ok(Sight::Hidden);
+        }
+        let own = (centre(bounds) - start) / dt_s;
+        self.estimate.own_velocity += (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+        if let Some(middle) = mean(self.points.positions().into_iter()) {
+            self.estimate.bounds = around(middle, bounds.width, bounds.height);
+        }
+        let wanted = cut_around(luma, self.estimate.bounds);
+        if self.patch.as_cut() != wanted {
+            self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
+        }
+        self.estimate.centroid = self.centre_of_mass()?;
+        Ok(Sight::Seen)
+    }
+
+    /// The thesis loses what it does not see.
+    fn coast(&mut self, _: &Observation, _: f32, _: &[Sighting]) -> opencv::Result<Sight> {
+        Ok(Sight::Gone)
+    }
+
+    fn resembles(&self, _: &Observation, _: &Sighting) -> opencv::Result<bool> {
+        Ok(false)
+    }
+
+    fn estimate(&self) -> &Estimate {
+        &self.estimate
+    }
+
+    fn points(&self) -> &Points {
+        &self.points
+    }
+}
