@@ -63,10 +63,12 @@ demo: packages-demo
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
-##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all)
+##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;
+##       PHOTOS=folder: then the photographs in it, PHOTO_ARGS="--tracker all ...", which leaves its report in target/evaluation/photos)
 evaluate: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate $(ARGS)
+	$(if $(PHOTOS),target/release/evaluate --photos "$(PHOTOS)" --out target/evaluation/photos $(PHOTO_ARGS))
 
 ## evaluate-all: the same with every tracker and ten seeds, hours of it; broken off, it goes on where it was
 ##       (leaves summary.md for the README and tables.md for docs/evaluation.md in target/evaluation/all)

@@ -8,7 +8,7 @@ use crate::{
     experiment::{Experiment, Scene},
     footage::{SceneError, Whom},
     record::{Codec, Delays, FirstBox, Suite, TestId, TrackerName},
-    suite::hard,
+    suite::{hard, photo::PhotosError},
     trackers::missing,
 };
 
@@ -64,7 +64,8 @@ pub struct Args {
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
-    /// Instead of running tests, write pictures of the room to look at: every subject, light and occlusion, from far and near
+    /// Instead of running tests, write pictures of the room, or of the photographs, to look at: every subject, light and occlusion,
+    /// from far and near
     #[arg(long, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time", "record"])]
     pub gallery: bool,
     /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
@@ -85,6 +86,19 @@ pub struct Args {
     /// seconds or more, one after the other
     #[arg(long, value_name = "ID|auto|all", default_value = "auto", requires = "recording")]
     pub person: Whom,
+    /// Instead of the tests, twelve ways through each photograph of a folder: panoramas in panoramas/, in walker/ somebody cut out
+    /// of film
+    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "test", "sweep_delay", "matrix"])]
+    pub photos: Option<PathBuf>,
+    /// Instead of the tests, twelve ways through this equirectangular panorama
+    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "test", "sweep_delay", "matrix"])]
+    pub photo: Option<PathBuf>,
+    /// Folder of somebody cut out of film: walker.csv, and the pictures that it lists
+    #[arg(long, value_name = "FOLDER", requires = "photo")]
+    pub walker: Option<PathBuf>,
+    /// Where one can walk in the panorama (JSON); the file beside it that has its name and ends with .json unless given
+    #[arg(long, value_name = "FILE", requires = "photo")]
+    pub photo_place: Option<PathBuf>,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
     pub jobs: usize,
@@ -100,7 +114,8 @@ Examples:
   evaluate --footage walk.mp4 --truth walk.csv --tracker ptztrack,thesis,csrt
                                                      a camera that turns within a recording, in closed loop
   evaluate --still-recording walk.mp4 --truth walk.csv --tracker all
-                                                     the recording as it is: success and precision of the box";
+                                                     the recording as it is: success and precision of the box
+  evaluate --photos photos --gallery                 pictures of somebody in photographs of rooms";
 
 /// Tests from one number to another.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -199,11 +214,17 @@ impl Args {
         (there, left_out)
     }
 
-    /// What pictures of the room are to be like.
-    pub fn gallery(&self) -> Option<Experiment> {
-        let seed = *self.seeds().first()?;
-        let scene = self.gallery.then(|| Scene::room(TestId(1), seed)).flatten()?;
-        Some(self.experiment(scene, TrackerName::Still, seed))
+    /// What there are to be pictures of; nothing unless asked for.
+    ///
+    /// # Errors
+    /// Where photographs cannot be used.
+    pub fn gallery(&self) -> Result<Vec<Experiment>, SceneError> {
+        let Some(&seed) = self.seeds().first().filter(|_| self.gallery) else { return Ok(Vec::new()) };
+        // The first quarter of the tests has all lights, occlusions and subjects.
+        let rooms = || (1..=18).filter_map(|test| Scene::room(TestId(test), seed)).collect();
+        let scenes: Vec<Scene> = self.photographs(seed).transpose()?.unwrap_or_else(rooms);
+        let still = |scene| self.experiment(scene, TrackerName::Still, seed);
+        Ok(scenes.into_iter().map(still).collect())
     }
 
     /// The worlds asked for, in order and each once.
@@ -238,8 +259,27 @@ impl Args {
         if self.real_time { 1 } else { self.jobs }
     }
 
+    /// Ways through photographs; `None` where none are asked for.
+    fn photographs(&self, seed: u64) -> Option<Result<Vec<Scene>, PhotosError>> {
+        match (&self.photos, &self.photo, &self.walker) {
+            (Some(folder), ..) => Some(Scene::photos(folder, seed)),
+            (None, Some(file), Some(walker)) => {
+                Some(Scene::photo(file, walker, self.photo_place.as_deref(), seed))
+            }
+            _ => None,
+        }
+    }
+
     /// What is to be followed, and the number of its world.
     fn scenes(&self) -> Result<Vec<(Scene, u64)>, SceneError> {
+        let mut photographs = Vec::new();
+        for seed in self.seeds() {
+            let scenes = self.photographs(seed).transpose()?.unwrap_or_default();
+            photographs.extend(scenes.into_iter().map(|scene| (scene, seed)));
+        }
+        if !photographs.is_empty() {
+            return Ok(photographs);
+        }
         let recordings = match (&self.footage, &self.still_recording, &self.truth) {
             (Some(file), _, Some(truth)) => Scene::footage(file, truth, self.person, self.size)?,
             (None, Some(file), Some(truth)) => Scene::recordings(file, truth, self.person)?,
@@ -414,6 +454,9 @@ mod tests {
             ("--footage x.avi --still-recording x.avi --truth x.csv", "cannot be used with"),
             ("--still-recording x.avi --truth x.csv --size 320x240", "cannot be used with"),
             ("--person somebody", "auto"),
+            ("--photo x.jpg", "--walker"),
+            ("--photos x --test 3", "cannot be used with"),
+            ("--photos x --photo y.jpg --walker z", "cannot be used with"),
         ] {
             let error = parse(line).unwrap_err().to_string();
             assert!(error.contains(hint), "{line}: {error}");

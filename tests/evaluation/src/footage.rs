@@ -9,6 +9,7 @@ use crate::{
     people::{self, TruthError},
     record::Suite,
     still::{self, Recording},
+    suite::photo::PhotosError,
 };
 
 /// Why there is nobody to follow in a recording.
@@ -17,6 +18,9 @@ pub enum SceneError {
     /// The ground truth cannot be used.
     #[error(transparent)]
     Truth(#[from] TruthError),
+    /// The photographs cannot be used.
+    #[error(transparent)]
+    Photos(#[from] PhotosError),
     /// The recording cannot be used.
     #[error(transparent)]
     Camera(#[from] virtual_camera::Error),

@@ -1,48 +1,45 @@
-//! Pictures of the room to look at: every subject, light and occlusion, from far and from near.
+//! Pictures of scenes to look at, from far and from near.
 
 use std::{path::Path, time::Duration};
 
 use virtual_camera::{Clock, GroundTruth, Pose, VirtualCamera};
 
 use crate::{
-    experiment::{self, Experiment, Place, Scene},
+    experiment::{self, Experiment, Place},
     lockstep::{RunError, clock_time, info},
     pipeline::{Pipeline, SINK, SOURCE},
-    record::{TestId, TrackerName},
     report,
 };
 
-/// Horizontal fields of view, degrees.
-const VIEWS: [(&str, f64); 2] = [("wide", 55.0), ("near", 14.0)];
+/// A near view is as wide as this part of the widest.
+const NEAR: f64 = 0.25;
 /// The camera is given this long to turn and zoom; its head remembers no longer.
 const AIMING: Duration = Duration::from_secs(2);
 
-/// Writes PNG files into `folder`: tests with fixed speed and direction, as the codec of `like` leaves them.
+/// Writes PNG files into `folder`: two of each of `experiments`, as its codec leaves them.
 ///
 /// # Errors
 /// In words, where a picture cannot be made or written.
-pub fn write(like: &Experiment, folder: &Path) -> Result<usize, Box<dyn std::error::Error>> {
+pub fn write(experiments: &[Experiment], folder: &Path) -> Result<usize, Box<dyn std::error::Error>> {
     let mut written = 0;
-    // The first quarter of the tests has all lights, occlusions and subjects.
-    for test in (1..=18).map(TestId) {
-        let Some(scene) = Scene::room(test, like.seed) else { continue };
-        let experiment = Experiment { scene, tracker: TrackerName::Still, ..like.clone() };
-        for (name, fov_deg) in VIEWS {
-            let png = shoot(&experiment, fov_deg)?;
-            report::save(&folder.join(format!("test-{test}-{name}.png")), png)?;
+    for experiment in experiments {
+        for (name, part) in [("wide", 1.0), ("near", NEAR)] {
+            let png = shoot(experiment, part)?;
+            let file = format!("{}-{name}.png", experiment.scene.title.replace(' ', "-"));
+            report::save(&folder.join(file), png)?;
             written += 1;
         }
     }
     Ok(written)
 }
 
-/// One picture with the person in the middle of it, half hidden where they are ever hidden.
-fn shoot(experiment: &Experiment, fov_deg: f64) -> Result<Vec<u8>, RunError> {
+/// One picture with the person in the middle of it, half hidden where they are ever hidden; so wide a part of the widest view.
+fn shoot(experiment: &Experiment, part: f64) -> Result<Vec<u8>, RunError> {
     let Place::Camera(settings) = &experiment.scene.place else { return Err(RunError::Nobody) };
     let camera = experiment.camera(settings, Clock::Stepped)?;
     let (exposure, person) = moment(experiment, &camera).ok_or(RunError::Nobody)?;
     camera.advance_to(exposure.saturating_sub(AIMING));
-    aim(&camera, &person, fov_deg)?;
+    aim(&camera, &person, part)?;
     camera.advance_to(exposure + camera.frame_period());
     let picture = camera.picture(exposure, experiment.size)?;
     let (width, height) = experiment.size;
@@ -85,10 +82,9 @@ fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, 
 }
 
 /// Turns and zooms to where the person will be.
-fn aim(camera: &VirtualCamera, person: &GroundTruth, fov_deg: f64) -> Result<(), RunError> {
+fn aim(camera: &VirtualCamera, person: &GroundTruth, part: f64) -> Result<(), RunError> {
     let (pan, tilt) = person.direction_deg.ok_or(RunError::Nobody)?;
-    let (optics, half) = (camera.optics(), |degrees: f64| (degrees / 2.0).to_radians().tan());
-    let zoom = optics.zoom_step(half(optics.wide_fov_deg) / half(fov_deg));
+    let zoom = camera.optics().zoom_step(1.0 / part);
     let query = format!("pan={pan:.2}&tilt={tilt:.2}&zoom={zoom:.0}");
     if camera.operate(&query) { Ok(()) } else { Err(RunError::Aim(query)) }
 }

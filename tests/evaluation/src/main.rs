@@ -28,10 +28,11 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
         tell(io::stdout(), format_args!("{}", report::compare::compare(before, after)?))?;
         return Ok(true);
     }
-    if let Some(like) = args.gallery() {
+    let gallery = args.gallery()?;
+    if !gallery.is_empty() {
         let folder = args.out.join("gallery");
         report::make_room(&folder)?;
-        let written = gallery::write(&like, &folder)?;
+        let written = gallery::write(&gallery, &folder)?;
         tell(io::stdout(), format_args!("{written} pictures in {}", folder.display()))?;
         return Ok(true);
     }
@@ -51,6 +52,11 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     if !hard.is_empty() {
         std::fs::write(args.out.join("hard.md"), &hard)?;
         tell(io::stdout(), format_args!("{hard}"))?;
+    }
+    let photos = suite::photo::summary(&runs);
+    if !photos.is_empty() {
+        std::fs::write(args.out.join("photos.md"), &photos)?;
+        tell(io::stdout(), format_args!("{photos}"))?;
     }
     let page = args.out.join("index.html");
     tell(io::stdout(), format_args!("{}\nall of it: {}", report.summary, page.display()))?;

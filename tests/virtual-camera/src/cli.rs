@@ -4,8 +4,8 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, Pose, PtzApi, RoomSettings, Settings,
-    SpeedMap, Stall, SyntheticSettings, Video, World,
+    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, PhotoPlace, PhotoSettings, Pose,
+    PtzApi, RoomSettings, Settings, SpeedMap, Stall, SyntheticSettings, Video, World,
 };
 
 /// From one stall of the pictures to the next.
@@ -15,7 +15,7 @@ const STALL_EVERY: Duration = Duration::from_secs(7);
 ///
 /// Serves VAPIX, MJPEG, snapshots and RTSP, and a page to look at and steer by hand at /. It looks around in a
 /// recording by a camera that stood still, as a turning camera in the same place would have seen it, or in a made-up
-/// room with a walking person. Prints one line "ready http=URL rtsp=URL" once it serves, and ends on SIGINT or SIGTERM.
+/// room or a photograph with a walking person. Prints one line "ready http=URL rtsp=URL" once it serves, and ends on SIGINT or SIGTERM.
 #[derive(Parser)]
 #[command(name = "virtual-camera", version)]
 pub struct Options {
@@ -47,6 +47,18 @@ pub struct Options {
     /// Another room, other clothes, another way to walk; 1 is the reference world
     #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
+    /// Photograph of everything around the camera, an equirectangular panorama
+    #[arg(long, value_name = "FILE", requires = "walker")]
+    photo: Option<PathBuf>,
+    /// Folder of somebody cut out of film, who walks in the photograph: walker.csv, and the pictures that it lists
+    #[arg(long, value_name = "FOLDER", requires = "photo")]
+    walker: Option<PathBuf>,
+    /// Where one can walk in the photograph (JSON); the file beside it that has its name and ends with .json unless given
+    #[arg(long, value_name = "FILE", requires = "photo")]
+    photo_place: Option<PathBuf>,
+    /// Which way through the photograph is walked, again and again: occlusion, speed and direction
+    #[arg(long, value_name = "NUMBER", requires = "photo", value_parser = clap::value_parser!(u32).range(1..=i64::from(PhotoSettings::WAYS)))]
+    photo_way: Option<u32>,
     /// Where in the recording to begin, in seconds
     #[arg(long, default_value_t = 0.0, value_name = "SECONDS", value_parser = not_negative)]
     start: f64,
@@ -174,6 +186,8 @@ pub struct Options {
 enum WorldName {
     /// Needs --footage
     Footage,
+    /// Needs --photo
+    Photo,
     /// Small and plain
     Synthetic,
     /// In true perspective
@@ -261,20 +275,29 @@ impl TryFrom<Options> for Settings {
 
 impl Options {
     fn world(&self) -> Result<World, String> {
-        let for_room = self.room_test.is_some() || self.seed.is_some() || self.action.is_some();
-        let name = self.world.unwrap_or(match (&self.footage, for_room) {
+        let for_room = self.room_test.is_some()
+            || self.action.is_some()
+            || (self.seed.is_some() && self.photo.is_none());
+        let name = self.world.unwrap_or(match (&self.footage, &self.photo) {
             (Some(_), _) => WorldName::Footage,
-            (None, true) => WorldName::Room,
-            (None, false) => WorldName::Synthetic,
+            (None, Some(_)) => WorldName::Photo,
+            (None, None) if for_room => WorldName::Room,
+            (None, None) => WorldName::Synthetic,
         });
+        if self.photo.is_some() && name != WorldName::Photo {
+            return Err("--photo is for --world photo".into());
+        }
         if self.footage.is_some() && name != WorldName::Footage {
             return Err("--footage is for --world footage".into());
         }
         if for_room && name != WorldName::Room {
-            return Err("--room-test, --action and --seed are for --world room".into());
+            return Err(
+                "--room-test and --action are for --world room, --seed is for that or --world photo".into()
+            );
         }
         Ok(match name {
             WorldName::Footage => World::Footage(self.recording()?),
+            WorldName::Photo => World::Photo(Box::new(self.photograph()?)),
             WorldName::Synthetic => World::Synthetic(SyntheticSettings::default()),
             WorldName::Room => World::Room(self.room()?),
         })
@@ -290,6 +313,19 @@ impl Options {
             ground_truth: self.ground_truth.clone(),
             ..FootageSettings::new(file)
         })
+    }
+
+    fn photograph(&self) -> Result<PhotoSettings, String> {
+        let (photo, walker) = self
+            .photo
+            .clone()
+            .zip(self.walker.clone())
+            .ok_or("--world photo needs --photo FILE --walker FOLDER")?;
+        let place = PhotoPlace::of(&photo, self.photo_place.as_deref()).map_err(|error| error.to_string())?;
+        let way =
+            PhotoSettings::way(photo, walker, place, self.photo_way.unwrap_or(1), self.seed.unwrap_or(1));
+        let way = way.ok_or_else(|| format!("--photo-way is from 1 to {}", PhotoSettings::WAYS))?;
+        Ok(PhotoSettings { repeats: !self.once, ..way })
     }
 
     fn room(&self) -> Result<RoomSettings, String> {
@@ -462,11 +498,24 @@ mod tests {
     }
 
     #[test]
+    fn a_photograph_takes_who_walks_in_it_and_which_way() {
+        let settings = settings("--photo lake.jpg --walker w --photo-way 3 --seed 4").unwrap();
+        let World::Photo(photo) = settings.world else { panic!("no photograph") };
+        assert_eq!((photo.way, photo.seed, photo.repeats), (3, 4, true));
+        assert_eq!(settings.home, Some(photo.home()));
+    }
+
+    #[test]
     fn worlds_take_only_what_is_theirs() {
         for line in [
             "--world footage",
             "--world synthetic --footage a.avi",
             "--world room --footage a.avi",
+            "--world photo",
+            "--photo lake.jpg",
+            "--photo unknown.jpg --walker w",
+            "--photo lake.jpg --walker w --photo-way 13",
+            "--world room --photo lake.jpg --walker w",
             "--world synthetic --seed 2",
             "--footage a.avi --room-test 3",
             "--room-test 73",

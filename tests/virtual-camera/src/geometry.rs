@@ -117,6 +117,14 @@ pub fn aim(pose: &Pose, x: f64, y: f64) -> (f64, f64) {
     (pan.to_degrees(), tilt.to_degrees())
 }
 
+/// How far to the side the edge of a view reaches, in radians of pan, for what lies at a height of `above` the horizon:
+/// the view is tilted by `tilt` and half as wide as `half`, all in radians.
+pub(crate) fn edge_of_view(half: f64, tilt: f64, above: f64) -> f64 {
+    let half = half.tan();
+    let (across, down) = (half * tilt.cos(), half * above.tan() * tilt.sin());
+    across.atan() + (down / across.hypot(1.0)).asin()
+}
+
 /// How far a view may turn in a recording so that all of it stays inside, for every pan with every tilt.
 ///
 /// Fields of view horizontally in degrees, aspect ratios as height over width. The corners decide: with half sizes a, b of the
@@ -177,6 +185,16 @@ mod tests {
         near(project(&right, 159.5, 119.5), (383.5 + recording.focal * 10f64.to_radians().tan(), 287.5));
         let up = view_to_recording(&pose(0.0, 5.0), &view, &recording);
         near(project(&up, 159.5, 119.5), (383.5, 287.5 - recording.focal * 5f64.to_radians().tan()));
+    }
+
+    #[test]
+    fn the_edge_of_a_tilted_view_is_where_it_shows_things() {
+        let view = Pinhole { focal: 1.0, centre_x: 0.0, centre_y: 0.0 };
+        for (tilt, above) in [(0.0f64, 0.0f64), (-20.0, -20.0), (-15.0, -5.0), (10.0, -12.0)] {
+            let pan = edge_of_view(0.5, tilt.to_radians(), above.to_radians());
+            let ahead = between((&pose(pan.to_degrees(), above), &view), (&pose(0.0, tilt), &view));
+            assert!((project(&ahead, 0.0, 0.0).0 - 0.5f64.tan()).abs() < 1e-9, "{tilt} {above}");
+        }
     }
 
     #[test]

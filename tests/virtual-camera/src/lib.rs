@@ -1,6 +1,6 @@
 //! A virtual Axis pan-tilt-zoom camera on loopback: VAPIX over HTTP, MJPEG, RTSP, kinematics and a live page.
 //!
-//! Its world is a wide still recording or a made-up room; the picture is what a turning pinhole camera would see in it,
+//! Its world is a wide still recording, a photograph of all around it or a made-up room; the picture is what a turning pinhole camera would see in it,
 //! and who is in it and where is known. What is known of the AXIS Q6034-E is its default, what is not known or differs
 //! between cameras is a setting. Its time is everybody's, or goes on step by step as its owner says.
 //!
@@ -46,8 +46,8 @@ pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall,
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette};
 pub use world::{
-    Action, Change, Event, FootageError, Lighting, MotError, Occlusion, People, Person, RoomSettings,
-    Subject, SyntheticSettings, Waypoint, read_mot,
+    Action, Change, Event, FootageError, Lane, Lighting, MotError, Occlusion, People, Person, PhotoError,
+    PhotoPlace, PhotoSettings, RoomSettings, Subject, SyntheticSettings, Waypoint, read_mot,
 };
 
 /// Why a camera does not start.

@@ -6,7 +6,7 @@ use crate::{
     imaging::Imaging,
     kinematics::{Kinematics, Pose},
     seeded::Seeded,
-    world::{RoomSettings, SyntheticSettings},
+    world::{PhotoSettings, RoomSettings, SyntheticSettings},
 };
 
 /// How the camera asks its clients who they are.
@@ -88,6 +88,8 @@ pub enum World {
     Footage(FootageSettings),
     /// A small world made up on the spot, with one person in it.
     Synthetic(SyntheticSettings),
+    /// A photograph of everything around the camera, with one person cut out of film walking in it.
+    Photo(Box<PhotoSettings>),
     /// A room in true perspective, with one walking person in it.
     Room(RoomSettings),
 }
@@ -97,6 +99,7 @@ impl World {
     pub fn home(&self) -> Pose {
         match self {
             Self::Footage(_) | Self::Synthetic(_) => Pose::default(),
+            Self::Photo(photo) => photo.home(),
             Self::Room(room) => room.home(),
         }
     }

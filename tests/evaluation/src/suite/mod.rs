@@ -1,4 +1,5 @@
 //! Sets of tests besides the thesis' 72.
 
 pub mod hard;
+pub mod photo;
 pub mod summary;

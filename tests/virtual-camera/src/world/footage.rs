@@ -25,6 +25,9 @@ const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
 /// Why there is nothing to see.
 #[derive(Debug, thiserror::Error)]
 pub enum FootageError {
+    /// A photograph cannot be walked in.
+    #[error(transparent)]
+    Photo(#[from] super::photo::PhotoError),
     /// No such file, or not one to read.
     #[error("cannot read the footage {path}: {source}")]
     Unreadable {

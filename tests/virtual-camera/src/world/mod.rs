@@ -2,9 +2,12 @@
 
 mod blur;
 mod footage;
+mod layer;
 mod mot;
 mod panorama;
+mod photo;
 pub(crate) mod room;
+mod sighting;
 mod synthetic;
 mod timeline;
 mod warp;
@@ -15,6 +18,7 @@ pub use footage::FootageError;
 pub use mot::{MotError, People, read as read_mot};
 use panorama::Panorama;
 pub use panorama::Person;
+pub use photo::{Lane, PhotoError, PhotoPlace, PhotoSettings};
 pub use room::{Action, Change, Event, Lighting, Occlusion, RoomSettings, Subject};
 pub use synthetic::{SyntheticSettings, Waypoint};
 
@@ -140,6 +144,7 @@ pub(crate) fn open(settings: &Settings) -> Result<Box<dyn World>, FootageError> 
             let recording = Box::new(footage::Footage::open(footage)?);
             Box::new(Panorama::new(recording, footage.recording_fov_deg, wide, settings))
         }
+        settings::World::Photo(photo) => Box::new(photo::Photo::new(photo, settings)?),
         settings::World::Room(room) => Box::new(room::Room::new(room, settings)),
         settings::World::Synthetic(synthetic) => {
             let recording = Box::new(synthetic::Synthetic::new(synthetic));

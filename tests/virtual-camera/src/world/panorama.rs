@@ -138,7 +138,7 @@ impl World for Panorama {
         let mut picture = Picture::grey(size.0, size.1, 0);
         for (index, target) in picture.planes.iter_mut().enumerate() {
             let homography = if index == 0 { &luma } else { &chroma };
-            warp(&source.planes[index], target, homography);
+            warp(&source.planes[index], target, |x, y| geometry::project(homography, x, y));
         }
         let (x, y) = self.sweep(exposure, size);
         motion_blur(&mut picture, x, y);

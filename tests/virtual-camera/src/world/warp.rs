@@ -1,24 +1,21 @@
-//! Pictures through a homography.
+//! Pictures seen through another lens: through a homography, or out of a panorama.
 //!
 //! By hand, in whole numbers: less work than OpenCV's, and the same picture however many cores there are.
 
-use crate::{
-    geometry::{Matrix, project},
-    picture::Plane,
-};
+use crate::picture::Plane;
 
 /// Pixels between exact places; straight lines between them are off by less than a hundredth of a pixel.
 const SPAN: usize = 16;
 /// Places in the source count in 1/65536 pixel.
 const ONE: f64 = 65536.0;
 
-/// Fills `target` with what `homography` sees of `source` from each of its pixels; the source's edge goes on beyond it.
-pub(super) fn warp(source: &Plane, target: &mut Plane, homography: &Matrix) {
+/// Fills `target` with what `source` shows where `place` takes each of its pixels; the source's edge goes on beyond it.
+pub(super) fn warp(source: &Plane, target: &mut Plane, place: impl Fn(f64, f64) -> (f64, f64)) {
     for (row, line) in target.data.chunks_exact_mut(target.width).enumerate() {
-        let mut start = project(homography, 0.0, row as f64);
+        let mut start = place(0.0, row as f64);
         for (span, pixels) in line.chunks_mut(SPAN).enumerate() {
             let next = span * SPAN + pixels.len();
-            let end = project(homography, next as f64, row as f64);
+            let end = place(next as f64, row as f64);
             fill(source, pixels, start, end);
             start = end;
         }
@@ -74,7 +71,7 @@ fn blend(corners: [u8; 4], u: i64, v: i64) -> u8 {
 mod tests {
     use super::*;
     use crate::{
-        geometry::{Pinhole, view_to_recording},
+        geometry::{Pinhole, project, view_to_recording},
         kinematics::Pose,
     };
 
@@ -91,7 +88,7 @@ mod tests {
         let homography =
             view_to_recording(&pose, &Pinhole::new(203, 151, 25.0), &Pinhole::new(256, 192, 60.0));
         let mut view = Plane::filled(203, 151, 0);
-        warp(&source, &mut view, &homography);
+        warp(&source, &mut view, |x, y| project(&homography, x, y));
         for (i, &pixel) in view.data.iter().enumerate() {
             let (u, v) = project(&homography, (i % 203) as f64, (i / 203) as f64);
             let expected = (u + v) / 2.0 - 0.25;
@@ -103,7 +100,7 @@ mod tests {
     fn the_identity_changes_nothing() {
         let source = ramp(100, 80);
         let mut copy = Plane::filled(100, 80, 0);
-        warp(&source, &mut copy, &[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+        warp(&source, &mut copy, |x, y| (x, y));
         assert_eq!(copy, source);
     }
 
@@ -111,7 +108,7 @@ mod tests {
     fn beyond_the_edge_the_edge_goes_on() {
         let source = Plane { width: 2, height: 2, data: vec![10, 20, 30, 40] };
         let mut view = Plane::filled(6, 6, 0);
-        warp(&source, &mut view, &[[1.0, 0.0, -2.0], [0.0, 1.0, -2.0], [0.0, 0.0, 1.0]]);
+        warp(&source, &mut view, |x, y| (x - 2.0, y - 2.0));
         assert_eq!(view.data[..6], [10, 10, 10, 20, 20, 20]);
         assert_eq!(view.data[30..], [30, 30, 30, 40, 40, 40]);
     }

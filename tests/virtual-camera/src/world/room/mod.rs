@@ -6,7 +6,7 @@ mod event;
 pub(crate) mod light;
 mod raster;
 mod scene;
-mod sensor;
+pub(crate) mod sensor;
 mod settings;
 pub(crate) mod view;
 mod walker;

@@ -59,7 +59,7 @@ impl Exposure {
 }
 
 /// A sensor that turns the same light into the same numbers, picture by picture.
-pub(super) struct Sensor {
+pub(crate) struct Sensor {
     exposure: Exposure,
     noise: Vec<i8>,
     seeded: Seeded,

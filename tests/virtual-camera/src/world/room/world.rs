@@ -8,16 +8,21 @@ use super::{
     sensor::{Sensor, soften},
     settings::RoomSettings,
     view::View,
-    walker::{BodyPose, MOMENTS, Walker, obstacles},
+    walker::{BodyPose, Walker, obstacles},
 };
 use crate::{
-    geometry::{Pinhole, aim},
+    geometry::Pinhole,
     kinematics::{Limits, Optics, Pose},
     picture::{Picture, Plane},
     seeded::Seeded,
     settings::Settings,
-    truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette},
-    world::{Exposure, FootageError, World, blur::motion_blur},
+    truth::{Bounds, Mask, Sighting},
+    world::{
+        Exposure, FootageError, World,
+        blur::motion_blur,
+        layer::MOMENTS,
+        sighting::{mask, sight},
+    },
 };
 
 const FRAME_RATE: u64 = 25;
@@ -31,8 +36,6 @@ const LIMITS: Limits = Limits { pan_deg: (-170.0, 170.0), tilt_deg: (-80.0, 20.0
 const OVERVIEW_SIZE: (u32, u32) = (1280, 480);
 const OVERVIEW_FOV_DEG: f64 = 130.0;
 const OVERVIEW_POSE: Pose = Pose { pan_deg: 0.0, tilt_deg: -10.0, zoom_step: 1.0 };
-/// A body is measured in no more pixels than this across and down: one seen larger is measured as if it were smaller.
-const MEASURED: f64 = 400.0;
 /// Stream of chance of the sensor.
 const SENSOR: u64 = 0x5e25;
 
@@ -150,81 +153,8 @@ impl Room {
         let (body, view) = (bodies.first()?, self.view(pose, size));
         let [left, top, right, bottom] = body.walker.bounds(&body.pose, &view)?;
         let bounds = Bounds { left, top, width: right - left, height: bottom - top };
-        // A picture of the body alone, with a pixel around it.
-        let scale = (MEASURED / bounds.width.max(bounds.height)).min(1.0);
-        let pinhole = Pinhole {
-            focal: view.pinhole.focal * scale,
-            centre_x: (view.pinhole.centre_x + 0.5 - left) * scale + 0.5,
-            centre_y: (view.pinhole.centre_y + 0.5 - top) * scale + 0.5,
-        };
-        let length = |length: f64| (length * scale).ceil() as usize + 2;
-        let close = view.through(pinhole, (length(bounds.width), length(bounds.height)));
-        let [whole, unhidden] = self.shape(bodies, time, &close);
-        let place = |column: usize, row: usize| {
-            ((column as f64 - 0.5) / scale + left, (row as f64 - 0.5) / scale + top)
-        };
-        let all = Weight::of(&whole, |_, _| true);
-        let inside = |column, row| {
-            let (x, y) = place(column, row);
-            (0.0..f64::from(size.0)).contains(&x) && (0.0..f64::from(size.1)).contains(&y)
-        };
-        let share = |weight: Weight| if all.sum > 0.0 { weight.sum / all.sum } else { 0.0 };
-        let centroid = if all.sum > 0.0 {
-            let (column, row) = (all.columns / all.sum, all.rows / all.sum);
-            ((column - 0.5) / scale + left, (row - 0.5) / scale + top)
-        } else {
-            bounds.centre()
-        };
-        let ray = |place: f64, centre: f64| (place - 0.5 - centre) / view.pinhole.focal;
-        let (x, y) = (ray(centroid.0, view.pinhole.centre_x), ray(centroid.1, view.pinhole.centre_y));
-        let truth = GroundTruth {
-            id: body.id,
-            bounds,
-            centroid,
-            visible: share(Weight::of(&unhidden, inside)),
-            unhidden: share(Weight::of(&unhidden, |_, _| true)),
-            in_view: share(Weight::of(&whole, inside)),
-            position_m: Some(body.pose.place),
-            direction_deg: Some(aim(pose, x, y)),
-        };
-        let pixel = 1.0 / scale;
-        let [whole, visible] = [whole, unhidden].map(mask);
-        let mut silhouette = Silhouette::new((left - pixel, top - pixel), (pixel, pixel), whole, visible);
-        silhouette.cut_to(size);
-        Some(Sighting { truth, silhouette })
-    }
-}
-
-/// Which pixels are more than half covered.
-fn mask(Plane { width, height, mut data }: Plane) -> Mask {
-    for pixel in &mut data {
-        *pixel = if *pixel > 127 { 255 } else { 0 };
-    }
-    Mask { width, height, data }
-}
-
-/// How much of a mask is set, and where.
-struct Weight {
-    sum: f64,
-    columns: f64,
-    rows: f64,
-}
-
-impl Weight {
-    /// Of the pixels (column, row) that are to be counted.
-    fn of(mask: &Plane, counted: impl Fn(usize, usize) -> bool) -> Self {
-        let mut weight = Self { sum: 0.0, columns: 0.0, rows: 0.0 };
-        for (row, line) in mask.data.chunks_exact(mask.width.max(1)).enumerate() {
-            for (column, &value) in line.iter().enumerate() {
-                if value > 0 && counted(column, row) {
-                    let value = f64::from(value);
-                    weight.sum += value;
-                    weight.columns += value * column as f64;
-                    weight.rows += value * row as f64;
-                }
-            }
-        }
-        weight
+        let shape = |close: &View| self.shape(bodies, time, close);
+        Some(sight(body.id, body.pose.place, bounds, (pose, &view), size, shape))
     }
 }
 

@@ -6,7 +6,6 @@ mod clothes;
 mod figure;
 mod fill;
 mod gait;
-mod layer;
 mod mesh;
 mod obstruction;
 mod paint;
@@ -16,7 +15,6 @@ mod walk;
 mod wardrobe;
 
 pub(crate) use gait::BodyPose;
-pub(crate) use layer::{Layer, MOMENTS};
 pub(super) use obstruction::obstacles;
 pub(crate) use walk::Walk;
 
@@ -35,7 +33,11 @@ use super::{
     settings::{RoomSettings, Subject},
     view::{Canvas, Vector, View, add, scale},
 };
-use crate::{picture::Plane, seeded::Seeded};
+use crate::{
+    picture::Plane,
+    seeded::Seeded,
+    world::layer::{Layer, MOMENTS},
+};
 
 /// Streams of chance: who somebody is depends on the seed and the subject alone, how they step off on the way too.
 const PERSON: u64 = 0xb0d7;

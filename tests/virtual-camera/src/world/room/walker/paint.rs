@@ -7,50 +7,24 @@ use super::{
     },
     clothes::Cloth,
     fill::{CARRIED, Corner, triangle},
-    layer::{Layer, MOMENTS},
     mesh::{Detail, Patch, Ring, Vertex, skin},
 };
-use crate::{picture::Plane, truth::Bounds};
+use crate::{
+    picture::Plane,
+    world::layer::{ASIDE, Layer, MOMENTS, Window},
+};
 
-/// A part of the picture.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Window {
-    /// First pixel; even, so that chroma pixels are whole.
-    pub left: usize,
-    pub top: usize,
-    /// In pixels.
-    pub width: usize,
-    pub height: usize,
+/// The part of the picture that these skins lie in; none where one of them is behind the camera.
+fn window(patches: &[Patch], view: &View) -> Option<Window> {
+    let vertices = patches.iter().flat_map(|patch| &patch.vertices);
+    let pixels: Vec<_> = vertices.map(|vertex| Some(view.pixel(vertex.place)?.0)).collect::<Option<_>>()?;
+    Window::around(pixels.into_iter(), view.size)
 }
 
-impl Window {
-    /// The part of a picture of `size` that these pixels lie in, if any.
-    fn around(pixels: impl Iterator<Item = (f64, f64)>, size: (usize, usize)) -> Option<Self> {
-        let bounds = Bounds::around(pixels)?;
-        let limit = |place: f64, end: usize| place.clamp(0.0, end as f64) as usize;
-        let (left, top) = (limit(bounds.left - 1.0, size.0) & !1, limit(bounds.top - 1.0, size.1) & !1);
-        let width = limit(bounds.left + bounds.width + 2.0, size.0).saturating_sub(left);
-        let height = limit(bounds.top + bounds.height + 2.0, size.1).saturating_sub(top);
-        (width > 0 && height > 0).then_some(Self { left, top, width, height })
-    }
-
-    /// The part that these skins lie in; none where one of them is behind the camera.
-    fn of(patches: &[Patch], view: &View) -> Option<Self> {
-        let vertices = patches.iter().flat_map(|patch| &patch.vertices);
-        let pixels: Vec<_> =
-            vertices.map(|vertex| Some(view.pixel(vertex.place)?.0)).collect::<Option<_>>()?;
-        Self::around(pixels.into_iter(), view.size)
-    }
-
-    fn size(&self) -> (usize, usize) {
-        (self.width, self.height)
-    }
-
-    /// A corner, for samples that lie `aside` of the middle of their pixel.
-    fn corner(&self, (x, y): (f64, f64), aside: (f64, f64), carried: [f32; CARRIED]) -> Corner {
-        let place = |pixel: f64, aside: f64, first: usize| (pixel - aside - first as f64) as f32;
-        Corner { x: place(x, aside.0, self.left), y: place(y, aside.1, self.top), carried }
-    }
+/// A corner in a window, for samples that lie `aside` of the middle of their pixel.
+fn corner(window: &Window, (x, y): (f64, f64), aside: (f64, f64), carried: [f32; CARRIED]) -> Corner {
+    let place = |pixel: f64, aside: f64, first: usize| (pixel - aside - first as f64) as f32;
+    Corner { x: place(x, aside.0, window.left), y: place(y, aside.1, window.top), carried }
 }
 
 /// Every triangle of a patch that faces the camera.
@@ -94,12 +68,9 @@ pub(super) struct Moment {
     pub view: View,
 }
 
-/// Where in a pixel each moment of an exposure has its sample: together they smooth the edges.
-const ASIDE: [(f64, f64); MOMENTS] = [(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)];
-
 /// Paints the body alone, as the mean of some moments; `None` where nothing of it is in the picture.
 pub(super) fn paint(moments: &[Moment; MOMENTS], cloths: &[Cloth], light: &Light) -> Option<Layer> {
-    let windows = moments.iter().filter_map(|moment| Window::of(&moment.patches, &moment.view));
+    let windows = moments.iter().filter_map(|moment| window(&moment.patches, &moment.view));
     let corners = windows.flat_map(|Window { left, top, width, height }| {
         [(left, top), (left + width, top + height)].map(|(x, y)| (x as f64, y as f64))
     });
@@ -137,7 +108,7 @@ fn sample(
         let texture = Texture { texels, side, weave: (cloths[patch.material].weave * 256.0) as i32 };
         let corners = |vertex: &Vertex, pixel, depth: f64| {
             let [u, v] = vertex.cloth.map(|metres| (metres * texels_per_metre) as f32);
-            window.corner(pixel, aside, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
+            corner(window, pixel, aside, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
         };
         for corners in facing(patch, view, corners) {
             triangle(corners, window.size(), |start, end, carried, step| {
@@ -237,9 +208,9 @@ fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
 
 /// Marks the pixels whose centre the body covers.
 pub(super) fn mark(patches: &[Patch], view: &View, mask: &mut Plane) {
-    let Some(window) = Window::of(patches, view) else { return };
+    let Some(window) = window(patches, view) else { return };
     for patch in patches {
-        for corners in facing(patch, view, |_, pixel, _| window.corner(pixel, (0.0, 0.0), [0.0; 4])) {
+        for corners in facing(patch, view, |_, pixel, _| corner(&window, pixel, (0.0, 0.0), [0.0; 4])) {
             triangle(corners, window.size(), |start, end, _, _| {
                 let (row, first) = (start / window.width, start % window.width);
                 let begin = (window.top + row) * mask.width + window.left + first;
@@ -265,9 +236,9 @@ pub(super) fn shadow(middle: Vector, radius: f64, dark: f64, view: &View, canvas
     let mut disc = skin(&rings, 0, [0.0; 2], Detail { corners: 20, steps: 1 });
     disc.vertices.iter_mut().for_each(|vertex| vertex.normal = [0.0, 1.0, 0.0]);
     let patches = [disc];
-    let Some(window) = Window::of(&patches, view) else { return };
+    let Some(window) = window(&patches, view) else { return };
     let corners =
-        |vertex: &Vertex, pixel, _| window.corner(pixel, (0.0, 0.0), [vertex.open as f32, 0.0, 0.0, 0.0]);
+        |vertex: &Vertex, pixel, _| corner(&window, pixel, (0.0, 0.0), [vertex.open as f32, 0.0, 0.0, 0.0]);
     let plane = &mut canvas.planes[0];
     for corners in facing(&patches[0], view, corners) {
         triangle(corners, window.size(), |start, end, mut carried, step| {

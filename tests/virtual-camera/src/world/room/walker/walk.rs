@@ -10,7 +10,7 @@ use super::{
     },
     cast, route,
 };
-use crate::{kinematics::Pose, seeded::Seeded};
+use crate::{geometry::edge_of_view, kinematics::Pose, seeded::Seeded};
 
 /// Ordinary walking, metres per second.
 pub(crate) const SPEED: f64 = 1.4;
@@ -135,10 +135,7 @@ impl Walk {
         let edge = self.at(self.at_the_edge);
         let height = (MIDDLE - CAMERA[1]).atan2(edge.x.hypot(edge.z));
         let tilt = height - self.above_deg.to_radians();
-        // The side of a tilted view where it shows what lies that high.
-        let half = HALF_VIEW_DEG.to_radians().tan();
-        let (across, down) = (half * tilt.cos(), half * height.tan() * tilt.sin());
-        let beside = across.atan() + (down / across.hypot(1.0)).asin();
+        let beside = edge_of_view(HALF_VIEW_DEG.to_radians(), tilt, height);
         let pan = edge.x.atan2(edge.z) + self.side * beside;
         Pose { pan_deg: pan.to_degrees(), tilt_deg: tilt.to_degrees(), ..Pose::default() }
     }

@@ -1,20 +1,47 @@
 //! Somebody without what is behind them: the mean of some moments of an exposure, laid over a picture.
 
-use super::paint::Window;
-use crate::{
-    geometry::Pinhole,
-    picture::Plane,
-    world::{
-        blur::blur_plane,
-        room::view::{Canvas, View},
-    },
+use super::{
+    blur::blur_plane,
+    room::view::{Canvas, View},
 };
+use crate::{geometry::Pinhole, picture::Plane, truth::Bounds};
 
 /// Moments of an exposure that are looked at: what moves is blurred by as many steps. A power of two.
-pub(crate) const MOMENTS: usize = 4;
+pub(super) const MOMENTS: usize = 4;
+
+/// Where in a pixel each moment of an exposure has its sample: together they smooth the edges.
+pub(super) const ASIDE: [(f64, f64); MOMENTS] =
+    [(-0.375, -0.125), (0.125, -0.375), (0.375, 0.125), (-0.125, 0.375)];
+
+/// A part of the picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window {
+    /// First pixel; even, so that chroma pixels are whole.
+    pub left: usize,
+    pub top: usize,
+    /// In pixels.
+    pub width: usize,
+    pub height: usize,
+}
+
+impl Window {
+    /// The part of a picture of `size` that these pixels lie in, if any.
+    pub fn around(pixels: impl Iterator<Item = (f64, f64)>, size: (usize, usize)) -> Option<Self> {
+        let bounds = Bounds::around(pixels)?;
+        let limit = |place: f64, end: usize| place.clamp(0.0, end as f64) as usize;
+        let (left, top) = (limit(bounds.left - 1.0, size.0) & !1, limit(bounds.top - 1.0, size.1) & !1);
+        let width = limit(bounds.left + bounds.width + 2.0, size.0).saturating_sub(left);
+        let height = limit(bounds.top + bounds.height + 2.0, size.1).saturating_sub(top);
+        (width > 0 && height > 0).then_some(Self { left, top, width, height })
+    }
+
+    pub fn size(&self) -> (usize, usize) {
+        (self.width, self.height)
+    }
+}
 
 /// Sums over the samples of all moments; what is not covered is black.
-pub(crate) struct Layer {
+pub(super) struct Layer {
     window: Window,
     /// Of each pixel: brightness, and how many samples are covered.
     luma: Vec<[u16; 2]>,
@@ -23,7 +50,7 @@ pub(crate) struct Layer {
 }
 
 impl Layer {
-    pub(super) fn new(window: Window) -> Self {
+    pub fn new(window: Window) -> Self {
         let Window { width, height, .. } = window;
         let squares = width.div_ceil(2) * height.div_ceil(2);
         Self { window, luma: vec![[0; 2]; width * height], chroma: vec![[0; 3]; squares] }

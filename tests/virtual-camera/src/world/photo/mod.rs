@@ -1,0 +1,16 @@
+//! A photograph of everything around the camera, with somebody cut out of film walking in it.
+
+mod equirectangular;
+mod obstacle;
+mod place;
+mod settings;
+mod sprite;
+mod way;
+mod world;
+
+pub use place::{Lane, PhotoPlace};
+pub use settings::{PhotoError, PhotoSettings};
+pub(crate) use world::Photo;
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,282 @@
+//! Where the person is when: along a lane of the floor, at what speed, facing where.
+//!
+//! Metres, x to the right, z ahead at pan 0, from below the lens.
+
+use super::{
+    place::{Lane, PhotoPlace},
+    settings::PhotoSettings,
+};
+use crate::{geometry, kinematics::Pose, seeded::Seeded, world::Change};
+
+/// How tall the person is, in metres.
+pub(super) const HEIGHT: f64 = 1.75;
+/// Half of the width that they take with swinging arms, in metres.
+pub(super) const HALF_WIDTH: f64 = 0.42;
+/// Metres per second: ordinary, and once each where the speed varies.
+const SPEED: f64 = 1.1;
+const FAST: f64 = 1.6;
+const SLOW: f64 = 0.7;
+/// Metres per second squared: of a change of pace, and of turning round.
+const GENTLE: f64 = 1.5;
+const BRISK: f64 = 2.2;
+/// A lane goes on for so many metres beyond the turn.
+const LEFT: f64 = 0.45;
+/// A way takes one of so many of the longest lanes.
+const LONGEST: usize = 3;
+/// When the person sets off, in seconds.
+const DEPARTURE: f64 = 1.6;
+/// Metres walked on the way round when somebody turns on their heel, a second.
+const TURNING: f64 = 0.5;
+/// How far somebody may face away from the camera: nobody was filmed from behind.
+const SIDEWAYS_DEG: f64 = 112.0;
+/// Steps of the tables: points a lane, and moments a second.
+const POINTS: usize = 400;
+const RATE: f64 = 100.0;
+
+/// The person at one moment.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Moment {
+    pub x: f64,
+    pub z: f64,
+    /// Which way they face, seen from the camera, in degrees: 0 towards it, 90 to the right of the picture.
+    pub heading_deg: f64,
+    /// Metres that their feet have walked.
+    pub walked: f64,
+}
+
+impl Moment {
+    /// Degrees to the right of the picture's middle column.
+    pub fn yaw_deg(&self) -> f64 {
+        self.x.atan2(self.z).to_degrees()
+    }
+
+    /// How far away on the floor.
+    pub fn away(&self) -> f64 {
+        self.x.hypot(self.z)
+    }
+}
+
+/// The way of a test.
+#[derive(Debug, Clone)]
+pub(super) struct Way {
+    moments: Vec<Moment>,
+    eye: f64,
+    fov_deg: f64,
+    above_deg: f64,
+    repeats: bool,
+}
+
+impl Way {
+    pub fn new(settings: &PhotoSettings) -> Self {
+        let mut chance = Seeded::new(settings.seed).fork(0x9407).fork(u64::from(settings.way));
+        let place = &settings.place;
+        let back = settings.direction == Change::Variable;
+        let track = Track::choose(place, back, &mut chance);
+        let moments = track.walked(settings.speed, back, &mut chance);
+        let above_deg = chance.range(-4.0, 4.0);
+        Self { moments, eye: place.eye_m, fov_deg: place.fov_deg, above_deg, repeats: settings.repeats }
+    }
+
+    /// When it is over, in seconds.
+    pub fn duration(&self) -> f64 {
+        DEPARTURE + (self.moments.len() - 1) as f64 / RATE
+    }
+
+    /// The person at a time in seconds; before the first and after the last moment they stand still.
+    pub fn at(&self, time: f64) -> Moment {
+        let time = if self.repeats { time.rem_euclid(self.duration()) } else { time };
+        let place = ((time - DEPARTURE) * RATE).clamp(0.0, (self.moments.len() - 1) as f64);
+        let index = (place as usize).min(self.moments.len().saturating_sub(2));
+        let (from, to) = (self.moments[index], self.moments[(index + 1).min(self.moments.len() - 1)]);
+        let between = |from: f64, to: f64| from + (to - from) * (place - index as f64);
+        Moment {
+            x: between(from.x, to.x),
+            z: between(from.z, to.z),
+            heading_deg: between(from.heading_deg, to.heading_deg),
+            walked: between(from.walked, to.walked),
+        }
+    }
+
+    /// The time at which a part of all moments has gone, 0 to 1.
+    pub fn time_of(&self, part: f64) -> f64 {
+        DEPARTURE + part * (self.duration() - DEPARTURE)
+    }
+
+    /// The first view: beside the person, who stands just outside of it.
+    pub fn home(&self) -> Pose {
+        let start = self.moments[0];
+        let away = start.away();
+        let middle = (HEIGHT / 2.0 - self.eye).atan2(away);
+        let tilt = middle - self.above_deg.to_radians();
+        let beside = geometry::edge_of_view((self.fov_deg / 2.0).to_radians(), tilt, middle);
+        let outside = 1.1 * (HALF_WIDTH / away).atan();
+        let next = self.at(DEPARTURE + 0.5).yaw_deg();
+        let side = if turned(start.yaw_deg(), next) > 0.0 { 1.0 } else { -1.0 };
+        let pan_deg = start.yaw_deg() + side * (beside + outside).to_degrees();
+        Pose { pan_deg: turned(0.0, pan_deg), tilt_deg: tilt.to_degrees(), ..Pose::default() }
+    }
+}
+
+/// From one direction to another, from -180 to 180.
+pub(super) fn turned(from_deg: f64, to_deg: f64) -> f64 {
+    (to_deg - from_deg + 180.0).rem_euclid(360.0) - 180.0
+}
+
+/// A lane as a line on the floor.
+struct Track {
+    /// x, z and metres from the start.
+    points: Vec<[f64; 3]>,
+}
+
+impl Track {
+    /// A lane of the place in one of its directions, such that nobody shows their back; there and back where asked for.
+    fn choose(place: &PhotoPlace, back: bool, chance: &mut Seeded) -> Self {
+        let lanes = place.lanes.iter().flat_map(|Lane(points)| {
+            let mut reversed = points.clone();
+            reversed.reverse();
+            [Self::new(place.eye_m, points), Self::new(place.eye_m, &reversed)]
+        });
+        let mut tracks: Vec<(Self, f64)> = lanes
+            .map(|track| {
+                let back = if back { track.most_away_deg(-1.0) } else { 0.0 };
+                let away = track.most_away_deg(1.0).max(back);
+                (track, away)
+            })
+            .collect();
+        tracks.sort_by(|one, other| one.1.total_cmp(&other.1));
+        tracks.truncate(tracks.iter().filter(|(_, away)| *away <= SIDEWAYS_DEG).count().max(1));
+        tracks.sort_by(|one, other| other.0.length().total_cmp(&one.0.length()));
+        tracks.swap_remove(chance.below(tracks.len().min(LONGEST))).0
+    }
+
+    fn new(eye: f64, corners: &[[f64; 2]]) -> Self {
+        let mut points: Vec<[f64; 3]> = Vec::with_capacity(POINTS + 1);
+        for step in 0..=POINTS {
+            let place = step as f64 / POINTS as f64 * (corners.len() - 1) as f64;
+            let index = (place as usize).min(corners.len() - 2);
+            let share = place - index as f64;
+            let [yaw, below] = [0, 1]
+                .map(|axis| corners[index][axis] + (corners[index + 1][axis] - corners[index][axis]) * share);
+            let away = eye / below.to_radians().tan();
+            let (sin, cos) = yaw.to_radians().sin_cos();
+            let (x, z) = (away * sin, away * cos);
+            let come = points.last().map_or(0.0, |last| last[2] + (x - last[0]).hypot(z - last[1]));
+            points.push([x, z, come]);
+        }
+        Self { points }
+    }
+
+    fn length(&self) -> f64 {
+        self.points.last().map_or(0.0, |last| last[2])
+    }
+
+    /// Where it is so many metres from its start, and its heading there in degrees; along it (1) or back (-1).
+    fn at(&self, come: f64, direction: f64) -> (f64, f64, f64) {
+        let after = self.points.partition_point(|point| point[2] <= come).clamp(1, self.points.len() - 1);
+        let (from, to) = (self.points[after - 1], self.points[after]);
+        let share = ((come - from[2]) / (to[2] - from[2]).max(1e-9)).clamp(0.0, 1.0);
+        let (x, z) = (from[0] + (to[0] - from[0]) * share, from[1] + (to[1] - from[1]) * share);
+        let (right, ahead) = (direction * (to[0] - from[0]), direction * (to[1] - from[1]));
+        let away = x.hypot(z).max(1e-9);
+        // To the right of the picture, and towards the camera.
+        let (sideways, near) = ((right * z - ahead * x) / away, -(right * x + ahead * z) / away);
+        (x, z, sideways.atan2(near).to_degrees())
+    }
+
+    fn most_away_deg(&self, direction: f64) -> f64 {
+        let headings =
+            (0..=20).map(|part| self.at(self.length() * f64::from(part) / 20.0, direction).2.abs());
+        headings.fold(0.0, f64::max)
+    }
+
+    /// Somebody's moments along it, from setting off.
+    fn walked(&self, speed: Change, back: bool, chance: &mut Seeded) -> Vec<Moment> {
+        let length = self.length();
+        let turn = if back { (length * chance.range(0.72, 0.85)).min(length - LEFT) } else { f64::INFINITY };
+        let paces = chance.pick(&[[FAST, SLOW], [SLOW, FAST]]);
+        let wanted = |gone: f64, all: f64| match (speed, gone / all) {
+            (Change::Variable, part) if (0.25..0.45).contains(&part) => paces[0],
+            (Change::Variable, part) if (0.62..0.82).contains(&part) => paces[1],
+            _ => SPEED,
+        };
+        let (mut come, mut gone, mut walked, mut direction) = (0.0f64, 0.0f64, 0.0f64, 1.0);
+        let (mut velocity, mut heading) = (0.0f64, self.at(0.0, 1.0).2);
+        let all = if back { 2.0 * turn } else { length };
+        let mut moments = Vec::new();
+        while (back || come < length) && come >= 0.0 {
+            if come >= turn {
+                direction = -1.0;
+            }
+            let change = if velocity * direction < 0.0 { BRISK } else { GENTLE } / RATE;
+            // Who turns slows down, and goes on the other way.
+            let target = direction * wanted(gone, all);
+            velocity += (target - velocity).clamp(-change, change);
+            let (x, z, along) = self.at(come, direction);
+            // Turns towards the camera, as nobody was filmed from behind.
+            let step = 180.0 / RATE / 1.2;
+            heading += (along - heading).clamp(-step, step);
+            moments.push(Moment { x, z, heading_deg: heading, walked });
+            let moved = velocity / RATE;
+            let turning = (along - heading).abs() > 30.0;
+            walked += moved.abs().max(if turning { TURNING / RATE } else { 0.0 });
+            // Who comes fast to the end of the lane turns on the spot.
+            (come, gone) = ((come + moved).min(length), gone + moved.abs());
+        }
+        moments
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::world::Occlusion;
+    use std::path::PathBuf;
+
+    fn ways() -> Vec<PhotoSettings> {
+        let names =
+            ["chester_v112351", "chester_v112355", "leaving-room", "puydesancy", "lake", "abandoned-room"];
+        let numbers = 1..=PhotoSettings::WAYS;
+        let way = |name: &str, number| {
+            let panorama = PathBuf::from(format!("{name}.jpg"));
+            let place = PhotoPlace::of(&panorama, None).unwrap();
+            PhotoSettings::way(panorama, "walker".into(), place, number, 1).unwrap()
+        };
+        names.iter().flat_map(|name| numbers.clone().map(move |number| way(name, number))).collect()
+    }
+
+    #[test]
+    fn nobody_shows_their_back_or_jumps() {
+        for settings in ways() {
+            let way = Way::new(&settings);
+            assert!((3.4..20.0).contains(&way.duration()), "{} {settings:?}", way.duration());
+            let mut before = way.at(0.0);
+            for step in 0..(way.duration() / 0.04) as u32 {
+                let now = way.at(f64::from(step) * 0.04);
+                assert!(now.heading_deg.abs() < 120.0, "{settings:?} {now:?}");
+                assert!((now.x - before.x).hypot(now.z - before.z) < 0.07, "{settings:?} {now:?}");
+                assert!(now.walked >= before.walked);
+                before = now;
+            }
+        }
+    }
+
+    #[test]
+    fn there_and_back_turns_once_and_varied_speed_varies() {
+        for settings in ways() {
+            let way = Way::new(&settings);
+            let speed = |time: f64| (way.at(time + 0.02).walked - way.at(time).walked) / 0.02;
+            let speeds: Vec<f64> = (0..100).map(|part| speed(way.time_of(f64::from(part) / 101.0))).collect();
+            let fastest = speeds.iter().copied().fold(0.0, f64::max);
+            assert_eq!(fastest > 1.15, settings.speed == Change::Variable, "{settings:?} {fastest}");
+            let (start, end) = (way.at(0.0), way.at(way.duration()));
+            let apart = (end.x - start.x).hypot(end.z - start.z);
+            assert_eq!(apart < 0.5, settings.direction == Change::Variable, "{settings:?} {apart}");
+        }
+    }
+
+    #[test]
+    fn a_third_of_the_ways_each_has_nothing_something_low_and_something_high_before_it() {
+        let count = |kind: Occlusion| ways().iter().filter(|settings| settings.occlusion == kind).count();
+        assert_eq!([Occlusion::None, Occlusion::Partial, Occlusion::Full].map(count), [24; 3]);
+    }
+}
