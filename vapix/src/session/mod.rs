@@ -34,6 +34,9 @@ use servo::{Access, ActuatorStatus, Mode, Servo, ServoSettings};
 
 use crate::wire::Command;
 
+/// A camera that did not answer a move is not expected to act on it later than this.
+pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
+
 /// Speaks with one camera for a servo: says what to send, hears what is answered. Sends nothing itself, and has no
 /// clock: both are the caller's.
 #[derive(Debug)]
@@ -144,6 +147,11 @@ impl Session {
     /// Whether it rests for good: nothing that went unanswered can set it going any more.
     pub fn stays_at_rest(&self) -> bool {
         self.is_at_rest() && !self.scheduler.in_doubt()
+    }
+
+    /// Whether it may yet act on a move that went unanswered.
+    pub fn in_doubt(&self) -> bool {
+        self.scheduler.in_doubt()
     }
 
     /// Whether the camera counts on hearing from us.

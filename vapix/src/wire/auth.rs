@@ -3,6 +3,7 @@
 use base64::prelude::{BASE64_STANDARD, Engine};
 use digest_auth::{AuthContext, WwwAuthenticateHeader};
 use reqwest::header::{HeaderMap, HeaderValue, WWW_AUTHENTICATE};
+use serde::{Deserialize, Serialize};
 
 use super::text::excerpt;
 use super::{Error, Secret};
@@ -10,12 +11,13 @@ use super::{Error, Secret};
 /// A longer challenge is none: real ones have about 200 characters.
 const MAX_CHALLENGE_BYTES: usize = 4096;
 
-/// A user and the password.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// A user and the password. Serialised with the password, for the socket of the watchdog and nothing else.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Credentials {
     /// The user.
     pub user: String,
     /// The password.
+    #[serde(with = "super::secret::in_clear")]
     pub password: Secret,
 }
 

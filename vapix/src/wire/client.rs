@@ -2,6 +2,7 @@ use std::time::Duration;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, LOCATION};
 use reqwest::{Response, StatusCode, redirect};
+use serde::{Deserialize, Serialize};
 use servo::{Limits, Position, Presets};
 
 use super::auth::Authenticator;
@@ -20,7 +21,7 @@ const MAX_BODY_BYTES: usize = 64 * 1024;
 const MAX_ATTEMPTS: usize = 5;
 
 /// How a camera is spoken to.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct ClientSettings {
     /// Where it is.
     pub location: Location,
@@ -32,6 +33,14 @@ pub struct ClientSettings {
     pub timeout: Duration,
     /// Whose certificates are believed.
     pub trust: Trust,
+}
+
+/// Who a client is to its camera: whoever has it speaks in the client's place.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Identity {
+    /// As they are by now: redirects followed, user and password those of the last request.
+    pub settings: ClientSettings,
+    cookies: Cookies,
 }
 
 /// One camera. Every request takes `&mut self`: there is at most one in flight.
@@ -70,6 +79,19 @@ impl Client {
             accepted: false,
             connected: false,
         })
+    }
+
+    /// Speaks to the camera in another client's place.
+    ///
+    /// # Errors
+    /// [`Error::Tls`] where `trust` cannot be used.
+    pub fn in_place_of(identity: Identity) -> Result<Self, Error> {
+        Ok(Self { cookies: identity.cookies, ..Self::new(identity.settings)? })
+    }
+
+    /// Who this client is to the camera.
+    pub fn identity(&self) -> Identity {
+        Identity { settings: self.settings.clone(), cookies: self.cookies.clone() }
     }
 
     /// Takes another user or password, and asks again even where the last were refused.

@@ -1,9 +1,10 @@
 use std::fmt;
 
+use serde::{Deserialize, Serialize};
 use servo::Actuation;
 
 /// A move, as `ptz.cgi` takes it. `Display` is its part of the query string.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// `continuouspantiltmove`: move until told otherwise.
     Velocity {

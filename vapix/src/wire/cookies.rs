@@ -1,4 +1,5 @@
 use reqwest::header::{COOKIE, HeaderMap, HeaderValue, SET_COOKIE};
+use serde::{Deserialize, Serialize};
 
 /// What a camera is reminded of that has set a cookie with this header; `None`: of nothing.
 pub fn answer_to_cookie(header: &str) -> Option<String> {
@@ -13,7 +14,7 @@ pub fn answer_to_cookie(header: &str) -> Option<String> {
 /// Remembers what the camera asks to be reminded of: with a control queue that is who we are.
 ///
 /// For one camera only, until the end; and few, so that no camera can fill the memory.
-#[derive(Debug, Default)]
+#[derive(Debug, Default, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub(super) struct Cookies(Vec<(String, String)>);
 
 impl Cookies {

@@ -1,11 +1,13 @@
 use std::fmt;
 
 use reqwest::Url;
+use serde::{Deserialize, Serialize};
 
 use super::{Error, Secret};
 
 /// Where the camera is: `http://host`, `https://host:port`. Holds no user and no password.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "String", try_from = "String")]
 pub struct Location(Url);
 
 /// What an address of the form `http://user:password@host` carries besides the location.
@@ -65,6 +67,20 @@ impl Location {
         let upgrade = !self.is_https() && target.scheme() == "https" && target.host() == self.0.host();
         let (location, _) = upgrade.then(|| Self::parse(target.as_str()).ok())??;
         Some(location)
+    }
+}
+
+impl From<Location> for String {
+    fn from(location: Location) -> Self {
+        location.to_string()
+    }
+}
+
+impl TryFrom<String> for Location {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self, Error> {
+        Self::parse(&text).map(|(location, _)| location)
     }
 }
 

@@ -22,7 +22,7 @@ mod tls;
 
 pub use attributes::Attributes;
 pub use auth::{Credentials, answer_to_challenge};
-pub use client::{Client, ClientSettings};
+pub use client::{Client, ClientSettings, Identity};
 pub use command::Command;
 pub use cookies::answer_to_cookie;
 pub use error::Error;

@@ -10,9 +10,10 @@ use rustls::{ClientConfig, DigitallySignedStruct, RootCertStore, SignatureScheme
 use rustls_platform_verifier::BuilderVerifierExt;
 
 use super::Error;
+use serde::{Deserialize, Serialize};
 
 /// Whose certificates are believed.
-#[derive(Debug, Clone, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Trust {
     /// Those the system trusts.
     #[default]

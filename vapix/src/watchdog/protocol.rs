@@ -1,0 +1,81 @@
+//! What an application tells its watchdog. It says all there is to say each time: a watchdog that was started anew, or took
+//! over, needs to know nothing of before.
+
+use serde::{Deserialize, Serialize};
+
+use crate::wire::{Command, Identity};
+
+/// One line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Message {
+    /// A camera may move from now on, or still does: the lease begins, or is renewed.
+    Hold {
+        /// Of all leases of this application.
+        lease: u64,
+        /// What is to be done when it ends.
+        stop: Box<StopOrder>,
+    },
+    /// The camera rests, or is no longer ours to stop.
+    Release {
+        /// Which lease.
+        lease: u64,
+    },
+}
+
+/// How a camera is stopped.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StopOrder {
+    /// By whom the camera is to think that it is stopped.
+    pub identity: Identity,
+    /// The words that end its move.
+    pub command: Command,
+    /// A move is under way that the camera has not answered: it may act on it after a stop.
+    pub in_doubt: bool,
+}
+
+impl Message {
+    /// With the end of the line.
+    ///
+    /// # Errors
+    /// Where a value has no JSON form, which none of these lacks but a path that is not UTF-8.
+    pub fn to_line(&self) -> Result<Vec<u8>, serde_json::Error> {
+        let mut line = serde_json::to_vec(self)?;
+        line.push(b'\n');
+        Ok(line)
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn of_line(line: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(line)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::wire::{Client, ClientSettings, Credentials, Location, Secret, Trust};
+    use std::time::Duration;
+
+    #[test]
+    fn a_line_says_all_and_its_debug_form_keeps_the_password() {
+        let settings = ClientSettings {
+            location: Location::parse("https://camera:8443").unwrap().0,
+            camera: 2,
+            credentials: Some(Credentials { user: "root".to_owned(), password: Secret::new("geheim") }),
+            timeout: Duration::from_millis(1500),
+            trust: Trust::Anyone,
+        };
+        let identity = Client::new(settings).unwrap().identity();
+        let stop = StopOrder { identity, command: Command::REST, in_doubt: true };
+        let message = Message::Hold { lease: 7, stop: Box::new(stop) };
+        let line = message.to_line().unwrap();
+        assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
+        assert_eq!(Message::of_line(&line).unwrap(), message);
+        assert!(!format!("{message:?}").contains("geheim"));
+        assert!(Message::of_line(b"{}").is_err());
+    }
+}
