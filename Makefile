@@ -21,6 +21,9 @@ CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 25m
 
+# What is installed: both plugins, and the watchdog, which is a program of crate `vapix`.
+PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix
+
 CODEC ?= mjpeg
 DURATION ?= 60
 FOOTAGE ?=
@@ -33,9 +36,9 @@ SEED ?= 1
 help:
 	@sed -n 's/^## //p' $(MAKEFILE_LIST)
 
-## build: build the plugins (release) into target/release
+## build: build the plugins and the watchdog (release) into target/release
 build: packages-build
-	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix
+	$(CARGO) build --release $(PRODUCT)
 
 ## test: check formatting, lint, build, run all tests
 test: packages-test lint
@@ -53,7 +56,7 @@ lint: packages-build
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
 ##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
 demo: packages-demo
-	$(CARGO) build --release --package gst-plugin-ptztrack --package gst-plugin-vapix --package virtual-camera
+	$(CARGO) build --release $(PRODUCT) --package virtual-camera
 	@case "$(WORLD)" in \
 	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
 	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \
@@ -76,7 +79,7 @@ evaluate-all: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate --matrix --out target/evaluation/all $(ARGS)
 
-## install: build, and copy the plugins to a GStreamer plugin folder
+## install: build, and copy the plugins to a GStreamer plugin folder, the watchdog to `libexec` in it
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
 install: build
 	scripts/install-plugins target/release "$(PREFIX)" "$(DESTDIR)"

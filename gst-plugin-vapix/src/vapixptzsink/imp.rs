@@ -15,6 +15,7 @@ use super::picture::Picture;
 use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
+use super::watchdog::watchdog;
 use crate::control_loop::Status;
 use crate::lock::lock;
 
@@ -61,7 +62,7 @@ impl ObjectImpl for VapixPtzSink {
     fn properties() -> &'static [glib::ParamSpec] {
         static PROPERTIES: LazyLock<Vec<glib::ParamSpec>> = LazyLock::new(|| {
             let stats = glib::ParamSpecBoxed::builder::<gst::Structure>("stats")
-                .blurb("What it does and what it knows of the camera: state; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own limits camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
+                .blurb("What it does and what it knows of the camera: state; dead-man, which is off, ready, armed or unavailable; commands-sent, commands-failed, commands-coalesced; round-trip and round-trip-average in nanoseconds; pan-rate and tilt-rate in degrees per second; where known mode, pan and tilt in degrees, zoom in zoom steps, the camera's own limits camera-pan-min, camera-pan-max, camera-tilt-min, camera-tilt-max in degrees and camera-zoom-min, camera-zoom-max in zoom steps, camera-endless-pan, field-of-view in degrees, latency in nanoseconds, speeds of the steps 1 to 100 in degrees per second, last-error")
                 .read_only()
                 .build();
             Property::all().iter().map(|property| property.spec.clone()).chain([stats]).collect()
@@ -219,7 +220,8 @@ impl VapixPtzSink {
         *lock(&self.status_to_push) = None;
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
-        let task = CameraTask::start(client, settings.servo(), clock, move |event| {
+        let watchdog = watchdog(&settings, self.obj().upcast_ref());
+        let task = CameraTask::start(client, settings.servo(), clock, watchdog, move |event| {
             if let Some(element) = element.upgrade() {
                 element.imp().happened(event);
             }

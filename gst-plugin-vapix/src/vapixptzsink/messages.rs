@@ -81,6 +81,11 @@ impl VapixPtzSink {
                 gst::ResourceError::Write,
                 ("the camera has not confirmed its stop in time and may still be moving; retrying for a minute. Check it, and stop it by hand if need be")
             ),
+            Event::NoWatchdog(reason) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::NotFound,
+                ("no watchdog process: {reason}. A camera that moves when this process is killed or hangs would go on turning. Install `vapix-watchdog` in `libexec` beside the plugin, or name it by VAPIX_WATCHDOG; `dead-man=false` does without")
+            ),
             Event::Died(reason) => gst::element_imp_error!(
                 self,
                 gst::LibraryError::Failed,

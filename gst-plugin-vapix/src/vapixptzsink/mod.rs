@@ -15,6 +15,10 @@
 //! stop is repeated until the camera says yes; EOS and leaving PLAYING wait for that at most 1 s, READY
 //! at most 2.5 s. In PAUSED the camera is asked, never moved; in READY nothing is connected.
 //!
+//! Whatever this process was about to do it cannot do once it is dead: with `dead-man` the process `vapix-watchdog` holds a
+//! lease for as long as the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is
+//! started with the first move. `stats` has it as `dead-man`; where there is none, one warning says so.
+//!
 //! User and password are taken from `user` and `password`, from `location`
 //! (`http://user:password@host`, where they are taken out at once), or from the environment variables
 //! `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process lists and of the parser's log.
@@ -96,6 +100,7 @@ mod properties;
 mod setters;
 mod settings;
 mod statistics;
+mod watchdog;
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]

@@ -126,6 +126,12 @@ fn table() -> Vec<Property> {
         duration("home-timeout", AtOnce, "The camera goes home when there has been no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
         switch("home-at-start", AtStart, "Go home on start-up too, without waiting for `home-timeout`", |s| &mut s.servo.home_at_start),
         duration("override-timeout", AtOnce, "Somebody else who moves the camera keeps it until it has not been moved for this long, in nanoseconds, up to a day (0: never give way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.override_timeout),
+        switch("dead-man", AtStart, "Have a process of its own stop the camera where this one dies or hangs while the camera moves; not with `lockstep`", |s| &mut s.dead_man),
+        special(
+            text("dead-man-socket", AtStart, "Socket of a `vapix-watchdog --listen` that runs elsewhere and is to be that process (unset: one is started)"),
+            |s| s.dead_man_socket.to_value(),
+            |s, value| { s.dead_man_socket = string(value).filter(|socket| !socket.is_empty()); Ok(()) },
+        ),
         switch("lockstep", AtStart, "Use the stream's time, and let each buffer wait for the camera's answers: for simulated cameras", |s| &mut s.lockstep),
     ]
 }

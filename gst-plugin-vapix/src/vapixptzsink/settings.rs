@@ -17,6 +17,8 @@ pub struct Settings {
     pub insecure: bool,
     pub ca_file: Option<String>,
     pub lockstep: bool,
+    pub dead_man: bool,
+    pub dead_man_socket: Option<String>,
     pub auto_zoom: bool,
     pub target_height: f64,
     /// All that the servo is to know but `target_height`, which is zoomed by only with `auto_zoom`.
@@ -37,6 +39,8 @@ impl Default for Settings {
             insecure: false,
             ca_file: None,
             lockstep: false,
+            dead_man: true,
+            dead_man_socket: None,
             auto_zoom: servo.target_height.is_some(),
             target_height: 0.4,
             kept_limits: servo.limits,

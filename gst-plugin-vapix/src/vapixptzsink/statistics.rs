@@ -5,6 +5,7 @@ use std::time::Duration;
 use servo::{Estimates, Mode, is_endless};
 use vapix::wire::Command;
 
+use super::camera_task::DeadManState;
 use crate::control_loop::Status;
 
 /// What was exchanged with the camera, and what it is known to do.
@@ -25,6 +26,7 @@ pub struct Statistics {
     pub round_trip_average: Duration,
     pub last_error: Option<String>,
     pub halted: bool,
+    pub dead_man: DeadManState,
 }
 
 impl Statistics {
@@ -59,6 +61,7 @@ impl Statistics {
         let limits = &status.limits;
         gst::Structure::builder("application/x-vapixptzsink-stats")
             .field("state", state)
+            .field("dead-man", self.dead_man.name())
             .field("commands-sent", self.sent)
             .field("commands-failed", self.failed)
             .field("commands-coalesced", self.coalesced)

@@ -61,10 +61,15 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// A sink for the camera at `location`, not yet playing.
+    /// A sink for the camera at `location`, not yet playing. The watchdog process has its own tests: these need none to be
+    /// built.
     pub fn ready(location: &str) -> Self {
         init();
-        let sink = gst::ElementFactory::make("vapixptzsink").property("location", location).build().unwrap();
+        let sink = gst::ElementFactory::make("vapixptzsink")
+            .property("location", location)
+            .property("dead-man", false)
+            .build()
+            .unwrap();
         let bus = gst::Bus::new();
         sink.set_bus(Some(&bus));
         Self { sink, bus, stamps: None, harness: None }

@@ -6,15 +6,15 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// The folder that holds the built `libgst*.so`: the one that this test was built into.
+/// The folder that holds the built `libgst*.so` and the watchdog: the one that this test was built into.
 ///
 /// # Panics
 /// Where the plugins were not built: `cargo test` alone does not build them.
 pub fn plugin_folder() -> PathBuf {
     let test = std::env::current_exe().expect("a running test has a path");
     let folder = test.parent().and_then(|deps| deps.parent()).expect("target/<profile>/deps").to_owned();
-    for library in ["libgstptztrack.so", "libgstvapix.so"] {
-        assert!(folder.join(library).exists(), "{library} is not built: run `cargo build` first");
+    for file in ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog"] {
+        assert!(folder.join(file).exists(), "{file} is not built: run `cargo build` first");
     }
     folder
 }

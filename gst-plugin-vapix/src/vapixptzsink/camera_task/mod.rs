@@ -1,5 +1,6 @@
 //! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
 
+mod dead_man;
 mod mailbox;
 mod state;
 
@@ -12,6 +13,9 @@ use std::time::Duration;
 use once_cell::sync::OnceCell;
 use tokio::runtime::{Builder, Runtime};
 
+pub use self::dead_man::DeadManState;
+
+use self::dead_man::DeadMan;
 use self::mailbox::Mailbox;
 use self::state::TaskState;
 use super::clock::Clock;
@@ -21,6 +25,7 @@ use crate::control_loop::{ControlLoop, LoopEvent, Status};
 use crate::lock::lock;
 use servo::ServoSettings;
 use vapix::session::{Next, Query, Request, Response};
+use vapix::watchdog::{Unavailable, Watchdog};
 use vapix::wire::{Client, ClientSettings, Command, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
@@ -47,6 +52,8 @@ pub enum Event {
         /// Whether nothing more may be sent either.
         halted: bool,
     },
+    /// A camera that moves goes on where this process dies: there is no watchdog.
+    NoWatchdog(Unavailable),
     /// The camera task itself broke.
     Died(String),
 }
@@ -89,6 +96,7 @@ impl CameraTask {
         client: ClientSettings,
         servo: ServoSettings,
         clock: Clock,
+        watchdog: Option<Arc<Watchdog>>,
         observer: impl Fn(Event) + Clone + Send + Sync + 'static,
     ) -> Result<Self, String> {
         let camera = (client.location.clone(), client.camera);
@@ -102,7 +110,7 @@ impl CameraTask {
         let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
-        let task = Task { client, settings: settings.clone(), state };
+        let task = Task { client, settings: settings.clone(), dead_man: DeadMan::new(watchdog), state };
         let running = runtime.spawn(task.run());
         let task = Self { camera, mailbox, statistics };
         let predecessor = task.predecessor();
@@ -211,17 +219,21 @@ struct Task<O> {
     client: Client,
     /// For whoever must finish what the task has begun.
     settings: Arc<Mutex<ClientSettings>>,
+    dead_man: DeadMan,
     state: TaskState<O>,
 }
 
 impl<O: Fn(Event) + Send + Sync> Task<O> {
     async fn run(mut self) {
+        let missing = self.dead_man.check();
+        self.state.tell_dead_man(self.dead_man.state(), missing);
         loop {
             self.state.take_mail();
             self.state.check_deadline();
             if self.state.credentials.is_some() {
                 self.change_credentials().await;
             }
+            self.keep_lease().await;
             self.state.publish();
             if self.state.is_over() {
                 break;
@@ -235,11 +247,25 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                     tokio::select! {
                         () = self.state.mailbox.arrived() => {}
                         () = self.state.mailbox.sleep_until(until) => {}
+                        () = self.dead_man.due() => {}
                     }
                 }
             }
         }
         self.state.give_up();
+    }
+
+    /// For as long as the camera may move on our behalf, the watchdog is to stop it where we cannot.
+    async fn keep_lease(&mut self) {
+        let Self { client, dead_man, state, .. } = self;
+        let in_doubt = state.control.session().in_doubt();
+        let mut missing = None;
+        if !state.is_ours_to_stop() {
+            dead_man.release();
+        } else if dead_man.is_due(in_doubt) {
+            missing = dead_man.hold(client.identity(), state.control.stop(), in_doubt).await;
+        }
+        state.tell_dead_man(dead_man.state(), missing);
     }
 
     /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
@@ -259,12 +285,16 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
     async fn perform(&mut self, request: Request) {
-        let Self { client, state, .. } = self;
+        let Self { client, dead_man, state, .. } = self;
         let mailbox = state.mailbox.clone();
         let sent = mailbox.now();
         state.control.sending(&request, sent);
         let stop = state.control.stop();
         lock(&state.statistics).stop = Some(stop);
+        if matches!(&request, Request::Command(command) if !command.is_stop()) {
+            let missing = dead_man.hold(client.identity(), stop, true).await;
+            state.tell_dead_man(dead_man.state(), missing);
+        }
         let mut exchange = pin!(exchange(client, &request));
         let mut give_up_at = None;
         loop {
@@ -280,6 +310,10 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 answer = &mut exchange => return state.answered(&request, answer, sent),
                 () = mailbox.arrived() => state.take_mail(),
                 () = mailbox.sleep_until(until) => {}
+                () = dead_man.due() => {
+                    let missing = dead_man.renew().await;
+                    state.tell_dead_man(dead_man.state(), missing);
+                }
             }
         }
     }
@@ -319,7 +353,7 @@ mod tests {
             timeout: Duration::from_secs(2),
             trust: Trust::System,
         };
-        CameraTask::start(client, ServoSettings::default(), Clock::running(), observer).unwrap()
+        CameraTask::start(client, ServoSettings::default(), Clock::running(), None, observer).unwrap()
     }
 
     fn see(task: &CameraTask) {

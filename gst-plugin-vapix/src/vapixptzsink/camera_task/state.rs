@@ -6,11 +6,12 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::mailbox::{Mail, Mailbox};
-use super::{Event, FINISH_BUDGET, LAST_RETRIES, STOP_GRACE};
+use super::{DeadManState, Event, FINISH_BUDGET, LAST_RETRIES, STOP_GRACE};
 use crate::control_loop::{ControlLoop, Status};
 use crate::lock::lock;
 use crate::vapixptzsink::statistics::Statistics;
 use vapix::session::{Request, Response};
+use vapix::watchdog::Unavailable;
 use vapix::wire::{Credentials, Error};
 
 /// Everything but the client, which is lent out while a request is in flight.
@@ -101,6 +102,20 @@ impl<O: Fn(Event)> TaskState<O> {
         }
         self.waiting.extend(waiting);
         self.settling.extend(settling);
+    }
+
+    /// Whether a camera that moves does so at our word, and would hear our stop.
+    pub fn is_ours_to_stop(&self) -> bool {
+        let session = self.control.session();
+        !session.stays_at_rest() && !session.halted() && !session.is_taken_over(self.mailbox.now())
+    }
+
+    /// How it stands with the watchdog, and whether it is missing since just now.
+    pub fn tell_dead_man(&self, dead_man: DeadManState, missing: Option<Unavailable>) {
+        lock(&self.statistics).dead_man = dead_man;
+        if let Some(missing) = missing {
+            (self.observer)(Event::NoWatchdog(missing));
+        }
     }
 
     /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
