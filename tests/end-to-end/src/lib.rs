@@ -5,9 +5,11 @@
 mod launch;
 mod pipeline;
 pub mod scene;
+mod watchdog;
 
 pub use launch::{GstLaunch, plugin_folder, tool};
 pub use pipeline::{Running, init};
+pub use watchdog::Watchdog;
 
 use std::time::Duration;
 

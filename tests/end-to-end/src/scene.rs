@@ -1,8 +1,10 @@
 //! The scene that most tests play: a virtual camera, a person who crosses its world, a pipeline that follows.
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use virtual_camera::{Settings, SyntheticSettings, Video, VirtualCamera, World};
+use virtual_camera::{ReceivedCommand, Settings, SyntheticSettings, Video, VirtualCamera, World};
+
+use crate::PATIENCE;
 
 /// Name and password that the cameras of these tests ask for.
 pub const USER: &str = "operator";
@@ -54,4 +56,32 @@ pub fn servo(camera: &VirtualCamera) -> String {
 /// The whole: source, detector, tracker, servo.
 pub fn follow(camera: &VirtualCamera) -> String {
     format!("{} ! bgavgdetect ! lkfeaturetrack ! {}", mjpeg(camera), servo(camera))
+}
+
+/// Between two looks at the camera.
+const MOMENT: Duration = Duration::from_millis(100);
+
+/// The camera is moving because the pipeline follows somebody.
+#[track_caller]
+pub fn wait_until_following(camera: &VirtualCamera) {
+    assert!(camera.wait_for(PATIENCE, |status| status.moving), "the camera never moved");
+}
+
+/// The camera stops, and its last order is the reason; for a moment it may rest between two others.
+#[track_caller]
+pub fn assert_left_at_rest(camera: &VirtualCamera) {
+    let end = Instant::now() + PATIENCE;
+    let moves = |command: &ReceivedCommand| command.query.contains("move");
+    loop {
+        let rests = camera.wait_for(MOMENT, |status| !status.moving);
+        let last = camera.commands().into_iter().rfind(moves);
+        if rests && last.as_ref().is_some_and(|last| last.query.contains("continuouspantiltmove=0,0")) {
+            return;
+        }
+        assert!(
+            Instant::now() < end,
+            "left {}, the last order was {last:?}",
+            if rests { "at rest" } else { "moving" }
+        );
+    }
 }

@@ -1,39 +1,10 @@
 //! However a pipeline ends, the camera ends at rest: it moves until told otherwise.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::time::{Duration, Instant};
-
-use end_to_end::{GstLaunch, PATIENCE, Running, scene};
+use end_to_end::scene::{assert_left_at_rest, wait_until_following};
+use end_to_end::{GstLaunch, Running, scene};
 use gst::prelude::*;
-use virtual_camera::{ReceivedCommand, VirtualCamera};
-
-/// Between two looks at the camera.
-const MOMENT: Duration = Duration::from_millis(100);
-
-/// The camera is moving because the pipeline follows somebody.
-#[track_caller]
-fn wait_until_following(camera: &VirtualCamera) {
-    assert!(camera.wait_for(PATIENCE, |status| status.moving), "the camera never moved");
-}
-
-/// The camera stops, and its last order is the reason; for a moment it may rest between two others.
-#[track_caller]
-fn assert_left_at_rest(camera: &VirtualCamera) {
-    let end = Instant::now() + PATIENCE;
-    let moves = |command: &ReceivedCommand| command.query.contains("move");
-    loop {
-        let rests = camera.wait_for(MOMENT, |status| !status.moving);
-        let last = camera.commands().into_iter().rfind(moves);
-        if rests && last.as_ref().is_some_and(|last| last.query.contains("continuouspantiltmove=0,0")) {
-            return;
-        }
-        assert!(
-            Instant::now() < end,
-            "left {}, the last order was {last:?}",
-            if rests { "at rest" } else { "moving" }
-        );
-    }
-}
+use virtual_camera::VirtualCamera;
 
 /// Starts `gst-launch-1.0`, waits until it follows, ends it as `end` does.
 #[track_caller]

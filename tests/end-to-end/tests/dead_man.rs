@@ -1,0 +1,182 @@
+//! However an application dies, in the middle of a pan, the camera's last order is a stop.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::process::Command;
+use std::time::{Duration, Instant};
+
+use end_to_end::scene::{assert_left_at_rest, wait_until_following};
+use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, tool};
+use virtual_camera::{Fault, VirtualCamera};
+
+/// For as long an operator waits before the next turn.
+const LOOK: Duration = Duration::from_millis(700);
+
+/// `gst-launch-1.0` that follows, with a watchdog of its own.
+struct Application {
+    camera: VirtualCamera,
+    launch: GstLaunch,
+    watchdog: Watchdog,
+}
+
+fn launch(watchdog: &Watchdog, options: &[&str], pipeline: &str) -> GstLaunch {
+    let mut command = watchdog.of(tool("gst-launch-1.0"));
+    command.args(options).args(pipeline.split_whitespace());
+    GstLaunch::spawn(command)
+}
+
+impl Application {
+    fn following(test: &str, options: &[&str]) -> Self {
+        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+        let watchdog = Watchdog::new(test);
+        let launch = launch(&watchdog, options, &scene::follow(&camera));
+        wait_until_following(&camera);
+        Self { camera, launch, watchdog }
+    }
+
+    fn dies_of(self, signal: &str) {
+        self.launch.signal(signal);
+        let (status, output) = self.launch.finish();
+        assert!(!status.success(), "{output}");
+        assert_left_at_rest(&self.camera);
+        self.watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+    }
+}
+
+#[test]
+fn killed() {
+    Application::following("killed", &[]).dies_of("KILL");
+}
+
+#[test]
+fn terminated() {
+    Application::following("terminated", &[]).dies_of("TERM");
+}
+
+/// Without `-f`, `gst-launch-1.0` catches this and waits for a debugger.
+#[test]
+fn segmentation_fault() {
+    Application::following("segmentation-fault", &["-f"]).dies_of("SEGV");
+}
+
+#[test]
+fn aborted() {
+    Application::following("aborted", &[]).dies_of("ABRT");
+}
+
+/// A process that is stopped, or swapped out, or in a debugger; and that goes on.
+#[test]
+fn suspended() {
+    let Application { camera, launch, watchdog } = Application::following("suspended", &[]);
+    launch.signal("STOP");
+    assert_left_at_rest(&camera);
+    launch.signal("CONT");
+    wait_until_following(&camera);
+    launch.signal("INT");
+    launch.finish();
+    assert_left_at_rest(&camera);
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
+
+/// Everything was done right, and the camera could not be reached.
+#[test]
+fn exits_right_after_null_in_an_outage() {
+    let Application { camera, launch, watchdog } = Application::following("exits", &[]);
+    camera.set_fault(Fault::BlackHole);
+    launch.signal("INT");
+    launch.finish();
+    assert!(camera.status().moving);
+    camera.set_fault(Fault::None);
+    assert_left_at_rest(&camera);
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
+
+#[test]
+fn one_watchdog_stops_all_cameras_of_an_application() {
+    let cameras = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    let watchdog = Watchdog::new("two");
+    let pipelines = cameras.each_ref().map(|camera| scene::follow(camera).replace(" name=servo", ""));
+    let launch = launch(&watchdog, &[], &pipelines.join(" "));
+    cameras.iter().for_each(wait_until_following);
+    assert_eq!(watchdog.processes().len(), 1);
+    launch.signal("KILL");
+    launch.finish();
+    cameras.iter().for_each(assert_left_at_rest);
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
+
+/// A host in C dies of SIGPIPE where it writes to a socket that nobody reads.
+#[test]
+fn a_watchdog_that_dies_takes_nobody_along_and_is_replaced() {
+    let Application { camera, launch, watchdog } = Application::following("replaced", &["-m"]);
+    let first = watchdog.processes();
+    let killed = Command::new("kill").args(["-s", "KILL", &first[0].to_string()]).status().unwrap();
+    assert!(killed.success());
+    watchdog
+        .wait_for("no other was started", |processes| processes.first().is_some_and(|id| *id != first[0]));
+    wait_until_following(&camera);
+    launch.signal("KILL");
+    launch.finish();
+    assert_left_at_rest(&camera);
+}
+
+/// Whoever has taken the camera in the meantime is not to be stopped by us.
+#[test]
+fn an_operator_who_has_the_camera_keeps_it() {
+    let Application { camera, mut launch, watchdog } = Application::following("operator", &["-m"]);
+    let begin = Instant::now();
+    let taken_over = |line: &String| line.contains("change=(string)taken-over");
+    while !launch.seen().iter().any(taken_over) {
+        assert!(begin.elapsed() < PATIENCE, "{:?}", launch.seen());
+        assert!(camera.operate("rpan=-12"));
+        launch.read_for(LOOK);
+    }
+    launch.signal("STOP");
+    launch.signal("KILL");
+    let orders = camera.status().commands;
+    launch.finish();
+    watchdog.wait_for("it has nothing to do", <[u32]>::is_empty);
+    assert_eq!(camera.status().commands, orders);
+}
+
+#[test]
+fn without_a_watchdog_one_warning_says_so() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut command = tool("gst-launch-1.0");
+    command.env("VAPIX_WATCHDOG", "/nonexistent/vapix-watchdog");
+    command.arg("-m").args(scene::follow(&camera).split_whitespace());
+    let mut launch = GstLaunch::spawn(command);
+    launch.wait_for_line("ptztrack-camera, change=(string)moving");
+    launch.signal("INT");
+    let (_, output) = launch.finish();
+    let warnings: Vec<_> = output.lines().filter(|line| line.starts_with("WARNING")).collect();
+    assert_eq!(warnings.len(), 1, "{output}");
+    assert!(
+        output.contains("no watchdog process: `/nonexistent/vapix-watchdog` cannot be started"),
+        "{output}"
+    );
+}
+
+/// Not by who only looks, nor before there is something to stop.
+#[test]
+fn none_is_started_before_the_first_move() {
+    let watchdog = Watchdog::new("first");
+    let mut inspect = watchdog.of(tool("gst-inspect-1.0"));
+    assert!(inspect.arg("vapixptzsink").output().unwrap().status.success());
+    let camera = VirtualCamera::start(scene::nobody()).unwrap();
+    let mut launch = launch(&watchdog, &["-m"], &scene::follow(&camera));
+    launch.wait_for_line("ptztrack-camera, change=(string)connected");
+    assert!(watchdog.processes().is_empty());
+    launch.signal("KILL");
+    launch.finish();
+}
+
+/// It is there before the move that it is for.
+#[test]
+fn a_camera_that_moves_has_its_watchdog() {
+    let Application { camera, launch, watchdog } = Application::following("there", &[]);
+    assert_eq!(watchdog.processes().len(), 1);
+    launch.signal("INT");
+    launch.finish();
+    assert_left_at_rest(&camera);
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
