@@ -60,7 +60,8 @@ impl Servo {
         let least_deg = 0.75 * self.camera.speed_map.deg_s(1) * interval_s;
         let zone_deg = self.zone_deg(view, settings.dead_zone);
         ControlLaw {
-            gain: settings.gain,
+            // Told so rarely, the camera must not turn by more than the error until it is told again.
+            gain: settings.gain.min(1.0 / interval_s),
             dead_zone_deg: PanTilt::new(zone_deg.pan.max(least_deg), zone_deg.tilt.max(least_deg)),
             max_deg_s: settings.max_speed_deg_s,
             max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
