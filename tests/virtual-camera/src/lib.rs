@@ -39,7 +39,8 @@ pub use encode::EncodeError;
 pub use geometry::{Matrix, aim, project};
 pub use imaging::Imaging;
 pub use kinematics::{
-    Kinematics, Limits, Optics, Pose, ProportionalRule, ProportionalSpeed, SpeedMap, ZOOM_RANGE,
+    Head, Kinematics, Limits, Motion, Optics, Pose, ProportionalRule, ProportionalSpeed, Snapshot, SpeedMap,
+    ZOOM_RANGE,
 };
 pub use picture::{Picture, Plane};
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};

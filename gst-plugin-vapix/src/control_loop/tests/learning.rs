@@ -3,9 +3,10 @@
 use std::ops::Range;
 use std::time::Duration;
 
-use super::simulation::{Run, Setup, WIDE_FOV_DEG};
-use servo::{PanTilt, SpeedCurve, SpeedMap};
+use super::closed_loop::{Run, Setup, WIDE_FOV_DEG};
+use servo::{PanTilt, SpeedCurve};
 use vapix::wire::Command;
+use virtual_camera::{Kinematics, Limits, SpeedMap};
 
 type Walk = fn(f64) -> (PanTilt, f64);
 
@@ -75,8 +76,9 @@ fn assert_right(
     for (walk, way) in walks {
         for run in 1..=RUNS {
             let setup = setup(delay_ms, run, &lie);
-            let (real, case) = (setup.map, format!("{case}, {delay_ms} ms, {walk}, run {run}"));
-            let delay_s = (setup.video_delay + setup.command_delay).as_secs_f64();
+            let (real, case) =
+                (setup.kinematics.speed_map.clone(), format!("{case}, {delay_ms} ms, {walk}, run {run}"));
+            let delay_s = (setup.video_delay + setup.kinematics.command_delay).as_secs_f64();
             let run = setup.run(20.0, way);
             let estimates = run.estimates.unwrap();
             let off_s = (estimates.delays.sum().as_secs_f64() - delay_s).abs();
@@ -85,9 +87,9 @@ fn assert_right(
             let fov = estimates.fov_deg / WIDE_FOV_DEG;
             assert!((0.9..1.1).contains(&fov), "{case}: field of view {fov}");
             // Slower ones are told by no picture.
-            let used = used_steps(&run).filter(|step| real.deg_s(*step) >= 2.0);
+            let used = used_steps(&run).filter(|step| real.deg_s(f64::from(*step)) >= 2.0);
             let parts: Vec<_> =
-                used.map(|step| (step, estimates.map.deg_s(step) / real.deg_s(step))).collect();
+                used.map(|step| (step, estimates.map.deg_s(step) / real.deg_s(f64::from(step)))).collect();
             assert!(!parts.is_empty(), "{case}: it was not followed");
             assert!(parts.iter().all(|(_, part)| speeds.contains(part)), "{case}: {parts:?}");
         }
@@ -172,7 +174,8 @@ fn any_growing_speed_map_is_found_within_20_s() {
     for (curve, deg_s) in curves {
         for delay_ms in [100, 300] {
             assert_right(curve, delay_ms, &WALKS, TENTH, |setup| {
-                setup.map = SpeedMap::new(100.0, SpeedCurve::Linear).times(|step| deg_s(step) / step);
+                let rows = (1..=100).map(|step| (f64::from(step), deg_s(f64::from(step))));
+                setup.kinematics.speed_map = SpeedMap::Table(rows.collect());
             });
         }
     }
@@ -186,13 +189,13 @@ fn a_camera_that_does_not_tell_its_position_is_learned_by_the_picture() {
             wide(setup);
             setup.tells_position = false;
         });
-        let real = setup.map;
+        let real = setup.kinematics.speed_map.clone();
         let run = setup.run(20.0, way);
         let estimates = run.estimates.unwrap();
         assert!((estimates.fov_deg - 1.3 * WIDE_FOV_DEG).abs() < 0.1, "{walk}: {}", estimates.fov_deg);
         let wider = (1.3 * WIDE_FOV_DEG / 2.0).to_radians().tan() / (WIDE_FOV_DEG / 2.0).to_radians().tan();
         let parts: Vec<_> = used_steps(&run)
-            .map(|step| (step, estimates.map.deg_s(step) / real.deg_s(step) / wider))
+            .map(|step| (step, estimates.map.deg_s(step) / real.deg_s(f64::from(step)) / wider))
             .collect();
         assert!(parts.iter().all(|(_, part)| TENTH.contains(part)), "{walk}: {parts:?}");
     }
@@ -211,13 +214,18 @@ fn everything_wrong_at_once_is_put_right_within_20_s() {
 /// A linear camera that takes a second for each command, where everything else is as by default.
 #[test]
 fn a_slow_camera_of_another_make_is_followed() {
+    let taken_for = Setup::new(200, 1.0);
     let setup = Setup {
         settings: super::ServoSettings::default(),
-        map: SpeedMap::new(100.0, SpeedCurve::Linear),
+        kinematics: Kinematics {
+            speed_map: SpeedMap::Linear { max_deg_s: 100.0 },
+            limits: Some(Limits { pan_deg: (-170.0, 170.0), tilt_deg: (-90.0, 20.0) }),
+            endless_pan: false,
+            ..taken_for.kinematics.clone()
+        },
         round_trip: Duration::from_secs(1),
-        pan_limits: servo::Range { min: -170.0, max: 170.0 },
         jitter: 0.003,
-        ..Setup::new(200, 1.0)
+        ..taken_for
     };
     let run = setup.run(40.0, |time| (PanTilt::new(10.0 * (0.4 * time).sin(), 0.0), 20.0));
     assert!(run.mean_offset(15.0, 40.0) < 0.1, "{}", run.mean_offset(15.0, 40.0));

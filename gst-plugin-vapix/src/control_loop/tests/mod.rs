@@ -1,11 +1,11 @@
 //! The whole loop, with a camera that answers at once, or late, or not at all.
 
+mod closed_loop;
 mod discovery;
 mod learning;
 mod motion;
 mod others;
 mod point_to_point;
-mod simulation;
 mod words;
 mod zoom;
 

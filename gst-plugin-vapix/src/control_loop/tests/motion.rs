@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::simulation::{ASPECT, Run, Setup};
+use super::closed_loop::{ASPECT, Run, Setup};
 use crate::control_loop::LoopEvent;
 use servo::{Mode, PanTilt};
 
@@ -144,8 +144,8 @@ fn somebody_who_goes_to_and_fro_is_no_swing_of_the_loop() {
 fn coarse_speed_steps_make_no_limit_cycle() {
     // Its slowest is 4.5 degrees per second, nearly a picture's width.
     for delay in [100, 300] {
-        let linear = servo::SpeedMap::new(450.0, servo::SpeedCurve::Linear);
-        let mut setup = Setup { map: linear, jitter: 0.003, ..Setup::new(delay, 10.0) };
+        let mut setup = Setup { jitter: 0.003, ..Setup::new(delay, 10.0) };
+        setup.kinematics.speed_map = virtual_camera::SpeedMap::Linear { max_deg_s: 450.0 };
         setup.settings.speed_curve = servo::SpeedCurve::Linear;
         let run = setup.run(70.0, pan(|_| 1.0));
         assert_eq!(run.commands_between(10.0, 70.0), 0, "{:?}", run.commands);

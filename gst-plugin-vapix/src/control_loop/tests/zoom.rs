@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::simulation::{Run, Setup};
+use super::closed_loop::{Run, Setup};
 use servo::{Mode, PanTilt, Range, Visibility};
 use vapix::wire::Command;
 

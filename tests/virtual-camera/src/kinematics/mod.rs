@@ -6,7 +6,7 @@ mod speed;
 
 use std::time::Duration;
 
-pub use head::{Head, Motion};
+pub use head::{Head, Motion, Snapshot};
 pub use speed::{ProportionalRule, ProportionalSpeed, SpeedMap};
 
 /// Where a camera looks. Endless pan counts its turns. Pan grows to the right, tilt upwards, zoom (1 to 9999) inwards.

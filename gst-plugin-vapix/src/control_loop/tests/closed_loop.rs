@@ -1,16 +1,18 @@
-//! A head that turns and zooms as it is told, everything late, before somebody who walks: closed loops for tests.
+//! The virtual camera's head, everything late, before somebody who walks: closed loops for tests, without a picture and
+//! without a network.
 
 use std::collections::VecDeque;
+use std::iter;
 use std::time::Duration;
 
 use ptztrack_contract::{Point, Rect, Vector};
 
 use servo::{
-    Estimates, Lens, Limits, Measurement, PanTilt, Position, Range, ServoSettings, SpeedCurve, SpeedMap,
-    View, Visibility, around_deg, magnified,
+    Estimates, Limits, Measurement, PanTilt, Position, Range, ServoSettings, View, Visibility, around_deg,
 };
 use vapix::session::{Next, Query, Request, Response};
 use vapix::wire::{Command, Error};
+use virtual_camera::{Head, Kinematics, Motion, Optics, Pose, ProportionalSpeed, ZOOM_RANGE};
 
 use crate::control_loop::{ControlLoop, LoopEvent};
 
@@ -18,21 +20,17 @@ const TICK: Duration = Duration::from_millis(5);
 const PICTURE: Duration = Duration::from_millis(40);
 pub const ASPECT: f64 = 4.0 / 3.0;
 pub const WIDE_FOV_DEG: f64 = 55.2;
-const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
-const TILT_LIMITS: Range = Range { min: -90.0, max: 20.0 };
+const OPTICS: Optics = Optics { wide_fov_deg: WIDE_FOV_DEG, max_magnification: 18.0 };
+const TILT_LIMITS_DEG: (f64, f64) = (-90.0, 20.0);
 
 /// What the world is, whatever the servo believes.
 pub struct Setup {
     pub settings: ServoSettings,
+    /// How the camera moves, and how late.
+    pub kinematics: Kinematics,
     pub video_delay: Duration,
-    pub command_delay: Duration,
     pub round_trip: Duration,
-    pub map: SpeedMap,
-    pub acceleration_deg_s2: f64,
-    /// Zoom steps per second at speed step 100.
-    pub zoom_speed: f64,
-    pub zoom_step: f64,
-    pub pan_limits: Range,
+    pub magnification: f64,
     /// Where it looks at first.
     pub pose: PanTilt,
     /// Half the width of the noise in the target's place and height, parts of the picture.
@@ -55,7 +53,8 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// A dome, zoomed so that it is magnified so often, with so much delay in all; the servo knows the delay.
+    /// A dome that turns round and round, zoomed so that it magnifies so many times, with so much delay in all; the servo
+    /// knows the delay.
     pub fn new(total_delay_ms: u64, magnification: f64) -> Self {
         Self {
             settings: ServoSettings {
@@ -63,13 +62,17 @@ impl Setup {
                 ..ServoSettings::default()
             },
             video_delay: Duration::from_millis(total_delay_ms * 2 / 5 / 5 * 5),
-            command_delay: Duration::from_millis(total_delay_ms * 3 / 5),
+            kinematics: Kinematics {
+                command_delay: Duration::from_millis(total_delay_ms * 3 / 5),
+                endless_pan: true,
+                proportional_speed: ProportionalSpeed {
+                    enabled: false,
+                    ..Kinematics::default().proportional_speed
+                },
+                ..Kinematics::default()
+            },
             round_trip: Duration::from_millis(30),
-            map: SpeedMap::new(450.0, SpeedCurve::Cubic),
-            acceleration_deg_s2: 400.0,
-            zoom_speed: 3000.0,
-            zoom_step: ZOOM_STEPS.min + (magnification - 1.0) / 17.0 * (ZOOM_STEPS.max - ZOOM_STEPS.min),
-            pan_limits: Range { min: -180.0, max: 180.0 },
+            magnification,
             pose: PanTilt::default(),
             jitter: 0.0,
             noisy_velocity: false,
@@ -81,6 +84,10 @@ impl Setup {
             visible: |_| Visibility::Seen,
             refuses: |_| false,
         }
+    }
+
+    fn pan_limits_deg(&self) -> (f64, f64) {
+        self.kinematics.limits.map_or((-180.0, 180.0), |limits| limits.pan_deg)
     }
 
     /// Lets it follow a target for some seconds. `target`: its direction and height in degrees at a time in seconds.
@@ -153,14 +160,7 @@ struct Simulation {
     setup: Setup,
     control: ControlLoop,
     now: Duration,
-    pose: PanTilt,
-    rate: PanTilt,
-    wanted: PanTilt,
-    /// Where a move to a position goes.
-    goal: Option<(PanTilt, Option<f64>)>,
-    zoom_rate: f64,
-    lens: Lens,
-    under_way: VecDeque<(Duration, Command)>,
+    head: Head,
     in_flight: Option<(Request, Duration)>,
     shots: VecDeque<Shot>,
     last_shot: Option<(Duration, PanTilt, View, PanTilt, Point)>,
@@ -172,16 +172,16 @@ impl Simulation {
     const START_S: f64 = 2.0;
 
     fn new(setup: Setup) -> Self {
+        let limits = virtual_camera::Limits { pan_deg: setup.pan_limits_deg(), tilt_deg: TILT_LIMITS_DEG };
+        let home = Pose {
+            pan_deg: setup.pose.pan,
+            tilt_deg: setup.pose.tilt,
+            zoom_step: OPTICS.zoom_step(setup.magnification),
+        };
         Self {
             control: ControlLoop::new(setup.settings.clone()),
             now: Duration::from_secs(1),
-            pose: setup.pose,
-            rate: PanTilt::default(),
-            wanted: PanTilt::default(),
-            goal: None,
-            zoom_rate: 0.0,
-            lens: Lens::linear(WIDE_FOV_DEG, ZOOM_STEPS, 18.0),
-            under_way: VecDeque::new(),
+            head: Head::new(setup.kinematics.clone(), OPTICS, limits, home, Duration::ZERO),
             in_flight: None,
             shots: VecDeque::new(),
             last_shot: None,
@@ -192,12 +192,7 @@ impl Simulation {
 
     fn tick(&mut self, target: &impl Fn(f64) -> (PanTilt, f64), run: &mut Run) {
         self.now += TICK;
-        while self.under_way.front().is_some_and(|(at, _)| *at <= self.now) {
-            if let Some((_, command)) = self.under_way.pop_front() {
-                self.obey(&command);
-            }
-        }
-        self.turn();
+        self.head.advance(self.now);
         if self.now.as_millis().is_multiple_of(PICTURE.as_millis()) {
             self.expose(target);
         }
@@ -209,98 +204,44 @@ impl Simulation {
         self.talk(run);
     }
 
-    fn obey(&mut self, command: &Command) {
-        match *command {
-            Command::Velocity { pan, tilt, zoom, .. } => {
-                self.goal = None;
-                self.wanted = PanTilt::new(self.setup.map.deg_s(pan), self.setup.map.deg_s(tilt));
-                self.zoom_rate =
-                    zoom.map_or(self.zoom_rate, |zoom| f64::from(zoom) / 100.0 * self.setup.zoom_speed);
-            }
-            Command::Absolute { pan_deg, tilt_deg, zoom, .. } => {
-                self.goal = Some((PanTilt::new(pan_deg, tilt_deg), zoom.map(f64::from)));
-            }
-            Command::Centre { x, y, width, height, zoom_percent } => {
-                let part = |pixel: u32, size: u32| f64::from(pixel) / f64::from(size);
-                let view = self.view();
-                let turn = view.error(Point { x: part(x, width), y: part(y, height) });
-                let zoomed = zoom_percent.and_then(|percent| {
-                    self.lens.step(magnified(view.horizontal_fov_deg, f64::from(percent) / 100.0))
-                });
-                self.goal = Some((self.pose + turn, zoomed));
-            }
-            Command::Preset { .. } => self.goal = Some((PanTilt::default(), None)),
-            Command::Halt | Command::Stop => {
-                self.goal = None;
-                self.wanted = PanTilt::default();
-                if *command == Command::Stop {
-                    self.zoom_rate = 0.0;
-                }
-            }
-        }
-    }
-
-    fn turn(&mut self) {
-        let dt = TICK.as_secs_f64();
-        if let Some((goal, zoom)) = self.goal {
-            // Fast, and slower near the end.
-            let way = self.pose.turn_to(goal);
-            let part = |way: f64| (way * 8.0).clamp(-200.0, 200.0);
-            self.wanted = PanTilt::new(part(way.pan), part(way.tilt));
-            self.zoom_rate = zoom.map_or(0.0, |zoom| {
-                ((zoom - self.setup.zoom_step) * 8.0).clamp(-self.setup.zoom_speed, self.setup.zoom_speed)
-            });
-        }
-        let change = self.setup.acceleration_deg_s2 * dt;
-        let towards = |rate: f64, wanted: f64| rate + (wanted - rate).clamp(-change, change);
-        self.rate =
-            PanTilt::new(towards(self.rate.pan, self.wanted.pan), towards(self.rate.tilt, self.wanted.tilt));
-        self.pose = self.pose + self.rate * dt;
-        self.pose.tilt = self.pose.tilt.clamp(TILT_LIMITS.min, TILT_LIMITS.max);
-        let limits = self.setup.pan_limits;
-        if limits.max - limits.min < 360.0 {
-            self.pose.pan = self.pose.pan.clamp(limits.min, limits.max);
-        }
-        self.setup.zoom_step =
-            (self.setup.zoom_step + self.zoom_rate * dt).clamp(ZOOM_STEPS.min, ZOOM_STEPS.max);
+    fn pose(&self) -> PanTilt {
+        let Pose { pan_deg, tilt_deg, .. } = self.head.now().pose;
+        PanTilt::new(pan_deg, tilt_deg)
     }
 
     fn view(&self) -> View {
-        View {
-            horizontal_fov_deg: self.lens.fov_deg(self.setup.zoom_step),
-            aspect: ASPECT,
-            tilt_deg: self.pose.tilt,
-        }
+        let Pose { tilt_deg, zoom_step, .. } = self.head.now().pose;
+        View { horizontal_fov_deg: OPTICS.fov_deg(zoom_step), aspect: ASPECT, tilt_deg }
     }
 
     fn expose(&mut self, target: &impl Fn(f64) -> (PanTilt, f64)) {
         let time_s = self.now.as_secs_f64();
         let (direction, height_deg) = target(time_s);
-        let view = self.view();
-        let point = |direction: PanTilt| view.point(direction - self.pose);
+        let (pose, view, head) = (self.pose(), self.view(), self.head.now());
+        let point = |direction: PanTilt| view.point(direction - pose);
         let place = point(direction);
         let above = point(direction + PanTilt::new(0.0, height_deg / 2.0));
         let below = point(direction - PanTilt::new(0.0, height_deg / 2.0));
         let jitter = self.setup.jitter;
         let noisy = Point { x: place.x + self.noise(jitter), y: place.y + self.noise(jitter) };
         let (mut ego, mut velocity) = (Vector::default(), Vector::default());
-        if let Some((at, pose, last_view, last_direction, last_noisy)) = self.last_shot {
+        if let Some((at, last_pose, last_view, last_direction, last_noisy)) = self.last_shot {
             let dt = (self.now - at).as_secs_f64();
             let per_s = |to: Point, from: Point| Vector { x: (to.x - from.x) / dt, y: (to.y - from.y) / dt };
-            let before = last_view.point(last_direction - pose);
-            ego = per_s(view.point(last_direction - self.pose), before);
+            let before = last_view.point(last_direction - last_pose);
+            ego = per_s(point(last_direction), before);
             velocity =
                 if self.setup.noisy_velocity { per_s(noisy, last_noisy) } else { per_s(place, before) };
         }
         let shaken = self.setup.ground_jitter;
         ego = Vector { x: ego.x + self.noise(shaken), y: ego.y + self.noise(shaken) };
-        self.last_shot = Some((self.now, self.pose, view, direction, noisy));
+        self.last_shot = Some((self.now, pose, view, direction, noisy));
         let frame = Frame {
             time_s: time_s - Self::START_S,
             offset: Vector { x: place.x - 0.5, y: place.y - 0.5 },
             height: below.y - above.y,
-            pose: self.pose,
-            rate: self.rate,
+            pose,
+            rate: PanTilt::new(head.pan_rate_deg_s, head.tilt_rate_deg_s),
         };
         let height = (frame.height + self.noise(jitter)).max(0.0);
         let bounds = box_about(noisy, height);
@@ -343,7 +284,9 @@ impl Simulation {
             if let Request::Command(command) = request {
                 run.commands.push((self.now.as_secs_f64() - Self::START_S, command));
                 if !(self.setup.refuses)(&command) {
-                    self.under_way.push_back((self.now + self.setup.command_delay, command));
+                    for motion in motions(&command) {
+                        self.head.command(self.now, motion);
+                    }
                 }
             }
         }
@@ -356,18 +299,15 @@ impl Simulation {
             }
             Request::Command(_) => Response::Accepted,
             Request::Query(Query::Position) if self.setup.tells_position => Response::Position(Position {
-                pan_deg: Some(around_deg(0.0, self.pose.pan)),
-                tilt_deg: Some(self.pose.tilt),
-                zoom_steps: Some(self.setup.zoom_step.round()),
+                pan_deg: Some(around_deg(0.0, self.pose().pan)),
+                tilt_deg: Some(self.pose().tilt),
+                zoom_steps: Some(self.head.now().pose.zoom_step.round()),
             }),
             Request::Query(Query::Limits) => Response::Limits(Limits {
-                pan_deg: Some(self.setup.pan_limits),
-                tilt_deg: Some(TILT_LIMITS),
-                zoom_steps: Some(ZOOM_STEPS),
-                field_angle_deg: Some(Range {
-                    min: self.lens.fov_deg(ZOOM_STEPS.max),
-                    max: self.lens.fov_deg(ZOOM_STEPS.min),
-                }),
+                pan_deg: Some(range(self.setup.pan_limits_deg())),
+                tilt_deg: Some(range(TILT_LIMITS_DEG)),
+                zoom_steps: Some(range(ZOOM_RANGE)),
+                field_angle_deg: Some(range((OPTICS.fov_deg(ZOOM_RANGE.1), WIDE_FOV_DEG))),
             }),
             Request::Query(_) => return Err(Error::Camera("none".to_owned())),
         })
@@ -378,6 +318,40 @@ impl Simulation {
         self.noise =
             self.noise.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         ((self.noise >> 33) as f64 / f64::from(1u32 << 31) * 2.0 - 1.0) * half_width
+    }
+}
+
+fn range((min, max): (f64, f64)) -> Range {
+    Range { min, max }
+}
+
+/// What the head is to do.
+fn motions(command: &Command) -> Vec<Motion> {
+    match *command {
+        Command::Velocity { pan, tilt, zoom, .. } => {
+            let turn = Motion::PanTilt { pan: f64::from(pan), tilt: f64::from(tilt) };
+            iter::once(turn).chain(zoom.map(|zoom| Motion::Zoom(f64::from(zoom)))).collect()
+        }
+        Command::Absolute { pan_deg, tilt_deg, speed, zoom } => vec![
+            Motion::Speed(f64::from(speed)),
+            Motion::Absolute {
+                pan_deg: Some(pan_deg),
+                tilt_deg: Some(tilt_deg),
+                zoom_step: zoom.map(f64::from),
+            },
+        ],
+        Command::Centre { x, y, width, height, zoom_percent } => {
+            let (width, height) = (f64::from(width), f64::from(height));
+            vec![Motion::Centre {
+                x: f64::from(x) / width - 0.5,
+                y: (f64::from(y) - height / 2.0) / width,
+                magnify: f64::from(zoom_percent.unwrap_or(100)) / 100.0,
+            }]
+        }
+        Command::Preset { .. } => {
+            vec![Motion::Absolute { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom_step: None }]
+        }
+        Command::Halt | Command::Stop => vec![Motion::Stop],
     }
 }
 
