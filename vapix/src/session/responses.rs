@@ -35,6 +35,9 @@ impl Session {
         if matches!(request, Request::Query(_)) {
             self.asked_at = now;
         }
+        if response.is_ok() {
+            self.scheduler.answered(sent, now);
+        }
         match (request, response) {
             (Request::Command(command), Ok(_)) => self.command_accepted(command, servo, (sent, now)),
             (Request::Command(command), Err(err)) => self.command_failed(command, &err, servo, now),
@@ -114,7 +117,7 @@ impl Session {
 
     fn command_accepted(&mut self, command: &Command, servo: &mut Servo, (sent, now): (Duration, Duration)) {
         let was_moving = self.scheduler.may_move();
-        self.scheduler.accepted(command, sent, now);
+        self.scheduler.accepted(command, now);
         self.arbitration.commanded();
         self.arbitration.queue.obeyed();
         let actuation = command.actuation();

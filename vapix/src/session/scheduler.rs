@@ -15,7 +15,7 @@ pub struct Scheduler {
     doubt_until: Option<Duration>,
     /// The words that end the last move, whatever the mode is by now.
     stop: Command,
-    /// How long the last command took.
+    /// How long the camera took to answer last.
     round_trip: Duration,
 }
 
@@ -88,14 +88,18 @@ impl Scheduler {
         self.stop = stop;
     }
 
-    /// How long the last command took.
+    /// How long the camera took to answer last.
     pub fn round_trip(&self) -> Duration {
         self.round_trip
     }
 
-    /// The camera said yes to what was sent then.
-    pub fn accepted(&mut self, command: &Command, sent: Duration, now: Duration) {
+    /// The camera answered what was sent then.
+    pub fn answered(&mut self, sent: Duration, now: Duration) {
         self.round_trip = now.saturating_sub(sent);
+    }
+
+    /// The camera said yes.
+    pub fn accepted(&mut self, command: &Command, now: Duration) {
         self.accepted = Some((*command, now));
         self.may_move = !command.is_stop();
         if self.doubt_until.is_some_and(|until| until <= now) {
@@ -170,7 +174,7 @@ mod tests {
 
     fn accept(scheduler: &mut Scheduler, command: Command, at: Duration) {
         scheduler.attempted(&command, at);
-        scheduler.accepted(&command, at, at);
+        scheduler.accepted(&command, at);
     }
 
     #[test]

@@ -77,6 +77,17 @@ fn a_step_in_the_targets_speed_neither_overshoots_nor_oscillates() {
 }
 
 #[test]
+fn a_camera_that_takes_long_to_answer_is_turned_no_farther_than_the_target() {
+    for round_trip_ms in [500, 1000, 2000] {
+        let round_trip = Duration::from_millis(round_trip_ms);
+        let run = Setup { round_trip, ..Setup::new(200, 1.0) }.run(20.0, pan(|_| 15.0));
+        let overshoot = run.farthest(-1.0, 0.0, 20.0);
+        assert!(overshoot < 0.05, "{round_trip_ms} ms: {overshoot} of the half width");
+        assert!(run.mean_offset(10.0, 20.0) < 0.03, "{round_trip_ms} ms");
+    }
+}
+
+#[test]
 fn three_times_the_delay_is_not_half_as_much_again_off_the_middle() {
     for zoom in [1.0, 10.0] {
         let offset = |delay| {
