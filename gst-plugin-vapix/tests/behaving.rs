@@ -244,7 +244,10 @@ fn a_way_home_is_broken_off_for_a_target_and_for_a_pause() {
     assert!(stage.moves().last().unwrap().contains("continuouspantiltmove="), "{:?}", stage.moves());
     stage.run(13.0, &nobody());
     assert!(stage.camera.status().moving, "on the way again");
+    let sent = stage.camera.status().commands;
     stage.rig.sink.set_state(gst::State::Paused).unwrap();
+    // Without a wait.
+    assert!(stage.camera.wait_for(PATIENCE, |status| status.commands > sent));
     assert_eq!(stage.moves().last().unwrap(), "camera=1&move=stop");
 }
 

@@ -11,6 +11,7 @@ use servo::Measurement;
 use super::camera_task::{self, CameraTask, Predecessor};
 use super::clock::Clock;
 use super::events::camera_event;
+use super::outbox::Outbox;
 use super::picture::Picture;
 use super::properties::Property;
 use super::settings::{Settings, environment};
@@ -23,7 +24,7 @@ pub(super) static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("vapixptzsink", gst::DebugColorFlags::empty(), Some("VAPIX PTZ servo"))
 });
 
-/// Longest wait for the camera's yes when leaving PLAYING and at EOS.
+/// Longest wait for the camera's yes at EOS.
 const REST_WAIT: Duration = Duration::from_secs(1);
 
 /// A picture older than this tells nothing: rather its timestamps are wrong.
@@ -133,15 +134,14 @@ impl ElementImpl for VapixPtzSink {
             self.start_task()?;
         }
         if transition == gst::StateChange::PausedToPlaying {
-            self.with_task(|task| task.mailbox().accept_measurements(true));
+            self.with_task(CameraTask::play);
         }
         let result = self.parent_change_state(transition);
         match transition {
             gst::StateChange::PlayingToPaused => {
                 // The base class may go on rendering: where it was PLAYING for so short a time that the streaming
                 // thread did not wake from its preroll, it takes the preroll for done and waits for none.
-                self.with_task(|task| task.mailbox().accept_measurements(false));
-                self.rest();
+                self.with_task(CameraTask::pause);
             }
             gst::StateChange::PausedToReady => self.finish_task(),
             gst::StateChange::ReadyToPaused if result.is_err() => self.finish_task(),
@@ -220,10 +220,20 @@ impl VapixPtzSink {
         *lock(&self.status_to_push) = None;
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
+        let told = element.clone();
+        let outbox = Outbox::new(move |event| {
+            if let Some(element) = told.upgrade() {
+                element.imp().tell(event);
+            }
+        })
+        .map_err(|reason| {
+            gst::element_imp_error!(self, gst::LibraryError::Init, ("no thread for messages: {reason}"));
+            gst::StateChangeError
+        })?;
         let watchdog = watchdog(&settings, self.obj().upcast_ref());
         let task = CameraTask::start(client, settings.servo(), clock, watchdog, move |event| {
             if let Some(element) = element.upgrade() {
-                element.imp().happened(event);
+                element.imp().happened(event, &outbox);
             }
         })
         .map_err(|reason| {

@@ -6,13 +6,14 @@ use ptztrack_contract::{CameraChange, CameraMessage, Times};
 
 use super::camera_task::Event;
 use super::imp::{CAT, VapixPtzSink};
+use super::outbox::Outbox;
 use crate::control_loop::LoopEvent;
 use crate::lock::lock;
 use vapix::session::{ConnectionChange, ControlOwner, SessionEvent};
 
 impl VapixPtzSink {
-    /// Called by the camera task.
-    pub(super) fn happened(&self, event: Event) {
+    /// Called by the camera task, which is not to wait: what may take its time is left in the outbox.
+    pub(super) fn happened(&self, event: Event, outbox: &Outbox) {
         match event {
             Event::Exchanged { request, failure: None, round_trip } => {
                 gst::log!(CAT, imp = self, "{request} answered in {round_trip:?}");
@@ -20,6 +21,15 @@ impl VapixPtzSink {
             Event::Exchanged { request, failure: Some(err), round_trip } => {
                 gst::debug!(CAT, imp = self, "{request} failed after {round_trip:?}: {err}");
             }
+            Event::Status(status) => *lock(&self.status_to_push) = Some(status),
+            event => outbox.leave(event),
+        }
+    }
+
+    /// Logs and posts what is to be told.
+    pub(super) fn tell(&self, event: Event) {
+        match event {
+            Event::Exchanged { .. } | Event::Status(_) => {}
             Event::Loop(LoopEvent::Session(SessionEvent::Connection(change))) => self.link_changed(&change),
             Event::Loop(LoopEvent::Session(SessionEvent::Discovered(camera))) => gst::info!(CAT, imp = self, "the camera: {camera}"),
             Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => self.post(CameraChange::Moving, "the camera moves"),
@@ -70,7 +80,6 @@ impl VapixPtzSink {
                 gst::ResourceError::Settings,
                 ("the camera does not support the `mode` that is set; it is moved by mode `{}` instead", mode.name())
             ),
-            Event::Status(status) => *lock(&self.status_to_push) = Some(status),
             Event::GaveUp { halted: true } => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,

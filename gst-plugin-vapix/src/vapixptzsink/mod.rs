@@ -12,8 +12,8 @@
 //!
 //! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a
 //! flush, when leaving PLAYING, when the element goes to READY or NULL, and when it is disposed of. A
-//! stop is repeated until the camera says yes; EOS and leaving PLAYING wait for that at most 1 s, READY
-//! at most 2.5 s. In PAUSED the camera is asked, never moved; in READY nothing is connected.
+//! stop is repeated until the camera says yes; EOS waits for that at most 1 s, leaving PLAYING not at all,
+//! READY until 2.5 s after leaving PLAYING: a bin pauses all its sinks first, so many take no longer than one. In PAUSED the camera is asked, never moved; in READY nothing is connected.
 //!
 //! Whatever this process was about to do it cannot do once it is dead: with `dead-man` the process `vapix-watchdog` holds a
 //! lease for as long as the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is
@@ -95,6 +95,7 @@ mod clock;
 mod events;
 mod imp;
 mod messages;
+mod outbox;
 mod picture;
 mod properties;
 mod setters;

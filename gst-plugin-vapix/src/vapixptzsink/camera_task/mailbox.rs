@@ -27,8 +27,8 @@ pub struct Mail {
     pub waiting: Vec<SyncSender<()>>,
     /// Who waits until nothing more is to be done at this time.
     pub settling: Vec<SyncSender<()>>,
-    /// The last thing to do is to stop the camera.
-    pub finish: bool,
+    /// The last thing to do is to stop the camera, within this time.
+    pub finish: Option<Duration>,
     /// Somebody else sees to the camera from here on.
     pub quit: bool,
 }
@@ -109,10 +109,10 @@ impl Mailbox {
         receiver
     }
 
-    /// Asks for rest, and for an end. From here on time runs: an end must come, stream or not.
-    pub fn finish(&self) -> Receiver<()> {
+    /// Asks for rest, and for an end within this time. From here on time runs: an end must come, stream or not.
+    pub fn finish(&self, within: Duration) -> Receiver<()> {
         self.clock.run();
-        self.mail().finish = true;
+        self.mail().finish = Some(within);
         self.rest()
     }
 

@@ -8,7 +8,7 @@ use std::cell::Cell;
 use std::pin::pin;
 use std::sync::mpsc::Receiver;
 use std::sync::{Arc, Mutex, Weak};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use once_cell::sync::OnceCell;
 use tokio::runtime::{Builder, Runtime};
@@ -68,6 +68,9 @@ pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
     !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
 }
 
+/// Threads that talk to cameras.
+const WORKERS: usize = 2;
+
 /// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
 const LAST_RETRIES_PAUSE: Duration = Duration::from_secs(1);
 
@@ -77,6 +80,8 @@ pub struct CameraTask {
     camera: (Location, u32),
     mailbox: Arc<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
+    /// When the camera was last asked to rest, while it is to.
+    paused_at: Mutex<Option<Instant>>,
 }
 
 /// What is left of a camera task that was dropped: it may outlive its time in order to stop the camera.
@@ -112,7 +117,7 @@ impl CameraTask {
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
         let task = Task { client, settings: settings.clone(), dead_man: DeadMan::new(watchdog), state };
         let running = runtime.spawn(task.run());
-        let task = Self { camera, mailbox, statistics };
+        let task = Self { camera, mailbox, statistics, paused_at: Mutex::default() };
         let predecessor = task.predecessor();
         let mailbox = task.mailbox.clone();
         runtime.spawn(async move {
@@ -129,6 +134,20 @@ impl CameraTask {
     /// Where to leave things for it.
     pub fn mailbox(&self) -> &Mailbox {
         &self.mailbox
+    }
+
+    /// Has the camera stopped, and moved no more; waits for nothing.
+    pub fn pause(&self) {
+        self.mailbox.accept_measurements(false);
+        *lock(&self.paused_at) = Some(Instant::now());
+        // Waited for when the task is dropped.
+        drop(self.mailbox.rest());
+    }
+
+    /// The camera may be moved.
+    pub fn play(&self) {
+        *lock(&self.paused_at) = None;
+        self.mailbox.accept_measurements(true);
     }
 
     /// What will be left of it.
@@ -199,18 +218,22 @@ impl Predecessor {
 
 impl Drop for CameraTask {
     fn drop(&mut self) {
-        // Whether the camera came to rest the camera task itself reports.
-        wait_for(&self.mailbox.finish(), FINISH_BUDGET + STOP_GRACE);
+        // Of many that were paused together each has waited while the first one was waited for.
+        let waited = lock(&self.paused_at).map_or(Duration::ZERO, |since| since.elapsed());
+        let left = FINISH_BUDGET.saturating_sub(waited);
+        // Whether the camera came to rest the camera task itself reports, and when that time is over.
+        wait_for(&self.mailbox.finish(left), left + STOP_GRACE);
     }
 }
 
-/// The plugin's own threads: one for all elements, made when first needed. Never waited for with
+/// The plugin's own threads, for all elements, made when first needed; several, so that one that is kept busy delays no
+/// other camera's stop. Never waited for with
 /// `block_on`: the caller may be inside an application's own runtime.
-fn runtime() -> Result<&'static Runtime, std::io::Error> {
+pub fn runtime() -> Result<&'static Runtime, std::io::Error> {
     static RUNTIME: OnceCell<Runtime> = OnceCell::new();
     RUNTIME.get_or_try_init(|| {
         let mut builder = Builder::new_multi_thread();
-        builder.worker_threads(1).thread_name("vapix").on_thread_start(|| IS_OURS.set(true));
+        builder.worker_threads(WORKERS).thread_name("vapix").on_thread_start(|| IS_OURS.set(true));
         builder.enable_all().build()
     })
 }
@@ -339,12 +362,21 @@ mod tests {
     use servo::Measurement;
     use std::sync::mpsc::RecvTimeoutError;
     use vapix::session::SessionEvent;
+    use vapix::watchdog::{Armed, WatchdogAddress, serve};
     use vapix::wire::Trust;
     use virtual_camera::VirtualCamera;
 
     const PATIENCE: Duration = Duration::from_secs(20);
 
     fn start(camera: &VirtualCamera, observer: impl Fn(Event) + Clone + Send + Sync + 'static) -> CameraTask {
+        start_with(camera, None, observer)
+    }
+
+    fn start_with(
+        camera: &VirtualCamera,
+        watchdog: Option<Arc<Watchdog>>,
+        observer: impl Fn(Event) + Clone + Send + Sync + 'static,
+    ) -> CameraTask {
         let (location, _) = Location::parse(&camera.url()).unwrap();
         let client = ClientSettings {
             location,
@@ -353,7 +385,7 @@ mod tests {
             timeout: Duration::from_secs(2),
             trust: Trust::System,
         };
-        CameraTask::start(client, ServoSettings::default(), Clock::running(), None, observer).unwrap()
+        CameraTask::start(client, ServoSettings::default(), Clock::running(), watchdog, observer).unwrap()
     }
 
     fn see(task: &CameraTask) {
@@ -410,6 +442,44 @@ mod tests {
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
     }
 
+    /// A watchdog in this process: to the camera's task it makes no difference.
+    fn watchdog() -> (Arc<Watchdog>, std::path::PathBuf) {
+        static ARMED: Armed = Armed::new(|_| {});
+        let socket = std::env::temp_dir().join(format!("vapix-watchdog-test-{}", std::process::id()));
+        let _ = std::fs::remove_file(&socket);
+        let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        std::thread::spawn(move || {
+            let runtime = Builder::new_current_thread().enable_all().build().unwrap();
+            let (application, _) = listener.accept().unwrap();
+            application.set_nonblocking(true).unwrap();
+            runtime.block_on(async {
+                serve(tokio::net::UnixStream::from_std(application).unwrap(), &ARMED).await;
+            });
+        });
+        (Watchdog::new(WatchdogAddress::Socket(socket.clone())), socket)
+    }
+
+    /// The process lives, and the socket with it: only the lease runs out.
+    #[test]
+    fn one_that_hangs_has_its_camera_stopped_by_the_watchdog() {
+        let camera = camera();
+        let (watchdog, socket) = watchdog();
+        let (release, hold) = std::sync::mpsc::sync_channel::<()>(0);
+        let hold = Arc::new(Mutex::new(hold));
+        let task = start_with(&camera, Some(watchdog), move |event| {
+            if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
+                let _ = lock(&hold).recv();
+            }
+        });
+        see(&task);
+        assert!(camera.wait_for(PATIENCE, |status| status.moving));
+        assert_eq!(task.statistics().dead_man, DeadManState::Armed);
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+        drop(release);
+        drop(task);
+        std::fs::remove_file(socket).unwrap();
+    }
+
     /// Neither the camera goes on, nor does anybody wait for ever.
     #[test]
     fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
@@ -432,6 +502,9 @@ mod tests {
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
         assert_ne!(settled.recv_timeout(PATIENCE), Err(RecvTimeoutError::Timeout));
         assert_eq!(task.mailbox().settled().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
-        assert_eq!(task.mailbox().finish().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(
+            task.mailbox().finish(FINISH_BUDGET).recv_timeout(PATIENCE),
+            Err(RecvTimeoutError::Disconnected)
+        );
     }
 }

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use super::mailbox::{Mail, Mailbox};
-use super::{DeadManState, Event, FINISH_BUDGET, LAST_RETRIES, STOP_GRACE};
+use super::{DeadManState, Event, LAST_RETRIES, STOP_GRACE};
 use crate::control_loop::{ControlLoop, Status};
 use crate::lock::lock;
 use crate::vapixptzsink::statistics::Statistics;
@@ -90,8 +90,8 @@ impl<O: Fn(Event)> TaskState<O> {
         if rest {
             self.control.release();
         }
-        if finish {
-            self.deadline.get_or_insert(now + FINISH_BUDGET);
+        if let Some(within) = finish {
+            self.deadline.get_or_insert(now + within);
             self.control.session_mut().leave();
         }
         if quit {
@@ -215,6 +215,7 @@ impl<O: Fn(Event)> TaskState<O> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vapixptzsink::camera_task::FINISH_BUDGET;
     use crate::vapixptzsink::clock::Clock;
     use servo::{Measurement, Position, ServoSettings, Visibility};
     use std::sync::mpsc::Receiver;
@@ -280,7 +281,7 @@ mod tests {
         fn end_in_doubt(&mut self) -> Receiver<()> {
             self.see(Visibility::Seen);
             self.serve_at(ms(1000), |_| timeout());
-            let rest = self.mailbox.finish();
+            let rest = self.mailbox.finish(FINISH_BUDGET);
             assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [Command::Halt]);
             assert!(self.control.session().is_at_rest());
             rest
