@@ -29,6 +29,9 @@ pub struct TargetMeta {
     pub confidence: f64,
     /// The feature points.
     pub features: Vec<Feature>,
+    /// Width by height, as displayed, of the picture in which all this was found; `None` where that is not told. Scaling
+    /// leaves it as it is; where it is another, the picture was cropped or got borders, and nothing here is where it says.
+    pub aspect: Option<f64>,
     /// Running time at which the picture was captured, as far as its timestamp tells.
     pub capture_time: Option<gst::ClockTime>,
 }
@@ -44,6 +47,7 @@ impl Default for TargetMeta {
             ego_velocity: None,
             confidence: 0.0,
             features: Vec::new(),
+            aspect: None,
             capture_time: None,
         }
     }
@@ -67,6 +71,9 @@ impl BufferMeta for TargetMeta {
             [feature.position.x, feature.position.y, kept]
         });
         structure.set("features", codec::flat(features));
+        if let Some(aspect) = self.aspect {
+            structure.set("aspect", aspect);
+        }
         if let Some(time) = self.capture_time {
             structure.set("capture-time", time);
         }
@@ -87,6 +94,7 @@ impl BufferMeta for TargetMeta {
             ego_velocity: reader.vector_optional("ego-velocity")?,
             confidence: reader.number("confidence")?,
             features: features.collect(),
+            aspect: reader.number_optional("aspect")?,
             capture_time: reader.get_optional("capture-time")?,
         })
     }

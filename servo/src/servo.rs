@@ -100,7 +100,7 @@ impl Servo {
     ) -> Option<f64> {
         let measurement = self.settings.mounting.along_axes(measurement);
         let last_seen = match (measurement.visibility, &self.target) {
-            (Visibility::Seen, _) => now,
+            (Visibility::Seen, _) => measurement.taken_at.min(now),
             (Visibility::Predicted, Some(target)) => target.last_seen,
             (Visibility::Predicted, None) | (Visibility::Gone, _) => {
                 self.lose();

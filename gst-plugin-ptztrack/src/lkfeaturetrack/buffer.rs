@@ -56,9 +56,17 @@ pub(super) fn attach(
         ego_velocity: report.ego_velocity,
         confidence: report.confidence,
         features: report.features,
+        aspect: Some(aspect(info)),
         capture_time,
     };
     meta.attach(buffer)
+}
+
+/// Width by height as displayed.
+fn aspect(info: &VideoInfo) -> f64 {
+    let pixel = info.par();
+    f64::from(info.width()) * f64::from(pixel.numer())
+        / (f64::from(info.height().max(1)) * f64::from(pixel.denom().max(1)))
 }
 
 /// The message that says so.

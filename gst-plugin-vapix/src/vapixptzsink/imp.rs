@@ -1,4 +1,5 @@
-use std::sync::{LazyLock, Mutex};
+use std::sync::mpsc::SyncSender;
+use std::sync::{LazyLock, Mutex, Weak};
 use std::time::Duration;
 
 use gst::prelude::*;
@@ -16,6 +17,7 @@ use super::picture::Picture;
 use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
+use super::stream::{Fault, Stream};
 use super::watchdog::watchdog;
 use crate::control_loop::Status;
 use crate::lock::lock;
@@ -27,16 +29,15 @@ pub(super) static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
 /// Longest wait for the camera's yes at EOS.
 const REST_WAIT: Duration = Duration::from_secs(1);
 
-/// A picture older than this tells nothing: rather its timestamps are wrong.
-const OLDEST_PICTURE: gst::ClockTime = gst::ClockTime::from_seconds(2);
-
-/// What render keeps from buffer to buffer.
+/// Whether the streaming thread waits for the camera, which it does with `lockstep` only.
 #[derive(Debug, Default)]
-struct Stream {
-    picture: Option<Picture>,
-    /// Whether unreadable metas were already warned of.
-    warned: bool,
-    lockstep: bool,
+enum Waiting {
+    #[default]
+    Nobody,
+    /// Until it is sent this.
+    By(Weak<SyncSender<()>>),
+    /// Nobody may: a flush or a change of state is under way.
+    NotAllowed,
 }
 
 /// No lock is held while anything is posted, pushed or waited for. Of those here only two are held together, in this
@@ -48,6 +49,7 @@ pub struct VapixPtzSink {
     /// Of the camera tasks so far, that may still be about to stop their cameras.
     predecessors: Mutex<Vec<Predecessor>>,
     stream: Mutex<Stream>,
+    waiting: Mutex<Waiting>,
     /// What upstream was not told yet; pushed by the streaming thread, so that the camera task never waits for it.
     pub(super) status_to_push: Mutex<Option<Status>>,
 }
@@ -91,6 +93,8 @@ impl ObjectImpl for VapixPtzSink {
         sink.set_sync(false);
         sink.set_async(false);
         sink.set_qos(false);
+        // A buffer kept here would be shared, and copied whole by whoever draws into it in another branch.
+        sink.set_property("enable-last-sample", false);
     }
 
     fn dispose(&self) {
@@ -187,15 +191,39 @@ impl BaseSinkImpl for VapixPtzSink {
             self.settle();
             self.with_task(|task| task.mailbox().hold_at(time));
         }
-        match TargetMeta::of(buffer) {
-            Some(Ok(target)) => self.see(&target, buffer.pts()),
-            Some(Err(err)) => self.warn_of_meta(&err),
+        let target = TargetMeta::of(buffer);
+        self.miss_meta(target.is_some());
+        match target {
+            Some(Ok(target)) => self.see(&target, buffer),
+            Some(Err(err)) => self.warn(Fault::UnreadableMeta, || {
+                format!(
+                    "a target meta cannot be read ({err}); check that all plugins are of the same version"
+                )
+            }),
             None => {}
         }
         if step.is_some() {
             self.settle();
         }
         Ok(gst::FlowSuccess::Ok)
+    }
+
+    /// Whoever waits in `render` for the camera returns at once, and so does whoever would wait: a flush does not wait
+    /// for the network.
+    fn unlock(&self) -> Result<(), gst::ErrorMessage> {
+        let waiting = std::mem::replace(&mut *lock(&self.waiting), Waiting::NotAllowed);
+        if let Waiting::By(waker) = waiting
+            && let Some(waker) = waker.upgrade()
+        {
+            // It is awake already where that fails.
+            let _ = waker.try_send(());
+        }
+        Ok(())
+    }
+
+    fn unlock_stop(&self) -> Result<(), gst::ErrorMessage> {
+        *lock(&self.waiting) = Waiting::Nobody;
+        Ok(())
     }
 }
 
@@ -215,7 +243,7 @@ impl VapixPtzSink {
             );
             return Err(gst::StateChangeError);
         };
-        *lock(&self.stream) = Stream { lockstep: settings.lockstep, ..Stream::default() };
+        *lock(&self.stream) = Stream::new(settings.lockstep);
         let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
         *lock(&self.status_to_push) = None;
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
@@ -256,9 +284,20 @@ impl VapixPtzSink {
     }
 
     /// Leaves the target for the camera task.
-    fn see(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) {
+    fn see(&self, target: &TargetMeta, buffer: &gst::BufferRef) {
         let Some(picture) = lock(&self.stream).picture else { return };
-        let age = self.age(target, pts);
+        if !picture.shows(target) || buffer.meta::<gst_video::VideoCropMeta>().is_some() {
+            return self.warn(Fault::OtherPicture, || {
+                "the picture has been cropped, or its shape changed, since the target was found in it: the camera cannot be steered by it. Put `vapixptzsink` in front of the element that does that, or have it done before the tracker".to_owned()
+            });
+        }
+        let age = self.age(target, buffer.pts());
+        let stale_timeout = lock(&self.settings).servo.stale_timeout;
+        if age > stale_timeout {
+            return self.warn(Fault::OldPictures, || {
+                format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
+            });
+        }
         self.with_task(|task| {
             let mailbox = task.mailbox();
             mailbox.see(Measurement {
@@ -280,11 +319,17 @@ impl VapixPtzSink {
         lock(&self.stream).lockstep.then(|| self.running_time(pts)).flatten().map(Duration::from)
     }
 
-    /// Waits, not under the lock, until the camera has answered what is due.
+    /// Waits, not under the lock, until the camera has answered what is due, or [`Self::unlock`] is called.
     fn settle(&self) {
-        let settled = lock(&self.task).as_ref().map(|task| task.mailbox().settled());
+        let Some((settled, waker)) = lock(&self.task).as_ref().map(|task| task.mailbox().settled()) else {
+            return;
+        };
+        match &mut *lock(&self.waiting) {
+            Waiting::NotAllowed => return,
+            waiting => *waiting = Waiting::By(waker),
+        }
         // An error says that the camera task is gone; it has told why.
-        let _ = settled.map(|settled| settled.recv());
+        let _ = settled.recv();
     }
 
     fn running_time(&self, pts: Option<gst::ClockTime>) -> Option<gst::ClockTime> {
@@ -296,11 +341,13 @@ impl VapixPtzSink {
         if lock(&self.stream).lockstep {
             return Duration::ZERO;
         }
-        let sink = self.obj();
         let captured = target.capture_time.or_else(|| self.running_time(pts));
-        let age =
-            sink.current_running_time().zip(captured).map(|(now, captured)| now.saturating_sub(captured));
-        age.filter(|age| *age <= OLDEST_PICTURE).unwrap_or_default().into()
+        let Some((now, captured)) = self.obj().current_running_time().zip(captured) else {
+            return Duration::ZERO;
+        };
+        let nanoseconds = |time: gst::ClockTime| i64::try_from(time.nseconds()).unwrap_or(i64::MAX);
+        let arrived = self.time();
+        lock(&self.stream).age.of(nanoseconds(captured), nanoseconds(now), arrived)
     }
 
     fn rest(&self) {
@@ -317,13 +364,25 @@ impl VapixPtzSink {
         }
     }
 
-    fn warn_of_meta(&self, err: &ptztrack_contract::ContractError) {
-        if !std::mem::replace(&mut lock(&self.stream).warned, true) {
-            gst::element_imp_warning!(
-                self,
-                gst::StreamError::Format,
-                ("a target meta cannot be read ({err}); check that all plugins are of the same version")
-            );
+    /// Warns where no buffer has had a target meta for long.
+    fn miss_meta(&self, has_meta: bool) {
+        let now = self.time();
+        if lock(&self.stream).lacks_meta(has_meta, now) {
+            self.warn(Fault::NoMeta, || {
+                "no buffer has had a PtzTargetMeta for a second: there is no target to follow. Put `lkfeaturetrack` in front, with no element in between that drops metas".to_owned()
+            });
+        }
+    }
+
+    /// The camera task's.
+    fn time(&self) -> Duration {
+        lock(&self.task).as_ref().map_or(Duration::ZERO, |task| task.mailbox().now())
+    }
+
+    /// Warns once a stream.
+    fn warn(&self, fault: Fault, text: impl FnOnce() -> String) {
+        if lock(&self.stream).is_news(fault) {
+            gst::element_imp_warning!(self, gst::StreamError::Format, ("{}", text()));
         }
     }
 

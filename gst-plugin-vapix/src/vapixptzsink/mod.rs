@@ -101,6 +101,7 @@ mod properties;
 mod setters;
 mod settings;
 mod statistics;
+mod stream;
 mod watchdog;
 
 /// How the camera is moved.

@@ -1,5 +1,7 @@
 //! What the caps say of the picture.
 
+use ptztrack_contract::TargetMeta;
+
 /// Size and shape of the picture, whatever memory it lies in.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Picture {
@@ -20,6 +22,13 @@ impl Picture {
             f64::from(size.0) * f64::from(pixel.numer()) / (f64::from(size.1) * f64::from(pixel.denom()));
         (aspect.is_finite() && aspect > 0.0).then_some(Self { size, aspect })
     }
+
+    /// Whether this may be the picture in which a target was found: of the same shape, as scaling leaves it.
+    pub fn shows(&self, target: &TargetMeta) -> bool {
+        // As much as rounding to whole, even pixels does to a small picture.
+        const TOLERANCE: f64 = 0.03;
+        target.aspect.is_none_or(|aspect| (self.aspect / aspect).ln().abs() < TOLERANCE)
+    }
 }
 
 #[cfg(test)]
@@ -37,6 +46,21 @@ mod tests {
         assert_eq!(picture(caps()), Some(Picture { size: (720, 576), aspect: 1.25 }));
         let wide = caps().field("pixel-aspect-ratio", gst::Fraction::new(64, 45));
         assert!((picture(wide).unwrap().aspect - 16.0 / 9.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_scaled_picture_shows_the_target_and_a_cropped_one_does_not() {
+        gst::init().unwrap();
+        let found_in = |aspect| TargetMeta { aspect, ..TargetMeta::default() };
+        let caps =
+            |width, height| gst::Caps::builder("video/x-raw").field("width", width).field("height", height);
+        for (width, height, shows) in
+            [(1280, 720, true), (400, 226, true), (960, 720, false), (1280, 960, false)]
+        {
+            let picture = picture(caps(width, height)).unwrap();
+            assert_eq!(picture.shows(&found_in(Some(16.0 / 9.0))), shows, "{width}x{height}");
+            assert!(picture.shows(&found_in(None)), "of a tracker that does not tell");
+        }
     }
 
     #[test]

@@ -38,17 +38,19 @@ pub struct Stamps {
     begin: Instant,
     /// By how much they are ahead of the time since the beginning.
     pub ahead: Duration,
+    /// How fast they grow; by less than 1 pictures come later and later.
+    pub pace: f64,
 }
 
 impl Default for Stamps {
     fn default() -> Self {
-        Self { begin: Instant::now(), ahead: Duration::ZERO }
+        Self { begin: Instant::now(), ahead: Duration::ZERO, pace: 1.0 }
     }
 }
 
 impl Stamps {
     fn next(&self) -> gst::ClockTime {
-        gst::ClockTime::try_from(self.begin.elapsed() + self.ahead).unwrap()
+        gst::ClockTime::try_from(self.begin.elapsed().mul_f64(self.pace) + self.ahead).unwrap()
     }
 }
 

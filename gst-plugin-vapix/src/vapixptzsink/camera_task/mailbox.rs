@@ -3,7 +3,7 @@
 use std::mem;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use std::sync::{Mutex, MutexGuard};
+use std::sync::{Arc, Mutex, MutexGuard, Weak};
 use std::time::Duration;
 
 use tokio::sync::Notify;
@@ -26,7 +26,7 @@ pub struct Mail {
     /// Who waits for the camera to be at rest.
     pub waiting: Vec<SyncSender<()>>,
     /// Who waits until nothing more is to be done at this time.
-    pub settling: Vec<SyncSender<()>>,
+    pub settling: Vec<Arc<SyncSender<()>>>,
     /// The last thing to do is to stop the camera, within this time.
     pub finish: Option<Duration>,
     /// Somebody else sees to the camera from here on.
@@ -69,12 +69,15 @@ impl Mailbox {
         self.clock.hold_at(time);
     }
 
-    /// The receiver hears when nothing is left to be done at this time, or that there is nobody to do it.
-    pub fn settled(&self) -> Receiver<()> {
+    /// The receiver hears when nothing is left to be done at this time, or that there is nobody to do it; or, by the
+    /// sender, from somebody else who will have it wait no longer.
+    pub fn settled(&self) -> (Receiver<()>, Weak<SyncSender<()>>) {
         let (sender, receiver) = sync_channel(1);
+        let sender = Arc::new(sender);
+        let waker = Arc::downgrade(&sender);
         self.with_answerer(|mail| mail.settling.push(sender));
         self.arrived.notify_one();
-        receiver
+        (receiver, waker)
     }
 
     /// Leaves the newest picture of the target, in place of one not looked at yet.

@@ -490,7 +490,7 @@ mod tests {
             Event::Died(_) => died.send(()).unwrap(),
             _ => {}
         });
-        let settled = task.mailbox().settled();
+        let (settled, _waker) = task.mailbox().settled();
         see(&task);
         death.recv_timeout(PATIENCE).unwrap();
         let is_stop = |query: &str| query.ends_with("continuouspantiltmove=0,0");
@@ -501,7 +501,7 @@ mod tests {
         }
         assert!(camera.wait_for(PATIENCE, |status| !status.moving));
         assert_ne!(settled.recv_timeout(PATIENCE), Err(RecvTimeoutError::Timeout));
-        assert_eq!(task.mailbox().settled().recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+        assert_eq!(task.mailbox().settled().0.recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
         assert_eq!(
             task.mailbox().finish(FINISH_BUDGET).recv_timeout(PATIENCE),
             Err(RecvTimeoutError::Disconnected)

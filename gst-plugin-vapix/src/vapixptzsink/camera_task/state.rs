@@ -23,7 +23,7 @@ pub struct TaskState<O> {
     last_status: Status,
     pub credentials: Option<Option<Credentials>>,
     waiting: Vec<SyncSender<()>>,
-    settling: Vec<SyncSender<()>>,
+    settling: Vec<Arc<SyncSender<()>>>,
     /// The end, once it has been asked for.
     pub deadline: Option<Duration>,
     /// Nobody waits any more.

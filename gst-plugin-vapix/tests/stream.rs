@@ -1,0 +1,116 @@
+//! Streams that are not what they seem: late, cropped, without a target, stalled.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+mod common;
+
+use std::sync::mpsc::channel;
+
+use common::stage::PATIENT_NS;
+use common::{Heard, PATIENCE, Rig, Stamps, camera, moves, target};
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, TargetMeta, TargetState};
+use virtual_camera::{Auth, Fault};
+
+/// So many seconds of buffers without a target meta, by the stream's time; what is heard of that.
+fn without_target(seconds: u64, first_has_one: bool) -> Vec<Heard> {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS).play();
+    for picture in 0..=25 * seconds {
+        let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
+        let content = buffer.get_mut().unwrap();
+        content.set_pts(gst::ClockTime::from_mseconds(40 * picture));
+        if first_has_one && picture == 0 {
+            target(TargetState::Searching, 0.5, 0.5).attach(content).unwrap();
+        }
+        assert_eq!(rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+    }
+    rig.heard().into_iter().filter(Heard::is_warning).collect()
+}
+
+#[test]
+fn a_stream_without_target_metas_is_warned_of_once() {
+    let warnings = without_target(5, false);
+    assert!(
+        matches!(warnings.as_slice(), [Heard::Warning(text)] if text.contains("lkfeaturetrack")),
+        "{warnings:?}"
+    );
+    assert_eq!(without_target(5, true), []);
+}
+
+/// The target is in every picture, but those come later and later.
+#[test]
+fn pictures_that_are_too_old_are_not_steered_by() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("stale-timeout", 500_000_000u64).play();
+    let clock = gst::SystemClock::obtain();
+    rig.sink.set_clock(Some(&clock)).unwrap();
+    rig.sink.set_base_time(clock.time());
+    // As behind a decoder that is too slow, with a queue that drops nothing.
+    rig.stamps = Some(Stamps::default());
+    rig.stamps.as_mut().unwrap().pace = 0.5;
+    let aside = target(TargetState::Tracking, 0.9, 0.4);
+    let heard = rig.push_until_message(&aside, Heard::is_warning);
+    let warning = heard.into_iter().find_map(Heard::into_warning).unwrap();
+    assert!(warning.contains("stale-timeout"), "{warning}");
+    rig.push_until(&aside, &camera, |status| !status.moving);
+    rig.stamps.as_mut().unwrap().pace = 1.0;
+    rig.set_going(&camera);
+    assert!(!rig.heard().iter().any(Heard::is_warning), "once is enough");
+}
+
+#[test]
+fn a_picture_of_another_shape_is_not_steered_by() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.set_going(&camera);
+    // The rig's pictures are 4:3; this was found in a wider one.
+    let cropped = TargetMeta { aspect: Some(16.0 / 9.0), ..target(TargetState::Tracking, 0.9, 0.4) };
+    let heard = rig.push_until_message(&cropped, Heard::is_warning);
+    let warning = heard.into_iter().find_map(Heard::into_warning).unwrap();
+    assert!(warning.contains("cropped"), "{warning}");
+    rig.push_until(&cropped, &camera, |status| !status.moving);
+    let before = moves(&camera).len();
+    for _ in 0..20 {
+        rig.push(&cropped);
+    }
+    assert_eq!(moves(&camera).len(), before);
+}
+
+#[test]
+fn no_buffer_is_kept() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    rig.push(&target(TargetState::Searching, 0.5, 0.5));
+    assert!(rig.sink.property::<Option<gst::Sample>>("last-sample").is_none());
+}
+
+/// In lockstep each buffer waits for the camera; but a flush does not.
+#[test]
+fn a_flush_does_not_wait_for_the_camera() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS).play();
+    rig.push(&target(TargetState::Searching, 0.5, 0.5));
+    camera.set_fault(Fault::Hang);
+    let pad = rig.sink.static_pad("sink").unwrap();
+    let (waits, waited) = channel();
+    let pushing = pad.peer().unwrap();
+    let stuck = std::thread::spawn(move || {
+        for picture in 1..100 {
+            let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
+            let content = buffer.get_mut().unwrap();
+            content.set_pts(gst::ClockTime::from_mseconds(40 * picture));
+            target(TargetState::Tracking, 0.9, 0.4).attach(content).unwrap();
+            if pushing.push(buffer).is_err() {
+                break;
+            }
+            let _ = waits.send(());
+        }
+    });
+    let seen = camera.status().commands;
+    assert!(camera.wait_for(PATIENCE, |status| status.commands > seen));
+    assert!(pad.send_event(gst::event::FlushStart::new()));
+    stuck.join().unwrap();
+    drop(waited);
+    assert!(pad.send_event(gst::event::FlushStop::new(true)));
+    camera.set_fault(Fault::None);
+}
