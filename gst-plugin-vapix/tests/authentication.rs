@@ -5,20 +5,34 @@ mod common;
 
 use std::time::Duration;
 
-use common::{Heard, Rig, camera, target};
+use common::{FRAME, Heard, Rig, camera, target};
 use gst::prelude::*;
 use ptztrack_contract::TargetState;
-use virtual_camera::{Auth, Settings, VirtualCamera};
+use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
 #[test]
 fn every_kind_of_authentication() {
     for auth in [Auth::Basic, Auth::Digest { qop: true }, Auth::Digest { qop: false }, Auth::Both] {
         let camera = camera(auth);
-        let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+        let allowed = if auth == Auth::Basic { "basic" } else { "auto" };
+        let rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass");
+        let mut rig = rig.with_str("auth", allowed).play();
         rig.set_going(&camera);
         rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
         assert_eq!(camera.status().refused, 1, "{auth:?}: one challenge serves all requests");
     }
+}
+
+/// Nor is it told by a camera whose answers somebody else gives.
+#[test]
+fn nobody_is_told_the_password_in_clear() {
+    let camera = camera(Auth::Basic);
+    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    let here = target(TargetState::Tracking, 0.9, 0.5);
+    let heard = rig.push_until_message(&here, Heard::is_warning);
+    let Some(Heard::Warning(text)) = heard.last() else { panic!("{heard:?}") };
+    assert!(text.contains("Basic") && text.contains("`auth=basic`"), "{text}");
+    assert_eq!(camera.status().commands, 0);
 }
 
 #[test]
@@ -43,7 +57,9 @@ fn a_nonce_that_expires_is_no_fault() {
 fn an_account_that_may_only_move_the_camera_does() {
     for auth in [Auth::Basic, Auth::Digest { qop: true }] {
         let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
-        let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+        let allowed = if auth == Auth::Basic { "basic" } else { "auto" };
+        let rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass");
+        let mut rig = rig.with_str("auth", allowed).play();
         rig.set_going(&camera);
         rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
         let heard = rig.heard();
@@ -77,4 +93,24 @@ fn a_camera_that_turns_is_stopped_before_the_password_changes() {
     assert!(!camera.status().moving);
     rig.sink.set_property("password", "pass");
     rig.set_going(&camera);
+}
+
+/// The camera did not hear the stop before; by a wrong password nobody could tell it another time.
+#[test]
+fn a_camera_that_still_turns_is_stopped_by_whom_it_knows() {
+    let camera = camera(Auth::Digest { qop: true });
+    let rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass");
+    let mut rig = rig.with("timeout", 200_000_000u64).play();
+    rig.set_going(&camera);
+    camera.set_fault(Fault::Hang);
+    let failed = |rig: &Rig| rig.stats().get::<u64>("commands-failed").unwrap();
+    let before = failed(&rig);
+    rig.sink.set_property("password", "falsch");
+    while failed(&rig) < before + 2 {
+        rig.push(&target(TargetState::Tracking, 0.9, 0.4));
+        rig.hear(FRAME);
+    }
+    camera.set_fault(Fault::None);
+    let lost = target(TargetState::Lost, 0.0, 0.0);
+    rig.push_until(&lost, &camera, |status| !status.moving);
 }

@@ -79,7 +79,7 @@ fn an_operator_is_given_way_and_control_comes_back() {
 }
 
 #[test]
-fn an_operator_who_steers_against_us_is_noticed_and_our_own_move_ended() {
+fn an_operator_who_steers_against_us_is_noticed_and_his_move_not_ended() {
     let mut stage = Stage::new(Settings::default(), |rig| rig);
     stage.run(2.0, &centred());
     let mut seconds = 0.0;
@@ -90,8 +90,29 @@ fn an_operator_who_steers_against_us_is_noticed_and_our_own_move_ended() {
         seconds += FRAME.as_secs_f64();
         assert!(seconds < 6.0, "not noticed");
     }
-    stage.run(0.2, &aside());
+    // He lets go of nothing; ours would have ended within this.
+    let before = stage.moves().len();
+    stage.run(3.0, &aside());
+    assert_eq!(stage.moves()[before..], [] as [String; 0]);
+    assert!(stage.camera.status().pan_rate_deg_s < 0.0);
+}
+
+/// He nudged it once, and our command came after that.
+#[test]
+fn where_an_operator_is_noticed_a_move_of_ours_is_ended() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig);
+    stage.run(2.0, &centred());
+    let mut seconds = 0.0;
+    while !stage.heard.contains(&TAKEN_OVER) {
+        stage.camera.operate("continuouspantiltmove=-20,0");
+        stage.picture(Some(&aside()));
+        seconds += FRAME.as_secs_f64();
+        assert!(seconds < 6.0, "not noticed");
+    }
+    stage.camera.operate("continuouspantiltmove=20,0");
+    stage.run(2.0, &aside());
     assert_eq!(stage.moves().last().unwrap(), "camera=1&continuouspantiltmove=0,0");
+    assert_eq!(stage.camera.status().pan_rate_deg_s, 0.0);
 }
 
 #[test]

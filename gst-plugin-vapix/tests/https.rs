@@ -10,7 +10,9 @@ use std::time::Duration;
 
 use certificates::{certificate, server_config};
 use rustls::{ServerConnection, StreamOwned};
-use vapix::wire::{Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust};
+use vapix::wire::{
+    Authentication, Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust,
+};
 
 /// Answers every request on a connection with the same bytes; the request lines and credentials go to `seen`.
 fn serve(stream: impl Read + Write, answer: &str, seen: &std::sync::mpsc::Sender<String>) {
@@ -57,7 +59,14 @@ fn try_client(location: &str, trust: Trust) -> Result<Client, Error> {
     let (location, _) = Location::parse(location).unwrap();
     let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
     let timeout = Duration::from_secs(10);
-    Client::new(ClientSettings { location, camera: 1, credentials: Some(credentials), timeout, trust })
+    Client::new(ClientSettings {
+        location,
+        camera: 1,
+        credentials: Some(credentials),
+        authentication: Authentication::Auto,
+        timeout,
+        trust,
+    })
 }
 
 fn halt(client: &mut Client) -> Result<(), Error> {

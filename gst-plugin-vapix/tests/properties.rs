@@ -167,7 +167,8 @@ fn no_password_in_log_or_graph() {
     });
     gst::log::set_default_threshold(gst::DebugLevel::Trace);
     let camera = camera(Auth::Basic);
-    let mut rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass").play();
+    let rig = Rig::ready(&camera.url()).with("user", "root").with("password", "pass");
+    let mut rig = rig.with_str("auth", "basic").play();
     rig.set_going(&camera);
     rig.push_until(&target(TargetState::Lost, 0.0, 0.0), &camera, |status| !status.moving);
     let bin = gst::Bin::new();
@@ -223,7 +224,7 @@ fn any_layout_of_the_pixels_is_welcome() {
 /// As an application's handler of messages may.
 #[test]
 fn what_is_set_while_it_starts_counts() {
-    let camera = camera(Auth::Basic);
+    let camera = camera(Auth::Digest { qop: true });
     let rig = Rig::ready(&camera.url()).with("pan-min", 50.0).with("pan-max", -50.0);
     let sink = rig.sink.clone();
     rig.bus.set_sync_handler(move |_, message| {

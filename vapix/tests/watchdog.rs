@@ -87,6 +87,7 @@ fn client(camera: &VirtualCamera) -> Client {
         location: Location::parse(&camera.url()).unwrap().0,
         camera: 1,
         credentials: Some(credentials),
+        authentication: vapix::wire::Authentication::default(),
         timeout: Duration::from_millis(500),
         trust: Trust::System,
     })

@@ -5,7 +5,7 @@ mod tests;
 
 use std::time::Duration;
 
-use servo::{Estimates, Limits, Measurement, Mode, PanTilt, Position, Servo, ServoSettings};
+use servo::{Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, ServoSettings};
 use vapix::session::{Next, Request, Response, Session, SessionEvent};
 use vapix::wire::{Command, Error};
 
@@ -47,7 +47,7 @@ pub struct Status {
     /// Horizontal field of view in degrees, where it is set, told or learned.
     pub fov_deg: Option<f64>,
     /// How far it can look and zoom, by its own word.
-    pub limits: Limits,
+    pub limits: HardLimits,
     /// How it is moved, where it is.
     pub mode: Option<Mode>,
 }

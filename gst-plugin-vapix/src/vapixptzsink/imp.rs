@@ -9,7 +9,7 @@ use gst_base::subclass::prelude::*;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 use servo::Measurement;
 
-use super::camera_task::{self, CameraTask, Predecessor};
+use super::camera_task::{self, CameraTask, Event, Predecessor};
 use super::clock::Clock;
 use super::events::camera_event;
 use super::outbox::Outbox;
@@ -50,8 +50,10 @@ pub struct VapixPtzSink {
     predecessors: Mutex<Vec<Predecessor>>,
     stream: Mutex<Stream>,
     waiting: Mutex<Waiting>,
-    /// What upstream was not told yet; pushed by the streaming thread, so that the camera task never waits for it.
-    pub(super) status_to_push: Mutex<Option<Status>>,
+    /// What upstream was not told yet; never pushed by the camera task, which would wait for whoever hears it.
+    status_to_push: Mutex<Option<Status>>,
+    /// Held by whoever pushes it; nobody waits for this one.
+    pushing: Mutex<()>,
 }
 
 #[glib::object_subclass]
@@ -386,13 +388,28 @@ impl VapixPtzSink {
         }
     }
 
-    /// Tells upstream what the camera does, if that has changed.
-    fn push_status(&self) {
-        let Some(status) = lock(&self.status_to_push).take() else { return };
-        let aspect = lock(&self.stream).picture.map(|picture| picture.aspect);
-        let event = camera_event(&status, aspect);
-        // Nobody upstream needs to care.
-        let _ = self.obj().sink_pad().push_event(event.to_event());
+    /// Tells upstream what the camera does, if that has changed. Whoever comes while somebody else does leaves it to him,
+    /// so that the last to be told is the newest.
+    pub(super) fn push_status(&self) {
+        while lock(&self.status_to_push).is_some() {
+            let Ok(_pushing) = self.pushing.try_lock() else { return };
+            let Some(status) = lock(&self.status_to_push).take() else { continue };
+            let aspect = lock(&self.stream).picture.map(|picture| picture.aspect);
+            let mounting = lock(&self.settings).servo.mounting;
+            let event = camera_event(&status, &mounting, aspect);
+            // Nobody upstream needs to care.
+            let _ = self.obj().sink_pad().push_event(event.to_event());
+        }
+    }
+
+    /// Keeps what upstream is to be told; the streaming thread tells it. But that the camera rests is told where no buffer
+    /// comes any more too: whoever believes that it moves looks for nobody.
+    pub(super) fn status_changed(&self, status: Status, outbox: &Outbox) {
+        *lock(&self.status_to_push) = Some(status);
+        // In lockstep upstream hears of it with a buffer only, the same in every run.
+        if !status.moving && !lock(&self.stream).lockstep {
+            outbox.leave(Event::Status(status));
+        }
     }
 
     fn stats(&self) -> gst::Structure {

@@ -8,7 +8,6 @@ use super::camera_task::Event;
 use super::imp::{CAT, VapixPtzSink};
 use super::outbox::Outbox;
 use crate::control_loop::LoopEvent;
-use crate::lock::lock;
 use vapix::session::{ConnectionChange, ControlOwner, SessionEvent};
 
 impl VapixPtzSink {
@@ -21,7 +20,7 @@ impl VapixPtzSink {
             Event::Exchanged { request, failure: Some(err), round_trip } => {
                 gst::debug!(CAT, imp = self, "{request} failed after {round_trip:?}: {err}");
             }
-            Event::Status(status) => *lock(&self.status_to_push) = Some(status),
+            Event::Status(status) => self.status_changed(status, outbox),
             event => outbox.leave(event),
         }
     }
@@ -29,7 +28,8 @@ impl VapixPtzSink {
     /// Logs and posts what is to be told.
     pub(super) fn tell(&self, event: Event) {
         match event {
-            Event::Exchanged { .. } | Event::Status(_) => {}
+            Event::Exchanged { .. } => {}
+            Event::Status(_) => self.push_status(),
             Event::Loop(LoopEvent::Session(SessionEvent::Connection(change))) => self.link_changed(&change),
             Event::Loop(LoopEvent::Session(SessionEvent::Discovered(camera))) => gst::info!(CAT, imp = self, "the camera: {camera}"),
             Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => self.post(CameraChange::Moving, "the camera moves"),

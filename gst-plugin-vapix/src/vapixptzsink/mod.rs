@@ -19,11 +19,14 @@
 //! lease for as long as the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is
 //! started with the first move. `stats` has it as `dead-man`; where there is none, one warning says so.
 //!
+//! The password is never sent in clear: a camera is answered by Digest, or over https by Basic if it never asked for Digest.
+//! `auth=basic` allows Basic over http too.
+//!
 //! User and password are taken from `user` and `password`, from `location`
 //! (`http://user:password@host`, where they are taken out at once), or from the environment variables
 //! `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process lists and of the parser's log.
 //! `user`, `password` and everything about the servo can be changed while playing; `location`,
-//! `camera`, `timeout`, `ca-file`, `insecure` and `lockstep` count from the next READY to PAUSED on.
+//! `camera`, `auth`, `timeout`, `ca-file`, `insecure` and `lockstep` count from the next READY to PAUSED on.
 //!
 //! With `lockstep` the servo's time is the stream's running time and stands still between buffers: each
 //! buffer waits until the camera has answered what is due at its time. A simulated camera that moves on only
@@ -38,6 +41,11 @@
 //! steps 1 to 100), and the camera's own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What
 //! the camera told of itself is one line of INFO.
 //! A loop that oscillates all the same is calmed by lowering the gain, with a warning.
+//!
+//! ## Between tracker and camera
+//! A picture may be scaled between the tracker and this sink, where the target's place stays what it was. One that is
+//! cropped or gets borders is refused, with a warning. One that is flipped or turned (`videoflip`) looks just like any
+//! other: put that element in front of the tracker, and see the next section.
 //!
 //! ## Mounting
 //! `rotation` is for pictures that arrive turned clockwise; `invert-pan` and `invert-tilt` are for a camera that hangs, or
@@ -120,6 +128,25 @@ pub enum Mode {
     Centre,
 }
 
+/// How user and password may be proved to the camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstVapixPtzSinkAuthentication")]
+pub enum Authentication {
+    /// Never in clear.
+    #[default]
+    #[enum_value(
+        name = "By Digest, or over https by Basic where the camera never asked for Digest",
+        nick = "auto"
+    )]
+    Auto,
+    /// In clear too.
+    #[enum_value(
+        name = "Also by Basic over http: anybody on the network path can then read the password",
+        nick = "basic"
+    )]
+    Basic,
+}
+
 /// How the target's motion is carried forward.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
 #[enum_type(name = "GstVapixPtzSinkPrediction")]
@@ -148,25 +175,27 @@ pub enum SpeedCurve {
 
 /// An enumeration of GObject's and the servo's of the same values.
 macro_rules! same_values {
-    ($($name:ident { $($value:ident),+ })+) => {$(
-        impl From<$name> for servo::$name {
+    ($($name:ident = $other:path { $($value:ident),+ })+) => {$(
+        impl From<$name> for $other {
             fn from(value: $name) -> Self {
                 match value { $($name::$value => Self::$value),+ }
             }
         }
 
-        impl From<servo::$name> for $name {
-            fn from(value: servo::$name) -> Self {
-                match value { $(servo::$name::$value => Self::$value),+ }
+        impl From<$other> for $name {
+            fn from(value: $other) -> Self {
+                type Other = $other;
+                match value { $(Other::$value => Self::$value),+ }
             }
         }
     )+};
 }
 
 same_values! {
-    Mode { Velocity, Absolute, Centre }
-    Prediction { Average, Lead }
-    SpeedCurve { Linear, Cubic }
+    Authentication = vapix::wire::Authentication { Auto, Basic }
+    Mode = servo::Mode { Velocity, Absolute, Centre }
+    Prediction = servo::Prediction { Average, Lead }
+    SpeedCurve = servo::SpeedCurve { Linear, Cubic }
 }
 
 glib::wrapper! {

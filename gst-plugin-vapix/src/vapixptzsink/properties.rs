@@ -9,7 +9,7 @@ use glib::{HasParamSpec, ParamSpec, Value};
 use gst::prelude::*;
 
 use super::settings::Settings;
-use super::{Mode, Prediction, SpeedCurve};
+use super::{Authentication, Mode, Prediction, SpeedCurve};
 use vapix::wire::{Location, Secret};
 
 /// When a value that was set counts, and who must hear of it.
@@ -87,6 +87,7 @@ fn table() -> Vec<Property> {
             |_| None::<String>.to_value(),
             |s, value| { s.password = string(value).map(Secret::new); Ok(()) },
         ),
+        choice::<Authentication, _>("auth", AtStart, "How user and password may be proved to the camera", |s| &mut s.authentication),
         duration("timeout", AtStart, "Longest wait for an answer from the camera, in nanoseconds, from 0.1 s to 60 s", millis(100)..=millis(60_000), |s| &mut s.timeout),
         switch("insecure", AtStart, "With https, accept any certificate: anybody on the network path can then take over the camera", |s| &mut s.insecure),
         special(

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use servo::{Range, ServoSettings, SoftLimits};
-use vapix::wire::{ClientSettings, Credentials, Location, Secret, Trust};
+use vapix::wire::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
 
 /// What the properties hold.
 #[derive(Debug, Clone)]
@@ -13,6 +13,7 @@ pub struct Settings {
     pub camera: u32,
     pub user: Option<String>,
     pub password: Option<Secret>,
+    pub authentication: Authentication,
     pub timeout: Duration,
     pub insecure: bool,
     pub ca_file: Option<String>,
@@ -35,6 +36,7 @@ impl Default for Settings {
             camera: 1,
             user: None,
             password: None,
+            authentication: Authentication::default(),
             timeout: Duration::from_millis(1500),
             insecure: false,
             ca_file: None,
@@ -79,6 +81,7 @@ impl Settings {
             location: self.location.clone()?,
             camera: self.camera,
             credentials: self.credentials(environment),
+            authentication: self.authentication,
             timeout: self.timeout,
             trust,
         })

@@ -1,6 +1,8 @@
 use std::time::Duration;
 
-use crate::model::{CommandHistory, Limits, PanTilt, Range, SoftLimits, around_deg, is_endless, narrower};
+use crate::model::{
+    CommandHistory, HardLimits, PanTilt, Range, SoftLimits, around_deg, is_endless, narrower,
+};
 
 /// Keeps the camera from being driven against its ends, and knows when it has got there.
 #[derive(Debug, Default)]
@@ -32,7 +34,7 @@ impl LimitEnforcer {
         &mut self,
         rate: PanTilt,
         position: Option<PanTilt>,
-        (hard, soft): (&Limits, &SoftLimits),
+        (hard, soft): (&HardLimits, &SoftLimits),
         lasting_s: f64,
     ) -> PanTilt {
         let Some(position) = position else {
@@ -73,11 +75,11 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn limits(pan: Option<(f64, f64)>) -> Limits {
-        Limits { pan_deg: pan.map(|(min, max)| Range { min, max }), ..Limits::default() }
+    fn limits(pan: Option<(f64, f64)>) -> HardLimits {
+        HardLimits { pan_deg: pan.map(|(min, max)| Range { min, max }), ..HardLimits::default() }
     }
 
-    fn apply(rate: f64, pan: f64, limits: &Limits, soft: &SoftLimits) -> (f64, bool) {
+    fn apply(rate: f64, pan: f64, limits: &HardLimits, soft: &SoftLimits) -> (f64, bool) {
         let mut guard = LimitEnforcer::default();
         let rate = guard.apply(PanTilt::new(rate, 3.0), Some(PanTilt::new(pan, 0.0)), (limits, soft), 0.5);
         assert_eq!(rate.tilt, 3.0);
@@ -177,7 +179,7 @@ mod tests {
 
     #[test]
     fn tilt_has_its_own_ends() {
-        let hard = Limits { tilt_deg: Some(Range { min: -90.0, max: 20.0 }), ..Limits::default() };
+        let hard = HardLimits { tilt_deg: Some(Range { min: -90.0, max: 20.0 }), ..HardLimits::default() };
         let soft = SoftLimits { tilt_deg: Range { min: -30.0, max: 10.0 }, ..SoftLimits::default() };
         let apply = |rate: f64, tilt: f64, soft: &SoftLimits| {
             let mut guard = LimitEnforcer::default();

@@ -23,7 +23,8 @@ impl From<TargetState> for Visibility {
     }
 }
 
-/// The target in one picture.
+/// The target in one picture, as estimation needs it: what the tracker's record in the contract says, with the shape of the
+/// picture and the time it was taken by the servo's own clock. That record is GStreamer's, which nothing here may know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measurement {
     /// How the tracker knows.

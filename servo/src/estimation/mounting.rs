@@ -27,6 +27,11 @@ impl Mounting {
         }
     }
 
+    /// Width by height of the picture along the axes, of one that arrives with this.
+    pub fn aspect_along_axes(&self, aspect: f64) -> f64 {
+        if self.rotation_deg / 90 % 2 == 1 { 1.0 / aspect } else { aspect }
+    }
+
     /// Between a place along the axes and the camera's own picture, either way.
     pub fn mirrored(&self, Point { x, y }: Point) -> Point {
         Point { x: if self.invert_pan { 1.0 - x } else { x }, y: if self.invert_tilt { 1.0 - y } else { y } }

@@ -1,4 +1,4 @@
-use super::{CommandHistory, Lens, Limits, PanTilt, Position, Range, SpeedMap, TableRow};
+use super::{CommandHistory, HardLimits, Lens, PanTilt, Position, Range, SpeedMap, TableRow};
 
 /// Field of view of a camera that does not tell: a common dome's, zoomed out.
 const ASSUMED_FOV_DEG: f64 = 55.0;
@@ -10,7 +10,7 @@ const OPTICAL_STEPS: Range = Range { min: 1.0, max: 9999.0 };
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Capabilities {
     /// How far it can look and zoom.
-    pub limits: Limits,
+    pub limits: HardLimits,
     /// Degrees per second of speed steps, growing.
     pub speeds: Vec<TableRow>,
     /// Magnification of zoom steps, growing.
@@ -113,7 +113,8 @@ mod tests {
 
     #[test]
     fn field_of_view_follows_the_zoom() {
-        let limits = Limits { field_angle_deg: Some(Range { min: 3.2, max: 55.2 }), ..Limits::default() };
+        let limits =
+            HardLimits { field_angle_deg: Some(Range { min: 3.2, max: 55.2 }), ..HardLimits::default() };
         let mut told = camera(Capabilities { limits, ..Capabilities::default() });
         assert!((told.fov_deg(None) - 55.2).abs() < 1e-9);
         told.position.zoom_steps = Some(9999.0);

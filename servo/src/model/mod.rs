@@ -13,5 +13,5 @@ pub use command_history::CommandHistory;
 pub use delays::Delays;
 pub use pan_tilt::{PanTilt, around_deg};
 pub use projection::{Lens, View, magnified, rise_deg};
-pub use ranges::{Limits, Position, Presets, Range, SoftLimits, TableRow, is_endless, narrower};
+pub use ranges::{HardLimits, Position, Presets, Range, SoftLimits, TableRow, is_endless, narrower};
 pub use speed_map::{SpeedCurve, SpeedMap};

@@ -38,7 +38,7 @@ impl Position {
 
 /// How far the camera can look and zoom, as far as it tells.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Limits {
+pub struct HardLimits {
     /// Degrees.
     pub pan_deg: Option<Range>,
     /// Degrees.
@@ -49,7 +49,7 @@ pub struct Limits {
     pub field_angle_deg: Option<Range>,
 }
 
-impl Limits {
+impl HardLimits {
     /// These limits, and where they are silent those of `other`.
     pub fn or(self, other: Self) -> Self {
         Self {

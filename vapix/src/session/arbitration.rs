@@ -112,6 +112,11 @@ impl Arbitration {
         self.watch.undecided();
     }
 
+    /// Whether pan or tilt turned otherwise than commanded when last seen.
+    pub fn turns_otherwise(&self) -> bool {
+        self.watch.turns_otherwise()
+    }
+
     /// Whether the camera is to be asked at once where it looks.
     pub fn asks(&self) -> bool {
         self.watch.suspects()

@@ -1,6 +1,6 @@
 use std::fmt;
 
-use servo::{Capabilities, Limits, Range, SpeedMap, is_endless};
+use servo::{Capabilities, HardLimits, Range, SpeedMap, is_endless};
 
 use crate::wire::{Attributes, Parameters};
 
@@ -8,7 +8,7 @@ use crate::wire::{Attributes, Parameters};
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Description {
     /// `query=limits`.
-    pub limits: Limits,
+    pub limits: HardLimits,
     /// Its PTZ parameters.
     pub parameters: Parameters,
     /// `query=attributes`.
@@ -33,7 +33,7 @@ impl Description {
     }
 
     /// How far it can look and zoom, by whichever of its answers.
-    fn limits(&self) -> Limits {
+    fn limits(&self) -> HardLimits {
         self.limits.or(self.parameters.limits)
     }
 
@@ -92,7 +92,7 @@ mod tests {
         let nothing = "pan not told; tilt not told; zoom not told; field of view not told; speeds not told; \
                        not told whether proportional; no control queue";
         assert_eq!(Description::default().to_string(), nothing);
-        let limits = Limits {
+        let limits = HardLimits {
             pan_deg: Some(Range { min: -180.0, max: 180.0 }),
             tilt_deg: Some(Range { min: -20.0, max: 90.0 }),
             zoom_steps: Some(Range { min: 1.0, max: 9999.0 }),

@@ -3,7 +3,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use servo::{Limits, Mode, Position, Presets};
+use servo::{HardLimits, Mode, Position, Presets};
 
 use super::{ConnectionChange, ControlOwner};
 use crate::wire::{Attributes, Command, Error, Parameters, QueuePlace, QueueRequest};
@@ -64,7 +64,7 @@ pub enum Response {
     /// To [`Query::Position`].
     Position(Position),
     /// To [`Query::Limits`].
-    Limits(Limits),
+    Limits(HardLimits),
     /// To [`Query::Parameters`].
     Parameters(Parameters),
     /// To [`Query::Attributes`].

@@ -22,6 +22,8 @@ pub struct OperatorDetector {
     /// One turn of the camera was seen that is ours, or none: what follows is not its way of starting up.
     armed: bool,
     suspects: bool,
+    /// Whether the last position was off by a turn that nobody commanded, not by a zoom.
+    turns_otherwise: bool,
     /// Until then it may turn any way at our word.
     excused_until: Duration,
 }
@@ -85,6 +87,13 @@ impl OperatorDetector {
             self.place = Some(place);
             return Verdict::Ours;
         };
+        self.turns_otherwise = before.asked > self.excused_until
+            && !explains_turn(
+                &before,
+                &place,
+                (before.asked.saturating_sub(Self::LATEST), answered),
+                commands.pan_tilt,
+            );
         if self.explains(&before, &place, answered, commands) {
             let alone = before.asked > self.excused_until && is_still(&before, answered, commands);
             // What turns slowly by somebody's hand turns far in time.
@@ -117,6 +126,11 @@ impl OperatorDetector {
     /// The position that was to decide did not come: whoever moved it will be noticed again.
     pub fn undecided(&mut self) {
         self.suspects = false;
+    }
+
+    /// Whether pan or tilt turned otherwise than commanded when last seen.
+    pub fn turns_otherwise(&self) -> bool {
+        self.turns_otherwise
     }
 
     /// Whether the next position decides.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{Mode, PanTilt, Position, Servo};
+use servo::{Actuation, Mode, PanTilt, Position, Servo};
 
 use super::arbitration::Finding;
 use super::connection::Connection;
@@ -19,6 +19,8 @@ impl Session {
     const POLL_MOVING: Duration = Duration::from_secs(1);
     /// ... while it rests, so that an operator's zoom or a lost connection is noticed.
     const POLL_RESTING: Duration = Duration::from_secs(5);
+    /// While it may go on at an operator's word or at ours: in this time his shows if it is of 3 degrees per second.
+    const POLL_CONTESTED: Duration = Duration::from_millis(500);
     /// While it goes to a position.
     const POLL_UNDER_WAY: Duration = Duration::from_millis(150);
     /// A camera that does not tell its position is asked again this much later.
@@ -179,7 +181,10 @@ impl Session {
     fn told_position(&mut self, position: Position, servo: &mut Servo, (sent, now): (Duration, Duration)) {
         match position.pan_tilt() {
             Some(place) => self.look_for_others((place, position.zoom_steps), servo, (sent, now)),
-            None => self.arbitration.undecided(),
+            None => {
+                self.arbitration.undecided();
+                self.scheduler.settle(true);
+            }
         }
         self.positioned(Some(position), servo, (sent + now) / 2, now);
     }
@@ -187,6 +192,7 @@ impl Session {
     fn not_told(&mut self, query: Query, err: &Error, servo: &mut Servo, now: Duration) {
         if query == Query::Position {
             self.arbitration.undecided();
+            self.scheduler.settle(true);
         }
         if let Some(refusal) = self.modes.failed().filter(|_| err.is_refusal() && !err.is_final()) {
             self.asked(query, servo, now);
@@ -295,7 +301,16 @@ impl Session {
         let give_way = servo.settings().override_timeout;
         // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
         let commands = CommandedMotion { pan_tilt: &servo.camera().history, zoom: servo.zoom_commands() };
-        match self.arbitration.positioned(place, (asked, now), commands, give_way) {
+        let finding = self.arbitration.positioned(place, (asked, now), commands, give_way);
+        if self.scheduler.is_contested() {
+            let is_ours = !self.arbitration.turns_otherwise();
+            self.scheduler.settle(is_ours);
+            if !is_ours {
+                servo.accepted(&Actuation::Rest, now, now);
+                self.events.push(SessionEvent::Stopped);
+            }
+        }
+        match finding {
             Finding::Nothing => {}
             Finding::Orphan => {
                 // That its zoom was not seen to move is no proof that it does not.
@@ -303,7 +318,10 @@ impl Session {
                 self.scheduler.found_moving(if lacks_speed { Command::Stop } else { Command::REST });
                 self.events.push(SessionEvent::Orphan);
             }
-            Finding::Operator => servo.home().strayed(),
+            Finding::Operator => {
+                servo.home().strayed();
+                self.scheduler.contest();
+            }
         }
     }
 
@@ -318,6 +336,7 @@ impl Session {
         self.next_poll = now
             + match (servo.is_under_way(), self.scheduler.may_move()) {
                 (true, _) => Self::POLL_UNDER_WAY,
+                (false, true) if self.scheduler.is_contested() => Self::POLL_CONTESTED,
                 (false, _) if self.arbitration.asks() => Duration::ZERO,
                 (false, true) if servo.is_zooming(now) => Self::POLL_ZOOMING,
                 (false, true) => Self::POLL_MOVING,

@@ -11,6 +11,8 @@ pub struct Scheduler {
     /// A move was sent that may have had an effect, and no stop was confirmed since.
     may_move: bool,
     stop_tried: bool,
+    /// Somebody else moved the camera since, and whose move it is in now is being found out.
+    contested: bool,
     /// A move went unanswered: it may still act until then, even after a stop.
     doubt_until: Option<Duration>,
     /// The words that end the last move, whatever the mode is by now.
@@ -26,6 +28,7 @@ impl Default for Scheduler {
             last_attempt: None,
             may_move: false,
             stop_tried: false,
+            contested: false,
             doubt_until: None,
             stop: Command::Halt,
             round_trip: Duration::ZERO,
@@ -40,8 +43,11 @@ impl Scheduler {
     /// A camera that answers a command later than this is not expected to act on it any more.
     pub const DOUBT: Duration = Duration::from_secs(6);
 
-    /// When to send a stop; `None`: no need to.
+    /// When to send a stop; `None`: no need to, or not known yet.
     pub fn stop_due(&self, now: Duration, interval: Duration, retry_at: Duration) -> Option<Duration> {
+        if self.contested {
+            return None;
+        }
         if !self.may_move {
             return self.doubt_until.map(|until| until.max(retry_at));
         }
@@ -127,6 +133,25 @@ impl Scheduler {
     pub fn arrived(&mut self) {
         self.accepted = None;
         self.may_move = false;
+    }
+
+    /// Somebody else has moved the camera. Where it may be moving at our word too, what it does next tells whose move it
+    /// is; but a zoom of ours goes on whatever pan and tilt do.
+    pub fn contest(&mut self) {
+        self.contested = self.may_move && self.stop != Command::REST;
+    }
+
+    /// Whether that is being found out.
+    pub fn is_contested(&self) -> bool {
+        self.contested
+    }
+
+    /// It is found out. Where it is not ours, it has taken the place of ours, and a stop would end his.
+    pub fn settle(&mut self, is_ours: bool) {
+        self.contested = false;
+        if !is_ours {
+            self.arrived();
+        }
     }
 
     /// It moves at the word of somebody who is not there any more.
@@ -216,6 +241,23 @@ mod tests {
         scheduler.attempted(&RIGHT, ms(0));
         scheduler.failed(&RIGHT, false, ms(10));
         assert_eq!(scheduler.stop_due(ms(10), INTERVAL, ms(0)), None);
+    }
+
+    #[test]
+    fn only_a_move_of_ours_is_stopped() {
+        for is_ours in [true, false] {
+            let mut scheduler = Scheduler::default();
+            accept(&mut scheduler, RIGHT, ms(0));
+            scheduler.contest();
+            assert_eq!(scheduler.stop_due(ms(100), INTERVAL, ms(0)), None);
+            scheduler.settle(is_ours);
+            assert_eq!(scheduler.stop_due(ms(600), INTERVAL, ms(0)).is_some(), is_ours);
+            assert_eq!(scheduler.may_move(), is_ours);
+        }
+        let mut scheduler = Scheduler::default();
+        accept(&mut scheduler, Command::Velocity { pan: 1, tilt: 0, zoom: Some(9), free: false }, ms(0));
+        scheduler.contest();
+        assert!(!scheduler.is_contested(), "a zoom is ended in any case");
     }
 
     #[test]

@@ -87,6 +87,7 @@ mod tests {
             location: Location::parse(&location).unwrap().0,
             camera: 1,
             credentials: None,
+            authentication: crate::wire::Authentication::default(),
             timeout: Duration::from_secs(1),
             trust: Trust::System,
         }

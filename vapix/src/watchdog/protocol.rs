@@ -66,6 +66,7 @@ mod tests {
             location: Location::parse("https://camera:8443").unwrap().0,
             camera: 2,
             credentials: Some(Credentials { user: "root".to_owned(), password: Secret::new("geheim") }),
+            authentication: crate::wire::Authentication::default(),
             timeout: Duration::from_millis(1500),
             trust: Trust::Anyone,
         };

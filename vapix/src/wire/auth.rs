@@ -11,6 +11,16 @@ use super::{Error, Secret};
 /// A longer challenge is none: real ones have about 200 characters.
 const MAX_CHALLENGE_BYTES: usize = 4096;
 
+/// By which kinds of authentication user and password may be proved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Authentication {
+    /// Digest, or over TLS Basic where the camera has never asked for Digest.
+    #[default]
+    Auto,
+    /// Also Basic in clear: whoever listens, or answers in the camera's place, then has the password.
+    Basic,
+}
+
 /// A user and the password. Serialised with the password, for the socket of the watchdog and nothing else.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Credentials {
@@ -26,7 +36,10 @@ pub struct Credentials {
 #[derive(Debug)]
 pub(super) struct Authenticator {
     credentials: Option<Credentials>,
+    allowed: Authentication,
     challenge: Option<Challenge>,
+    /// Whether the camera has ever asked for Digest: whoever asks for less then may be somebody else.
+    knows_digest: bool,
 }
 
 #[derive(Debug)]
@@ -37,8 +50,13 @@ enum Challenge {
 }
 
 impl Authenticator {
-    pub fn new(credentials: Option<Credentials>) -> Self {
-        Self { credentials, challenge: None }
+    pub fn new(credentials: Option<Credentials>, allowed: Authentication) -> Self {
+        Self { credentials, allowed, challenge: None, knows_digest: false }
+    }
+
+    /// Takes another user or password.
+    pub fn set_credentials(&mut self, credentials: Option<Credentials>) {
+        (self.credentials, self.challenge) = (credentials, None);
     }
 
     pub fn user(&self) -> &str {
@@ -70,12 +88,13 @@ impl Authenticator {
         Ok(Some(value))
     }
 
-    /// Takes the challenges of a 401. Returns whether the camera calls the old one stale, which means
+    /// Takes the challenges of a 401, which came over TLS or not. Returns whether the camera calls the old one stale, which means
     /// that the credentials themselves were right.
     ///
     /// # Errors
-    /// [`Error::CredentialsMissing`], or [`Error::UnsupportedAuthentication`] where none is Basic or Digest.
-    pub fn challenged(&mut self, headers: &HeaderMap) -> Result<bool, Error> {
+    /// [`Error::CredentialsMissing`], [`Error::UnsupportedAuthentication`] where none is Basic or Digest, or
+    /// [`Error::BasicRefused`].
+    pub fn challenged(&mut self, headers: &HeaderMap, over_tls: bool) -> Result<bool, Error> {
         if self.credentials.is_none() {
             return Err(Error::CredentialsMissing);
         }
@@ -89,10 +108,15 @@ impl Authenticator {
         let digest = offers.iter().filter_map(|offer| parameters_of(offer, "Digest")).find_map(parse_digest);
         if let Some(digest) = digest {
             let stale = digest.stale;
+            self.knows_digest = true;
             self.challenge = Some(Challenge::Digest(Box::new(digest)));
             return Ok(stale);
         }
         if offers.iter().any(|offer| parameters_of(offer, "Basic").is_some()) {
+            if self.allowed == Authentication::Auto && (!over_tls || self.knows_digest) {
+                self.challenge = None;
+                return Err(Error::BasicRefused);
+            }
             self.challenge = Some(Challenge::Basic);
             return Ok(false);
         }
@@ -115,9 +139,9 @@ pub fn answer_to_challenge(
     target: &str,
 ) -> Result<HeaderValue, Error> {
     let unsupported = || Error::UnsupportedAuthentication(excerpt(challenge));
-    let mut authenticator = Authenticator::new(Some(credentials));
+    let mut authenticator = Authenticator::new(Some(credentials), Authentication::Basic);
     let challenge = HeaderValue::from_str(challenge).map_err(|_| unsupported())?;
-    authenticator.challenged(&HeaderMap::from_iter([(WWW_AUTHENTICATE, challenge)]))?;
+    authenticator.challenged(&HeaderMap::from_iter([(WWW_AUTHENTICATE, challenge)]), false)?;
     authenticator.authorization(target)?.ok_or_else(unsupported)
 }
 
@@ -182,7 +206,7 @@ mod tests {
 
     fn authenticator(user: &str, password: &str) -> Authenticator {
         let credentials = Credentials { user: user.to_owned(), password: Secret::new(password) };
-        Authenticator::new(Some(credentials))
+        Authenticator::new(Some(credentials), Authentication::Auto)
     }
 
     fn headers(challenges: &[&str]) -> HeaderMap {
@@ -210,7 +234,7 @@ mod tests {
         ];
         for offer in offers {
             let mut authenticator = authenticator("root", "pass");
-            assert!(!authenticator.challenged(&headers(offer)).unwrap());
+            assert!(!authenticator.challenged(&headers(offer), true).unwrap());
             let sent = authorization(&mut authenticator, "/a");
             assert!(sent.starts_with("Digest ") && sent.contains(r#"realm="AXIS_1""#), "{sent}");
         }
@@ -221,7 +245,7 @@ mod tests {
         let mut authenticator = authenticator("root", "pass");
         let challenge =
             r#"Digest realm="AXIS_ACCC8EB3494E", nonce="PNHWZB6nBQA=316099a1", algorithm=MD5, qop="auth""#;
-        authenticator.challenged(&headers(&[challenge])).unwrap();
+        authenticator.challenged(&headers(&[challenge]), true).unwrap();
         let target = "/axis-cgi/com/ptz.cgi?camera=1&continuouspantiltmove=-49,0";
         for count in ["nc=00000001", "nc=00000002", "nc=00000003"] {
             let sent = authorization(&mut authenticator, target);
@@ -232,7 +256,7 @@ mod tests {
     #[test]
     fn a_stale_nonce_is_no_refusal() {
         let challenge = r#"Digest realm="AXIS_1", nonce="n", stale=true, algorithm=MD5, qop="auth""#;
-        assert!(authenticator("root", "pass").challenged(&headers(&[challenge])).unwrap());
+        assert!(authenticator("root", "pass").challenged(&headers(&[challenge]), true).unwrap());
     }
 
     #[test]
@@ -240,7 +264,7 @@ mod tests {
         // RFC 2069's example with the response of its erratum.
         let mut authenticator = authenticator("Mufasa", "CircleOfLife");
         let challenge = r#"Digest realm="testrealm@host.com", nonce="dcd98b7102dd2f0e8b11d0f600bfb0c093", opaque="5ccc069c403ebaf9f0171e9517f40e41""#;
-        authenticator.challenged(&headers(&[challenge])).unwrap();
+        authenticator.challenged(&headers(&[challenge]), true).unwrap();
         let sent = authorization(&mut authenticator, "/dir/index.html");
         assert!(sent.contains(r#"response="1949323746fe6a43ef61f9606e7febea""#), "{sent}");
         assert!(!sent.contains("qop") && !sent.contains("cnonce"), "{sent}");
@@ -296,17 +320,44 @@ mod tests {
     }
 
     #[test]
+    fn basic_is_taken_over_tls_or_where_it_is_allowed() {
+        let basic = &[r#"Basic realm="x""#];
+        for (allowed, over_tls, taken) in [
+            (Authentication::Auto, false, false),
+            (Authentication::Auto, true, true),
+            (Authentication::Basic, false, true),
+        ] {
+            let mut authenticator = Authenticator { allowed, ..authenticator("root", "pass") };
+            assert_eq!(authenticator.challenged(&headers(basic), over_tls).is_ok(), taken);
+            assert_eq!(authenticator.authorization("/").unwrap().is_some(), taken);
+        }
+    }
+
+    #[test]
+    fn digest_once_seen_stays() {
+        let digest = r#"Digest realm="AXIS_1", nonce="n", algorithm=MD5, qop="auth""#;
+        let mut authenticator = authenticator("root", "pass");
+        authenticator.challenged(&headers(&[digest]), true).unwrap();
+        authenticator.set_credentials(Some(Credentials { user: "a".to_owned(), password: Secret::new("b") }));
+        let err = authenticator.challenged(&headers(&[r#"Basic realm="x""#]), true).unwrap_err();
+        assert_eq!(err, Error::BasicRefused);
+        assert_eq!(authenticator.authorization("/").unwrap(), None);
+    }
+
+    #[test]
     fn basic_is_base64() {
         let mut authenticator = authenticator("Aladdin", "open sesame");
-        authenticator.challenged(&headers(&[r#"Basic realm="x""#])).unwrap();
+        authenticator.challenged(&headers(&[r#"Basic realm="x""#]), true).unwrap();
         assert_eq!(authorization(&mut authenticator, "/"), "Basic QWxhZGRpbjpvcGVuIHNlc2FtZQ==");
     }
 
     #[test]
     fn what_is_not_spoken_is_named() {
-        let err = authenticator("root", "pass").challenged(&headers(&["Negotiate"])).unwrap_err();
+        let err = authenticator("root", "pass").challenged(&headers(&["Negotiate"]), true).unwrap_err();
         assert_eq!(err, Error::UnsupportedAuthentication("Negotiate".to_owned()));
-        let err = Authenticator::new(None).challenged(&headers(&["Basic realm=\"x\""])).unwrap_err();
+        let err = Authenticator::new(None, Authentication::Basic)
+            .challenged(&headers(&["Basic realm=\"x\""]), true)
+            .unwrap_err();
         assert_eq!(err, Error::CredentialsMissing);
     }
 
@@ -322,7 +373,7 @@ mod tests {
         #[test]
         fn any_challenge_is_taken_or_refused(text in "[ -~]{0,128}") {
             let mut authenticator = authenticator("root", "pass");
-            if authenticator.challenged(&headers(&[&text])).is_ok() {
+            if authenticator.challenged(&headers(&[&text]), true).is_ok() {
                 let _ = authenticator.authorization("/axis-cgi/com/ptz.cgi");
             }
         }
@@ -330,7 +381,7 @@ mod tests {
         #[test]
         fn any_digest_challenge_is_taken_or_refused(text in "(realm|nonce|qop|algorithm|stale|opaque|=|\"|,| |\\\\|MD5|x){0,24}") {
             let mut authenticator = authenticator("root", "pass");
-            if authenticator.challenged(&headers(&[&format!("Digest {text}")])).is_ok() {
+            if authenticator.challenged(&headers(&[&format!("Digest {text}")]), true).is_ok() {
                 let _ = authenticator.authorization("/axis-cgi/com/ptz.cgi");
             }
         }

@@ -1,17 +1,17 @@
 use std::time::Duration;
 
 use reqwest::header::{AUTHORIZATION, HeaderMap, LOCATION};
-use reqwest::{Response, StatusCode, redirect};
+use reqwest::{Response, StatusCode, Url, redirect};
 use serde::{Deserialize, Serialize};
-use servo::{Limits, Position, Presets};
+use servo::{HardLimits, Presets};
 
 use super::auth::Authenticator;
 use super::cookies::Cookies;
 use super::location::without_user_info;
 use super::text::{complaint, excerpt, unexpected};
 use super::{
-    Attributes, Command, Credentials, Error, Location, Parameters, QueuePlace, QueueRequest, Trust,
-    parse_limits, parse_move_speed, parse_position, parse_presets,
+    Attributes, Authentication, Command, Credentials, Error, Location, Parameters, QueuePlace, QueueRequest,
+    Trust, parse_limits, parse_move_speed, parse_position, parse_presets,
 };
 
 /// Longest answer that is read; a full PTZ parameter list is a few kilobytes.
@@ -29,6 +29,8 @@ pub struct ClientSettings {
     pub camera: u32,
     /// Who we are.
     pub credentials: Option<Credentials>,
+    /// How that may be proved.
+    pub authentication: Authentication,
     /// Longest time for one answer.
     pub timeout: Duration,
     /// Whose certificates are believed.
@@ -48,6 +50,8 @@ pub struct Identity {
 pub struct Client {
     settings: ClientSettings,
     http: reqwest::Client,
+    /// The same, but for connections of a single request.
+    http_once: reqwest::Client,
     authenticator: Authenticator,
     cookies: Cookies,
     /// Set once user and password were refused: asking again could lock the account.
@@ -56,6 +60,16 @@ pub struct Client {
     accepted: bool,
     /// Whether the connection may be one that the camera has closed since its last answer.
     connected: bool,
+}
+
+/// Whether a request is sent again where the connection breaks, as it does where the camera has closed it meanwhile. It
+/// may have arrived all the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Repeat {
+    /// Twice is as good as once.
+    WhereBroken,
+    /// Twice is too much: sent over a connection of its own, that the camera cannot have closed.
+    Never,
 }
 
 /// A complete answer.
@@ -71,8 +85,9 @@ impl Client {
     /// [`Error::Tls`] where `trust` cannot be used.
     pub fn new(settings: ClientSettings) -> Result<Self, Error> {
         Ok(Self {
-            http: http_client(&settings)?,
-            authenticator: Authenticator::new(settings.credentials.clone()),
+            http: http_client(&settings, 1)?,
+            http_once: http_client(&settings, 0)?,
+            authenticator: Authenticator::new(settings.credentials.clone(), settings.authentication),
             cookies: Cookies::default(),
             settings,
             locked_out: false,
@@ -96,7 +111,7 @@ impl Client {
 
     /// Takes another user or password, and asks again even where the last were refused.
     pub fn set_credentials(&mut self, credentials: Option<Credentials>) {
-        self.authenticator = Authenticator::new(credentials.clone());
+        self.authenticator.set_credentials(credentials.clone());
         self.settings.credentials = credentials;
         (self.locked_out, self.accepted) = (false, false);
     }
@@ -107,7 +122,9 @@ impl Client {
     /// Any; see [`Error::may_have_acted`].
     pub async fn send(&mut self, command: &Command) -> Result<(), Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&{command}", self.settings.camera);
-        let answer = self.get(&target).await?;
+        // Of these the second would go on from where the first led.
+        let once = matches!(command, Command::Centre { .. });
+        let answer = self.get(&target, if once { Repeat::Never } else { Repeat::WhereBroken }).await?;
         match answer.status {
             StatusCode::NO_CONTENT => Ok(()),
             // 200 in answer to a move is a refusal, whatever it says.
@@ -119,7 +136,7 @@ impl Client {
     ///
     /// # Errors
     /// Any.
-    pub async fn position(&mut self) -> Result<Position, Error> {
+    pub async fn position(&mut self) -> Result<servo::Position, Error> {
         parse_position(&self.query("position").await?)
     }
 
@@ -127,7 +144,7 @@ impl Client {
     ///
     /// # Errors
     /// Any.
-    pub async fn limits(&mut self) -> Result<Limits, Error> {
+    pub async fn limits(&mut self) -> Result<HardLimits, Error> {
         parse_limits(&self.query("limits").await?)
     }
 
@@ -136,7 +153,7 @@ impl Client {
     /// # Errors
     /// Any.
     pub async fn parameters(&mut self) -> Result<Parameters, Error> {
-        let answer = self.get("/axis-cgi/param.cgi?action=list&group=PTZ").await?;
+        let answer = self.get("/axis-cgi/param.cgi?action=list&group=PTZ", Repeat::WhereBroken).await?;
         Parameters::parse(&answer.body, self.settings.camera)
     }
 
@@ -170,14 +187,14 @@ impl Client {
     /// Any.
     pub async fn queue(&mut self, request: QueueRequest) -> Result<Option<QueuePlace>, Error> {
         let target = format!("/axis-cgi/com/ptzqueue.cgi?control={request}&camera={}", self.settings.camera);
-        let answer = self.get(&target).await?;
+        let answer = self.get(&target, Repeat::WhereBroken).await?;
         let accepted = answer.status == StatusCode::NO_CONTENT;
         if accepted { Ok(None) } else { QueuePlace::parse(&answer.body).map(Some) }
     }
 
     async fn query(&mut self, what: &str) -> Result<String, Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&query={what}", self.settings.camera);
-        let answer = self.get(&target).await?;
+        let answer = self.get(&target, Repeat::WhereBroken).await?;
         match complaint(&answer.body) {
             Some(text) => Err(Error::Camera(text)),
             None if answer.body.trim().is_empty() => Err(Error::NoPtz),
@@ -187,15 +204,22 @@ impl Client {
 
     /// One exchange: the answer to a GET of this path and query, with the challenges, the redirect to
     /// the camera's own HTTPS and the closed connection that may lie in between.
-    async fn get(&mut self, target: &str) -> Result<Answer, Error> {
+    /// All of it takes no longer than an answer may.
+    async fn get(&mut self, target: &str, repeat: Repeat) -> Result<Answer, Error> {
         if self.locked_out {
             return Err(self.bad_credentials());
         }
+        let longest = self.settings.timeout;
+        let answer = tokio::time::timeout(longest, self.attempts(target, repeat)).await;
+        answer.unwrap_or(Err(Error::Timeout(longest)))
+    }
+
+    async fn attempts(&mut self, target: &str, repeat: Repeat) -> Result<Answer, Error> {
         // Whether the signature answers a challenge of this very exchange.
         let mut signed_fresh = false;
         for _ in 0..MAX_ATTEMPTS {
-            let response = match self.request(target).await {
-                Err(Error::Broken(_)) if self.connected => {
+            let response = match self.request(target, repeat).await {
+                Err(Error::Broken(_)) if self.connected && repeat == Repeat::WhereBroken => {
                     self.connected = false;
                     continue;
                 }
@@ -203,7 +227,8 @@ impl Client {
             };
             let status = response.status();
             if status == StatusCode::UNAUTHORIZED {
-                let stale = self.authenticator.challenged(response.headers())?;
+                let stale =
+                    self.authenticator.challenged(response.headers(), self.settings.location.is_https())?;
                 if signed_fresh && !stale {
                     self.locked_out = !self.accepted;
                     return Err(if self.accepted { self.not_permitted() } else { self.bad_credentials() });
@@ -227,10 +252,12 @@ impl Client {
         Err(Error::Unexpected("challenged or redirected again and again".to_owned()))
     }
 
-    async fn request(&mut self, target: &str) -> Result<Response, Error> {
+    async fn request(&mut self, target: &str, repeat: Repeat) -> Result<Response, Error> {
         let url = self.settings.location.join(target)?;
-        let mut request = self.http.get(url);
-        if let Some(authorization) = self.authenticator.authorization(target)? {
+        let target = path_and_query(&url);
+        let http = if repeat == Repeat::Never { &self.http_once } else { &self.http };
+        let mut request = http.get(url);
+        if let Some(authorization) = self.authenticator.authorization(&target)? {
             request = request.header(AUTHORIZATION, authorization);
         }
         let mut headers = HeaderMap::new();
@@ -261,7 +288,7 @@ impl Client {
         };
         // Where TLS cannot be set up nothing changes, so that each attempt fails alike.
         let settings = ClientSettings { location, ..self.settings.clone() };
-        self.http = http_client(&settings)?;
+        (self.http, self.http_once) = (http_client(&settings, 1)?, http_client(&settings, 0)?);
         self.settings = settings;
         self.authenticator.forget_challenge();
         self.connected = false;
@@ -287,7 +314,13 @@ impl Client {
     }
 }
 
-fn http_client(settings: &ClientSettings) -> Result<reqwest::Client, Error> {
+/// What a request names of its address, and a signature covers.
+fn path_and_query(url: &Url) -> String {
+    url.query().map_or_else(|| url.path().to_owned(), |query| format!("{}?{query}", url.path()))
+}
+
+/// `idle`: connections that are kept for the next request.
+fn http_client(settings: &ClientSettings, idle: usize) -> Result<reqwest::Client, Error> {
     let tls = settings.trust.client_config(settings.location.is_https())?;
     reqwest::Client::builder()
         .tls_backend_preconfigured(tls)
@@ -295,7 +328,7 @@ fn http_client(settings: &ClientSettings) -> Result<reqwest::Client, Error> {
         .no_proxy()
         .redirect(redirect::Policy::none())
         .http1_only()
-        .pool_max_idle_per_host(1)
+        .pool_max_idle_per_host(idle)
         .connect_timeout(settings.timeout)
         .timeout(settings.timeout)
         .tcp_nodelay(true)

@@ -42,6 +42,9 @@ pub enum Error {
     /// The camera wants a kind of authentication that is not spoken here.
     #[error("the camera asks for an unsupported kind of authentication: {0}")]
     UnsupportedAuthentication(String),
+    /// The camera asks for Basic authentication, and that may not be given.
+    #[error("the camera asks for Basic authentication, which shows the password to whoever listens")]
+    BasicRefused,
     /// An HTTP status that is neither success nor a challenge.
     #[error("the camera answered HTTP {status} {reason}")]
     Status {
@@ -105,6 +108,9 @@ impl Error {
                 "Correct `user` or `password`; nothing more is sent until then, so as not to lock the account."
             }
             Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
+            Self::BasicRefused => {
+                "Use https, or choose Digest in the camera's settings; `auth=basic` allows it all the same; retrying."
+            }
             Self::NotPermitted { .. } => {
                 "Give this user the right to control PTZ, or set another `user` and `password`; retrying once a minute, so as not to lock the account."
             }

@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::{Error, Secret};
 
-/// Where the camera is: `http://host`, `https://host:port`. Holds no user and no password.
+/// Where the camera is: `http://host`, `https://host:port`, or behind a proxy `https://host/path`. Holds no user and no
+/// password.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(into = "String", try_from = "String")]
 pub struct Location(Url);
@@ -39,11 +40,12 @@ impl Location {
             user: Some(decoded(url.username())).filter(|user| !user.is_empty()),
             password: url.password().map(|password| Secret::new(decoded(password))),
         };
-        // A cleared address has no path, query or user that could reach a log or a request.
+        // A cleared address has no query and no user that could reach a log or a request.
         if url.set_username("").and_then(|()| url.set_password(None)).is_err() {
             return Err(wrong("user and password cannot be taken out".to_owned()));
         }
-        url.set_path("/");
+        let path = prefix(url.path()).to_owned();
+        url.set_path(&path);
         url.set_query(None);
         url.set_fragment(None);
         Ok((Self(url), user_info))
@@ -56,8 +58,9 @@ impl Location {
 
     /// The address of a request; `target` is path and query.
     pub(super) fn join(&self, target: &str) -> Result<Url, Error> {
+        let prefix = self.0.path().trim_end_matches('/');
         self.0
-            .join(target)
+            .join(&format!("{prefix}{target}"))
             .map_err(|err| Error::Location { location: self.to_string(), reason: err.to_string() })
     }
 
@@ -66,6 +69,8 @@ impl Location {
         let target = self.0.join(redirect).ok()?;
         let upgrade = !self.is_https() && target.scheme() == "https" && target.host() == self.0.host();
         let (location, _) = upgrade.then(|| Self::parse(target.as_str()).ok())??;
+        // Elsewhere on the same host somebody else may be.
+        let location = Some(location).filter(|location| location.0.path() == self.0.path())?;
         Some(location)
     }
 }
@@ -88,6 +93,13 @@ impl fmt::Display for Location {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(self.0.as_str().trim_end_matches('/'))
     }
+}
+
+/// What of a path stands before VAPIX' own, which is often pasted along.
+fn prefix(path: &str) -> &str {
+    const OWN: [&str; 2] = ["/axis-cgi", "/axis-media"];
+    let end = OWN.iter().filter_map(|own| path.find(own)).min().unwrap_or(path.len());
+    path.get(..end).unwrap_or(path).trim_end_matches('/')
 }
 
 /// `text` without what stands before an `@` in its authority, for messages about addresses that do not parse.
@@ -118,6 +130,26 @@ mod tests {
         assert_eq!(info.user.as_deref(), Some("root"));
         assert_eq!(info.password, Some(Secret::new("p@ss")));
         assert!(!format!("{location:?} {info:?}").contains("p@ss"));
+    }
+
+    #[test]
+    fn a_path_in_front_of_the_cameras_own_is_kept() {
+        for (text, shown, request) in [
+            ("http://camera", "http://camera", "http://camera/axis-cgi/a?b=c"),
+            ("http://camera/", "http://camera", "http://camera/axis-cgi/a?b=c"),
+            ("https://proxy/door/1", "https://proxy/door/1", "https://proxy/door/1/axis-cgi/a?b=c"),
+            ("https://proxy/door/1/", "https://proxy/door/1", "https://proxy/door/1/axis-cgi/a?b=c"),
+            ("http://proxy/1/axis-cgi/com/ptz.cgi?info=1", "http://proxy/1", "http://proxy/1/axis-cgi/a?b=c"),
+        ] {
+            let (location, _) = Location::parse(text).unwrap();
+            assert_eq!(location.to_string(), shown);
+            assert_eq!(location.join("/axis-cgi/a?b=c").unwrap().as_str(), request);
+            assert_eq!(Location::parse(&location.to_string()).unwrap().0, location);
+        }
+        let (location, _) = Location::parse("http://proxy/1").unwrap();
+        let upgraded = |redirect| location.upgraded_by(redirect).map(|location| location.to_string());
+        assert_eq!(upgraded("https://proxy/1/axis-cgi/a"), Some("https://proxy/1".to_owned()));
+        assert_eq!(upgraded("https://proxy/2/axis-cgi/a"), None);
     }
 
     #[test]

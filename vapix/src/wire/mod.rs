@@ -21,7 +21,7 @@ mod text;
 mod tls;
 
 pub use attributes::Attributes;
-pub use auth::{Credentials, answer_to_challenge};
+pub use auth::{Authentication, Credentials, answer_to_challenge};
 pub use client::{Client, ClientSettings, Identity};
 pub use command::Command;
 pub use cookies::answer_to_cookie;

@@ -3,7 +3,7 @@
 //! Read by key and never by place, as the set of keys varies with camera and firmware; lines end in
 //! CRLF (`ptz.cgi`) or LF (`param.cgi`). Every field is optional.
 
-use servo::{Limits, Position, Range};
+use servo::{HardLimits, Position, Range};
 
 use super::Error;
 
@@ -34,13 +34,13 @@ pub fn parse_position(body: &str) -> Result<Position, Error> {
 ///
 /// # Errors
 /// [`Error::Unexpected`] where it tells no limit.
-pub fn parse_limits(body: &str) -> Result<Limits, Error> {
+pub fn parse_limits(body: &str) -> Result<HardLimits, Error> {
     let limits = limits_of(&Fields::of(body), "");
-    if limits == Limits::default() { Err(unexpected(body)) } else { Ok(limits) }
+    if limits == HardLimits::default() { Err(unexpected(body)) } else { Ok(limits) }
 }
 
-fn limits_of(fields: &Fields, prefix: &str) -> Limits {
-    Limits {
+fn limits_of(fields: &Fields, prefix: &str) -> HardLimits {
+    HardLimits {
         pan_deg: fields.range(prefix, "Pan"),
         tilt_deg: fields.range(prefix, "Tilt"),
         zoom_steps: fields.range(prefix, "Zoom"),
@@ -56,7 +56,7 @@ fn limits_of(fields: &Fields, prefix: &str) -> Limits {
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Parameters {
     /// `PTZ.Limit.L#`.
-    pub limits: Limits,
+    pub limits: HardLimits,
     /// `PTZ.Various.V#.ProportionalSpeedEnabled`: speed is bound to the field of view.
     pub proportional_speed: Option<bool>,
     /// `PTZ.Various.V#.MaxProportionalSpeed`: the bound, in fields of view per second.

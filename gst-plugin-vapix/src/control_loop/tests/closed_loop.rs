@@ -8,7 +8,7 @@ use std::time::Duration;
 use ptztrack_contract::{Point, Rect, Vector};
 
 use servo::{
-    Estimates, Limits, Measurement, PanTilt, Position, Range, ServoSettings, View, Visibility, around_deg,
+    Estimates, HardLimits, Measurement, PanTilt, Position, Range, ServoSettings, View, Visibility, around_deg,
 };
 use vapix::session::{Next, Query, Request, Response};
 use vapix::wire::{Command, Error};
@@ -303,7 +303,7 @@ impl Simulation {
                 tilt_deg: Some(self.pose().tilt),
                 zoom_steps: Some(self.head.now().pose.zoom_step.round()),
             }),
-            Request::Query(Query::Limits) => Response::Limits(Limits {
+            Request::Query(Query::Limits) => Response::Limits(HardLimits {
                 pan_deg: Some(range(self.setup.pan_limits_deg())),
                 tilt_deg: Some(range(TILT_LIMITS_DEG)),
                 zoom_steps: Some(range(ZOOM_RANGE)),

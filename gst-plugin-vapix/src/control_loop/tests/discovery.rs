@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{Home, Limits, Measurement, Position, Presets, Range, ServoSettings, Visibility};
+use servo::{HardLimits, Home, Measurement, Position, Presets, Range, ServoSettings, Visibility};
 use vapix::session::{ConnectionChange, Next, Query, Request, Response, SessionEvent};
 use vapix::wire::{Command, Error, Parameters, QueueRequest};
 
@@ -31,9 +31,10 @@ fn told(request: &Request) -> Result<Response, Error> {
         Request::Query(Query::Position) => {
             Response::Position(Position { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom_steps: Some(1.0) })
         }
-        Request::Query(Query::Limits) => {
-            Response::Limits(Limits { pan_deg: Some(Range { min: -170.0, max: 170.0 }), ..Limits::default() })
-        }
+        Request::Query(Query::Limits) => Response::Limits(HardLimits {
+            pan_deg: Some(Range { min: -170.0, max: 170.0 }),
+            ..HardLimits::default()
+        }),
         Request::Query(Query::Parameters) => {
             Response::Parameters(Parameters { proportional_speed: Some(false), ..Parameters::default() })
         }
@@ -189,9 +190,9 @@ fn after_an_outage_all_is_asked_and_only_what_is_new_is_told() {
     outage(&mut meeting, told);
     assert_eq!((meeting.met(), meeting.asked(Query::Limits), meeting.asked(Query::MoveSpeed)), (None, 2, 2));
     outage(&mut meeting, |request| match request {
-        Request::Query(Query::Limits) => Ok(Response::Limits(Limits {
+        Request::Query(Query::Limits) => Ok(Response::Limits(HardLimits {
             pan_deg: Some(Range { min: -90.0, max: 90.0 }),
-            ..Limits::default()
+            ..HardLimits::default()
         })),
         Request::Query(Query::Position) => told(request),
         _ => Err(refused()),

@@ -60,10 +60,10 @@ impl Rig {
                     tilt_deg: Some(0.0),
                     zoom_steps: Some(1.0),
                 })),
-                Request::Query(Query::Limits) => Ok(Response::Limits(Limits {
+                Request::Query(Query::Limits) => Ok(Response::Limits(HardLimits {
                     pan_deg: Some(Range { min: -170.0, max: 170.0 }),
                     field_angle_deg: Some(Range { min: 3.2, max: 60.0 }),
-                    ..Limits::default()
+                    ..HardLimits::default()
                 })),
                 Request::Query(_) => Err(Error::Camera("none".to_owned())),
             });
@@ -253,7 +253,8 @@ fn a_camera_that_hears_is_stopped_before_we_are_somebody_else() {
 #[test]
 fn what_was_learned_outlives_the_same_answers_and_no_others() {
     let mut rig = Rig::new(ServoSettings::default());
-    let limits = |wide| Limits { field_angle_deg: Some(Range { min: 3.2, max: wide }), ..Limits::default() };
+    let limits =
+        |wide| HardLimits { field_angle_deg: Some(Range { min: 3.2, max: wide }), ..HardLimits::default() };
     let attributes = |fastest| Attributes {
         speeds: [(1.0, 0.05), (100.0, fastest)].map(|(step, value)| TableRow { step, value }).to_vec(),
         ..Attributes::default()

@@ -1,7 +1,7 @@
 //! Where the camera looks, told or not, and what follows from that for limits and home.
 
 use super::*;
-use servo::{Home, SoftLimits};
+use servo::{Home, Mounting, SoftLimits};
 
 /// A camera at this pan; `None`: it will not tell.
 fn looking(pan_deg: Option<f64>) -> impl Fn(&Request) -> Option<Result<Response, Error>> {
@@ -83,4 +83,17 @@ fn a_zoom_is_ended_before_the_camera_goes_home() {
     let mut sent = rig.after(ms(100));
     sent.extend(rig.after(ms(100)));
     assert!(matches!(sent[..], [Command::REST, Command::Absolute { pan_deg: 9.0, .. }]), "{sent:?}");
+}
+
+/// The camera counts in its own picture, which is the one that arrives: an axis that is inverted within it inverts that too.
+#[test]
+fn whichever_axis_is_inverted_the_camera_centres_the_place_that_is_seen() {
+    for (invert_pan, invert_tilt) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mounting = Mounting { invert_pan, invert_tilt, ..Mounting::default() };
+        let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, mounting, ..ServoSettings::default() });
+        rig.see(0.9, 0.2);
+        let sent = rig.after(ms(0));
+        let [Command::Centre { x, y, width: 640, height: 480, .. }] = sent[..] else { panic!("{sent:?}") };
+        assert!(x.abs_diff(576) <= 1 && y.abs_diff(96) <= 1, "{mounting:?}: {x}, {y}");
+    }
 }

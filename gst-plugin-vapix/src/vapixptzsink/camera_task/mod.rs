@@ -26,7 +26,7 @@ use crate::lock::lock;
 use servo::ServoSettings;
 use vapix::session::{Next, Query, Request, Response};
 use vapix::watchdog::{Unavailable, Watchdog};
-use vapix::wire::{Client, ClientSettings, Command, Error, Location};
+use vapix::wire::{Client, ClientSettings, Command, Credentials, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 pub const STOP_GRACE: Duration = Duration::from_millis(500);
@@ -115,7 +115,13 @@ impl CameraTask {
         let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
-        let task = Task { client, settings: settings.clone(), dead_man: DeadMan::new(watchdog), state };
+        let task = Task {
+            client,
+            settings: settings.clone(),
+            dead_man: DeadMan::new(watchdog),
+            state,
+            former: None,
+        };
         let running = runtime.spawn(task.run());
         let task = Self { camera, mailbox, statistics, paused_at: Mutex::default() };
         let predecessor = task.predecessor();
@@ -244,6 +250,8 @@ struct Task<O> {
     settings: Arc<Mutex<ClientSettings>>,
     dead_man: DeadMan,
     state: TaskState<O>,
+    /// Who we were when the camera last moved, where it has not confirmed a stop since.
+    former: Option<Option<Credentials>>,
 }
 
 impl<O: Fn(Event) + Send + Sync> Task<O> {
@@ -256,6 +264,7 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
             if self.state.credentials.is_some() {
                 self.change_credentials().await;
             }
+            self.fall_back();
             self.keep_lease().await;
             self.state.publish();
             if self.state.is_over() {
@@ -300,10 +309,27 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
             self.state.take_mail();
         }
         if let Some(credentials) = self.state.credentials.take() {
-            lock(&self.settings).credentials.clone_from(&credentials);
-            self.client.set_credentials(credentials);
-            self.state.control.session_mut().credentials_changed();
+            self.former.get_or_insert(lock(&self.settings).credentials.clone());
+            self.become_known_as(credentials);
         }
+    }
+
+    /// Where the camera refuses us, but moves at our word: then we are again who it knew.
+    fn fall_back(&mut self) {
+        let session = self.state.control.session();
+        if session.stays_at_rest() {
+            self.former = None;
+        } else if session.halted()
+            && let Some(former) = self.former.take()
+        {
+            self.become_known_as(former);
+        }
+    }
+
+    fn become_known_as(&mut self, credentials: Option<Credentials>) {
+        lock(&self.settings).credentials.clone_from(&credentials);
+        self.client.set_credentials(credentials);
+        self.state.control.session_mut().credentials_changed();
     }
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
@@ -382,6 +408,7 @@ mod tests {
             location,
             camera: 1,
             credentials: None,
+            authentication: vapix::wire::Authentication::default(),
             timeout: Duration::from_secs(2),
             trust: Trust::System,
         };

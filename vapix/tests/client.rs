@@ -1,0 +1,94 @@
+//! How often a request is sent.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+use std::io::{BufRead, BufReader, Write};
+use std::net::{TcpListener, TcpStream};
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use vapix::wire::{Authentication, Client, ClientSettings, Command, Error, Location, Trust};
+
+const RIGHT: Command = Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false };
+const CENTRE: Command = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: None };
+
+type Asked = Arc<Mutex<Vec<String>>>;
+
+/// A camera that says yes, but closes the connection instead after the requests that are `silent`, by their number from 1;
+/// and after so many requests in any case. What it was asked is in the list.
+fn camera(requests: usize, silent: fn(usize) -> bool) -> (Client, Asked) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    let asked = Asked::default();
+    let list = asked.clone();
+    std::thread::spawn(move || {
+        for stream in listener.incoming() {
+            let (stream, list) = (stream.unwrap(), list.clone());
+            std::thread::spawn(move || serve(stream, requests, silent, &list));
+        }
+    });
+    let client = Client::new(ClientSettings {
+        location: Location::parse(&format!("http://{address}")).unwrap().0,
+        camera: 1,
+        credentials: None,
+        authentication: Authentication::Auto,
+        timeout: Duration::from_secs(60),
+        trust: Trust::System,
+    });
+    (client.unwrap(), asked)
+}
+
+fn serve(mut stream: TcpStream, requests: usize, silent: fn(usize) -> bool, asked: &Mutex<Vec<String>>) {
+    let mut lines = BufReader::new(stream.try_clone().unwrap()).lines();
+    for _ in 0..requests {
+        let Some(Ok(request)) = lines.next() else { return };
+        while lines.next().is_some_and(|line| line.is_ok_and(|line| !line.is_empty())) {}
+        let number = {
+            let mut asked = asked.lock().unwrap();
+            asked.push(request);
+            asked.len()
+        };
+        if silent(number) {
+            return;
+        }
+        stream.write_all(b"HTTP/1.1 204 No Content\r\n\r\n").unwrap();
+    }
+}
+
+fn send(client: &mut Client, commands: &[Command]) -> Vec<Result<(), Error>> {
+    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
+    runtime.block_on(async {
+        let mut answers = Vec::new();
+        for command in commands {
+            answers.push(client.send(command).await);
+        }
+        answers
+    })
+}
+
+fn count(asked: &Mutex<Vec<String>>, word: &str) -> usize {
+    asked.lock().unwrap().iter().filter(|request| request.contains(word)).count()
+}
+
+#[test]
+fn what_may_be_repeated_is_sent_again_where_the_connection_breaks() {
+    let (mut client, asked) = camera(10, |number| number == 2);
+    assert_eq!(send(&mut client, &[RIGHT, RIGHT]), [Ok(()), Ok(())]);
+    assert_eq!(count(&asked, "continuouspantiltmove"), 3);
+}
+
+/// It may have arrived, and would lead on from where it led.
+#[test]
+fn centring_is_never_sent_twice() {
+    let (mut client, asked) = camera(10, |number| number == 2);
+    let answers = send(&mut client, &[RIGHT, CENTRE]);
+    assert!(matches!(answers.as_slice(), [Ok(()), Err(Error::Broken(_))]), "{answers:?}");
+    assert_eq!(count(&asked, "center"), 1);
+}
+
+/// As cameras close a connection that was idle for long.
+#[test]
+fn centring_does_not_meet_a_closed_connection() {
+    let (mut client, asked) = camera(1, |_| false);
+    assert_eq!(send(&mut client, &[CENTRE, RIGHT, CENTRE, CENTRE]), [Ok(()), Ok(()), Ok(()), Ok(())]);
+    assert_eq!(count(&asked, "center"), 3);
+}
