@@ -2,11 +2,13 @@
 //! inside the test, and waiting for something to happen without sleeping.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod front;
 mod launch;
 mod pipeline;
 pub mod scene;
 mod watchdog;
 
+pub use front::{Front, Way};
 pub use launch::{GstLaunch, plugin_folder, tool};
 pub use pipeline::{Running, init};
 pub use watchdog::Watchdog;
