@@ -16,12 +16,12 @@ use crate::{
 #[derive(Debug, Clone, Parser)]
 #[command(name = "evaluate", version, after_help = EXAMPLES)]
 pub struct Args {
-    /// Tests by number, `7` or `1-6`; all 72 unless given
+    /// Tests by number, `7` or `1-6`; all of the suite unless given
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
     pub test: Vec<Tests>,
-    /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests have
-    /// codecs and delays of their own
-    #[arg(long, value_parser = suite, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time"])]
+    /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests, numbered
+    /// too, have codecs, sizes and delays of their own
+    #[arg(long, value_parser = suite, conflicts_with_all = ["sweep_delay", "footage", "still_recording", "real_time"])]
     pub suite: Option<Suite>,
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
@@ -110,6 +110,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   evaluate                                           all 72 tests in a simulated room
+  evaluate --suite hard --seed 1-3                   38 hard tests: several people, nobody, cameras with faults
   evaluate --test 1-6 --tracker ptztrack,oracle --record
   evaluate --footage walk.mp4 --truth walk.csv --tracker ptztrack,thesis,csrt
                                                      a camera that turns within a recording, in closed loop
@@ -193,10 +194,11 @@ const SWEPT: [u32; 4] = [1, 19, 37, 55];
 impl Args {
     /// The tests asked for, in order and each once.
     pub fn tests(&self) -> Vec<TestId> {
-        let asked = |test: &TestId| {
-            self.test.is_empty() || self.test.iter().any(|Tests(range)| range.contains(&test.0))
-        };
-        TestId::all().filter(asked).collect()
+        TestId::all().filter(|test| self.asks_for(*test)).collect()
+    }
+
+    fn asks_for(&self, test: TestId) -> bool {
+        self.test.is_empty() || self.test.iter().any(|Tests(range)| range.contains(&test.0))
     }
 
     /// The trackers asked for, in the order of the tables, and what is to be said of those that are left out.
@@ -320,7 +322,9 @@ impl Args {
             trackers.iter().flat_map(|name| self.seeds().into_iter().map(move |seed| (name, seed)))
         {
             let Some(scene) = Scene::room(TestId(1), seed) else { continue };
-            experiments.extend(hard::experiments(name, seed, &self.experiment(scene, name, seed)));
+            let all = (1..).zip(hard::experiments(name, seed, &self.experiment(scene, name, seed)));
+            let asked = |(number, _): &(u32, Experiment)| self.asks_for(TestId(*number));
+            experiments.extend(all.filter(asked).map(|(_, experiment)| experiment));
         }
         experiments
     }
@@ -381,6 +385,16 @@ mod tests {
         assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
         assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
         assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
+    }
+
+    #[test]
+    fn hard_tests_have_numbers_and_seeds() {
+        let args = parse("--suite hard --test 1-3 --seed 2,4").unwrap();
+        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
+        let seeds: Vec<_> = experiments.iter().map(|one| one.seed).collect();
+        assert_eq!(seeds, [2, 2, 2, 4, 4, 4]);
+        assert!(experiments.iter().all(|one| one.scene.suite == Suite::Hard));
+        assert!(parse("--suite room").is_err());
     }
 
     #[test]

@@ -10,8 +10,11 @@ use crate::{
     record::{Codec, Delays, Suite, TrackerName},
 };
 
-/// Pictures a second where nobody comes for ten minutes: more would say no more, and take longer.
+/// Where nobody comes for ten minutes, pictures are fewer (a second) and smaller than usual: all would take half an hour.
 const EMPTY_RATE: f64 = 10.0;
+const EMPTY_SIZE: (u32, u32) = (320, 240);
+/// Pictures a second of three minutes' wandering.
+const WANDER_RATE: f64 = 12.5;
 /// The field of view of a camera that is zoomed in, in degrees.
 const NARROW_DEG: f64 = 12.0;
 /// The room's widest field of view in degrees, and its magnification at zoom step 9999.
@@ -26,6 +29,7 @@ struct Trial {
     room: RoomSettings,
     camera: Settings,
     codec: Codec,
+    size: (u32, u32),
     delays: Delays,
     servo: &'static str,
 }
@@ -43,7 +47,10 @@ const TESTS: [(&str, Change); 38] = [
     ("sit down and rise", |trial| trial.room.action = Action::Sit),
     ("towards the camera and away", |trial| trial.room.action = Action::Approach),
     ("run at 4 m/s", |trial| trial.room.action = Action::Run),
-    ("wander for 3 min", |trial| trial.room.action = Action::Wander),
+    ("wander for 3 min", |trial| {
+        trial.room.action = Action::Wander;
+        trial.camera.video.frame_rate = Some(WANDER_RATE);
+    }),
     ("zoomed in to 12 degrees", |trial| {
         let mut home = trial.room.home();
         let tangent = |degrees: f64| (degrees / 2.0).to_radians().tan();
@@ -92,12 +99,19 @@ impl Trial {
     fn new(seed: u64) -> Self {
         let number = 37 + (seed % 3) as u32;
         let room = RoomSettings::test(number, seed).unwrap_or_default();
-        Self { room, camera: Settings::default(), codec: Codec::Mjpeg, delays: Delays::default(), servo: "" }
+        Self {
+            room,
+            camera: Settings::default(),
+            codec: Codec::Mjpeg,
+            size: (640, 480),
+            delays: Delays::default(),
+            servo: "",
+        }
     }
 
     fn empty(&mut self, events: &[Event]) {
         (self.room.action, self.room.events) = (Action::Nobody, events.to_vec());
-        self.camera.video.frame_rate = Some(EMPTY_RATE);
+        (self.size, self.camera.video.frame_rate) = (EMPTY_SIZE, Some(EMPTY_RATE));
     }
 
     /// Lets the camera turn by so much of the speed that the servo expects.
@@ -117,15 +131,18 @@ impl Trial {
             title: title.into(),
             path: title.into(),
             duration: self.room.duration(),
-            place: Place::Camera(Box::new(Settings { world: World::Room(self.room), ..self.camera })),
+            place: Place::Camera(Box::new(Settings {
+                world: World::Room(self.room.clone()),
+                ..self.camera.clone()
+            })),
             target,
         };
-        let (codec, delays, servo) = (self.codec, self.delays, self.servo);
-        Experiment { codec, delays, servo, ..Experiment::new(scene, tracker, seed) }
+        let (codec, size, delays, servo) = (self.codec, self.size, self.delays, self.servo);
+        Experiment { codec, size, delays, servo, ..Experiment::new(scene, tracker, seed) }
     }
 }
 
-/// All tests in the rooms of a seed; `like` says what else is as asked for.
+/// All tests in the rooms of a seed, in the order of their numbers from 1; `like` says what else is as asked for.
 pub fn experiments(tracker: TrackerName, seed: u64, like: &Experiment) -> Vec<Experiment> {
     let test = |(title, change): (&str, Change)| {
         let mut trial = Trial::new(seed);
