@@ -7,7 +7,7 @@ use super::{
     scene::{Scene, Style},
     sensor::{Sensor, soften},
     settings::RoomSettings,
-    view::View,
+    view::{Vector, View},
     walker::{BodyPose, Walker, obstacles},
 };
 use crate::{
@@ -63,9 +63,10 @@ impl Room {
         let seeded = Seeded::new(room.seed);
         let walkers = Walker::all(room);
         let obstacles = obstacles(&walkers, room);
+        let trodden: Vec<Vector> = walkers.iter().flat_map(|walker| walker.walk().off_the_way()).collect();
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         Self {
-            scene: Scene::new(room.seed, &obstacles, &room.events),
+            scene: Scene::new(room.seed, &obstacles, &room.events, &trodden),
             walkers,
             effects: Effects::new(room),
             sensor: Sensor::new(

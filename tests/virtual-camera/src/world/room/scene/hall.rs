@@ -69,7 +69,13 @@ impl Hall {
     }
 
     /// Everything in the hall: walls and what hangs on them in the order of drawing, and what stands there.
-    pub fn furnish(&mut self, painter: &Painter, seeded: &mut Seeded) -> (Vec<Surface>, Vec<Piece>) {
+    /// People tread on the floor at `trodden`.
+    pub fn furnish(
+        &mut self,
+        trodden: &[Vector],
+        painter: &Painter,
+        seeded: &mut Seeded,
+    ) -> (Vec<Surface>, Vec<Piece>) {
         let look = Look::new(self.style, painter, seeded);
         let Walls { hung, mut pieces, windows, .. } =
             Walls::furnished(&self.places(), &look, painter, seeded);
@@ -83,7 +89,7 @@ impl Hall {
             self.light.lamps = standing::lamps(self.back, painter, seeded, &mut pieces);
         }
         if self.style.full {
-            standing::fill(self.back, painter, seeded, &mut pieces);
+            standing::fill(self.back, trodden, painter, seeded, &mut pieces);
         }
         shell.extend(hung);
         self.light.windows = windows;

@@ -58,12 +58,12 @@ pub(super) struct Scene {
 
 impl Scene {
     /// The room of a seed with what `events` need. `obstacles` stand on the floor where their boxes are; what they are is
-    /// up to the seed.
-    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event]) -> Self {
+    /// up to the seed. Nothing else stands where people tread, at `trodden`.
+    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event], trodden: &[Vector]) -> Self {
         let (seeded, style) = (Seeded::new(seed), Style::of(seed));
         let painter = Painter::new(seeded.fork(1));
         let mut hall = Hall::new(style, &mut seeded.fork(2));
-        let (mut shell, mut pieces) = hall.furnish(&painter, &mut seeded.fork(3));
+        let (mut shell, mut pieces) = hall.furnish(trodden, &painter, &mut seeded.fork(3));
         let mut choice = seeded.fork(4);
         for &(kind, solid) in obstacles {
             pieces.extend(hall.obstacle(kind, solid, &painter, &mut choice));

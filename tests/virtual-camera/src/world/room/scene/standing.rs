@@ -12,6 +12,8 @@ const WAY: (f64, f64) = (4.7, 7.4);
 const NEAREST: f64 = 1.5;
 /// From side to side, in metres.
 const WIDTH: (f64, f64) = (-7.6, 7.6);
+/// How far people keep from things, in metres.
+const BERTH: f64 = 0.45;
 /// Places that are tried, before the way and behind it.
 const TRIES: (usize, usize) = (9, 22);
 
@@ -21,8 +23,14 @@ fn farthest_before(height: f64) -> f64 {
     WAY.0 * (CAMERA[1] - height) / CAMERA[1]
 }
 
-/// Fills the floor of a hall that is so deep with tables, chairs and plants, wherever there is room.
-pub(super) fn fill(back: f64, painter: &Painter, seeded: &mut Seeded, pieces: &mut Vec<Piece>) {
+/// Fills the floor of a hall that is so deep with tables, chairs and plants, wherever there is room and nobody treads.
+pub(super) fn fill(
+    back: f64,
+    trodden: &[Vector],
+    painter: &Painter,
+    seeded: &mut Seeded,
+    pieces: &mut Vec<Piece>,
+) {
     for number in 0..TRIES.0 + TRIES.1 {
         let before = number < TRIES.0;
         // Plants are high: none of them before the way.
@@ -41,7 +49,8 @@ pub(super) fn fill(back: f64, painter: &Painter, seeded: &mut Seeded, pieces: &m
         let z = seeded.range(near + round, far - round);
         let x = seeded.range(WIDTH.0, WIDTH.1);
         let at = Solid { base: [x, 0.0, z], size, yaw_deg };
-        if pieces.iter().any(|piece| piece.solid.distance(at.base) < round + 0.05) {
+        let is_trodden = trodden.iter().any(|feet| at.distance(*feet) < BERTH);
+        if is_trodden || pieces.iter().any(|piece| piece.solid.distance(at.base) < round + 0.05) {
             continue;
         }
         pieces.extend(match kind {

@@ -18,7 +18,7 @@ fn picture(scene: &Scene, view: &View) -> Canvas {
 }
 
 fn scene(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Scene {
-    Scene::new(seed, obstacles, &[])
+    Scene::new(seed, obstacles, &[], &[])
 }
 
 fn spread(plane: &Plane) -> f64 {
@@ -166,7 +166,7 @@ fn what_moves_moves_and_nothing_else_does() {
     let still = scene(1, &[]);
     assert_eq!(picture(&still, 0.0), picture(&still, 60.0));
     for event in [Event::Door, Event::Film, Event::Draught] {
-        let scene = Scene::new(1, &[], &[event]);
+        let scene = Scene::new(1, &[], &[event], &[]);
         let pictures: Vec<_> = (0..300).map(|second| picture(&scene, f64::from(second) * 0.7)).collect();
         assert!(pictures.windows(2).any(|pair| pair[0] != pair[1]), "{event:?}");
         assert_eq!(pictures[7], picture(&scene, 7.0 * 0.7), "{event:?}");

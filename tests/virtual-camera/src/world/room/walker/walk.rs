@@ -6,7 +6,7 @@ use super::{
     super::{
         action::Action,
         settings::{Change, RoomSettings},
-        view::CAMERA,
+        view::{CAMERA, Vector},
     },
     cast, route,
 };
@@ -30,6 +30,8 @@ const TO_THE_EDGE: f64 = 1.7;
 pub(super) const RATE: f64 = 250.0;
 /// Height of the middle of a person, in metres.
 const MIDDLE: f64 = 0.87;
+/// No test's way is nearer to the camera, in metres.
+const NEAREST_WAY: f64 = 4.7;
 /// Half of the widest view, in degrees.
 const HALF_VIEW_DEG: f64 = 27.5;
 /// How far above or below the middle of the first view somebody comes in, in degrees; all of them is in it still.
@@ -113,6 +115,13 @@ impl Walk {
             turning: between(before.turning, after.turning),
             seated: between(before.seated, after.seated),
         }
+    }
+
+    /// Where it leads nearer to the camera than the tests' ways, a place every half second.
+    pub fn off_the_way(&self) -> impl Iterator<Item = Vector> + '_ {
+        let every = (RATE / 2.0) as usize;
+        let near = self.moments.iter().step_by(every).filter(|moment| moment.z < NEAREST_WAY);
+        near.map(|moment| [moment.x, 0.0, moment.z])
     }
 
     /// When it is over, in seconds.
