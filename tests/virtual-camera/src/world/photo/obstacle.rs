@@ -8,7 +8,7 @@ use crate::world::Occlusion;
 
 /// How far from the lens it stands, as a part of the person's distance.
 const NEARNESS: f64 = 0.78;
-/// When the hiding begins, as a part of the time on the way.
+/// Where the hiding begins, as a part of the way from one end to the other.
 const BEGINS: f64 = 0.42;
 /// Seconds for which all of the person is hidden, or their legs.
 const HIDDEN: f64 = 1.0;
@@ -57,7 +57,7 @@ impl Obstacle {
             Occlusion::Full => HIDDEN,
         };
         let full = settings.occlusion == Occlusion::Full;
-        let begins = way.time_of(BEGINS);
+        let begins = way.time_at(BEGINS);
         let yaws = |from: f64, to: f64| {
             let start = way.at(from);
             let moments = (0..=50).map(|step| way.at(from + (to - from) * f64::from(step) / 50.0));

@@ -39,6 +39,16 @@ pub(super) struct Sprite {
     levels: Vec<(usize, usize, Vec<[u8; 4]>)>,
 }
 
+/// One of its levels.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Level<'a> {
+    width: usize,
+    height: usize,
+    pixels: &'a [[u8; 4]],
+    /// Its pixels in one of the whole picture, across and down.
+    finer: f64,
+}
+
 /// Everybody's pictures are decoded once, when they are needed.
 pub(super) struct Sprites {
     pub rows: Vec<Row>,
@@ -122,15 +132,21 @@ impl Sprite {
         Ok(Self { levels })
     }
 
-    /// What is at a place, in pixels of the picture whose edges are at whole numbers, where a sample is as wide as `step` of
-    /// these: nearest of the level that fits.
-    pub fn at(&self, x: f64, y: f64, step: f64) -> [u8; 4] {
+    /// The level for samples that are `step` pixels of the picture apart.
+    pub fn level(&self, step: f64) -> Level<'_> {
         let level = (step.max(1.0).log2().round() as usize).min(self.levels.len() - 1);
         let (width, height, pixels) = &self.levels[level];
-        let finer = f64::from(1u32 << level);
-        let (column, row) = ((x / finer).floor(), (y / finer).floor());
-        let inside = column >= 0.0 && row >= 0.0 && column < *width as f64 && row < *height as f64;
-        if inside { pixels[row as usize * width + column as usize] } else { [0; 4] }
+        Level { width: *width, height: *height, pixels, finer: 1.0 / f64::from(1u32 << level) }
+    }
+}
+
+impl Level<'_> {
+    /// What is at a place, in pixels of the whole picture, whose edges are at whole numbers: the nearest pixel.
+    #[inline]
+    pub fn at(self, x: f64, y: f64) -> [u8; 4] {
+        let (x, y) = (x * self.finer, y * self.finer);
+        let inside = x >= 0.0 && y >= 0.0 && x < self.width as f64 && y < self.height as f64;
+        if inside { self.pixels[y as usize * self.width + x as usize] } else { [0; 4] }
     }
 }
 

@@ -6,7 +6,7 @@ use super::{
     equirectangular::{Equirectangular, Rays},
     obstacle::Obstacle,
     settings::PhotoSettings,
-    sprite::{Sprite, Sprites},
+    sprite::{Level, Sprite, Sprites},
     way::{HEIGHT, Moment, Way},
 };
 use crate::{
@@ -56,32 +56,38 @@ struct Figure {
     sprite: Arc<Sprite>,
     mirrored: bool,
     foot: (f64, f64),
+    /// Sine and cosine of the direction they stand in, and how far away.
+    facing: (f64, f64),
+    away: f64,
     /// Pixels of the picture on a metre.
     per_metre: f64,
     eye: f64,
 }
 
 impl Figure {
-    /// What a ray (right, down, ahead) meets of them, where samples are `step` radians apart.
-    fn seen(&self, [right, down, ahead]: [f64; 3], step: f64) -> [u8; 4] {
-        // An upright board at their feet that faces the camera.
-        let away = self.moment.away();
-        let (sin, cos) = (self.moment.x / away, self.moment.z / away);
+    /// The level of the picture for samples that are `step` radians apart.
+    fn level(&self, step: f64) -> Level<'_> {
+        self.sprite.level(step * self.away * self.per_metre)
+    }
+
+    /// What a ray (right, down, ahead) meets of them: an upright board at their feet that faces the camera.
+    #[inline]
+    fn seen(&self, level: Level, [right, down, ahead]: [f64; 3]) -> [u8; 4] {
+        let (sin, cos) = self.facing;
         let depth = right * sin + ahead * cos;
         if depth <= 1e-6 {
             return [0; 4];
         }
-        let reach = away / depth;
+        let reach = self.away / depth;
         let across = (right * cos - ahead * sin) * reach * self.per_metre;
         let up = (self.eye - down * reach) * self.per_metre;
         let across = if self.mirrored { -across } else { across };
-        self.sprite.at(self.foot.0 + across, self.foot.1 - up, step * away * self.per_metre)
+        level.at(self.foot.0 + across, self.foot.1 - up)
     }
 
     /// Corners of the board in a view, generously; none where it is behind.
     fn bounds(&self, view: &View) -> Option<Bounds> {
-        let away = self.moment.away();
-        let (sin, cos) = (self.moment.x / away, self.moment.z / away);
+        let (sin, cos) = self.facing;
         let corners = [(-0.75, -0.12), (0.75, -0.12), (-0.75, 1.1), (0.75, 1.1)].map(|(right, up)| {
             let (right, up) = (right * 0.8 * HEIGHT / 1.75, up * HEIGHT - self.eye);
             let seen = view.turned([self.moment.x + right * cos, up, self.moment.z - right * sin]);
@@ -121,8 +127,11 @@ impl Photo {
         let moment = self.way.at(time);
         let (index, mirrored) = self.sprites.choose(moment.heading_deg, moment.walked);
         let row = &self.sprites.rows[index];
+        let away = moment.away();
         Ok(Figure {
             moment,
+            facing: (moment.x / away, moment.z / away),
+            away,
             mirrored,
             sprite: self.sprites.picture(index, self.settings.other_clothes)?,
             foot: row.foot,
@@ -174,7 +183,7 @@ impl Photo {
         let mut layer = Layer::new(window);
         let mut colours = vec![[0u8; 4]; window.width * window.height];
         for ((figure, (pose, view)), aside) in moments.iter().zip(ASIDE) {
-            let rays = Rays::new(pose, view);
+            let (rays, level) = (Rays::new(pose, view), figure.level(0.5 / view.pinhole.focal));
             let shade = |value: u8, zero: f64| {
                 (zero + (f64::from(value) - zero) * self.settings.place.shade).clamp(0.0, 255.0) as u8
             };
@@ -182,7 +191,7 @@ impl Photo {
                 let y = (window.top + row) as f64 + aside.1;
                 for (column, colour) in line.iter_mut().enumerate() {
                     let ray = rays.ray((window.left + column) as f64 + aside.0, y);
-                    let [luma, u, v, there] = figure.seen(ray, 0.5 / view.pinhole.focal);
+                    let [luma, u, v, there] = figure.seen(level, ray);
                     *colour = if there == 0 {
                         [0; 4]
                     } else {
@@ -198,8 +207,7 @@ impl Photo {
     /// Darkens the floor at somebody's feet.
     fn shade(&self, figure: &Figure, pose: &Pose, view: &View, canvas: &mut Picture) {
         let Some(bounds) = figure.bounds(view) else { return };
-        let (rays, away) = (Rays::new(pose, view), figure.moment.away());
-        let (sin, cos) = (figure.moment.x / away, figure.moment.z / away);
+        let (rays, (sin, cos)) = (Rays::new(pose, view), figure.facing);
         let plane = &mut canvas.planes[0];
         let rows = |place: f64| place.clamp(0.0, view.size.1 as f64) as usize;
         let from = rows(bounds.top + bounds.height * 0.7);
@@ -243,16 +251,22 @@ impl Photo {
         }
     }
 
-    /// What shows of somebody through a view: all of them, and what nothing hides.
-    fn shapes(&self, figure: &Figure, pose: &Pose, view: &View) -> [Plane; 2] {
-        let rays = Rays::new(pose, view);
+    /// All of somebody through a view, whatever hides them.
+    fn whole(&self, figure: &Figure, pose: &Pose, view: &View) -> Plane {
+        let (rays, level) = (Rays::new(pose, view), figure.level(1.0 / view.pinhole.focal));
         let mut whole = Plane::filled(view.size.0, view.size.1, 0);
         for (row, line) in whole.data.chunks_exact_mut(view.size.0.max(1)).enumerate() {
             for (column, pixel) in line.iter_mut().enumerate() {
-                let [.., there] = figure.seen(rays.ray(column as f64, row as f64), 1.0 / view.pinhole.focal);
+                let [.., there] = figure.seen(level, rays.ray(column as f64, row as f64));
                 *pixel = 255 * there;
             }
         }
+        whole
+    }
+
+    /// What shows of somebody through a view: all of them, and what nothing hides.
+    fn shapes(&self, figure: &Figure, pose: &Pose, view: &View) -> [Plane; 2] {
+        let whole = self.whole(figure, pose, view);
         let mut unhidden = whole.clone();
         self.hide(pose, view, &mut unhidden);
         [whole, unhidden]
@@ -274,7 +288,7 @@ impl Photo {
             ..view.pinhole
         };
         let close = view.through(pinhole, (around.width as usize + 2, around.height as usize + 2));
-        let [whole, _] = self.shapes(&figure, pose, &close);
+        let whole = self.whole(&figure, pose, &close);
         let lit = (0..whole.data.len()).filter(|&index| whole.data[index] > 0);
         let pixels =
             lit.map(|index| ((index % whole.width) as f64 + left, (index / whole.width) as f64 + top));
