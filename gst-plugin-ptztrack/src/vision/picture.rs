@@ -55,7 +55,9 @@ pub struct Reduced {
     width: usize,
     height: usize,
     luma: Vec<u8>,
-    chroma: Option<[Vec<u8>; 2]>,
+    chroma: [Vec<u8>; 2],
+    /// Whether `chroma` tells anything.
+    has_chroma: bool,
     /// Sums of columns.
     sums: Vec<u16>,
 }
@@ -66,27 +68,25 @@ impl Reduced {
         (self.width, self.height) = (width, height);
         self.reduce_into(picture.luma.into(), |reduced| &mut reduced.luma);
         match picture.chroma {
-            None => self.chroma = None,
+            None => {}
             Some(Chroma::Yuv(planes)) => {
-                let mut chroma = self.chroma.take().unwrap_or_default();
-                for (plane, out) in planes.into_iter().zip(&mut chroma) {
+                for (plane, out) in planes.into_iter().zip(&mut self.chroma) {
                     reduce(plane, (width, height), &mut self.sums, out);
                 }
-                self.chroma = Some(chroma);
             }
             Some(Chroma::Rgb([red, _, blue])) => {
                 // Luma holds what green says: U and V of BT.601, as for the luma.
-                let mut chroma = self.chroma.take().unwrap_or_default();
-                for ((plane, weight), out) in [(blue, 0.564), (red, 0.713)].into_iter().zip(&mut chroma) {
+                for ((plane, weight), out) in [(blue, 0.564), (red, 0.713)].into_iter().zip(&mut self.chroma)
+                {
                     reduce(plane, (width, height), &mut self.sums, out);
                     for (value, &luma) in out.iter_mut().zip(&self.luma) {
                         let difference = f32::from(*value) - f32::from(luma);
                         *value = (128.0 + weight * difference) as u8;
                     }
                 }
-                self.chroma = Some(chroma);
             }
         }
+        self.has_chroma = picture.chroma.is_some() && self.chroma.iter().any(|plane| has_colour(plane));
     }
 
     fn reduce_into(&mut self, samples: Samples, out: impl FnOnce(&mut Self) -> &mut Vec<u8>) {
@@ -105,14 +105,25 @@ impl Reduced {
         self.plane(&self.luma)
     }
 
-    /// Its U and V.
+    /// Its U and V; `None` where it is grey, as a camera's pictures are by night: grey says nothing of clothes.
     pub fn chroma(&self) -> Option<[Luma<'_>; 2]> {
-        self.chroma.as_ref().map(|[u, v]| [self.plane(u), self.plane(v)])
+        let [u, v] = &self.chroma;
+        self.has_chroma.then(|| [self.plane(u), self.plane(v)])
     }
 
     fn plane<'a>(&self, pixels: &'a [u8]) -> Luma<'a> {
         Luma::packed(pixels, self.width)
     }
+}
+
+/// How far from grey noise gets, and the least part of a picture that has a colour in a room that has any.
+const GREY: u8 = 3;
+const MIN_COLOURED: f64 = 0.001;
+
+/// Whether a plane of U or V has any colour.
+fn has_colour(plane: &[u8]) -> bool {
+    let coloured = plane.iter().filter(|value| value.abs_diff(128) > GREY).count();
+    coloured as f64 > MIN_COLOURED * plane.len() as f64
 }
 
 /// Means of rectangles of `samples`, `size` of them; where that is more than there are, the nearest sample.

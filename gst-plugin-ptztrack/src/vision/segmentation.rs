@@ -26,7 +26,47 @@ pub fn segment(likelihood: &Luma, open_size: usize, close_size: (usize, usize)) 
     }
     clean(&mut mask, open_size, close_size)?;
     keep_sure(&mut mask, &strong, needed)?;
+    shed_shadows(&mut mask)?;
     Ok(mask)
+}
+
+/// Columns of a region with less than this part of its tallest one may be a shadow on the floor beside somebody upright ...
+const LOW: f32 = 0.3;
+/// ... and are one where they go on for so many heights of it: farther than a foot or a hand reaches.
+const LONG: f32 = 0.25;
+
+/// Takes a long low tail off either side of each region: somebody stands upright, and their shadow lies (by the heights of
+/// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003).
+fn shed_shadows(mask: &mut Mat) -> opencv::Result<()> {
+    let (mut labels, mut boxes, mut centres) = (Mat::default(), Mat::default(), Mat::default());
+    let count = imgproc::connected_components_with_stats_def(mask, &mut labels, &mut boxes, &mut centres)?;
+    for label in 1..count {
+        let side = |side: i32| boxes.at_2d::<i32>(label, side).map(|value| *value as usize);
+        let (left, width) = (side(imgproc::CC_STAT_LEFT)?, side(imgproc::CC_STAT_WIDTH)?);
+        let (top, height) = (side(imgproc::CC_STAT_TOP)?, side(imgproc::CC_STAT_HEIGHT)?);
+        let mut heights = vec![0_usize; width];
+        for row in top..top + height {
+            let line = &labels.at_row::<i32>(row as i32)?[left..left + width];
+            line.iter().zip(&mut heights).for_each(|(&seen, height)| *height += usize::from(seen == label));
+        }
+        let tallest = heights.iter().copied().max().unwrap_or(0) as f32;
+        let low = |height: &&usize| (**height as f32) < LOW * tallest;
+        let long = |tail: usize| if tail as f32 >= LONG * tallest { tail } else { 0 };
+        let before = long(heights.iter().take_while(low).count());
+        let after = long(heights.iter().rev().take_while(low).count());
+        for row in top..top + height {
+            let line = &labels.at_row::<i32>(row as i32)?[left..left + width];
+            let pixels = &mut mask.at_row_mut::<u8>(row as i32)?[left..left + width];
+            for (x, (pixel, _)) in
+                pixels.iter_mut().zip(line).enumerate().filter(|(_, (_, seen))| **seen == label)
+            {
+                if x < before || x >= width - after {
+                    *pixel = 0;
+                }
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Clears the connected parts of `mask` that hold fewer than `needed` pixels of `strong`.
@@ -74,6 +114,16 @@ mod tests {
         let alone = segmented(&[(head, 255)]);
         let both = segmented(&[(body, 180), (head, 255)]);
         assert!(alone > 40 && both > 400, "{alone} {both}");
+    }
+
+    #[test]
+    fn somebody_leaves_their_shadow_behind_and_keeps_their_feet() {
+        let (body, shadow, foot) = ((50, 20, 14, 60), (10, 72, 40, 6), (64, 74, 6, 6));
+        let alone = segmented(&[(body, 255)]);
+        assert!((segmented(&[(body, 255), (shadow, 255)]) - alone).abs() < 30, "a shadow");
+        assert!(segmented(&[(body, 255), (foot, 255)]) > alone + 15, "a foot");
+        let beside = (80, 25, 14, 60);
+        assert!(segmented(&[(body, 255), (shadow, 255), (beside, 255)]) > 2 * alone - 60, "somebody beside");
     }
 
     #[test]
