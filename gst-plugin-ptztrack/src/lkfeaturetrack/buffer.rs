@@ -20,7 +20,11 @@ pub(super) fn detections(
     if let Some(motion) = motion {
         let regions = motion?.regions.into_iter();
         return Ok(regions
-            .map(|region| Detection { bounds: region.bounds, contour: region.contour })
+            .map(|region| Detection {
+                bounds: region.bounds,
+                contour: region.contour,
+                restless: region.track.map_or(0.0, |track| track.restless as f32),
+            })
             .collect());
     }
     Ok(buffer
@@ -28,7 +32,7 @@ pub(super) fn detections(
         .filter(|region| region.roi_type() == roi_type)
         .map(|region| Detection {
             bounds: Rect::from_pixels(region.rect(), info.width(), info.height()),
-            contour: Vec::new(),
+            ..Detection::default()
         })
         .collect())
 }

@@ -29,6 +29,9 @@
 //! motion is seen in the background; where nothing is to be seen there, and with `profile=thesis`, the servo's
 //! events tell whether the camera rests. Without a servo it does.
 //!
+//! Whatever the limits, a target that was chosen because it moves and has not left its place after 1.8 s is released as
+//! `stationary`: what a screen shows never leaves the screen.
+//!
 //! Detections in the place of a target that was given up are not chosen until they have moved by about its width;
 //! anybody elsewhere is, at once. The place goes with the background. It is forgotten after a change of size, a
 //! seek or a gap, and when the camera turns too fast to be followed.

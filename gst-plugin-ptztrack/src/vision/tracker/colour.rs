@@ -14,8 +14,8 @@ const FLOOR: f32 = 0.005;
 /// What brightness, and what tint, may say at most, as a natural logarithm of odds.
 const LARGEST: f32 = 1.5;
 
-/// One cell's colour: Y, U, V.
-pub(super) type Colour = [u8; 3];
+/// One cell's colour: Y, and U and V where the picture has them.
+pub(super) type Colour = (u8, Option<[u8; 2]>);
 
 /// Shares of brightnesses and tints; each sums to 1 once something was counted.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,12 +35,14 @@ impl Histogram {
     pub fn of(colours: impl Iterator<Item = (Colour, f32)>) -> Option<Self> {
         let mut counted = Self::default();
         let mut total = 0.0;
-        for (colour, weight) in colours {
+        for ((grey, tint), weight) in colours {
             // Half of the weight to the bin, half to its nearer neighbour by brightness: noise moves it to and fro.
-            let (low, high, share) = grey_bins(colour[0]);
+            let (low, high, share) = grey_bins(grey);
             counted.greys[low] += weight * (1.0 - share);
             counted.greys[high] += weight * share;
-            counted.tints[tint_bin(colour)] += weight;
+            if let Some(tint) = tint {
+                counted.tints[tint_bin(tint)] += weight;
+            }
             total += weight;
         }
         (total > f32::EPSILON).then(|| counted.scaled(1.0 / total))
@@ -51,11 +53,25 @@ impl Histogram {
         self
     }
 
-    /// Moves to `other` by `rate`, 0 to 1.
+    /// The Bhattacharyya coefficients of brightness and tint, multiplied: 0 to 1.
+    fn likeness(&self, other: &Self) -> f32 {
+        let coefficient = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum::<f32>();
+        let tints =
+            if self.has_tints() && other.has_tints() { coefficient(&self.tints, &other.tints) } else { 1.0 };
+        coefficient(&self.greys, &other.greys) * tints
+    }
+
+    /// Moves to `other` by `rate`, 0 to 1; a grey picture says nothing of tints.
     pub fn blend(&mut self, other: &Self, rate: f32) {
         let mix = |old: &mut f32, new: &f32| *old += (*new - *old) * rate;
         self.greys.iter_mut().zip(&other.greys).for_each(|(old, new)| mix(old, new));
-        self.tints.iter_mut().zip(&other.tints).for_each(|(old, new)| mix(old, new));
+        if other.has_tints() {
+            self.tints.iter_mut().zip(&other.tints).for_each(|(old, new)| mix(old, new));
+        }
+    }
+
+    fn has_tints(&self) -> bool {
+        self.tints.iter().any(|share| *share > 0.0)
     }
 }
 
@@ -66,7 +82,7 @@ fn grey_bins(grey: u8) -> (usize, usize, f32) {
     (low, (low + 1).min(GREYS - 1), place - low as f32)
 }
 
-fn tint_bin([_, u, v]: Colour) -> usize {
+fn tint_bin([u, v]: [u8; 2]) -> usize {
     let bin = |tint: u8| {
         let middle = TINTS as i32 / 2;
         let offset = (i32::from(tint) - 128 + TINT_WIDTH / 2).div_euclid(TINT_WIDTH);
@@ -89,16 +105,25 @@ impl ColourModel {
     }
 
     /// Logarithm of the odds that a cell of that colour belongs to the target; `lower` 0 (upper body) to 1 (lower).
-    pub fn log_odds(&self, colour: Colour, lower: f32) -> f32 {
-        let (low, high, share) = grey_bins(colour[0]);
-        let tint = tint_bin(colour);
-        let grey = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
+    pub fn log_odds(&self, (grey, tint): Colour, lower: f32) -> f32 {
+        let (low, high, share) = grey_bins(grey);
+        let brightness = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
         let either = |of: &dyn Fn(&Histogram) -> f32| {
             of(&self.figure[0]) * (1.0 - lower) + of(&self.figure[1]) * lower
         };
         let odds =
             |figure: f32, ground: f32| ((figure + FLOOR) / (ground + FLOOR)).ln().clamp(-LARGEST, LARGEST);
-        odds(either(&grey), grey(&self.ground)) + odds(either(&|h| h.tints[tint]), self.ground.tints[tint])
+        let tinted =
+            tint.map(tint_bin).map_or(0.0, |bin| odds(either(&|h| h.tints[bin]), self.ground.tints[bin]));
+        odds(either(&brightness), brightness(&self.ground)) + tinted
+    }
+
+    /// How alike somebody else's figure is by brightness and tint, 0 to 1: the Bhattacharyya coefficient, the mean of upper
+    /// and lower body; 0 where nothing of them is seen.
+    pub fn likeness(&self, other: &[Option<Histogram>; 2]) -> f32 {
+        let [upper, lower] =
+            [0, 1].map(|half| other[half].as_ref().map_or(0.0, |seen| self.figure[half].likeness(seen)));
+        0.5 * (upper + lower)
     }
 
     /// Learns what is figure (upper and lower body) and ground now; what was not seen stays as it is.
@@ -124,9 +149,9 @@ impl ColourModel {
 mod tests {
     use super::*;
 
-    const RED: Colour = [90, 110, 190];
-    const DARK: Colour = [40, 128, 128];
-    const WALL: Colour = [150, 126, 130];
+    const RED: Colour = (90, Some([110, 190]));
+    const DARK: Colour = (40, Some([128, 128]));
+    const WALL: Colour = (150, Some([126, 130]));
 
     fn of(colour: Colour) -> Histogram {
         Histogram::of([(colour, 1.0)].into_iter()).expect("counted")
@@ -151,9 +176,29 @@ mod tests {
 
     #[test]
     fn grey_video_is_told_apart_by_brightness() {
-        let grey = |level| [level, 128, 128];
+        let grey = |level| (level, None);
         let model = ColourModel::new([of(grey(60)), of(grey(60))], of(grey(160)));
         assert!(model.log_odds(grey(60), 0.5) > 1.0 && model.log_odds(grey(160), 0.5) < -1.0);
+    }
+
+    #[test]
+    fn a_grey_picture_leaves_the_tints_as_they_were() {
+        let mut model = model();
+        for _ in 0..30 {
+            model.learn([Some(of((90, None))), None], 0.2, Some(of((150, None))), 0.2);
+        }
+        assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(WALL, 0.0) < -1.0);
+        assert!(model.log_odds((90, None), 0.0) > 1.0, "brightness still counts");
+    }
+
+    #[test]
+    fn likeness_is_of_both_halves_and_of_what_is_seen() {
+        let alike =
+            |upper: Option<Colour>, lower: Option<Colour>| model().likeness(&[upper.map(of), lower.map(of)]);
+        assert!(alike(Some(RED), Some(DARK)) > 0.99);
+        assert!((alike(Some(RED), None) - 0.5).abs() < 0.01);
+        assert!(alike(Some(WALL), Some(WALL)) < 0.1 && alike(None, None) == 0.0);
+        assert!(alike(Some((90, None)), Some((40, None))) > 0.99, "grey video is told apart by brightness");
     }
 
     #[test]

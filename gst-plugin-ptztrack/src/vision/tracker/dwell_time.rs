@@ -4,16 +4,20 @@ use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::ReleaseReason;
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{centre, length};
+use super::geometry::{breadth, centre, length};
 
 /// Time over which the place of a target is averaged, seconds: longer than a sway, shorter than it takes the
 /// errors of the measured camera motion to add up.
 const MEMORY_S: f32 = 3.0;
-/// How far from there a target has moved, in its widths: who sways or waves does not get there, who walks does
+/// How far from there a target has moved, in breadths of it: who sways or waves does not get there, who walks does
 /// from a sixth of a width per second on.
 const REACH: f32 = 0.5;
 /// By which factor, as a logarithm, its size has changed then: it comes nearer, or leaves.
 const GROWTH: f32 = 0.2;
+/// What was chosen because it moves must go somewhere within so many seconds of being seen, in breadths of it: what a
+/// screen shows does not leave the screen.
+const TRIAL_S: f64 = 1.8;
+const TRIAL_REACH: f32 = 1.0;
 
 /// After how many seconds a target is given up; infinite: never.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,13 +35,19 @@ pub struct Limits {
 pub(super) struct DwellTime {
     tracked_s: f64,
     still_s: f64,
-    /// From its average place, in its widths.
+    /// From its average place, in breadths of it.
     offset: Point2f,
     /// From its average size, as a logarithm.
     growth: f32,
+    on_trial: bool,
 }
 
 impl DwellTime {
+    /// Of a target that has yet to go somewhere.
+    pub fn on_trial() -> Self {
+        Self { on_trial: true, ..Self::default() }
+    }
+
     /// Takes a frame, `dt_s` seconds after the last one, in which the target was seen or not.
     pub fn pass(&mut self, dt_s: f64) {
         self.tracked_s += dt_s;
@@ -49,11 +59,16 @@ impl DwellTime {
     pub fn watch(&mut self, before: Rect2f, after: Rect2f, ego: EgoMotion, dt_s: f64) {
         let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
         let own = centre(after) - ego.apply(centre(before));
-        self.offset = (self.offset + own / after.width.max(1.0)) * keep;
-        self.growth =
-            (self.growth + (after.height / (before.height * ego.scale_at(centre(before)))).ln()) * keep;
+        self.offset = (self.offset + own / breadth(after).max(1.0)) * keep;
+        let scale = ego.scale_at(centre(before));
+        let (across, down) =
+            ((after.width / (before.width * scale)).ln(), (after.height / (before.height * scale)).ln());
+        // A side of the box that moves alone is no approach.
+        let growth = if across * down > 0.0 { across.abs().min(down.abs()).copysign(down) } else { 0.0 };
+        self.growth = (self.growth + growth) * keep;
         // What is not a number fails as well, and is forgotten.
-        let stands = length(self.offset) <= REACH && self.growth.abs() <= GROWTH;
+        let reach = if self.on_trial { TRIAL_REACH } else { REACH };
+        let stands = length(self.offset) <= reach && self.growth.abs() <= GROWTH;
         *self = if stands {
             Self { still_s: self.still_s + dt_s, ..*self }
         } else {
@@ -63,7 +78,8 @@ impl DwellTime {
 
     /// Why the target is to be given up now, if it is.
     pub fn exhausted(&self, limits: Limits) -> Option<ReleaseReason> {
-        if self.still_s > limits.stationary_s {
+        let patience_s = if self.on_trial { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
+        if self.still_s > patience_s {
             Some(ReleaseReason::Stationary)
         } else {
             (self.tracked_s > limits.tracked_s).then_some(ReleaseReason::MaxTrackingTime)
@@ -148,6 +164,23 @@ mod tests {
         }
         dwell.pass(0.25);
         assert_eq!(dwell.exhausted(limits), Some(ReleaseReason::MaxTrackingTime));
+    }
+
+    #[test]
+    fn who_was_chosen_because_they_move_must_go_somewhere() {
+        let given_up = |path: fn(f32) -> f32| {
+            let mut dwell = DwellTime::on_trial();
+            (0..100).any(|frame| {
+                let at = |frame: usize| {
+                    around(Point2f::new(WIDTH * path(frame as f32 * DT as f32), 0.0), WIDTH, 90.0)
+                };
+                dwell.watch(at(frame), at(frame + 1), EgoMotion::default(), DT);
+                dwell.exhausted(LIMITS).is_some()
+            })
+        };
+        assert!(given_up(|time| 0.4 * (4.0 * time).sin()), "what a screen shows stays on the screen");
+        assert!(!given_up(|time| 1.5 * time), "a walker");
+        assert!(!given_up(|time| 1.5 * time.min(1.2)), "who stops after a few steps");
     }
 
     #[test]

@@ -63,9 +63,9 @@ impl Cells {
         };
         let count = grid.columns * grid.rows;
         let luma = plane(&seen.scene.map_or(seen.luma, |scene| scene.luma))?;
-        let chroma = match seen.scene.and_then(|scene| scene.chroma) {
-            Some([u, v]) => [plane(&u)?, plane(&v)?],
-            None => [vec![128; count], vec![128; count]],
+        let tints = match seen.scene.and_then(|scene| scene.chroma) {
+            Some([u, v]) => plane(&u)?.into_iter().zip(plane(&v)?).map(|(u, v)| Some([u, v])).collect(),
+            None => vec![None; count],
         };
         let motion = match seen.scene {
             Some(scene) => plane(&scene.foreground)?.into_iter().map(motion_log_odds).collect(),
@@ -75,11 +75,7 @@ impl Cells {
             area,
             columns: grid.columns,
             rows: grid.rows,
-            colours: luma
-                .into_iter()
-                .zip(chroma[0].iter().zip(&chroma[1]))
-                .map(|(y, (u, v))| [y, *u, *v])
-                .collect(),
+            colours: luma.into_iter().zip(tints).collect(),
             motion,
             inside: vec![true; count],
         };

@@ -3,6 +3,14 @@
 use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Point, Rect, Vector};
 
+/// Width of an upright person as a share of their height.
+pub(super) const ASPECT: f32 = 0.4;
+
+/// How broad somebody of this box is: of a body half hidden, or of a door that begins to open, a strip is all that shows.
+pub(in super::super) fn breadth(bounds: Rect2f) -> f32 {
+    bounds.width.max(ASPECT * bounds.height)
+}
+
 /// The middle of a box.
 pub(super) fn centre(bounds: Rect2f) -> Point2f {
     Point2f::new(bounds.x + bounds.width / 2.0, bounds.y + bounds.height / 2.0)

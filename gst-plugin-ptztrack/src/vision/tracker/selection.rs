@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use opencv::core::{Point2f, Rect2f};
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, centre, grown, length, overlap, share_inside};
+use super::geometry::{Frame, breadth, centre, grown, length, overlap, share_inside};
 use super::suppressed_regions::SuppressedRegions;
 
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are no target.
@@ -23,8 +23,8 @@ const EDGE: f32 = 2.0;
 const RELEASE_HOLD_S: f64 = 3.0;
 /// Seconds over which the way of a detection is looked at.
 const WAY_S: f64 = 1.0;
-/// Who goes somewhere has moved both sides of the box by this share of its width, or has come nearer by this share of
-/// their height.
+/// Who goes somewhere has moved both sides of the box by this share of their breadth, and by all of it where much
+/// changed before, or has come nearer by this share of their height.
 const TRAVELLED: f32 = 0.25;
 const APPROACHED: f32 = 0.12;
 
@@ -48,6 +48,8 @@ pub(super) struct Sighting {
     pub bounds: Rect2f,
     /// Polygon around it; empty where only the box is known.
     pub contour: Vec<Point2f>,
+    /// How much of it lies where much changed before and nothing came of it: 0 to 1.
+    pub restless: f32,
     /// Pixels per second; nothing where it was seen only once.
     pub velocity: Point2f,
 }
@@ -103,7 +105,7 @@ impl Candidate {
             let (left, right) = (now.x - then.x, now.br().x - then.br().x);
             let (top, bottom) = (now.y - then.y, now.br().y - then.br().y);
             let both = |a: f32, b: f32| if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 };
-            let least = TRAVELLED * now.width.min(then.width);
+            let least = (TRAVELLED + self.sighting.restless) * breadth(now).min(breadth(*then));
             let nearer = (now.height / then.height.max(1.0) - 1.0).abs() >= APPROACHED
                 && bottom * left < 0.0
                 && bottom * right > 0.0;
@@ -207,6 +209,19 @@ impl Selection {
         chosen.map(|candidate| &candidate.sighting)
     }
 
+    /// The detections of this frame that go somewhere, wholly in view, the largest first.
+    pub fn travelling(&self, confirm_frames: u32, frame: Frame) -> Vec<&Sighting> {
+        let ready = self.candidates.iter().filter(|candidate| {
+            candidate.missed == 0
+                && candidate.frames >= confirm_frames
+                && !touches_edge(candidate.sighting.bounds, frame)
+                && candidate.travels()
+        });
+        let mut ready: Vec<_> = ready.map(|candidate| &candidate.sighting).collect();
+        ready.sort_by(|a, b| b.bounds.area().total_cmp(&a.bounds.area()));
+        ready
+    }
+
     /// The detections of this frame.
     pub fn current(&self) -> impl Iterator<Item = &Sighting> {
         self.candidates.iter().filter(|candidate| candidate.missed == 0).map(|candidate| &candidate.sighting)
@@ -251,6 +266,7 @@ mod tests {
         Sighting {
             bounds: Rect2f::new(x, y, width, height),
             contour: Vec::new(),
+            restless: 0.0,
             velocity: Point2f::default(),
         }
     }
@@ -334,6 +350,17 @@ mod tests {
         assert!(!chosen(still, |n| at(300.0 + 5.0 * (n % 2.0), 100.0, 60.0, 200.0)), "a curtain");
         let pan = EgoMotion::translation(Point2f::new(6.0, 0.0));
         assert!(!chosen(pan, |n| at(200.0 + 6.0 * n, 100.0, 60.0, 40.0)), "a screen, the camera turning");
+    }
+
+    #[test]
+    fn where_much_changed_for_nothing_more_travel_is_asked_for() {
+        let come = |restless: f32, way: f32| {
+            let path =
+                |n: f32| Sighting { restless, ..at(300.0 + way * (n / 9.0).min(1.0), 100.0, 60.0, 40.0) };
+            chosen(EgoMotion::default(), path)
+        };
+        assert!(come(0.0, 20.0) && !come(0.8, 20.0) && !come(0.8, 50.0));
+        assert!(come(0.8, 90.0), "who comes out of there");
     }
 
     #[test]

@@ -3,7 +3,7 @@ use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, Targe
 
 use super::dwell_time::{DwellTime, Limits};
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, around};
+use super::geometry::{ASPECT, Frame, around};
 use super::selection::{Choice, Selection, Sighting};
 use super::target::{Follow, Robust, Sight, Thesis};
 use crate::vision::Observation;
@@ -12,8 +12,6 @@ use crate::vision::Observation;
 const MIN_DT_S: f64 = 1e-3;
 /// After a longer gap, seconds, a velocity says nothing about where the target is.
 const MAX_DT_S: f64 = 2.0;
-/// Width of a box made by a click, as a share of its height: a standing person.
-const PERSON_ASPECT: f32 = 0.4;
 /// How long after a loss the same person gets the same number, seconds.
 const KNOWN_S: f64 = 10.0;
 
@@ -54,6 +52,8 @@ pub struct Detection {
     pub bounds: Rect,
     /// Polygon around it; empty where only the box is known.
     pub contour: Vec<Point>,
+    /// How much of it lies where much changed before and nothing came of it: 0 to 1.
+    pub restless: f32,
 }
 
 /// What the tracker knows after one frame, in frame sizes (per second).
@@ -211,6 +211,7 @@ impl Tracker {
         let sightings = detections.iter().map(|detection| Sighting {
             bounds: frame.rect_to_pixels(detection.bounds),
             contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
+            restless: detection.restless,
             velocity: Point2f::default(),
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
@@ -234,10 +235,15 @@ impl Tracker {
         let before = target.follow.estimate().bounds;
         let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
         let sightings: Vec<_> = self.selection.current().cloned().collect();
-        let sight = match hidden_s {
+        let mut sight = match hidden_s {
             None => target.follow.follow(seen, dt_s as f32, &sightings)?,
             Some(_) => target.follow.coast(seen, dt_s as f32, &sightings)?,
         };
+        if sight != Sight::Seen
+            && let Some(follow) = self.find_again(&target, seen, frame)?
+        {
+            (target.follow, sight) = (follow, Sight::Seen);
+        }
         let state = match sight {
             Sight::Seen => TargetState::Tracking,
             Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => TargetState::Occluded,
@@ -274,6 +280,24 @@ impl Tracker {
         })
     }
 
+    /// Who goes somewhere and looks like a hidden target is the target: however they sat, stooped or turned before.
+    fn find_again(
+        &self,
+        target: &Target,
+        seen: &Observation,
+        frame: Frame,
+    ) -> opencv::Result<Option<Box<dyn Follow>>> {
+        if self.config.profile != Profile::Robust {
+            return Ok(None);
+        }
+        for sighting in self.selection.travelling(self.config.confirm_frames, frame) {
+            if target.follow.resembles(seen, sighting)? {
+                return self.follow_anew(seen, sighting);
+            }
+        }
+        Ok(None)
+    }
+
     fn take_over(
         &mut self,
         old: Phase,
@@ -299,7 +323,7 @@ impl Tracker {
 
     fn box_at(&self, place: Point2f, frame: Frame) -> Rect2f {
         let height = self.config.manual_size as f32 * frame.height;
-        around(place, PERSON_ASPECT * height, height)
+        around(place, ASPECT * height, height)
     }
 
     fn let_go(
@@ -334,6 +358,10 @@ impl Tracker {
         let chosen = self.selection.choose(choice, confirm_frames, must_travel, frame).cloned();
         let Some(sighting) = chosen else { return Ok(Phase::Searching) };
         match self.acquire(seen, &sighting)? {
+            Some(target) if must_travel => {
+                let target = Target { dwell: DwellTime::on_trial(), ..target };
+                Ok(self.begin(target, frame, report, changes))
+            }
             Some(target) => Ok(self.begin(target, frame, report, changes)),
             None => Ok(Phase::Searching),
         }
@@ -341,11 +369,7 @@ impl Tracker {
 
     /// Takes up what was sighted: under its old number where it is who was lost. `None` where it cannot be followed.
     fn acquire(&mut self, seen: &Observation, sighting: &Sighting) -> opencv::Result<Option<Target>> {
-        let follow: Option<Box<dyn Follow>> = match self.config.profile {
-            Profile::Thesis => Thesis::acquire(&seen.luma, sighting)?.map(|target| Box::new(target) as _),
-            Profile::Robust => Robust::acquire(seen, sighting)?.map(|target| Box::new(target) as _),
-        };
-        let Some(follow) = follow else { return Ok(None) };
+        let Some(follow) = self.follow_anew(seen, sighting)? else { return Ok(None) };
         let known = match self.lost.take() {
             Some((lost, _)) if lost.follow.resembles(seen, sighting)? => Some(lost.id),
             _ => None,
@@ -353,6 +377,17 @@ impl Tracker {
         let id = known.unwrap_or(self.last_id + 1);
         self.last_id = self.last_id.max(id);
         Ok(Some(Target { id, follow, dwell: DwellTime::default() }))
+    }
+
+    fn follow_anew(
+        &self,
+        seen: &Observation,
+        sighting: &Sighting,
+    ) -> opencv::Result<Option<Box<dyn Follow>>> {
+        Ok(match self.config.profile {
+            Profile::Thesis => Thesis::acquire(&seen.luma, sighting)?.map(|target| Box::new(target) as _),
+            Profile::Robust => Robust::acquire(seen, sighting)?.map(|target| Box::new(target) as _),
+        })
     }
 
     fn begin(

@@ -3,10 +3,13 @@
 use opencv::core::Rect2f;
 
 use super::ego_motion::EgoMotion;
-use super::geometry::centre;
+use super::geometry::{breadth, centre};
 
 /// More places are not remembered: the oldest goes.
 const MAX_PLACES: usize = 16;
+
+/// Who is so many times as tall as the one given up has come nearer.
+const NEARER: f32 = 1.3;
 
 /// The places, in the newest picture; they go with the background.
 #[derive(Debug, Default)]
@@ -39,7 +42,7 @@ impl SuppressedRegions {
 
     /// Whether a detection there is a target that was given up and has not moved since.
     pub fn holds(&self, bounds: Rect2f) -> bool {
-        self.places.iter().any(|place| is_at(*place, bounds, 1.0))
+        self.places.iter().any(|place| is_at(*place, bounds, 1.0) && bounds.height < NEARER * place.height)
     }
 
     /// Somebody is followed from `taken` on. Next to a place where nobody is seen any more, it is who stood there.
@@ -55,7 +58,7 @@ impl SuppressedRegions {
 /// leg at the place is there as well.
 fn is_at(place: Rect2f, bounds: Rect2f, widths: f32) -> bool {
     let offset = centre(bounds) - centre(place);
-    let sideways = widths * place.width;
+    let sideways = widths * breadth(place);
     offset.x.abs() < sideways && offset.y.abs() < sideways.max(place.height / 2.0)
 }
 
@@ -99,6 +102,15 @@ mod tests {
         let mut suppressed = one();
         suppressed.free(moved(45.0, 0.0), [moved(45.0, 0.0)].into_iter());
         assert!(!suppressed.holds(PERSON));
+    }
+
+    #[test]
+    fn who_comes_nearer_is_free() {
+        let grown = |factor: f32| {
+            let (width, height) = (factor * PERSON.width, factor * PERSON.height);
+            Rect2f::new(320.0 - width / 2.0, 245.0 - height / 2.0, width, height)
+        };
+        assert!(one().holds(grown(1.2)) && !one().holds(grown(1.35)));
     }
 
     #[test]

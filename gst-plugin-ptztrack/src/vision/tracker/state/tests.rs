@@ -58,7 +58,7 @@ fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Chain {
         width: f64::from(PERSON.0) / width,
         height: f64::from(PERSON.1) / height,
     };
-    let report = chain.process(picture, DT, &[Detection { bounds, contour: Vec::new() }]);
+    let report = chain.process(picture, DT, &[Detection { bounds, ..Detection::default() }]);
     assert_eq!(report.changes, [TargetChange::Acquired]);
     chain
 }
@@ -184,4 +184,40 @@ fn a_long_gap_is_a_loss() {
         let report = tracker.process(&picture, gap, &[]);
         assert_eq!(report.changes, [TargetChange::Lost], "{gap}");
     }
+}
+
+#[test]
+fn who_comes_out_changed_beside_a_hidden_target_is_followed_on() {
+    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
+    let detected = |x: f32, height: f32| Detection {
+        bounds: Rect {
+            x: f64::from(x) / SIZE.0 as f64,
+            y: f64::from(190.0 - height) / SIZE.1 as f64,
+            width: f64::from(PERSON.0) / SIZE.0 as f64,
+            height: f64::from(height) / SIZE.1 as f64,
+        },
+        ..Detection::default()
+    };
+    let walk = |tracker: &mut Chain, texture: u32| {
+        let mut last = Report::default();
+        for n in 1..24 {
+            let mut picture = street((0.0, 0.0), &[]);
+            if n < 8 {
+                picture.paint(Rect2f::new(40.0 + 8.0 * n as f32, 100.0, PERSON.0, PERSON.1), 7);
+                last = step(tracker, &picture);
+                continue;
+            }
+            // Behind a wall they turn round, and stoop.
+            let x = 96.0 - 8.0 * (n - 12) as f32;
+            if n >= 12 {
+                picture.paint(Rect2f::new(x, 130.0, PERSON.0, 60.0), texture);
+                last = tracker.process(&picture, DT, &[detected(x, 60.0)]);
+            } else {
+                last = step(tracker, &picture);
+            }
+        }
+        last
+    };
+    let last = walk(&mut tracker, 7);
+    assert_eq!((last.state, last.id), (TargetState::Tracking, 1), "{:?}", last.bounds);
 }

@@ -73,8 +73,12 @@ const MAX_GROWTH: f32 = 4.0;
 const YOUNG_S: f32 = 1.0;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.15;
-/// How much farther, in heights of it a second, a hidden target may be than its last motion took it.
-const HIDDEN_SPREAD_PER_S: f32 = 0.8;
+/// How much farther, in heights of it a second, a hidden target may be than its last motion took it: whoever runs.
+const HIDDEN_SPREAD_PER_S: f32 = 2.3;
+/// Time constant of what its last motion says of a hidden target, seconds: somebody may turn or stop behind a wall.
+const HIDDEN_TIME_S: f32 = 2.0;
+/// How alike in colour whoever goes somewhere must be to a hidden target.
+const ALIKE: f32 = 0.6;
 /// Pictures in a row in which a hidden target must be seen.
 const SEEN_AGAIN: u32 = 2;
 
@@ -563,6 +567,7 @@ impl Follow for Robust {
     fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.hidden_s += dt_s;
+        self.estimate.own_velocity *= (-dt_s / HIDDEN_TIME_S).exp();
         self.carry(self.estimate.own_velocity * dt_s);
         let found = self.search(seen, sightings)?;
         self.seen_in_a_row = if found.is_some() { self.seen_in_a_row + 1 } else { 0 };
@@ -584,9 +589,11 @@ impl Follow for Robust {
     }
 
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
-        let bounds = self.estimate.bounds;
-        let place = around(centre(sighting.bounds), bounds.width, bounds.height);
-        Ok(self.locate(seen, place, WIDE_SPREAD)?.share >= FOUND)
+        let Some(colours) = &self.colours else { return Ok(false) };
+        let cells = Cells::observe(seen, sighting.bounds, self.grid)?;
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
+        let (figure, _) = cells.histograms(&map);
+        Ok(colours.likeness(&figure) >= ALIKE)
     }
 
     fn estimate(&self) -> &Estimate {
