@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
 use std::io::{BufRead, BufReader, Write};
-use std::net::{TcpListener, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -26,6 +26,10 @@ fn camera(requests: usize, silent: fn(usize) -> bool) -> (Client, Asked) {
             std::thread::spawn(move || serve(stream, requests, silent, &list));
         }
     });
+    (client(address), asked)
+}
+
+fn client(address: SocketAddr) -> Client {
     let client = Client::new(ClientSettings {
         location: Location::parse(&format!("http://{address}")).unwrap().0,
         camera: 1,
@@ -34,7 +38,7 @@ fn camera(requests: usize, silent: fn(usize) -> bool) -> (Client, Asked) {
         timeout: Duration::from_secs(60),
         trust: Trust::System,
     });
-    (client.unwrap(), asked)
+    client.unwrap()
 }
 
 fn serve(mut stream: TcpStream, requests: usize, silent: fn(usize) -> bool, asked: &Mutex<Vec<String>>) {
@@ -91,4 +95,24 @@ fn centring_does_not_meet_a_closed_connection() {
     let (mut client, asked) = camera(1, |_| false);
     assert_eq!(send(&mut client, &[CENTRE, RIGHT, CENTRE, CENTRE]), [Ok(()), Ok(()), Ok(()), Ok(())]);
     assert_eq!(count(&asked, "center"), 3);
+}
+
+/// A camera that answers once, takes the next move without a word and is not there any more.
+fn camera_that_goes() -> Client {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let client = client(listener.local_addr().unwrap());
+    std::thread::spawn(move || {
+        let (stream, _) = listener.accept().unwrap();
+        // From now on nobody is listening.
+        drop(listener);
+        serve(stream, 2, |number| number > 1, &Mutex::default());
+    });
+    client
+}
+
+#[test]
+fn a_move_that_may_have_reached_the_camera_is_not_forgotten_where_it_cannot_be_sent_again() {
+    let sent = send(&mut camera_that_goes(), &[RIGHT, RIGHT]);
+    assert!(sent[0].is_ok());
+    assert!(sent[1].as_ref().is_err_and(Error::may_have_acted), "{sent:?}");
 }

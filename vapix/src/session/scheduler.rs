@@ -136,9 +136,10 @@ impl Scheduler {
     }
 
     /// Somebody else has moved the camera. Where it may be moving at our word too, what it does next tells whose move it
-    /// is; but a zoom of ours goes on whatever pan and tilt do.
+    /// is; but a zoom of ours goes on whatever pan and tilt do, and what looks like somebody else may be a move of ours that
+    /// went unanswered.
     pub fn contest(&mut self) {
-        self.contested = self.may_move && self.stop != Command::REST;
+        self.contested = self.may_move && self.stop != Command::REST && !self.in_doubt();
     }
 
     /// Whether that is being found out.
@@ -258,6 +259,12 @@ mod tests {
         accept(&mut scheduler, Command::Velocity { pan: 1, tilt: 0, zoom: Some(9), free: false }, ms(0));
         scheduler.contest();
         assert!(!scheduler.is_contested(), "a zoom is ended in any case");
+        let mut scheduler = Scheduler::default();
+        scheduler.attempted(&RIGHT, ms(0));
+        scheduler.failed(&RIGHT, true, ms(0));
+        scheduler.contest();
+        assert!(!scheduler.is_contested(), "an unanswered move may be what turns it");
+        assert!(scheduler.stop_due(ms(100), INTERVAL, ms(0)).is_some());
     }
 
     #[test]

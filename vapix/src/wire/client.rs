@@ -210,17 +210,29 @@ impl Client {
             return Err(self.bad_credentials());
         }
         let longest = self.settings.timeout;
-        let answer = tokio::time::timeout(longest, self.attempts(target, repeat)).await;
-        answer.unwrap_or(Err(Error::Timeout(longest)))
+        let mut broken = None;
+        let answer = tokio::time::timeout(longest, self.attempts(target, repeat, &mut broken)).await;
+        match answer.unwrap_or(Err(Error::Timeout(longest))) {
+            // However the second attempt failed, the camera may have acted on the first.
+            Err(err) if !err.may_have_acted() => Err(broken.unwrap_or(err)),
+            answer => answer,
+        }
     }
 
-    async fn attempts(&mut self, target: &str, repeat: Repeat) -> Result<Answer, Error> {
+    /// The attempts themselves; `broken`: how the first ended where its connection broke.
+    async fn attempts(
+        &mut self,
+        target: &str,
+        repeat: Repeat,
+        broken: &mut Option<Error>,
+    ) -> Result<Answer, Error> {
         // Whether the signature answers a challenge of this very exchange.
         let mut signed_fresh = false;
         for _ in 0..MAX_ATTEMPTS {
             let response = match self.request(target, repeat).await {
-                Err(Error::Broken(_)) if self.connected && repeat == Repeat::WhereBroken => {
+                Err(err @ Error::Broken(_)) if self.connected && repeat == Repeat::WhereBroken => {
                     self.connected = false;
+                    broken.get_or_insert(err);
                     continue;
                 }
                 other => other?,
