@@ -125,9 +125,11 @@ fn an_operator_who_has_the_camera_keeps_it() {
     let Application { camera, mut launch, watchdog } = Application::following("operator", &["-m"]);
     let begin = Instant::now();
     let taken_over = |line: &String| line.contains("change=(string)taken-over");
+    // To and fro, so that no end of the travel is in his way.
+    let mut turns = ["rpan=-12", "rpan=12"].into_iter().cycle();
     while !launch.seen().iter().any(taken_over) {
         assert!(begin.elapsed() < PATIENCE, "{:?}", launch.seen());
-        assert!(camera.operate("rpan=-12"));
+        assert!(turns.next().is_some_and(|turn| camera.operate(turn)));
         launch.read_for(LOOK);
     }
     launch.signal("STOP");

@@ -107,7 +107,7 @@ impl<O: Fn(Event)> TaskState<O> {
     /// Whether a camera that moves does so at our word, and would hear our stop.
     pub fn is_ours_to_stop(&self) -> bool {
         let session = self.control.session();
-        !session.stays_at_rest() && !session.halted()
+        !session.stays_at_rest() && !session.halted() && !session.is_taken_over(self.mailbox.now())
     }
 
     /// How it stands with the watchdog, and whether it is missing since just now.
