@@ -73,6 +73,13 @@ fn edge_pixels(start: f64, length: f64, size: u32) -> (u32, u32) {
     (first as u32, (last - first) as u32)
 }
 
+/// Width by height of a picture as displayed: of its size in pixels, and of the shape of each; `None` where that is no
+/// shape.
+pub fn aspect((width, height): (u32, u32), pixel: (i32, i32)) -> Option<f64> {
+    let aspect = f64::from(width) * f64::from(pixel.0) / (f64::from(height) * f64::from(pixel.1));
+    (aspect.is_finite() && aspect > 0.0).then_some(aspect)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

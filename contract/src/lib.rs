@@ -38,7 +38,7 @@ mod target;
 #[cfg(feature = "gst")]
 mod target_meta;
 
-pub use geometry::{Point, Rect, Vector};
+pub use geometry::{Point, Rect, Vector, aspect};
 pub use homography::Homography;
 pub use target::{TARGET_ROI, TargetState};
 

@@ -3,7 +3,7 @@
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
     BufferMeta, ContractError, MOTION_ROI, MotionMeta, Rect, TARGET_ROI, TargetChange, TargetMessage,
-    TargetMeta, TargetState, Times,
+    TargetMeta, TargetState, Times, aspect,
 };
 
 use crate::region_of_interest::remove_regions_of_interest;
@@ -60,17 +60,10 @@ pub(super) fn attach(
         ego_velocity: report.ego_velocity,
         confidence: report.confidence,
         features: report.features,
-        aspect: Some(aspect(info)),
+        aspect: aspect((info.width(), info.height()), info.par().into()),
         capture_time,
     };
     meta.attach(buffer)
-}
-
-/// Width by height as displayed.
-fn aspect(info: &VideoInfo) -> f64 {
-    let pixel = info.par();
-    f64::from(info.width()) * f64::from(pixel.numer())
-        / (f64::from(info.height().max(1)) * f64::from(pixel.denom().max(1)))
 }
 
 /// The message that says so.

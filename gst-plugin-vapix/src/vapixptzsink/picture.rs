@@ -1,6 +1,6 @@
 //! What the caps say of the picture.
 
-use ptztrack_contract::TargetMeta;
+use ptztrack_contract::{TargetMeta, aspect};
 
 /// Size and shape of the picture, whatever memory it lies in.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -18,9 +18,7 @@ impl Picture {
         let pixels = |field| structure.get::<i32>(field).ok().and_then(|size| u32::try_from(size).ok());
         let size = (pixels("width")?, pixels("height")?);
         let pixel = structure.get::<gst::Fraction>("pixel-aspect-ratio").unwrap_or(gst::Fraction::new(1, 1));
-        let aspect =
-            f64::from(size.0) * f64::from(pixel.numer()) / (f64::from(size.1) * f64::from(pixel.denom()));
-        (aspect.is_finite() && aspect > 0.0).then_some(Self { size, aspect })
+        Some(Self { size, aspect: aspect(size, pixel.into())? })
     }
 
     /// Whether this may be the picture in which a target was found: of the same shape, as scaling leaves it.
