@@ -1,4 +1,6 @@
-use opencv::core::{self, CV_8UC1, Mat, Scalar, Size};
+use std::ops::Range;
+
+use opencv::core::{self, CV_8UC1, DataType, Mat, Scalar, Size};
 use opencv::imgproc;
 use opencv::prelude::*;
 
@@ -25,8 +27,14 @@ pub fn segment(likelihood: &Luma, open_size: usize, close_size: (usize, usize)) 
         return Mat::new_size_with_default(mask.size()?, CV_8UC1, Scalar::all(0.0));
     }
     clean(&mut mask, open_size, close_size)?;
-    keep_sure(&mut mask, &strong, needed)?;
-    shed_shadows(&mut mask)?;
+    let (mut labels, mut boxes, mut centres) = (Mat::default(), Mat::default(), Mat::default());
+    let count = imgproc::connected_components_with_stats_def(&mask, &mut labels, &mut boxes, &mut centres)?;
+    for label in 1..count {
+        let part = Part::of(&boxes, label)?;
+        let is_sure = part.count(&labels, &strong)? >= needed;
+        let kept = if is_sure { part.upright(&labels)? } else { 0..0 };
+        part.keep(kept, &labels, &mut mask)?;
+    }
     Ok(mask)
 }
 
@@ -35,55 +43,70 @@ const LOW: f32 = 0.3;
 /// ... and are one where they go on for so many heights of it: farther than a foot or a hand reaches.
 const LONG: f32 = 0.25;
 
-/// Takes a long low tail off either side of each region: somebody stands upright, and their shadow lies (by the heights of
-/// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003).
-fn shed_shadows(mask: &mut Mat) -> opencv::Result<()> {
-    let (mut labels, mut boxes, mut centres) = (Mat::default(), Mat::default(), Mat::default());
-    let count = imgproc::connected_components_with_stats_def(mask, &mut labels, &mut boxes, &mut centres)?;
-    for label in 1..count {
+/// A connected part of the mask: its number among the labels, and its box in pixels.
+struct Part {
+    label: i32,
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
+impl Part {
+    fn of(boxes: &Mat, label: i32) -> opencv::Result<Self> {
         let side = |side: i32| boxes.at_2d::<i32>(label, side).map(|value| *value as usize);
-        let (left, width) = (side(imgproc::CC_STAT_LEFT)?, side(imgproc::CC_STAT_WIDTH)?);
-        let (top, height) = (side(imgproc::CC_STAT_TOP)?, side(imgproc::CC_STAT_HEIGHT)?);
-        let mut heights = vec![0_usize; width];
-        for row in top..top + height {
-            let line = &labels.at_row::<i32>(row as i32)?[left..left + width];
-            line.iter().zip(&mut heights).for_each(|(&seen, height)| *height += usize::from(seen == label));
+        let (left, top) = (side(imgproc::CC_STAT_LEFT)?, side(imgproc::CC_STAT_TOP)?);
+        let (width, height) = (side(imgproc::CC_STAT_WIDTH)?, side(imgproc::CC_STAT_HEIGHT)?);
+        Ok(Self { label, columns: left..left + width, rows: top..top + height })
+    }
+
+    /// Its pixels that are set in another mask.
+    fn count(&self, labels: &Mat, other: &Mat) -> opencv::Result<usize> {
+        let mut count = 0;
+        for row in self.rows.clone() {
+            let set = self.line::<u8>(other, row)?.iter().zip(self.line::<i32>(labels, row)?);
+            count += set.filter(|(pixel, label)| **pixel > 0 && **label == self.label).count();
+        }
+        Ok(count)
+    }
+
+    /// Its columns without a long low tail on either side: somebody stands upright, and their shadow lies (by the heights of
+    /// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003).
+    fn upright(&self, labels: &Mat) -> opencv::Result<Range<usize>> {
+        let mut heights = vec![0_usize; self.columns.len()];
+        for row in self.rows.clone() {
+            let line = self.line::<i32>(labels, row)?;
+            line.iter()
+                .zip(&mut heights)
+                .for_each(|(label, height)| *height += usize::from(*label == self.label));
         }
         let tallest = heights.iter().copied().max().unwrap_or(0) as f32;
         let low = |height: &&usize| (**height as f32) < LOW * tallest;
         let long = |tail: usize| if tail as f32 >= LONG * tallest { tail } else { 0 };
         let before = long(heights.iter().take_while(low).count());
         let after = long(heights.iter().rev().take_while(low).count());
-        for row in top..top + height {
-            let line = &labels.at_row::<i32>(row as i32)?[left..left + width];
-            let pixels = &mut mask.at_row_mut::<u8>(row as i32)?[left..left + width];
-            for (x, (pixel, _)) in
-                pixels.iter_mut().zip(line).enumerate().filter(|(_, (_, seen))| **seen == label)
-            {
-                if x < before || x >= width - after {
+        Ok(self.columns.start + before..self.columns.end - after)
+    }
+
+    /// Clears its pixels in the mask but for those in these columns.
+    fn keep(&self, kept: Range<usize>, labels: &Mat, mask: &mut Mat) -> opencv::Result<()> {
+        if kept == self.columns {
+            return Ok(());
+        }
+        for row in self.rows.clone() {
+            let line = self.line::<i32>(labels, row)?;
+            let pixels = &mut mask.at_row_mut::<u8>(row as i32)?[self.columns.clone()];
+            for ((column, pixel), label) in self.columns.clone().zip(pixels).zip(line) {
+                if *label == self.label && !kept.contains(&column) {
                     *pixel = 0;
                 }
             }
         }
+        Ok(())
     }
-    Ok(())
-}
 
-/// Clears the connected parts of `mask` that hold fewer than `needed` pixels of `strong`.
-fn keep_sure(mask: &mut Mat, strong: &Mat, needed: usize) -> opencv::Result<()> {
-    let mut labels = Mat::default();
-    let count = imgproc::connected_components_def(mask, &mut labels)?;
-    let labels = labels.data_typed::<i32>()?;
-    let mut sure = vec![0_usize; count.max(1) as usize];
-    for (&label, &strong) in labels.iter().zip(strong.data_bytes()?) {
-        sure[label as usize] += usize::from(strong > 0);
+    /// A row of a picture within its box.
+    fn line<'a, T: DataType>(&self, picture: &'a Mat, row: usize) -> opencv::Result<&'a [T]> {
+        Ok(&picture.at_row::<T>(row as i32)?[self.columns.clone()])
     }
-    for (&label, pixel) in labels.iter().zip(mask.data_bytes_mut()?) {
-        if sure[label as usize] < needed {
-            *pixel = 0;
-        }
-    }
-    Ok(())
 }
 
 #[cfg(test)]

@@ -28,9 +28,7 @@ const GROUND: f32 = 0.3;
 /// The cells around a target: what they look like and how they move.
 #[derive(Debug, Clone)]
 pub(super) struct Cells {
-    area: Rect2f,
-    columns: usize,
-    rows: usize,
+    lattice: Lattice,
     colours: Vec<Colour>,
     /// Logarithm of the odds by motion against the background.
     motion: Vec<f32>,
@@ -43,6 +41,33 @@ pub(super) struct Cells {
 pub(super) struct Grid {
     pub columns: usize,
     pub rows: usize,
+}
+
+/// Where the cells around a target lie.
+#[derive(Debug, Clone, Copy)]
+struct Lattice {
+    area: Rect2f,
+    grid: Grid,
+}
+
+impl Lattice {
+    /// Size of a cell, pixels of the picture.
+    fn cell(&self) -> Point2f {
+        Point2f::new(self.area.width / self.grid.columns as f32, self.area.height / self.grid.rows as f32)
+    }
+
+    /// Middle of a cell, pixels of the picture.
+    fn place(&self, index: usize) -> Point2f {
+        let cell = self.cell();
+        let (x, y) = (index % self.grid.columns, index / self.grid.columns);
+        self.area.tl() + Point2f::new((x as f32 + 0.5) * cell.x, (y as f32 + 0.5) * cell.y)
+    }
+
+    /// How far down the box the row of a cell lies, 0 to 1.
+    fn lower(&self, index: usize) -> f32 {
+        let place = ((index / self.grid.columns) as f32 + 0.5) / self.grid.rows as f32;
+        ((place - 0.5) * CONTEXT.1 * 4.0 + 0.5).clamp(0.0, 1.0)
+    }
 }
 
 impl Cells {
@@ -71,45 +96,28 @@ impl Cells {
             Some(scene) => plane(&scene.foreground)?.into_iter().map(motion_log_odds).collect(),
             None => vec![0.0; count],
         };
-        let mut cells = Self {
-            area,
-            columns: grid.columns,
-            rows: grid.rows,
+        let lattice = Lattice { area, grid };
+        Ok(Self {
+            lattice,
             colours: luma.into_iter().zip(tints).collect(),
             motion,
-            inside: vec![true; count],
-        };
-        cells.inside = (0..count).map(|index| frame.contains(cells.place(index))).collect();
-        Ok(cells)
-    }
-
-    /// Middle of a cell, pixels of the picture.
-    fn place(&self, index: usize) -> Point2f {
-        let cell = self.cell();
-        let (x, y) = (index % self.columns, index / self.columns);
-        self.area.tl() + Point2f::new((x as f32 + 0.5) * cell.x, (y as f32 + 0.5) * cell.y)
+            inside: (0..count).map(|index| frame.contains(lattice.place(index))).collect(),
+        })
     }
 
     /// Size of a cell, pixels of the picture.
     pub fn cell(&self) -> Point2f {
-        Point2f::new(self.area.width / self.columns as f32, self.area.height / self.rows as f32)
-    }
-
-    /// How far down the box a row lies, 0 to 1.
-    fn lower(&self, row: usize) -> f32 {
-        let place = (row as f32 + 0.5) / self.rows as f32;
-        ((place - 0.5) * CONTEXT.1 * 4.0 + 0.5).clamp(0.0, 1.0)
+        self.lattice.cell()
     }
 
     /// Logarithm of the odds of each cell, by motion and colour.
     pub fn evidence(&self, colours: Option<&ColourModel>) -> Evidence {
         let odds = (0..self.colours.len()).map(|index| {
-            let colour =
-                |model: &ColourModel| model.log_odds(self.colours[index], self.lower(index / self.columns));
+            let colour = |model: &ColourModel| model.log_odds(self.colours[index], self.lattice.lower(index));
             let both = self.motion[index] + colours.map_or(0.0, colour);
             if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
         });
-        Evidence(odds.collect())
+        Evidence { grid: self.lattice.grid, odds: odds.collect() }
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -124,7 +132,7 @@ impl Cells {
         };
         let figure = |half: f32| {
             chosen(&|index| {
-                let lower = self.lower(index / self.columns);
+                let lower = self.lattice.lower(index);
                 let share = if half > 0.5 { lower } else { 1.0 - lower };
                 if map.probability[index] >= FIGURE { map.probability[index] * share } else { 0.0 }
             })
@@ -141,18 +149,29 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 
 /// Logarithm of the odds of each cell that it is figure.
 #[derive(Debug, Clone)]
-pub(super) struct Evidence(Vec<f32>);
+pub(super) struct Evidence {
+    grid: Grid,
+    odds: Vec<f32>,
+}
 
 impl Evidence {
+    /// Of the cell in a column and row; `None` beyond those there are.
+    #[inline]
+    fn at(&self, column: i32, row: i32) -> Option<f32> {
+        let inside = |place: i32, count: usize| (0..count as i32).contains(&place);
+        (inside(column, self.grid.columns) && inside(row, self.grid.rows))
+            .then(|| self.odds[row as usize * self.grid.columns + column as usize])
+    }
+
     /// How likely the strips just beyond the left, upper, right and lower side of the box are figure, by motion and
     /// colour alone.
-    pub fn beyond(&self, grid: Grid) -> [f32; 4] {
+    pub fn beyond(&self) -> [f32; 4] {
         // In half sizes of the box from its middle, along the side and away from it.
         const ALONG: f32 = 0.6;
         const AWAY: std::ops::Range<f32> = 1.05..1.3;
         let mut sums = [(0.0_f32, 0.0_f32); 4];
-        for (index, odds) in self.0.iter().enumerate() {
-            let (x, y) = normalised(index % grid.columns, index / grid.columns, grid);
+        for (index, odds) in self.odds.iter().enumerate() {
+            let (x, y) = normalised(index, self.grid);
             let strips = [(-x, y), (-y, x), (x, y), (y, x)];
             for ((sum, count), (away, along)) in sums.iter_mut().zip(strips) {
                 if AWAY.contains(&away) && along.abs() <= ALONG {
@@ -200,7 +219,7 @@ impl Shape {
     /// An upright person fills the ellipse in the box.
     pub fn upright(grid: Grid) -> Self {
         let share = (0..grid.columns * grid.rows).map(|index| {
-            let (x, y) = normalised(index % grid.columns, index / grid.columns, grid);
+            let (x, y) = normalised(index, grid);
             let radius = x.hypot(y);
             (0.9 - 0.8 * ((radius - 0.85) / 0.3).clamp(0.0, 1.0)).max(0.05)
         });
@@ -214,17 +233,17 @@ impl Shape {
         }
     }
 
-    /// How well the silhouette, larger by `scale` and moved by so many cells, fits the evidence: -1 to 1, near 0 before a
-    /// wall of one colour.
-    pub fn fit(&self, evidence: &Evidence, moved: (i32, i32), scale: f32) -> Halves {
+    /// The silhouette, larger by `scale`, to be held against evidence.
+    pub fn template(&self, scale: f32) -> Template {
         let Grid { columns, rows } = self.grid;
-        let half =
-            (0.5 * COMPARED.0 / CONTEXT.0 * columns as f32, 0.5 * COMPARED.1 / CONTEXT.1 * rows as f32);
         let middle = (columns as f32 / 2.0, rows as f32 / 2.0);
-        let first = |middle: f32, half: f32| (middle - half).round().max(0.0) as usize;
-        let window_x = first(middle.0, half.0)..columns - first(middle.0, half.0);
-        let window_y = first(middle.1, half.1)..rows - first(middle.1, half.1);
-        let count = (window_x.len() * window_y.len()).max(1) as f32;
+        let window = |compared: f32, context: f32, count: usize| {
+            let half = 0.5 * compared / context * count as f32;
+            let first = (count as f32 / 2.0 - half).round().max(0.0) as usize;
+            first..count - first
+        };
+        let window_x = window(COMPARED.0, CONTEXT.0, columns);
+        let window_y = window(COMPARED.1, CONTEXT.1, rows);
         let at = |x: usize, y: usize| {
             if scale == 1.0 {
                 return self.share[y * columns + x];
@@ -234,26 +253,16 @@ impl Shape {
             let inside = x >= 0.0 && y >= 0.0 && (x as usize) < columns && (y as usize) < rows;
             if inside { self.share[y as usize * columns + x as usize] } else { 0.05 }
         };
-        let mut mean = 0.0;
-        for y in window_y.clone() {
-            mean += window_x.clone().map(|x| at(x, y)).sum::<f32>();
-        }
-        mean /= count;
-        let mut sums = [(0.0_f32, 0.0_f32); 2];
-        for y in window_y {
-            let (sum, norm) = &mut sums[usize::from(y as f32 >= middle.1)];
-            let row = y as i32 + moved.1;
-            for x in window_x.clone() {
-                let weight = at(x, y) - mean;
-                *norm += weight.abs();
-                let column = x as i32 + moved.0;
-                if (0..rows as i32).contains(&row) && (0..columns as i32).contains(&column) {
-                    *sum += weight * evidence.0[row as usize * columns + column as usize];
-                }
-            }
-        }
-        let fit = |(sum, norm): (f32, f32)| sum / (norm * LARGEST).max(f32::EPSILON);
-        Halves { upper: fit(sums[0]), lower: fit(sums[1]) }
+        let row = |y: usize| window_x.clone().map(move |x| (x, y));
+        let count = (window_x.len() * window_y.len()).max(1) as f32;
+        let mean = window_y.clone().map(|y| row(y).map(|(x, y)| at(x, y)).sum::<f32>()).sum::<f32>() / count;
+        let weights: Vec<f32> = window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean).collect();
+        let first = (window_x.start as i32, window_y.start as i32);
+        let upper_rows = window_y.filter(|y| (*y as f32) < middle.1).count();
+        let (upper, lower) = weights.split_at(upper_rows * window_x.len());
+        let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
+        let norm = Halves { upper: norm(upper), lower: norm(lower) };
+        Template { first, columns: window_x.len(), upper_rows, weights, norm }
     }
 
     /// How likely the silhouette, moved by so many cells, is figure by motion and colour alone: 0 to 1.
@@ -262,9 +271,9 @@ impl Shape {
         let mut sums = [(0.0_f32, 0.0_f32); 2];
         for (index, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.5) {
             let (x, y) = ((index % columns) as i32 + moved.0, (index / columns) as i32 + moved.1);
-            if (0..rows as i32).contains(&y) && (0..columns as i32).contains(&x) {
+            if let Some(odds) = evidence.at(x, y) {
                 let (sum, weight) = &mut sums[usize::from(2 * (index / columns) >= rows)];
-                *sum += share / (1.0 + (-evidence.0[y as usize * columns + x as usize]).exp());
+                *sum += share / (1.0 + (-odds).exp());
                 *weight += share;
             }
         }
@@ -279,8 +288,39 @@ impl Shape {
     }
 }
 
+/// A silhouette of some size, less its mean: made once, and held against the evidence at many places.
+#[derive(Debug)]
+pub(super) struct Template {
+    /// Column and row of its first cell.
+    first: (i32, i32),
+    columns: usize,
+    /// Rows that belong to the upper half of the body.
+    upper_rows: usize,
+    weights: Vec<f32>,
+    /// Sum of the weights' magnitudes.
+    norm: Halves,
+}
+
+impl Template {
+    /// How well the silhouette, moved by so many cells, fits the evidence: -1 to 1, near 0 before a wall of one colour.
+    pub fn fit(&self, evidence: &Evidence, moved: (i32, i32)) -> Halves {
+        let (left, top) = (self.first.0 + moved.0, self.first.1 + moved.1);
+        let mut sums = Halves::default();
+        for (y, weights) in self.weights.chunks_exact(self.columns).enumerate() {
+            let sum = if y < self.upper_rows { &mut sums.upper } else { &mut sums.lower };
+            for (x, weight) in weights.iter().enumerate() {
+                if let Some(odds) = evidence.at(left + x as i32, top + y as i32) {
+                    *sum += weight * odds;
+                }
+            }
+        }
+        sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
+    }
+}
+
 /// Place of a cell in half sizes of the box from its middle: -1 to 1 inside.
-fn normalised(column: usize, row: usize, grid: Grid) -> (f32, f32) {
+fn normalised(index: usize, grid: Grid) -> (f32, f32) {
+    let (column, row) = (index % grid.columns, index / grid.columns);
     let at = |place: usize, count: usize, context: f32| {
         ((place as f32 + 0.5) / count as f32 - 0.5) * 2.0 * context
     };
@@ -290,44 +330,38 @@ fn normalised(column: usize, row: usize, grid: Grid) -> (f32, f32) {
 /// How likely each cell around the box is part of the target.
 #[derive(Debug, Clone)]
 pub(super) struct FigureMap {
-    area: Rect2f,
-    grid: Grid,
+    lattice: Lattice,
     probability: Vec<f32>,
 }
 
 impl FigureMap {
     /// What the evidence and the shape say together of the cells around the box.
     pub fn new(cells: &Cells, evidence: &Evidence, shape: &Shape) -> Self {
-        let odds = evidence.0.iter().enumerate().map(|(index, odds)| odds + shape.log_odds(index));
+        let odds = evidence.odds.iter().enumerate().map(|(index, odds)| odds + shape.log_odds(index));
         let probability = odds
             .zip(&cells.inside)
             .map(|(odds, inside)| if *inside { 1.0 / (1.0 + (-odds).exp()) } else { 0.0 });
-        Self {
-            area: cells.area,
-            grid: Grid { columns: cells.columns, rows: cells.rows },
-            probability: probability.collect(),
-        }
+        Self { lattice: cells.lattice, probability: probability.collect() }
     }
 
     /// How likely a place of the picture belongs to the target; 0 where the map does not reach.
     pub fn at(&self, place: Point2f) -> f32 {
-        let offset = place - self.area.tl();
-        let (x, y) = (
-            offset.x / self.area.width * self.grid.columns as f32,
-            offset.y / self.area.height * self.grid.rows as f32,
-        );
-        let inside = x >= 0.0 && y >= 0.0 && x < self.grid.columns as f32 && y < self.grid.rows as f32;
-        if inside { self.probability[y as usize * self.grid.columns + x as usize] } else { 0.0 }
+        let Lattice { area, grid: Grid { columns, rows } } = self.lattice;
+        let offset = place - area.tl();
+        let (x, y) = (offset.x / area.width * columns as f32, offset.y / area.height * rows as f32);
+        let inside = x >= 0.0 && y >= 0.0 && x < columns as f32 && y < rows as f32;
+        if inside { self.probability[y as usize * columns + x as usize] } else { 0.0 }
     }
 
     /// The mean over blocks of `side` x `side` cells, row after row.
     pub fn reduced(&self, side: usize) -> Vec<f32> {
-        let (columns, rows) = (self.grid.columns / side, self.grid.rows / side);
+        let whole = self.lattice.grid;
+        let (columns, rows) = (whole.columns / side, whole.rows / side);
         let mean = |x: usize, y: usize| {
             let rows = y * side..(y + 1) * side;
             let sum: f32 = rows
                 .map(|row| {
-                    let start = row * self.grid.columns + x * side;
+                    let start = row * whole.columns + x * side;
                     self.probability[start..start + side].iter().sum::<f32>()
                 })
                 .sum();
@@ -339,10 +373,8 @@ impl FigureMap {
     /// The centre of mass (3.13 to 3.15) of the figure inside `bounds`; `None` where there is none.
     pub fn centre_of_mass(&self, bounds: Rect2f) -> Option<Point2f> {
         let (mut sum, mut mass) = (Point2f::default(), 0.0);
-        let cell = (self.area.width / self.grid.columns as f32, self.area.height / self.grid.rows as f32);
         for (index, share) in self.probability.iter().enumerate() {
-            let (x, y) = (index % self.grid.columns, index / self.grid.columns);
-            let place = self.area.tl() + Point2f::new((x as f32 + 0.5) * cell.0, (y as f32 + 0.5) * cell.1);
+            let place = self.lattice.place(index);
             if *share >= 0.5 && bounds.contains(place) {
                 sum += (place - centre(bounds)) * *share;
                 mass += share;
@@ -409,11 +441,11 @@ mod tests {
         let moved = BOX + Point2f::new(8.0, 0.0);
         let cells = Scene::new(moved, 60, 255).cells(BOX);
         let evidence = cells.evidence(None);
-        let shape = Shape::upright(GRID);
+        let template = Shape::upright(GRID).template(1.0);
         let best = (-6..=6)
             .flat_map(|x| (-6..=6).map(move |y| (x, y)))
             .max_by(|a, b| {
-                let fit = |moved| shape.fit(&evidence, moved, 1.0).mean();
+                let fit = |moved| template.fit(&evidence, moved).mean();
                 fit(*a).total_cmp(&fit(*b))
             })
             .expect("some");
@@ -424,7 +456,7 @@ mod tests {
     #[test]
     fn a_known_wall_fits_nobody() {
         let cells = Scene::new(Rect2f::default(), 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).fit(&cells.evidence(None), (0, 0), 1.0);
+        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
         assert!(fit.mean().abs() < 0.05, "{fit:?}");
     }
 
@@ -432,7 +464,7 @@ mod tests {
     fn behind_a_table_the_upper_half_still_fits() {
         let upper = Rect2f { height: 50.0, ..BOX };
         let cells = Scene::new(upper, 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).fit(&cells.evidence(None), (0, 0), 1.0);
+        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
         assert!(fit.upper > 0.4 && fit.lower < 0.1, "{fit:?}");
     }
 
@@ -444,10 +476,10 @@ mod tests {
         let ([upper, lower], ground) = cells.histograms(&map);
         let model = ColourModel::new([upper.expect("seen"), lower.expect("seen")], ground.expect("seen"));
         let still = Scene::new(BOX, 60, 128).cells(BOX);
-        let fit = Shape::upright(GRID).fit(&still.evidence(Some(&model)), (0, 0), 1.0);
+        let fit = Shape::upright(GRID).template(1.0).fit(&still.evidence(Some(&model)), (0, 0));
         assert!(fit.mean() > 0.4, "{fit:?}");
         let gone = Scene::new(Rect2f::default(), 60, 128).cells(BOX);
-        let fit = Shape::upright(GRID).fit(&gone.evidence(Some(&model)), (0, 0), 1.0);
+        let fit = Shape::upright(GRID).template(1.0).fit(&gone.evidence(Some(&model)), (0, 0));
         assert!(fit.mean().abs() < 0.05, "{fit:?}");
     }
 

@@ -185,11 +185,9 @@ impl Selection {
         must_travel: bool,
         frame: Frame,
     ) -> Option<&Sighting> {
-        let ready = self.candidates.iter().filter(|candidate| {
+        let ready = self.confirmed(confirm_frames).filter(|candidate| {
             let bounds = candidate.sighting.bounds;
-            candidate.missed == 0
-                && candidate.frames >= confirm_frames
-                && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
+            (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
                 && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
                 && !self.suppressed.holds(bounds)
                 && (!must_travel || candidate.travels())
@@ -211,12 +209,9 @@ impl Selection {
 
     /// The detections of this frame that go somewhere, wholly in view, the largest first.
     pub fn travelling(&self, confirm_frames: u32, frame: Frame) -> Vec<&Sighting> {
-        let ready = self.candidates.iter().filter(|candidate| {
-            candidate.missed == 0
-                && candidate.frames >= confirm_frames
-                && !touches_edge(candidate.sighting.bounds, frame)
-                && candidate.travels()
-        });
+        let ready = self
+            .confirmed(confirm_frames)
+            .filter(|candidate| !touches_edge(candidate.sighting.bounds, frame) && candidate.travels());
         let mut ready: Vec<_> = ready.map(|candidate| &candidate.sighting).collect();
         ready.sort_by(|a, b| b.bounds.area().total_cmp(&a.bounds.area()));
         ready
@@ -224,7 +219,12 @@ impl Selection {
 
     /// The detections of this frame.
     pub fn current(&self) -> impl Iterator<Item = &Sighting> {
-        self.candidates.iter().filter(|candidate| candidate.missed == 0).map(|candidate| &candidate.sighting)
+        self.confirmed(0).map(|candidate| &candidate.sighting)
+    }
+
+    /// Those seen in this frame, and in so many in all.
+    fn confirmed(&self, frames: u32) -> impl Iterator<Item = &Candidate> {
+        self.candidates.iter().filter(move |candidate| candidate.missed == 0 && candidate.frames >= frames)
     }
 
     /// The smallest detection of this frame that a click at `point` means, a little beside it too.

@@ -358,11 +358,12 @@ impl Tracker {
         let chosen = self.selection.choose(choice, confirm_frames, must_travel, frame).cloned();
         let Some(sighting) = chosen else { return Ok(Phase::Searching) };
         match self.acquire(seen, &sighting)? {
-            Some(target) if must_travel => {
-                let target = Target { dwell: DwellTime::on_trial(), ..target };
+            Some(mut target) => {
+                if must_travel {
+                    target.dwell = DwellTime::on_trial();
+                }
                 Ok(self.begin(target, frame, report, changes))
             }
-            Some(target) => Ok(self.begin(target, frame, report, changes)),
             None => Ok(Phase::Searching),
         }
     }

@@ -8,7 +8,7 @@ use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, Shape};
+use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, Shape, Template};
 use crate::vision::tracker::flow::Flow;
 use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
 use crate::vision::tracker::grey_histogram::near_the_middle;
@@ -212,7 +212,7 @@ impl Robust {
         }
         let (_, evidence) = target.look_closely(seen)?;
         // Who was already there when the picture was first seen does not stand out from the background.
-        let fit = target.shape.fit(&evidence, (0, 0), 1.0);
+        let fit = target.shape.template(1.0).fit(&evidence, (0, 0));
         target.usual.fit = fit.with(fit, |fit, _| fit.max(LEAST_FIT));
         target.usual.level = target.shape.level(&evidence, (0, 0));
         target.filter.learn(&seen.luma, bounds, &target.map.reduced(FINER), 1.0)?;
@@ -267,10 +267,11 @@ impl Robust {
         let evidence = cells.evidence(self.colours.as_ref());
         let response = self.filter.respond(&seen.luma, bounds)?;
         let cell = cells.cell() * FINER as f32;
+        let silhouette = self.shape.template(1.0);
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
         let score = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            self.agreement(&evidence, &response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
+            self.agreement(&silhouette, &evidence, &response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
         };
         let places = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
         let (mut best, mut height) = ((0, 0), f32::NEG_INFINITY);
@@ -286,18 +287,25 @@ impl Robust {
             vertex(score((x, y - 1)), height, score((x, y + 1))),
         );
         let offset = Point2f::new((x as f32 + finer.x) * cell.x, (y as f32 + finer.y) * cell.y);
-        let fit = self.shape.fit(&evidence, (x * FINER as i32, y * FINER as i32), 1.0);
+        let moved = (x * FINER as i32, y * FINER as i32);
+        let fit = silhouette.fit(&evidence, moved);
         let answer = response.at(best);
-        let level = self.shape.level(&evidence, (x * FINER as i32, y * FINER as i32));
+        let level = self.shape.level(&evidence, moved);
         let shares = self.usual.shares(fit, level, answer);
         Ok(Place { bounds: bounds + offset, fit, level, response: answer, shares, share: of_whole(shares) })
     }
 
     /// What filter and silhouette say together of a displacement in cells of the filter.
-    fn agreement(&self, evidence: &Evidence, response: &Response, (x, y): (i32, i32)) -> f32 {
+    fn agreement(
+        &self,
+        silhouette: &Template,
+        evidence: &Evidence,
+        response: &Response,
+        (x, y): (i32, i32),
+    ) -> f32 {
         let moved = (x * FINER as i32, y * FINER as i32);
         let looks = 0.5 * response.at((x, y)).sum() / self.usual.response.sum();
-        looks.max(0.0) + self.shape.fit(evidence, moved, 1.0).mean().max(0.0)
+        looks.max(0.0) + silhouette.fit(evidence, moved).mean().max(0.0)
     }
 
     /// Takes a place over as the target's own.
@@ -332,7 +340,7 @@ impl Robust {
     ) -> opencv::Result<()> {
         let rate = (LEARNING_PER_S * dt_s).min(MAX_LEARNING);
         self.usual.learn(place.fit, place.level, place.response, rate);
-        self.widen(evidence.beyond(self.grid));
+        self.widen(evidence.beyond());
         self.shape.learn(&self.map, rate);
         let (figure, ground) = cells.histograms(&self.map);
         let ground_rate = (GROUND_LEARNING_PER_S * dt_s).min(0.5);
@@ -355,7 +363,7 @@ impl Robust {
         let respond =
             |bounds| self.filter.respond(&seen.luma, bounds).map(|response| response.at((0, 0)).sum());
         let (now, other) = (respond(bounds)?, respond(scaled(bounds, growth, growth))?);
-        let fit = |scale| self.shape.fit(evidence, (0, 0), scale).mean();
+        let fit = |scale| self.shape.template(scale).fit(evidence, (0, 0)).mean();
         let usual = self.usual.response.sum();
         if other / usual + fit(growth) > now / usual + fit(1.0) {
             self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
