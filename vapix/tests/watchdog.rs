@@ -10,8 +10,8 @@ use std::process::{Command as Process, ExitStatus};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use vapix::watchdog::{Lease, Watchdog, WatchdogAddress};
-use vapix::wire::{Client, ClientSettings, Command, Credentials, Location, Secret, Trust};
+use vapix::watchdog::{Lease, StopOrder, Watchdog, WatchdogAddress};
+use vapix::wire::{Client, ClientSettings, Command, Credentials, Identity, Location, Secret, Trust};
 use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
 /// Only a failure takes this long.
@@ -53,7 +53,7 @@ impl Application {
     }
 
     async fn hold(&mut self, in_doubt: bool) {
-        self.lease.hold(self.client.identity(), Command::Halt, in_doubt).await.unwrap();
+        self.lease.hold(order(self.client.identity(), in_doubt)).await.unwrap();
     }
 
     /// Moves, as an application does that plays by the rules.
@@ -109,6 +109,10 @@ fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
         assert!(begin.elapsed() < PATIENCE, "{what}");
         std::thread::sleep(MOMENT);
     }
+}
+
+fn order(identity: Identity, in_doubt: bool) -> StopOrder {
+    StopOrder { identity, command: Command::Halt, in_doubt }
 }
 
 #[track_caller]
@@ -256,7 +260,7 @@ async fn without_a_camera_to_stop_it_can_be_ended_and_is_started_anew() {
     // Not more often than once a second.
     let begin = Instant::now();
     let identity = application.client.identity();
-    while application.lease.hold(identity.clone(), Command::Halt, false).await.is_err() {
+    while application.lease.hold(order(identity.clone(), false)).await.is_err() {
         assert!(begin.elapsed() < PATIENCE);
         tokio::time::sleep(MOMENT).await;
     }

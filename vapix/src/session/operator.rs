@@ -87,15 +87,12 @@ impl OperatorDetector {
             self.place = Some(place);
             return Verdict::Ours;
         };
-        self.turns_otherwise = before.asked > self.excused_until
-            && !explains_turn(
-                &before,
-                &place,
-                (before.asked.saturating_sub(Self::LATEST), answered),
-                commands.pan_tilt,
-            );
-        if self.explains(&before, &place, answered, commands) {
-            let alone = before.asked > self.excused_until && is_still(&before, answered, commands);
+        let excused = before.asked <= self.excused_until;
+        let acting = (before.asked.saturating_sub(Self::LATEST), answered);
+        let explains_zoom = |zoom| explains_zoom(&before, &place, acting, zoom);
+        self.turns_otherwise = !excused && !explains_turn(&before, &place, acting, commands.pan_tilt);
+        if !self.turns_otherwise && (excused || commands.zoom.is_none_or(explains_zoom)) {
+            let alone = !excused && is_still(acting, commands);
             // What turns slowly by somebody's hand turns far in time.
             let place = if alone { place.seen_from(&before) } else { place };
             *self = Self { place: Some(place), armed: true, suspects: false, ..*self };
@@ -137,20 +134,10 @@ impl OperatorDetector {
     pub fn suspects(&self) -> bool {
         self.suspects
     }
-
-    fn explains(&self, before: &Place, place: &Place, answered: Duration, commands: CommandedMotion) -> bool {
-        if before.asked <= self.excused_until {
-            return true;
-        }
-        let since = before.asked.saturating_sub(Self::LATEST);
-        explains_turn(before, place, (since, answered), commands.pan_tilt)
-            && commands.zoom.is_none_or(|zoom| explains_zoom(before, place, (since, answered), zoom))
-    }
 }
 
-/// Whether no command could move the camera since then.
-fn is_still(before: &Place, answered: Duration, commands: CommandedMotion) -> bool {
-    let since = before.asked.saturating_sub(OperatorDetector::LATEST);
+/// Whether no command could move the camera then.
+fn is_still((since, answered): (Duration, Duration), commands: CommandedMotion) -> bool {
     let rests =
         |history: &CommandHistory| history.rates_between(since, answered).all(|rate| rate.largest() == 0.0);
     rests(commands.pan_tilt) && commands.zoom.is_none_or(rests)

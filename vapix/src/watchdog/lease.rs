@@ -7,7 +7,7 @@ use tokio::time::timeout;
 
 use super::protocol::{Message, StopOrder};
 use super::{RENEWAL, Unavailable, Watchdog};
-use crate::wire::{Command, Identity, Trust};
+use crate::wire::Trust;
 
 /// The promise to stop one camera in time, which the watchdog keeps where the holder cannot.
 ///
@@ -42,24 +42,17 @@ impl Lease {
         self.renewed.map(|renewed| renewed + RENEWAL)
     }
 
-    /// Takes or renews it; to be awaited before a move is sent. `command` ends the move, `in_doubt` where the camera has not
-    /// answered it yet. Starts the watchdog where there is none. To be tried again where it fails.
+    /// Takes or renews it; to be awaited before a move is sent, which the order ends. Starts the watchdog where there is none. To be tried again where it fails.
     ///
     /// # Errors
     /// Why there is no watchdog.
-    pub async fn hold(
-        &mut self,
-        mut identity: Identity,
-        command: Command,
-        in_doubt: bool,
-    ) -> Result<(), Unavailable> {
+    pub async fn hold(&mut self, mut order: StopOrder) -> Result<(), Unavailable> {
         // The watchdog stands in another folder.
-        if let Trust::Authority(path) = &mut identity.settings.trust {
+        if let Trust::Authority(path) = &mut order.identity.settings.trust {
             *path = absolute(&*path).unwrap_or_else(|_| path.clone());
         }
         self.renewed = Some(Instant::now());
-        let stop = Box::new(StopOrder { identity, command, in_doubt });
-        let message = Message::Hold { lease: self.number, stop };
+        let message = Message::Hold { lease: self.number, stop: Box::new(order) };
         if matches!(self.watchdog.say(&message), Ok(true)) {
             return Ok(());
         }

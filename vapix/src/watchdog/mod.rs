@@ -17,6 +17,7 @@ mod serve;
 
 pub use lease::Lease;
 pub use link::{Unavailable, Watchdog, WatchdogAddress};
+pub use protocol::StopOrder;
 pub use serve::{Armed, serve};
 
 use std::time::Duration;

@@ -3,8 +3,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use vapix::watchdog::{Lease, Unavailable, Watchdog};
-use vapix::wire::{Command, Identity};
+use vapix::watchdog::{Lease, StopOrder, Unavailable, Watchdog};
 
 /// What `stats` says of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -37,15 +36,8 @@ impl DeadManState {
 pub struct DeadMan {
     lease: Option<Lease>,
     state: DeadManState,
-    order: Option<Order>,
-}
-
-/// What the watchdog was told last.
-#[derive(Debug, Clone)]
-struct Order {
-    identity: Identity,
-    stop: Command,
-    in_doubt: bool,
+    /// What the watchdog was told last.
+    order: Option<StopOrder>,
 }
 
 impl DeadMan {
@@ -67,8 +59,8 @@ impl DeadMan {
     }
 
     /// Takes or renews the lease, before a move is sent or while it lasts; what is to be told once.
-    pub async fn hold(&mut self, identity: Identity, stop: Command, in_doubt: bool) -> Option<Unavailable> {
-        self.order = Some(Order { identity, stop, in_doubt });
+    pub async fn hold(&mut self, order: StopOrder) -> Option<Unavailable> {
+        self.order = Some(order);
         self.renew().await
     }
 
@@ -89,7 +81,7 @@ impl DeadMan {
     /// Says again what was said last.
     pub async fn renew(&mut self) -> Option<Unavailable> {
         let (lease, order) = (self.lease.as_mut()?, self.order.clone()?);
-        let held = lease.hold(order.identity, order.stop, order.in_doubt).await;
+        let held = lease.hold(order).await;
         self.turned_out(held, DeadManState::Armed)
     }
 

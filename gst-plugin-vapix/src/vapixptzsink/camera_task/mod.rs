@@ -25,7 +25,7 @@ use crate::control_loop::{ControlLoop, LoopEvent, Status};
 use crate::lock::lock;
 use servo::ServoSettings;
 use vapix::session::{Next, Query, Request, Response};
-use vapix::watchdog::{Unavailable, Watchdog};
+use vapix::watchdog::{StopOrder, Unavailable, Watchdog};
 use vapix::wire::{Client, ClientSettings, Command, Credentials, Error, Location};
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
@@ -295,7 +295,8 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         if !state.is_ours_to_stop() {
             dead_man.release();
         } else if dead_man.is_due(in_doubt) {
-            missing = dead_man.hold(client.identity(), state.control.stop(), in_doubt).await;
+            let (identity, command) = (client.identity(), state.control.stop());
+            missing = dead_man.hold(StopOrder { identity, command, in_doubt }).await;
         }
         state.tell_dead_man(dead_man.state(), missing);
     }
@@ -341,7 +342,8 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         let stop = state.control.stop();
         lock(&state.statistics).stop = Some(stop);
         if matches!(&request, Request::Command(command) if !command.is_stop()) {
-            let missing = dead_man.hold(client.identity(), stop, true).await;
+            let order = StopOrder { identity: client.identity(), command: stop, in_doubt: true };
+            let missing = dead_man.hold(order).await;
             state.tell_dead_man(dead_man.state(), missing);
         }
         let mut exchange = pin!(exchange(client, &request));
