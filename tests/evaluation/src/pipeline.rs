@@ -2,13 +2,14 @@
 
 use std::{
     sync::{
-        Arc, Mutex, PoisonError,
+        Arc, Mutex,
         mpsc::{Receiver, RecvTimeoutError, Sender, channel},
     },
     time::{Duration, Instant},
 };
 
 use gst::prelude::*;
+pub(crate) use ptztrack_contract::lock::lock;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
 /// No picture takes this long; who waits longer waits for something that never comes.
@@ -217,11 +218,6 @@ pub(crate) fn fault(message: &gst::Message) -> Option<String> {
         gst::MessageView::Warning(warning) => Some(format!("{}: {}", who(), warning.error())),
         _ => None,
     }
-}
-
-/// A panic elsewhere is told of where it happens.
-pub(crate) fn lock<T>(mutex: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
