@@ -31,6 +31,12 @@ pub fn tool(program: &str) -> Command {
     command
 }
 
+/// Sends a process a signal by name (`INT`, `TERM`).
+pub fn signal(process: u32, name: &str) {
+    let status = Command::new("kill").args(["-s", name, &process.to_string()]).status().unwrap();
+    assert!(status.success());
+}
+
 /// A running `gst-launch-1.0` (or a script that ends in one) whose output can be waited for.
 pub struct GstLaunch {
     child: Child,
@@ -90,8 +96,7 @@ impl GstLaunch {
 
     /// Sends a signal by name (`INT`, `TERM`).
     pub fn signal(&self, name: &str) {
-        let status = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status().unwrap();
-        assert!(status.success());
+        signal(self.id(), name);
     }
 
     /// Waits until it has ended by itself, as long as it has something to say; gives the exit status and everything it

@@ -9,7 +9,7 @@ pub mod scene;
 mod watchdog;
 
 pub use front::{Front, Way};
-pub use launch::{GstLaunch, plugin_folder, tool};
+pub use launch::{GstLaunch, plugin_folder, signal, tool};
 pub use pipeline::{Running, init};
 pub use watchdog::Watchdog;
 

@@ -1,11 +1,10 @@
 //! However an application dies, in the middle of a pan, the camera's last order is a stop.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::process::Command;
 use std::time::{Duration, Instant};
 
 use end_to_end::scene::{assert_left_at_rest, wait_until_following};
-use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, tool};
+use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 /// For as long an operator waits before the next turn.
@@ -77,6 +76,42 @@ fn suspended() {
     watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
 }
 
+/// A program of its own that follows.
+fn application(watchdog: &Watchdog, camera: &VirtualCamera, what: &str) -> GstLaunch {
+    let mut command = watchdog.of(tool(env!("CARGO_BIN_EXE_application")));
+    command.args([what, &camera.url(), scene::USER]).env("CAMERA_PASSWORD", scene::PASSWORD);
+    GstLaunch::spawn(command)
+}
+
+/// The socket to the watchdog stays open, and nobody speaks.
+#[test]
+fn a_forked_child_that_has_its_descriptors_lives_on() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let watchdog = Watchdog::new("fork");
+    let mut launch = application(&watchdog, &camera, "fork");
+    let child = launch.wait_for_line("child ").trim_start_matches("child ").parse().unwrap();
+    wait_until_following(&camera);
+    launch.signal("KILL");
+    assert_left_at_rest(&camera);
+    signal(child, "KILL");
+    launch.finish();
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
+
+/// As one that waits for any child (`waitpid(-1)`): whoever started one hears nothing of its end.
+#[test]
+fn a_host_that_reaps_all_children_has_a_watchdog_too() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let watchdog = Watchdog::new("reap");
+    let mut launch = application(&watchdog, &camera, "reap");
+    launch.wait_for_line("moving");
+    assert_eq!(watchdog.processes().len(), 1);
+    wait_until_following(&camera);
+    launch.signal("KILL");
+    launch.finish();
+    assert_left_at_rest(&camera);
+}
+
 /// Everything was done right, and the camera could not be reached.
 #[test]
 fn exits_right_after_null_in_an_outage() {
@@ -109,8 +144,7 @@ fn one_watchdog_stops_all_cameras_of_an_application() {
 fn a_watchdog_that_dies_takes_nobody_along_and_is_replaced() {
     let Application { camera, launch, watchdog } = Application::following("replaced", &["-m"]);
     let first = watchdog.processes();
-    let killed = Command::new("kill").args(["-s", "KILL", &first[0].to_string()]).status().unwrap();
-    assert!(killed.success());
+    signal(first[0], "KILL");
     watchdog
         .wait_for("no other was started", |processes| processes.first().is_some_and(|id| *id != first[0]));
     wait_until_following(&camera);

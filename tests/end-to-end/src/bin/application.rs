@@ -3,10 +3,13 @@
 //!
 //! `application follow URL USER`: follows for 60 frames, to the end of the stream.
 //! `application cycle URL USER N`: starts and stops N times, with the caps changing mid-stream each time.
+//! `application fork URL USER`: follows with the camera; when it first moves, forks a child, which keeps everything open.
+//! `application reap URL USER`: follows with the camera, and has the system reap all children before anybody can wait for them.
 //! The password is read from the environment variable `CAMERA_PASSWORD`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use gst::prelude::*;
+use ptztrack_contract::{CameraChange, CameraMessage};
 
 /// Size, format and frame rate of the pieces of one stream.
 const PIECES: [&str; 4] = [
@@ -30,6 +33,12 @@ fn main() {
                 run(&pipeline);
             }
         }
+        ["fork", url, user] => follow(url, user, fork),
+        ["reap", url, user] => {
+            // SAFETY: no code of ours runs on a signal.
+            unsafe { libc::signal(libc::SIGCHLD, libc::SIG_IGN) };
+            follow(url, user, || println!("moving"));
+        }
         _ => panic!("what is to be done? {arguments:?}"),
     }
     // SAFETY: nothing of GStreamer is used after this; it lets the leak tracer report.
@@ -48,6 +57,50 @@ fn pipeline(source: &gst::Element, url: &str, user: &str) -> gst::Pipeline {
     pipeline.add_many(&elements).unwrap();
     gst::Element::link_many(&elements).unwrap();
     pipeline
+}
+
+/// Follows for ever, and does something when the camera first moves.
+fn follow(url: &str, user: &str, first_move: impl FnOnce()) {
+    let pipeline = pipeline(&camera_source(url, user), url, user);
+    pipeline.set_state(gst::State::Playing).unwrap();
+    let bus = pipeline.bus().unwrap();
+    let moves = |message: &gst::Message| {
+        let message = message.structure().map(CameraMessage::from_structure);
+        matches!(message, Some(Ok(message)) if message.change == CameraChange::Moving)
+    };
+    let mut first_move = Some(first_move);
+    for message in bus.iter_timed(gst::ClockTime::NONE) {
+        assert_ne!(message.type_(), gst::MessageType::Error, "{message:?}");
+        if let Some(first_move) = first_move.take_if(|_| moves(&message)) {
+            first_move();
+        }
+    }
+}
+
+/// The child has every descriptor of ours until it is killed.
+fn fork() {
+    // SAFETY: the child does nothing but wait, which is allowed after a fork of many threads.
+    match unsafe { libc::fork() } {
+        0 => loop {
+            // SAFETY: no memory is involved.
+            unsafe { libc::pause() };
+        },
+        child => println!("child {child}"),
+    }
+}
+
+/// The camera's pictures.
+fn camera_source(url: &str, user: &str) -> gst::Element {
+    let description = "souphttpsrc name=source is-live=true do-timestamp=true ! multipartdemux ! jpegdec \
+        ! queue name=newest leaky=downstream max-size-buffers=1";
+    let bin = gst::parse::bin_from_description(description, false).unwrap();
+    let end = bin.by_name("newest").unwrap().static_pad("src").unwrap();
+    bin.add_pad(&gst::GhostPad::with_target(&end).unwrap()).unwrap();
+    let source = bin.by_name("source").unwrap();
+    source.set_property("location", format!("{url}/axis-cgi/mjpg/video.cgi"));
+    source.set_property("user-id", user);
+    source.set_property("user-pw", std::env::var("CAMERA_PASSWORD").unwrap());
+    bin.upcast()
 }
 
 fn follow_source() -> gst::Element {
