@@ -4,10 +4,10 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     effects::Effects,
-    scene::{Scene, Style},
+    scene::{Plan, Scene, Style},
     sensor::{Sensor, soften},
     settings::RoomSettings,
-    view::{Vector, View},
+    view::View,
     walker::{BodyPose, Walker, obstacles},
 };
 use crate::{
@@ -41,7 +41,7 @@ const SENSOR: u64 = 0x5e25;
 
 /// A room with people in it.
 pub(crate) struct Room {
-    scene: Scene,
+    scene: Arc<Scene>,
     /// The person to be followed first.
     walkers: Vec<Walker>,
     effects: Effects,
@@ -62,11 +62,15 @@ impl Room {
     pub fn new(room: &RoomSettings, settings: &Settings) -> Self {
         let seeded = Seeded::new(room.seed);
         let walkers = Walker::all(room);
-        let obstacles = obstacles(&walkers, room);
-        let trodden: Vec<Vector> = walkers.iter().flat_map(|walker| walker.walk().off_the_way()).collect();
+        let plan = Plan {
+            seed: room.seed,
+            obstacles: obstacles(&walkers, room),
+            events: room.events.clone(),
+            trodden: walkers.iter().flat_map(|walker| walker.walk().off_the_way()).collect(),
+        };
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         Self {
-            scene: Scene::new(room.seed, &obstacles, &room.events, &trodden),
+            scene: Scene::of(plan),
             walkers,
             effects: Effects::new(room),
             sensor: Sensor::new(

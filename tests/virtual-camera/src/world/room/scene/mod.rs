@@ -13,7 +13,11 @@ mod style;
 mod things;
 mod walls;
 
-use std::{borrow::Cow, collections::BTreeMap};
+use std::{
+    borrow::Cow,
+    collections::BTreeMap,
+    sync::{Arc, Mutex, PoisonError, Weak},
+};
 
 use furniture::Piece;
 use hall::Hall;
@@ -56,10 +60,37 @@ pub(super) struct Scene {
     pub light: Light,
 }
 
+/// What decides what a scene looks like.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Plan {
+    pub seed: u64,
+    /// Stand on the floor where their boxes are; what they are is up to the seed.
+    pub obstacles: Vec<(Obstacle, Solid)>,
+    /// What the scene must have for them is there.
+    pub events: Vec<Event>,
+    /// Where people tread: nothing else stands there.
+    pub trodden: Vec<Vector>,
+}
+
 impl Scene {
-    /// The room of a seed with what `events` need. `obstacles` stand on the floor where their boxes are; what they are is
-    /// up to the seed. Nothing else stands where people tread, at `trodden`.
-    pub fn new(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event], trodden: &[Vector]) -> Self {
+    /// The scene of a plan, shared by all rooms of that plan that there are: painting it takes longer than many a picture.
+    pub fn of(plan: Plan) -> Arc<Self> {
+        static SCENES: Mutex<Vec<(Plan, Weak<Scene>)>> = Mutex::new(Vec::new());
+        // Locked while one is painted, so that nobody paints the same one beside it. What a panic left is whole.
+        let mut scenes = SCENES.lock().unwrap_or_else(PoisonError::into_inner);
+        scenes.retain(|(_, scene)| scene.strong_count() > 0);
+        if let Some(scene) =
+            scenes.iter().find(|(other, _)| *other == plan).and_then(|(_, scene)| scene.upgrade())
+        {
+            return scene;
+        }
+        let scene = Arc::new(Self::new(&plan));
+        scenes.push((plan, Arc::downgrade(&scene)));
+        scene
+    }
+
+    fn new(Plan { seed, obstacles, events, trodden }: &Plan) -> Self {
+        let seed = *seed;
         let (seeded, style) = (Seeded::new(seed), Style::of(seed));
         let painter = Painter::new(seeded.fork(1));
         let mut hall = Hall::new(style, &mut seeded.fork(2));

@@ -18,7 +18,11 @@ fn picture(scene: &Scene, view: &View) -> Canvas {
 }
 
 fn scene(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Scene {
-    Scene::new(seed, obstacles, &[], &[])
+    Scene::new(&plan(seed, obstacles, &[]))
+}
+
+fn plan(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event]) -> Plan {
+    Plan { seed, obstacles: obstacles.to_vec(), events: events.to_vec(), trodden: Vec::new() }
 }
 
 fn spread(plane: &Plane) -> f64 {
@@ -31,6 +35,14 @@ fn spread(plane: &Plane) -> f64 {
 const DAY: u64 = 2;
 const SCREEN: (Obstacle, Solid) =
     (Obstacle::Screen, Solid { base: [0.5, 0.0, 4.0], size: [1.6, 2.2, 0.3], yaw_deg: 0.0 });
+
+#[test]
+fn rooms_of_one_plan_share_their_scene() {
+    let scene = Scene::of(plan(1, &[SCREEN], &[]));
+    assert!(Arc::ptr_eq(&scene, &Scene::of(plan(1, &[SCREEN], &[]))));
+    let others = [plan(2, &[SCREEN], &[]), plan(1, &[], &[]), plan(1, &[SCREEN], &[Event::Door])];
+    assert!(others.into_iter().all(|other| !Arc::ptr_eq(&scene, &Scene::of(other))));
+}
 
 #[test]
 fn a_seed_is_a_room() {
@@ -166,7 +178,7 @@ fn what_moves_moves_and_nothing_else_does() {
     let still = scene(1, &[]);
     assert_eq!(picture(&still, 0.0), picture(&still, 60.0));
     for event in [Event::Door, Event::Film, Event::Draught] {
-        let scene = Scene::new(1, &[], &[event], &[]);
+        let scene = Scene::new(&plan(1, &[], &[event]));
         let pictures: Vec<_> = (0..300).map(|second| picture(&scene, f64::from(second) * 0.7)).collect();
         assert!(pictures.windows(2).any(|pair| pair[0] != pair[1]), "{event:?}");
         assert_eq!(pictures[7], picture(&scene, 7.0 * 0.7), "{event:?}");
