@@ -30,7 +30,8 @@ pub(super) enum StreamError {
 }
 
 fn plane(luma: Luma) -> Plane {
-    let pixels: Vec<u8> = (0..luma.height()).flat_map(|y| luma.row(y)).copied().collect();
+    let mut pixels = Vec::with_capacity(luma.width() * luma.height());
+    (0..luma.height()).for_each(|y| pixels.extend_from_slice(luma.row(y)));
     Plane {
         width: luma.width() as u32,
         height: luma.height() as u32,

@@ -1,3 +1,5 @@
+use multiversion::multiversion;
+
 use super::{Luma, LumaError};
 
 /// One component of a picture as it lies in memory: bytes that are `step` apart.
@@ -122,8 +124,8 @@ const MIN_COLOURED: f64 = 0.001;
 
 /// Whether a plane of U or V has any colour.
 fn has_colour(plane: &[u8]) -> bool {
-    let coloured = plane.iter().filter(|value| value.abs_diff(128) > GREY).count();
-    coloured as f64 > MIN_COLOURED * plane.len() as f64
+    let coloured: u32 = plane.iter().map(|value| u32::from(value.abs_diff(128) > GREY)).sum();
+    f64::from(coloured) > MIN_COLOURED * plane.len() as f64
 }
 
 /// Means of rectangles of `samples`, `size` of them; where that is more than there are, the nearest sample.
@@ -178,6 +180,7 @@ fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>
 }
 
 /// Sums of the columns of some rows: at most 257 fit.
+#[multiversion(targets("x86_64+avx2"))]
 fn add_rows(bytes: Luma, top: usize, bottom: usize, sums: &mut Vec<u16>) {
     sums.clear();
     sums.extend(bytes.row(top).iter().map(|&byte| u16::from(byte)));
@@ -187,6 +190,7 @@ fn add_rows(bytes: Luma, top: usize, bottom: usize, sums: &mut Vec<u16>) {
 }
 
 /// Means of `N` columns of `rows` rows each.
+#[multiversion(targets("x86_64+avx2"))]
 fn means<const N: usize>(sums: &[u16], rows: usize, out: &mut [u8]) {
     let count = (N * rows) as u32;
     // Rounded up, so that the mean of equal values is exact.

@@ -9,7 +9,7 @@
 
 use opencv::core::{
     BORDER_REPLICATE, CV_32F, DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Rect2f, Size,
-    Vec2f,
+    ToInputArray, Vec2f,
 };
 use opencv::imgproc;
 use opencv::prelude::*;
@@ -147,7 +147,9 @@ impl CorrelationFilter {
     /// The features around `bounds`, one plane each.
     fn describe(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Vec<Vec<f32>>> {
         let (width, height) = (self.columns * CELL, self.rows * CELL);
-        let grey = sample(luma, scaled(bounds, CONTEXT.0, CONTEXT.1), width, height)?;
+        let pixels = sample(luma, scaled(bounds, CONTEXT.0, CONTEXT.1), width, height);
+        let grey = Mat::from_slice(&pixels)?;
+        let grey = grey.reshape(1, height as i32)?;
         let mut channels = features(&grey, self.columns, self.rows)?;
         for channel in &mut channels {
             channel.iter_mut().zip(&self.window).for_each(|(value, weight)| *value *= weight);
@@ -204,7 +206,7 @@ fn label(columns: usize, rows: usize) -> Vec<f32> {
 }
 
 /// Normalised histograms of oriented gradients of each cell, and its grey: one plane for each.
-fn features(grey: &Mat, columns: usize, rows: usize) -> opencv::Result<Vec<Vec<f32>>> {
+fn features(grey: &impl ToInputArray, columns: usize, rows: usize) -> opencv::Result<Vec<Vec<f32>>> {
     let (mut dx, mut dy) = (Mat::default(), Mat::default());
     imgproc::sobel(grey, &mut dx, CV_32F, 1, 0, 1, 1.0, 0.0, BORDER_REPLICATE)?;
     imgproc::sobel(grey, &mut dy, CV_32F, 0, 1, 1, 1.0, 0.0, BORDER_REPLICATE)?;
@@ -262,7 +264,7 @@ fn normalise(channels: &mut [Vec<f32>], columns: usize, rows: usize) {
     }
 }
 
-fn grey_cells(grey: &Mat, columns: usize, rows: usize) -> opencv::Result<Vec<f32>> {
+fn grey_cells(grey: &impl ToInputArray, columns: usize, rows: usize) -> opencv::Result<Vec<f32>> {
     let mut cells = Mat::default();
     let size = Size::new(columns as i32, rows as i32);
     imgproc::resize(grey, &mut cells, size, 0.0, 0.0, imgproc::INTER_AREA)?;

@@ -72,37 +72,31 @@ impl Lattice {
 
 impl Cells {
     /// Looks around `bounds` (pixels of the picture).
-    pub fn observe(seen: &Observation, bounds: Rect2f, grid: Grid) -> opencv::Result<Self> {
+    pub fn observe(seen: &Observation, bounds: Rect2f, grid: Grid) -> Self {
         let area = scaled(bounds, CONTEXT.0, CONTEXT.1);
         let frame = Rect2f::new(0.0, 0.0, seen.luma.width() as f32, seen.luma.height() as f32);
-        let plane = |plane: &Luma| -> opencv::Result<Vec<u8>> {
+        let plane = |plane: &Luma| {
             let (across, down) = (plane.width() as f32 / frame.width, plane.height() as f32 / frame.height);
             let part = Rect2f::new(area.x * across, area.y * down, area.width * across, area.height * down);
-            Ok(opencv::prelude::MatTraitConstManual::data_bytes(&sample(
-                plane,
-                part,
-                grid.columns,
-                grid.rows,
-            )?)?
-            .to_vec())
+            sample(plane, part, grid.columns, grid.rows)
         };
         let count = grid.columns * grid.rows;
-        let luma = plane(&seen.scene.map_or(seen.luma, |scene| scene.luma))?;
+        let luma = plane(&seen.scene.map_or(seen.luma, |scene| scene.luma));
         let tints = match seen.scene.and_then(|scene| scene.chroma) {
-            Some([u, v]) => plane(&u)?.into_iter().zip(plane(&v)?).map(|(u, v)| Some([u, v])).collect(),
+            Some([u, v]) => plane(&u).into_iter().zip(plane(&v)).map(|(u, v)| Some([u, v])).collect(),
             None => vec![None; count],
         };
         let motion = match seen.scene {
-            Some(scene) => plane(&scene.foreground)?.into_iter().map(motion_log_odds).collect(),
+            Some(scene) => plane(&scene.foreground).into_iter().map(motion_log_odds).collect(),
             None => vec![0.0; count],
         };
         let lattice = Lattice { area, grid };
-        Ok(Self {
+        Self {
             lattice,
             colours: luma.into_iter().zip(tints).collect(),
             motion,
             inside: (0..count).map(|index| frame.contains(lattice.place(index))).collect(),
-        })
+        }
     }
 
     /// Size of a cell, pixels of the picture.
@@ -161,6 +155,17 @@ impl Evidence {
         let inside = |place: i32, count: usize| (0..count as i32).contains(&place);
         (inside(column, self.grid.columns) && inside(row, self.grid.rows))
             .then(|| self.odds[row as usize * self.grid.columns + column as usize])
+    }
+
+    /// The cells of a row from a column on, and how many columns before the first cell there are.
+    fn row(&self, column: i32, row: i32) -> (&[f32], usize) {
+        let Some(cells) =
+            usize::try_from(row).ok().and_then(|row| self.odds.chunks_exact(self.grid.columns).nth(row))
+        else {
+            return (&[], 0);
+        };
+        let first = usize::try_from(column).unwrap_or(0).min(cells.len());
+        (&cells[first..], usize::try_from(-column).unwrap_or(0))
     }
 
     /// How likely the strips just beyond the left, upper, right and lower side of the box are figure, by motion and
@@ -307,12 +312,10 @@ impl Template {
         let (left, top) = (self.first.0 + moved.0, self.first.1 + moved.1);
         let mut sums = Halves::default();
         for (y, weights) in self.weights.chunks_exact(self.columns).enumerate() {
+            let (odds, skipped) = evidence.row(left, top + y as i32);
+            let seen = weights.iter().skip(skipped).zip(odds);
             let sum = if y < self.upper_rows { &mut sums.upper } else { &mut sums.lower };
-            for (x, weight) in weights.iter().enumerate() {
-                if let Some(odds) = evidence.at(left + x as i32, top + y as i32) {
-                    *sum += weight * odds;
-                }
-            }
+            *sum += seen.map(|(weight, odds)| weight * odds).sum::<f32>();
         }
         sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
     }
@@ -423,7 +426,7 @@ mod tests {
                 background: luma,
             };
             let seen = Observation { luma, scene: Some(scene) };
-            Cells::observe(&seen, bounds, GRID).expect("observe")
+            Cells::observe(&seen, bounds, GRID)
         }
     }
 

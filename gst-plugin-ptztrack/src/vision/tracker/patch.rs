@@ -16,6 +16,9 @@ const MAX_AREA: f32 = 40_000.0;
 const MARGIN_SHARE: f32 = 0.3;
 const MIN_MARGIN: f32 = 40.0;
 
+/// A patch lies well enough while none of its sides is farther off than this, in pixels of it.
+const SLACK: usize = 10;
+
 /// A window of the picture. Two of them can be compared wherever each lies, as long as both are of
 /// one size: where the camera pans, the second is cut where the first one's content is expected.
 pub(super) struct Patch {
@@ -56,6 +59,16 @@ impl Cut {
             y: place(self.y, shift.y, self.height, luma.height()),
             ..self
         }
+    }
+
+    /// Whether this one does as well as `wanted`: a patch is costly, and its margin is there to be used.
+    pub fn serves(&self, wanted: &Self) -> bool {
+        let near = |a: usize, b: usize| a.abs_diff(b) <= SLACK * self.step;
+        self.step == wanted.step
+            && near(self.x, wanted.x)
+            && near(self.y, wanted.y)
+            && near(self.x + self.width, wanted.x + wanted.width)
+            && near(self.y + self.height, wanted.y + wanted.height)
     }
 }
 

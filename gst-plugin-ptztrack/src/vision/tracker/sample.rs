@@ -1,31 +1,106 @@
 //! A part of a picture at another size.
 
-use opencv::core::{BORDER_REPLICATE, Mat, Point2f, Rect2f, Size};
-use opencv::imgproc;
+use multiversion::multiversion;
+use opencv::core::Rect2f;
 
-use super::geometry::centre;
 use crate::vision::Luma;
 
-/// `area` of the picture at `width` x `height`, the border repeated where it leaves the picture.
-pub(super) fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> opencv::Result<Mat> {
-    // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
-    let fine = (area.width / width as f32).round().clamp(1.0, 3.0);
-    let size = Size::new((width as f32 * fine) as i32, (height as f32 * fine) as i32);
-    let (across, down) = (area.width / size.width as f32, area.height / size.height as f32);
-    let middle = centre(area);
-    let corner =
-        middle - Point2f::new(area.width - across, area.height - down) / 2.0 - Point2f::new(0.5, 0.5);
-    let matrix = Mat::from_slice_2d(&[[across, 0.0, corner.x], [0.0, down, corner.y]])?;
-    let flags = imgproc::INTER_LINEAR | imgproc::WARP_INVERSE_MAP;
-    let mut grey = Mat::default();
-    luma.with_mat(|mat| {
-        imgproc::warp_affine(mat, &mut grey, &matrix, size, flags, BORDER_REPLICATE, Default::default())
-    })?;
-    if fine == 1.0 {
-        return Ok(grey);
+/// Parts of a pixel that samples are taken at.
+const PARTS: u16 = 64;
+
+/// Where a sample lies: from the middle of pixel `before`, `part` sixty-fourths of the way to that of `after`.
+#[derive(Debug, Clone, Copy)]
+struct Tap {
+    before: usize,
+    after: usize,
+    part: u16,
+}
+
+impl Tap {
+    /// The `index`th of samples that are `step` pixels apart, the first of which lies `step / 2` after `start`. The border
+    /// of the picture, of `size` pixels, is repeated.
+    fn at(index: usize, start: f32, step: f32, size: usize) -> Self {
+        let last = size.saturating_sub(1);
+        let place = (start + (index as f32 + 0.5) * step - 0.5).clamp(0.0, last as f32);
+        let before = (place as usize).min(last);
+        let part = ((place - before as f32) * f32::from(PARTS)).round() as u16;
+        Self { before, after: (before + 1).min(last), part }
     }
-    let mut coarse = Mat::default();
-    let size = Size::new(width as i32, height as i32);
-    imgproc::resize(&grey, &mut coarse, size, 0.0, 0.0, imgproc::INTER_AREA)?;
-    Ok(coarse)
+}
+
+/// `area` of the picture at `width` x `height`, rows packed, bilinear, the border repeated where it leaves the picture.
+pub(super) fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
+    // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
+    let fine = (area.width / width as f32).round().clamp(1.0, 3.0) as usize;
+    let taps = |start: f32, length: f32, count: usize, size: usize| -> Vec<Tap> {
+        let step = length / (count * fine) as f32;
+        (0..count * fine).map(|index| Tap::at(index, start, step, size)).collect()
+    };
+    let across = taps(area.x, area.width, width, luma.width());
+    let down = taps(area.y, area.height, height, luma.height());
+    let mut pixels = vec![0; width * height];
+    if luma.width() * luma.height() == 0 {
+        return pixels;
+    }
+    let (Some(first), Some(last)) = (across.first(), across.last()) else { return pixels };
+    let (left, right) = (first.before, last.after + 1);
+    let mut sums = vec![0_u16; right - left];
+    let scale = (fine * fine) as u32 * u32::from(PARTS) * u32::from(PARTS);
+    for (row, taps) in pixels.chunks_exact_mut(width).zip(down.chunks_exact(fine)) {
+        sums.fill(0);
+        for tap in taps {
+            add(&mut sums, &luma.row(tap.before)[left..right], &luma.row(tap.after)[left..right], tap.part);
+        }
+        for (pixel, taps) in row.iter_mut().zip(across.chunks_exact(fine)) {
+            let at = |tap: &Tap| {
+                let (before, after) = (sums[tap.before - left], sums[tap.after - left]);
+                u32::from(before) * u32::from(PARTS - tap.part) + u32::from(after) * u32::from(tap.part)
+            };
+            *pixel = ((taps.iter().map(at).sum::<u32>() + scale / 2) / scale) as u8;
+        }
+    }
+    pixels
+}
+
+/// Adds what lies `part` of the way from one row to the next.
+#[multiversion(targets("x86_64+avx2"))]
+fn add(sums: &mut [u16], upper: &[u8], lower: &[u8], part: u16) {
+    for (sum, (&upper, &lower)) in sums.iter_mut().zip(upper.iter().zip(lower)) {
+        *sum += u16::from(upper) * (PARTS - part) + u16::from(lower) * part;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SIZE: (usize, usize) = (60, 40);
+
+    proptest! {
+        #[test]
+        fn a_slope_stays_one_at_any_size(
+            x in 0.5..20.0f32, y in 0.5..15.0f32, across in 0.3..2.9f32, down in 0.3..2.9f32,
+        ) {
+            let slope = |x: f32, y: f32| 20.0 + 2.0 * x + 1.5 * y;
+            let pixels: Vec<u8> = (0..SIZE.0 * SIZE.1)
+                .map(|index| slope((index % SIZE.0) as f32 + 0.5, (index / SIZE.0) as f32 + 0.5) as u8)
+                .collect();
+            let (width, height) = (12, 8);
+            let area = Rect2f::new(x, y, across * width as f32, down * height as f32);
+            let sampled = sample(&Luma::packed(&pixels, SIZE.0), area, width, height);
+            for (index, pixel) in sampled.into_iter().enumerate() {
+                let middle = ((index % width) as f32 + 0.5, (index / width) as f32 + 0.5);
+                let expected = slope(x + middle.0 * across, y + middle.1 * down);
+                prop_assert!((f32::from(pixel) - expected).abs() < 2.0, "{pixel} for {expected}");
+            }
+        }
+
+        #[test]
+        fn beyond_the_border_it_is_repeated(x in -90.0..90.0f32, y in -90.0..90.0f32, side in 0.1..200.0f32) {
+            let pixels = [77; SIZE.0 * SIZE.1];
+            let sampled = sample(&Luma::packed(&pixels, SIZE.0), Rect2f::new(x, y, side, side), 5, 7);
+            prop_assert_eq!(sampled, vec![77; 35]);
+        }
+    }
 }

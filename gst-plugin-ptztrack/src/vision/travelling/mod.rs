@@ -5,6 +5,7 @@
 
 mod model;
 mod noise;
+mod rows;
 mod warp;
 
 use std::time::Duration;
@@ -136,22 +137,28 @@ impl TravellingBackground {
             self.rested = if rests { self.rested.saturating_add(elapsed) } else { Duration::ZERO };
             self.held = self.held.map(|held| moved(held, &motion.homography));
         }
-        let wanted = Homography::translation(-(MARGIN as f64), -(MARGIN as f64));
         let margin = MARGIN as f64;
         let (shift, bend) = shift_and_bend(&self.to_picture, self.model.size);
-        let off = (shift.0 + margin).abs().max((shift.1 + margin).abs());
-        let askew = bend > MAX_BEND || off > margin - 2.0;
+        let off = (shift.0 + margin, shift.1 + margin);
         let between = (shift.0 - shift.0.round()).abs().max((shift.1 - shift.1.round()).abs());
         let blurred = self.rested > REST && bend.max(between) > MAX_BLUR;
-        if !askew && !blurred {
-            return;
+        if bend > MAX_BEND || blurred {
+            let wanted = Homography::translation(-margin, -margin);
+            let Some(back) = self.to_picture.inverse() else { return self.start() };
+            self.lay_anew(&wanted.then(&back), wanted);
+        } else if off.0.abs().max(off.1.abs()) > margin - 2.0 {
+            // By whole pixels: nothing is resampled.
+            let to_old = Homography::translation(-off.0.round(), -off.1.round());
+            self.lay_anew(&to_old, to_old.then(&self.to_picture));
         }
-        // From the new canvas to the old one.
-        let Some(back) = self.to_picture.inverse() else { return self.start() };
+    }
+
+    /// Goes over to another canvas, whose pixels lie on the old one where `to_old` says.
+    fn lay_anew(&mut self, to_old: &Homography, to_picture: Homography) {
         let mut warp = Warp::default();
-        warp.prepare(self.model.size, self.model.size, &wanted.then(&back));
+        warp.prepare(self.model.size, self.model.size, to_old);
         self.model.carry(&warp);
-        self.to_picture = wanted;
+        self.to_picture = to_picture;
     }
 
     fn comparison(&self, motion: Option<&CameraMotion>, elapsed: Duration) -> Comparison {

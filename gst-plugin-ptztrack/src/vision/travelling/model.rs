@@ -1,20 +1,16 @@
 //! What is known of each pixel of the background, and how a picture is held against it.
 
-use super::noise::{Line, Noise, PER_MEAN_DEVIATION};
+use super::noise::Noise;
+use super::rows;
 use super::warp::Warp;
 
 /// An apparent background that nobody has looked at yet has this age.
 const UNSEEN: u8 = 0;
 /// From this age (pictures) on, a pixel is known: before, who can tell what is foreground?
-const KNOWN: u8 = 4;
+pub(super) const KNOWN: u8 = 4;
 const MAX_AGE: u8 = 250;
 /// Likelihood of a pixel of which nothing is known.
 pub(super) const UNKNOWN: u8 = 128;
-/// Squared deviations (of luma and chroma together) at which foreground is as likely as background. The noise of
-/// three channels has a mean of 3, and anything else is spread over many more grey levels than noise is.
-const EVEN: f32 = 16.0;
-/// Light varies by this part of what it is: clouds, exposure, faint shadows (a part of the mean, as thesis 3.3).
-const LIGHT: f32 = 0.04;
 /// Pixels of each row that the noise is learned from: one in so many.
 const SAMPLING: usize = 7;
 /// Where the background's own range around a pixel is larger, its deviations say little of noise.
@@ -117,31 +113,18 @@ impl Model {
             self.row.resize(row.len(), 0.0);
             if let Some(chroma) = &picture.chroma {
                 for (seen, mean) in chroma.iter().zip(&self.chroma) {
-                    let pixels = self.row.iter_mut().zip(&seen[row.clone()]).zip(&mean[row.clone()]);
-                    for ((sum, &seen), &mean) in pixels {
-                        let off = f32::from(seen) - f32::from(mean) / 256.0;
-                        *sum += off * off / chroma_noise;
-                    }
+                    rows::add_deviations(&mut self.row, &seen[row.clone()], &mean[row.clone()], chroma_noise);
                 }
             }
-            let ranges = self.low[row.clone()].iter().zip(&self.high[row.clone()]);
-            let known =
-                self.luma[row.clone()].iter().zip(&self.spread[row.clone()]).zip(&self.age[row.clone()]);
-            let pixels = picture.luma[row.clone()].iter().zip(&self.row).zip(known.zip(ranges));
-            for (out, ((&seen, &colour), (((&mean, &spread), &age), (&low, &high)))) in
-                self.likelihood[row.clone()].iter_mut().zip(pixels)
-            {
-                *out = likelihood(
-                    seen,
-                    colour,
-                    mean,
-                    spread,
-                    age,
-                    high.saturating_sub(low),
-                    how.misplaced,
-                    line,
-                );
-            }
+            let known = rows::Known {
+                mean: &self.luma[row.clone()],
+                spread: &self.spread[row.clone()],
+                age: &self.age[row.clone()],
+                low: &self.low[row.clone()],
+                high: &self.high[row.clone()],
+            };
+            let out = &mut self.likelihood[row.clone()];
+            rows::likelihoods(out, &picture.luma[row], &self.row, known, how.misplaced, line);
         }
     }
 
@@ -188,20 +171,12 @@ impl Model {
                     if likelihood <= UNKNOWN { weights[usize::from(age)] } else { 0 }
                 },
             ));
-            let pixels = self.luma[row.clone()].iter_mut().zip(&mut self.spread[row.clone()]);
-            for ((&seen, (mean, spread)), &alpha) in picture.luma[row.clone()].iter().zip(pixels).zip(&alphas)
-            {
-                let seen = u16::from(seen) << 8;
-                *spread = towards(*spread, seen.abs_diff(*mean), alpha);
-                *mean = towards(*mean, seen, alpha);
-            }
+            let (mean, spread) = (&mut self.luma[row.clone()], &mut self.spread[row.clone()]);
+            rows::learn_spread(spread, mean, &picture.luma[row.clone()], &alphas);
+            rows::learn_mean(mean, &picture.luma[row.clone()], &alphas);
             if let Some(chroma) = &picture.chroma {
                 for (seen, mean) in chroma.iter().zip(&mut self.chroma) {
-                    for ((&seen, mean), &alpha) in
-                        seen[row.clone()].iter().zip(&mut mean[row.clone()]).zip(&alphas)
-                    {
-                        *mean = towards(*mean, u16::from(seen) << 8, alpha);
-                    }
+                    rows::learn_mean(&mut mean[row.clone()], &seen[row.clone()], &alphas);
                 }
             }
             for (age, &alpha) in self.age[row.clone()].iter_mut().zip(&alphas) {
@@ -251,37 +226,4 @@ const CANDIDATE_TOLERANCE: u8 = 12;
 /// A quarter of the way.
 fn near(from: u8, to: u8) -> u8 {
     ((u16::from(from) * 3 + u16::from(to) + 2) / 4) as u8
-}
-
-/// (3.1) in 8.8 fixed point: `alpha` of 65536 parts of the way.
-#[inline(always)]
-fn towards(from: u16, to: u16, alpha: u16) -> u16 {
-    let way = i32::from(to) - i32::from(from);
-    // Rounded, so that a small alpha pulls to neither side.
-    (i32::from(from) + ((way * i32::from(alpha >> 1) + (1 << 14)) >> 15)) as u16
-}
-
-#[allow(clippy::too_many_arguments, reason = "one pixel of every plane, inlined into the loop")]
-#[inline(always)]
-fn likelihood(
-    seen: u8,
-    colour: f32,
-    mean: u16,
-    spread: u16,
-    age: u8,
-    range: u8,
-    misplaced: f32,
-    noise: Line,
-) -> u8 {
-    let (mean, age) = (f32::from(mean) / 256.0, f32::from(age));
-    let spread = f32::from(spread) * (PER_MEAN_DEVIATION / 256.0);
-    let sensor = noise.variance(mean);
-    // A spread of a few pictures says less than what is known of all pixels.
-    let light = LIGHT * mean;
-    let variance = ((age * spread * spread + 8.0 * sensor) / (age + 8.0)).max(sensor) + light * light;
-    let off = ((f32::from(seen) - mean).abs() - misplaced * f32::from(range)).max(0.0);
-    let squares = off * off / variance + colour;
-    let known = age.min(f32::from(KNOWN)) / f32::from(KNOWN);
-    let level = 128.0 + known * (squares * (128.0 / EVEN) - 128.0);
-    level.clamp(0.0, 255.0) as u8
 }

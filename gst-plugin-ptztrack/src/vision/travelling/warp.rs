@@ -1,10 +1,11 @@
 //! Pictures sampled through a projective map.
 
+use multiversion::multiversion;
 use ptztrack_contract::{Homography, Point};
 
 /// Side of the squares that move as a whole: within one, a camera's map is a displacement. Small enough that
 /// this holds to a third of a pixel, large enough that the compiler makes vector code of a row of it.
-const BLOCK: usize = 8;
+const BLOCK: usize = 16;
 /// Displacements are rounded to this part of a pixel, which also keeps a camera at rest from being resampled.
 const PARTS: i32 = 16;
 
@@ -23,8 +24,6 @@ pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
     shifts: Vec<Shift>,
-    /// Side of the blocks; the whole width where all move alike.
-    side: usize,
     /// For every row, from where to where it is covered by the source.
     spans: Vec<(usize, usize)>,
 }
@@ -45,8 +44,6 @@ impl Warp {
             let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
             Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) }
         }));
-        let alike = self.shifts.windows(2).all(|pair| pair[0] == pair[1]);
-        self.side = if alike { size.0 } else { BLOCK };
         let spans = (0..size.1).map(|y| self.span(y)).collect();
         self.spans = spans;
     }
@@ -68,20 +65,24 @@ impl Warp {
         span
     }
 
-    /// The blocks of a row: from where to where each is covered, and its shift.
+    /// The blocks of a row, those beside each other that move alike as one: from where to where each is covered, and its
+    /// shift.
     fn pieces(&self, y: usize) -> impl Iterator<Item = ((usize, usize), Shift)> + '_ {
-        let (columns, count) = (self.size.0.div_ceil(BLOCK), self.size.0.div_ceil(self.side));
-        let shifts = &self.shifts[y / BLOCK * columns..][..count];
-        shifts.iter().enumerate().map(move |(index, shift)| {
-            let (start, end) = (index * self.side, ((index + 1) * self.side).min(self.size.0));
+        let columns = self.size.0.div_ceil(BLOCK);
+        let shifts = &self.shifts[y / BLOCK * columns..][..columns];
+        let mut next = 0;
+        shifts.chunk_by(|a, b| a == b).map(move |alike| {
+            let (start, shift) = (next, alike[0]);
+            let end = (start + alike.len() * BLOCK).min(self.size.0);
+            next = end;
             let (width, height) = (self.source.0 as i32, self.source.1 as i32);
             let row = y as i32 + shift.y;
             if row < 0 || row + i32::from(shift.part_y > 0) >= height {
-                return ((start, start), *shift);
+                return ((start, start), shift);
             }
             let first = (-shift.x).clamp(start as i32, end as i32);
             let last = (width - shift.x - i32::from(shift.part_x > 0)).clamp(first, end as i32);
-            ((first as usize, last as usize), *shift)
+            ((first as usize, last as usize), shift)
         })
     }
 
@@ -137,6 +138,10 @@ impl Warp {
         for (y, out) in out.chunks_exact_mut(self.size.0).enumerate() {
             for ((first, last), shift) in self.pieces(y).filter(|(piece, _)| piece.0 < piece.1) {
                 let start = (y as i32 + shift.y) as usize * width + (first as i32 + shift.x) as usize;
+                if shift.part_x == 0 && shift.part_y == 0 {
+                    out[first..last].copy_from_slice(&source[start..start + last - first]);
+                    continue;
+                }
                 for (index, out) in out[first..last].iter_mut().enumerate() {
                     *out = pick(&source[start + index..], shift);
                 }
@@ -146,6 +151,7 @@ impl Warp {
 }
 
 /// One row of a block: the weights are the same for all of it.
+#[multiversion(targets("x86_64+avx2"))]
 fn blend(source: &[u8], width: usize, shift: Shift, out: &mut [u8]) {
     let count = out.len();
     if shift.part_x == 0 && shift.part_y == 0 {

@@ -180,7 +180,7 @@ impl Robust {
         let filter = CorrelationFilter::new(bounds)?;
         let grid = Grid { columns: filter.grid().columns * FINER, rows: filter.grid().rows * FINER };
         let shape = Shape::upright(grid);
-        let cells = Cells::observe(seen, bounds, grid)?;
+        let cells = Cells::observe(seen, bounds, grid);
         let map = FigureMap::new(&cells, &cells.evidence(None), &shape);
         let mut target = Self {
             estimate: Estimate {
@@ -225,7 +225,7 @@ impl Robust {
 
     /// The map of figure and ground around the box as it is now.
     fn look_closely(&mut self, seen: &Observation) -> opencv::Result<(Cells, Evidence)> {
-        let cells = Cells::observe(seen, self.estimate.bounds, self.grid)?;
+        let cells = Cells::observe(seen, self.estimate.bounds, self.grid);
         let evidence = cells.evidence(self.colours.as_ref());
         self.map = FigureMap::new(&cells, &evidence, &self.shape);
         Ok((cells, evidence))
@@ -263,7 +263,7 @@ impl Robust {
 
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
     fn locate(&self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
-        let cells = Cells::observe(seen, bounds, self.grid)?;
+        let cells = Cells::observe(seen, bounds, self.grid);
         let evidence = cells.evidence(self.colours.as_ref());
         let response = self.filter.respond(&seen.luma, bounds)?;
         let cell = cells.cell() * FINER as f32;
@@ -390,7 +390,7 @@ impl Robust {
     /// Keeps the pixels around the box for the next picture.
     fn remember(&mut self, luma: &Luma) -> opencv::Result<()> {
         let wanted = cut_around(luma, self.estimate.bounds);
-        if self.patch.as_cut() != wanted {
+        if !self.patch.as_cut().serves(&wanted) {
             self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
         }
         Ok(())
@@ -598,7 +598,7 @@ impl Follow for Robust {
 
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
         let Some(colours) = &self.colours else { return Ok(false) };
-        let cells = Cells::observe(seen, sighting.bounds, self.grid)?;
+        let cells = Cells::observe(seen, sighting.bounds, self.grid);
         let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
         let (figure, _) = cells.histograms(&map);
         Ok(colours.likeness(&figure) >= ALIKE)
