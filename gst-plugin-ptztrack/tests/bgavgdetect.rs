@@ -453,6 +453,20 @@ fn a_short_buffer_passes_unseen_with_one_warning() {
     assert_eq!(detector.see(&[], 1), [Some(0)]);
 }
 
+/// 255 pictures of 4K are 2 GB.
+#[test]
+fn a_window_of_too_much_memory_is_refused_with_its_size() {
+    let mut detector = Detector::new(&info(VideoFormat::Gray8, 3840, 2160));
+    for (property, value) in [("profile", "thesis"), ("test", "spread"), ("window", "255")] {
+        detector.element.set_property_from_str(property, value);
+    }
+    assert_eq!(detector.see(&[], 3), [None; 3], "video goes on");
+    let warnings = detector.warnings();
+    assert!(matches!(&warnings[..], [warning] if warning.contains("3840x2160 are 2017 MB")), "{warnings:?}");
+    detector.element.set_property("window", 4u32);
+    assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+}
+
 #[test]
 fn all_regions_or_the_longest_contour() {
     let boxes = [BOX, (100, 20, 30, 60)];

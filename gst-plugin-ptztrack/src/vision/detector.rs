@@ -6,7 +6,7 @@ use opencv::prelude::*;
 use ptztrack_contract::Region;
 
 use super::afterimage::Afterimage;
-use super::background::{Background, Criterion};
+use super::background::{Background, Criterion, ForegroundTest};
 use super::contours::{Grid, fill_regions, regions};
 use super::morphology::clean;
 use super::persistence::Persistence;
@@ -22,6 +22,9 @@ const AUTO_OPEN: usize = 3;
 /// The closing's width and height are these parts of the picture's height. Upright, as people are: head,
 /// body and legs are joined, neighbours are not.
 const AUTO_CLOSE: (usize, usize) = (64, 16);
+
+/// The most that the pictures of [`ForegroundTest::Spread`] may take: 32 of 4K, or 255 of 1280x720.
+const MAX_WINDOW_BYTES: usize = 256 << 20;
 
 /// Which regions are reported.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -87,6 +90,19 @@ pub enum DetectorError {
     /// The reduced picture is not what it should be.
     #[error(transparent)]
     Luma(#[from] LumaError),
+    /// More memory than a detector should take.
+    #[error(
+        "`window`={window} pictures of {width}x{height} are {} MB, more than {} MB: choose a smaller `window`, or smaller pictures",
+        (window * width * height) >> 20, MAX_WINDOW_BYTES >> 20
+    )]
+    Window {
+        /// As was asked for.
+        window: usize,
+        /// Pixels.
+        width: usize,
+        /// Pixels.
+        height: usize,
+    },
 }
 
 /// Finds what moves in a still picture: thesis 3.2 to 3.4 in a row.
@@ -203,7 +219,13 @@ impl Detector {
         elapsed: Duration,
         config: &DetectorConfig,
     ) -> Result<f64, DetectorError> {
-        let (rows, columns) = (luma.height() as i32, luma.width() as i32);
+        let (width, height) = (luma.width(), luma.height());
+        if let ForegroundTest::Spread { window, .. } = config.criterion.test
+            && window * width * height > MAX_WINDOW_BYTES
+        {
+            return Err(DetectorError::Window { window, width, height });
+        }
+        let (rows, columns) = (height as i32, width as i32);
         if (self.mask.rows(), self.mask.cols()) != (rows, columns) {
             self.mask = Mat::new_rows_cols_with_default(rows, columns, CV_8UC1, Scalar::all(0.0))?;
         }
