@@ -57,8 +57,12 @@ impl Default for Settings {
     }
 }
 
+/// Detectors of others, neural networks most of all, look at every nth frame.
+const FOREIGN_DETECTOR_PAUSE_S: f64 = 1.0;
+
 impl Settings {
     fn config(&self) -> vision::Config {
+        let own_detector = self.roi_type == MOTION_ROI;
         vision::Config {
             profile: match self.profile {
                 Profile::Thesis => vision::Profile::Thesis,
@@ -73,7 +77,8 @@ impl Settings {
             confirm_frames: self.confirm_frames,
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             manual_size: self.manual_size,
-            must_travel: self.profile == Profile::Robust && self.roi_type == MOTION_ROI,
+            must_travel: self.profile == Profile::Robust && own_detector,
+            detector_pause_s: if own_detector { 0.0 } else { FOREIGN_DETECTOR_PAUSE_S },
             limits: vision::Limits {
                 stationary_s: limit_s(self.stationary_timeout_ns),
                 tracked_s: limit_s(self.max_tracking_time_ns),
@@ -156,7 +161,7 @@ pub struct LkFeatureTrack {
     )]
     #[property(
         name = "roi-type", type = String, default = Some(MOTION_ROI), mutable_playing,
-        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect)",
+        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect); another detector need not see every frame, once a second will do",
         get = |imp: &Self| lock(&imp.settings).roi_type.clone(),
         set = |imp: &Self, name: Option<String>| lock(&imp.settings).roi_type = name.unwrap_or_default()
     )]

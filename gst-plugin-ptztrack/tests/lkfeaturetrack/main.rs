@@ -124,6 +124,18 @@ fn any_detector_will_do() {
 }
 
 #[test]
+fn a_detector_that_looks_at_every_fourth_frame_will_do() {
+    let mut bench = Bench::new(|element| element.set_property("roi-type", "person"));
+    let mut state = None;
+    for frame in 0..12 {
+        let seen = [("person", (60, 80, 32, 72))];
+        let seen = if frame % 4 == 0 { &seen[..] } else { &[] };
+        state = Some(bench.push(picture(Some((60, 80)), None), seen).state);
+    }
+    assert_eq!(state, Some(TargetState::Tracking));
+}
+
+#[test]
 fn clicks_select_and_release() {
     let mut bench = Bench::new(|element| element.set_property_from_str("selection", "manual"));
     for _ in 0..5 {

@@ -13,7 +13,7 @@ const MIN_SIDE: f32 = 6.0;
 const MAX_SHARE: f32 = 0.9;
 /// Intersection over union from which a detection continues an earlier one.
 const SAME: f32 = 0.2;
-/// Frames that a detection may be missing.
+/// Frames that a detection may be missing, however often the detector looks.
 const PATIENCE: u32 = 2;
 /// A detection at the edge may be half a person: how long it may take to walk in, seconds.
 const EDGE_WAIT_S: f64 = 1.2;
@@ -58,6 +58,7 @@ struct Candidate {
     sighting: Sighting,
     frames: u32,
     missed: u32,
+    missed_s: f64,
     age_s: f64,
     /// Its boxes of the last second, carried along with the background, and how old they are in seconds.
     way: VecDeque<(Rect2f, f64)>,
@@ -66,12 +67,13 @@ struct Candidate {
 impl Candidate {
     fn new(sighting: Sighting) -> Self {
         let way = VecDeque::from([(sighting.bounds, 0.0)]);
-        Self { sighting, frames: 1, missed: 0, age_s: 0.0, way }
+        Self { sighting, frames: 1, missed: 0, missed_s: 0.0, age_s: 0.0, way }
     }
 
     /// Goes with the background into the next frame; where nobody knows how that moved, the way so far says nothing.
     fn carry(&mut self, ego: Option<EgoMotion>, dt_s: f64) {
         self.missed += 1;
+        self.missed_s += dt_s;
         self.age_s += dt_s;
         match ego {
             Some(ego) => {
@@ -94,7 +96,7 @@ impl Candidate {
         let old = self.sighting.velocity;
         self.sighting = Sighting { velocity: old + (velocity - old) * SMOOTHING, ..sighting };
         self.frames += 1;
-        self.missed = 0;
+        (self.missed, self.missed_s) = (0, 0.0);
         self.way.push_back((self.sighting.bounds, 0.0));
     }
 
@@ -119,6 +121,8 @@ impl Candidate {
 pub(super) struct Selection {
     /// Who is not chosen until they move.
     pub suppressed: SuppressedRegions,
+    /// The longest that a detector may take from one look to the next, seconds; 0 for one that sees every frame.
+    pub detector_pause_s: f64,
     candidates: Vec<Candidate>,
     released: Option<(Rect2f, f64)>,
 }
@@ -160,7 +164,8 @@ impl Selection {
                 None => self.candidates.push(Candidate::new(sighting)),
             }
         }
-        self.candidates.retain(|candidate| candidate.missed <= PATIENCE);
+        self.candidates
+            .retain(|candidate| candidate.missed <= PATIENCE || candidate.missed_s <= self.detector_pause_s);
         self.follow_released(dt_s);
     }
 
@@ -302,6 +307,21 @@ mod tests {
             selection.update(vec![at(50.0 * n as f32, 100.0, 20.0, 30.0)], STILL, FRAME, DT);
         }
         assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_none());
+    }
+
+    /// A neural network may look at every fourth frame, or less.
+    #[test]
+    fn a_detector_need_not_see_every_frame() {
+        let confirmed = |detector_pause_s: f64| {
+            let mut selection = Selection { detector_pause_s, ..Default::default() };
+            (0..12).any(|n| {
+                let seen = (n % 4 == 0).then(|| at(100.0 + 2.0 * n as f32, 100.0, 40.0, 90.0));
+                selection.update(seen.into_iter().collect(), STILL, FRAME, DT);
+                selection.choose(Choice::Largest, 3, false, FRAME).is_some()
+            })
+        };
+        assert!(confirmed(1.0));
+        assert!(!confirmed(0.0), "what flickers is not confirmed by one that sees every frame");
     }
 
     #[test]

@@ -41,6 +41,8 @@ pub struct Config {
     /// Whether a detection is chosen only once it has travelled across the background: right for a motion detector,
     /// wrong for one that finds people who stand.
     pub must_travel: bool,
+    /// The longest that the detector may take from one look to the next, seconds; 0 for one that sees every frame.
+    pub detector_pause_s: f64,
     /// How long a target is followed at most.
     pub limits: Limits,
 }
@@ -215,6 +217,7 @@ impl Tracker {
             velocity: Point2f::default(),
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        self.selection.detector_pause_s = self.config.detector_pause_s;
         self.selection.update(sightings.collect(), ego, frame, dt_s);
     }
 

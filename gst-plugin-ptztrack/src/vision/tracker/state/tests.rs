@@ -15,6 +15,7 @@ fn config() -> Config {
         coast_s: 1.5,
         manual_size: 0.3,
         must_travel: false,
+        detector_pause_s: 0.0,
         limits: Limits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
     }
 }
