@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo evaluate evaluate-all install packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo evaluate evaluate-all soak deny fuzz install packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -21,8 +21,8 @@ CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 25m
 
-# What is installed: both plugins, and the watchdog, which is a program of crate `vapix`.
-PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix
+# Both plugins; the watchdog, which is a program of crate `vapix`; and what `pipelines/` are run with.
+PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix --package pipeline-supervisor
 
 CODEC ?= mjpeg
 DURATION ?= 60
@@ -31,12 +31,13 @@ ARGS ?=
 WORLD ?= footage
 ROOM_TEST ?= 1
 SEED ?= 1
+INPUTS ?= 10000000
 
 ## help: list the targets
 help:
 	@sed -n 's/^## //p' $(MAKEFILE_LIST)
 
-## build: build the plugins and the watchdog (release) into target/release
+## build: build the plugins, the watchdog and the program that runs `pipelines/` (release) into target/release
 build: packages-build
 	$(CARGO) build --release $(PRODUCT)
 
@@ -79,9 +80,25 @@ evaluate-all: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate --matrix --out target/evaluation/all $(ARGS)
 
-## install: build, and copy the plugins to a GStreamer plugin folder, the watchdog to `libexec` in it
+## soak: follow with four cameras for DURATION=600 seconds while everything happens to them (SEED=1), and leave a plot and an
+##       account in target/soak: every camera at rest, nothing grown, nothing lost
+soak: DURATION := 600
+soak: packages-test
+	$(CARGO) build --workspace --lib --bins
+	scripts/with-plugins debug target/debug/soak --duration $(DURATION) --seed $(SEED)
+
+## deny: check licences and origin of every dependency
+deny: packages-build
+	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
+	$(CARGO) deny check licenses bans sources
+
+## fuzz: feed INPUTS=10000000 inputs to each parser of what cameras say, with a nightly compiler
+fuzz: packages-build
+	@scripts/fuzz $(INPUTS)
+
+## install: copy what `make build` has built, the plugins to a GStreamer plugin folder, the watchdog to `libexec` in it
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
-install: build
+install:
 	scripts/install-plugins target/release "$(PREFIX)" "$(DESTDIR)"
 
 packages-build:

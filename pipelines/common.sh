@@ -10,10 +10,6 @@
 #
 # Ctrl-C, SIGTERM and SIGHUP end the stream and stop the camera. Where the picture ends for any other reason, the pipeline is
 # started anew until it is back: about twice a second, or where nothing is heard of the camera at all after 1 s (RTSP: 2 s) each.
-#
-# gst-launch-1.0 takes passwords as arguments, which other users of the same machine can read in the
-# list of processes. Where that matters, build the pipeline in a program (see embed/), or use an account that
-# may do nothing but watch and steer this camera.
 set -eu
 
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -56,9 +52,7 @@ mjpeg=(
     timeout=1 retries=0
     "location=$CAMERA/axis-cgi/mjpg/video.cgi?resolution=${SIZE:-640x480}&fps=${FPS:-15}&compression=30"
 )
-if [ -n "${CAMERA_USER:-}" ]; then
-    mjpeg+=("user-id=$CAMERA_USER" "user-pw=${CAMERA_PASSWORD:-}")
-fi
+if [ -n "${CAMERA_USER:-}" ]; then mjpeg+=("user-id=$CAMERA_USER"); fi
 mjpeg+=(! multipartdemux ! jpegdec)
 
 # rtsp CODEC: pictures by RTSP in the codec (mpeg4 or h264), still encoded.
@@ -66,9 +60,7 @@ rtsp() {
     local location="$RTSP/axis-media/media.amp?videocodec=$1"
     location+="${SIZE:+&resolution=$SIZE}${FPS:+&fps=$FPS}"
     stream=(rtspsrc "location=$location" latency=0 protocols=tcp)
-    if [ -n "${CAMERA_USER:-}" ]; then
-        stream+=("user-id=$CAMERA_USER" "user-pw=${CAMERA_PASSWORD:-}")
-    fi
+    if [ -n "${CAMERA_USER:-}" ]; then stream+=("user-id=$CAMERA_USER"); fi
     # Milliseconds between two packets.
     stream+=(! watchdog timeout=2000)
 }
@@ -78,62 +70,16 @@ follow=("${newest[@]}" ! bgavgdetect ! lkfeaturetrack)
 
 # Moves the camera.
 steer=(vapixptzsink "location=$CAMERA")
-if [ -n "${CAMERA_USER:-}" ]; then
-    steer+=("user=$CAMERA_USER" "password=${CAMERA_PASSWORD:-}")
-fi
+if [ -n "${CAMERA_USER:-}" ]; then steer+=("user=$CAMERA_USER"); fi
 
 # Draws, and shows each picture as soon as it is there.
 show=("${newest[@]}" ! ptzoverlay ! videoconvert ! "$VIDEO_SINK" sync=false)
 
-# end: ends the stream (-e), so that files are complete and the camera has stopped; without mercy where that takes too long.
-end() {
-    ending=1
-    [ -n "${player:-}" ] || return 0
-    kill -INT "$player" 2>/dev/null || return 0
-    set -m
-    { sleep 10 && kill -KILL "$player"; } >/dev/null 2>&1 &
-    mercy=$!
-    set +m
-}
-
-# hopeless FILE: whether what was said in it will be said again at each start; a password must not be tried for ever.
-hopeless() {
-    grep --quiet --extended-regexp 'erroneous pipeline|Unauthorized|no element' "$1"
-}
-
-# launch PIPELINE...: runs it, messages printed, again and again until it is told to end. {run} in it is nothing the first
-# time, then -2, -3 and so on.
+# launch PIPELINE...: runs it, messages printed, until it is told to end. {run} in it is nothing the first time, then -2, -3 and so
+# on. Elements with a user get CAMERA_PASSWORD from the environment: arguments can be read in the list of processes.
 launch() {
-    local errors status run= runs=1 begun pause=1 ending= player= mercy=
-    errors=$(mktemp)
-    trap end INT TERM HUP
-    while :; do
-        begun=$SECONDS
-        # In a process group of its own (-m): a terminal's Ctrl-C is for this script only.
-        set -m
-        gst-launch-1.0 -e -m "${@//\{run\}/$run}" 2> >(tee "$errors" >&2) </dev/null &
-        player=$!
-        set +m
-        # A signal ends the wait, not the pipeline.
-        while :; do
-            wait "$player" && status=0 || status=$?
-            kill -0 "$player" 2>/dev/null || break
-        done
-        player=
-        [ -z "$ending" ] || break
-        if hopeless "$errors"; then
-            echo "Not started anew: that would end in the same way." >&2
-            break
-        fi
-        # Tenths of a second, doubled while it comes to nothing.
-        [ $((SECONDS - begun)) -lt 5 ] || pause=1
-        echo "The picture is gone; starting anew." >&2
-        sleep "0.$pause" || true
-        [ -z "$ending" ] || break
-        pause=$((pause < 4 ? pause * 2 : 4)) runs=$((runs + 1))
-        run=-$runs
-    done
-    [ -z "$mercy" ] || kill -- "-$mercy" 2>/dev/null || true
-    rm -f "$errors"
-    exit "$status"
+    local launcher="$repository/target/release/ptztrack-launch"
+    launcher=$(command -v ptztrack-launch || echo "$launcher")
+    [ -x "$launcher" ] || { echo "$launcher is not built: run \`make build\` first." >&2; exit 2; }
+    exec "$launcher" "$@"
 }

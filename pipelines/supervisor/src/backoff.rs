@@ -41,4 +41,12 @@ mod tests {
         let mut after = |ran: u64| backoff.after(Duration::from_secs(ran)).as_millis();
         assert_eq!([0, 0, 0, 0, 6, 0].map(&mut after), [100, 200, 400, 400, 100, 200]);
     }
+
+    /// A source that hears nothing gives up after a second, and a pipeline is built and starts in much less than half of one.
+    #[test]
+    fn a_camera_that_is_back_is_asked_within_two_seconds() {
+        let (silence, start) = (Duration::from_secs(1), Duration::from_millis(500));
+        let mut backoff = Backoff::default();
+        assert!((0..100).all(|_| backoff.after(silence) + silence + start <= Duration::from_secs(2)));
+    }
 }

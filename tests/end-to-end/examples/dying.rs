@@ -6,11 +6,12 @@
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::thread;
 use std::time::Duration;
 
+use end_to_end::following::script;
 use end_to_end::{GstLaunch, PATIENCE, plugin_folder, scene, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
@@ -171,8 +172,7 @@ impl Application {
         let pipeline = format!("{} {}", scene::follow(camera), self.properties(socket));
         match self {
             Self::Script => {
-                let file = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../pipelines/headless.sh");
-                let mut command = tool(file.to_str().unwrap());
+                let mut command = script("headless.sh");
                 command.env("CAMERA", camera.url()).env("SIZE", "320x240");
                 command.env("CAMERA_USER", scene::USER).env("CAMERA_PASSWORD", scene::PASSWORD);
                 command

@@ -2,12 +2,13 @@
 
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex};
 
 use socket2::SockRef;
 
-/// What asks for video.
-const VIDEO: &[u8] = b"GET /axis-cgi/mjpg/video.cgi";
+/// What asks for video, by HTTP and by RTSP: with this a client there begins.
+const VIDEO: [&[u8]; 2] = [b"GET /axis-cgi/mjpg/video.cgi", b"OPTIONS rtsp://"];
 
 /// How the way to the camera is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -37,14 +38,20 @@ struct Traffic {
     streams: Vec<TcpStream>,
     /// Requests for video so far.
     video_requests: u64,
+    /// What has come back of the newest of them.
+    video_bytes: usize,
 }
+
+/// More than is said before there are pictures.
+const PICTURE_BYTES: usize = 4000;
 
 impl Front {
     /// A way to the port of a camera.
     pub fn new(camera: SocketAddr) -> Self {
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let address = listener.local_addr().unwrap();
-        let traffic = Mutex::new(Traffic { way: Way::Open, streams: Vec::new(), video_requests: 0 });
+        let traffic =
+            Mutex::new(Traffic { way: Way::Open, streams: Vec::new(), video_requests: 0, video_bytes: 0 });
         let state = Arc::new(State { address, camera, traffic, changed: Condvar::new() });
         listen(state.clone(), listener);
         Self { state }
@@ -81,10 +88,22 @@ impl Front {
     /// Waits until somebody asks for video, after so many requests.
     #[track_caller]
     pub fn wait_for_video_request(&self, after: u64) {
+        self.wait_while("nobody asks for video", |traffic| traffic.video_requests <= after);
+    }
+
+    /// Waits until whoever asked for video after so many requests has got some.
+    #[track_caller]
+    pub fn wait_for_picture(&self, after: u64) {
+        let none =
+            |traffic: &mut Traffic| traffic.video_requests <= after || traffic.video_bytes < PICTURE_BYTES;
+        self.wait_while("there is no picture", none);
+    }
+
+    #[track_caller]
+    fn wait_while(&self, what: &str, condition: impl FnMut(&mut Traffic) -> bool) {
         let traffic = self.state.traffic.lock().unwrap();
-        let none = |traffic: &mut Traffic| traffic.video_requests <= after;
-        let waited = self.state.changed.wait_timeout_while(traffic, crate::PATIENCE, none);
-        assert!(!waited.unwrap().1.timed_out(), "nobody asks for video");
+        let waited = self.state.changed.wait_timeout_while(traffic, crate::PATIENCE, condition);
+        assert!(!waited.unwrap().1.timed_out(), "{what}");
     }
 
     /// Everybody who is connected is reset, and may connect again.
@@ -123,26 +142,31 @@ fn listen(state: Arc<State>, listener: TcpListener) {
                 return;
             }
             let Ok(camera) = TcpStream::connect(state.camera) else { continue };
-            for (from, to) in [(&client, &camera), (&camera, &client)] {
-                let (from, to, state) = (from.try_clone().unwrap(), to.try_clone().unwrap(), state.clone());
+            let both = [(&client, &camera), (&camera, &client)].map(clones);
+            // Before anything passes: whoever has got something can be reset.
+            state.traffic.lock().unwrap().streams.extend([client, camera]);
+            let asked = Arc::new(AtomicU64::new(0));
+            for (from, to) in both {
+                let (state, asked) = (state.clone(), asked.clone());
                 std::thread::spawn(move || {
-                    state.pass_on(&from, &to);
+                    state.pass_on(&from, &to, &asked);
                     let _ = (from.shutdown(Shutdown::Both), to.shutdown(Shutdown::Both));
                 });
             }
-            state.traffic.lock().unwrap().streams.extend([client, camera]);
         }
     });
 }
 
+fn clones((from, to): (&TcpStream, &TcpStream)) -> (TcpStream, TcpStream) {
+    (from.try_clone().unwrap(), to.try_clone().unwrap())
+}
+
 impl State {
-    fn pass_on(&self, mut from: &TcpStream, mut to: &TcpStream) {
+    /// `asked`: the number of the connection's newest request for video.
+    fn pass_on(&self, mut from: &TcpStream, mut to: &TcpStream, asked: &AtomicU64) {
         let mut bytes = [0; 16 * 1024];
         while let Ok(read @ 1..) = from.read(&mut bytes) {
-            if bytes[..read].windows(VIDEO.len()).any(|part| part == VIDEO) {
-                self.traffic.lock().unwrap().video_requests += 1;
-                self.changed.notify_all();
-            }
+            self.count(&bytes[..read], asked);
             drop(
                 self.changed
                     .wait_while(self.traffic.lock().unwrap(), |traffic| traffic.way == Way::Stalled)
@@ -152,6 +176,19 @@ impl State {
                 return;
             }
         }
+    }
+
+    fn count(&self, bytes: &[u8], asked: &AtomicU64) {
+        let mut traffic = self.traffic.lock().unwrap();
+        let asks = |video: &&[u8]| bytes.windows(video.len()).any(|part| part == *video);
+        if VIDEO.iter().any(asks) {
+            traffic.video_requests += 1;
+            traffic.video_bytes = 0;
+            asked.store(traffic.video_requests, Ordering::Relaxed);
+        } else if asked.load(Ordering::Relaxed) == traffic.video_requests {
+            traffic.video_bytes += bytes.len();
+        }
+        self.changed.notify_all();
     }
 }
 

@@ -1,19 +1,21 @@
 //! `gst-launch-1.0` and friends as a user starts them, with the freshly built plugins.
 
 use std::io::{BufRead, BufReader, Read};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-/// The folder that holds the built `libgst*.so` and the watchdog: the one that this test was built into.
+/// The folder that holds the built `libgst*.so` and the watchdog: the one that this program was built into.
 ///
 /// # Panics
 /// Where the plugins were not built: `cargo test` alone does not build them.
 pub fn plugin_folder() -> PathBuf {
-    let test = std::env::current_exe().expect("a running test has a path");
-    let folder = test.parent().and_then(|deps| deps.parent()).expect("target/<profile>/deps").to_owned();
-    for file in ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog"] {
+    let program = std::env::current_exe().expect("a running program has a path");
+    // target/<profile>, and `deps` or `examples` in it.
+    let within = |folder: &&Path| !folder.ends_with("deps") && !folder.ends_with("examples");
+    let folder = program.ancestors().skip(1).find(within).expect("target/<profile>").to_owned();
+    for file in ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog", "ptztrack-launch"] {
         assert!(folder.join(file).exists(), "{file} is not built: run `cargo build` first");
     }
     folder

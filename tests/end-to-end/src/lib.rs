@@ -2,12 +2,15 @@
 //! inside the test, and waiting for something to happen without sleeping.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod chance;
+pub mod following;
 mod front;
 mod launch;
 mod pipeline;
 pub mod scene;
 mod watchdog;
 
+pub use chance::Chance;
 pub use front::{Front, Way};
 pub use launch::{GstLaunch, plugin_folder, signal, tool};
 pub use pipeline::{Running, init};

@@ -13,9 +13,14 @@ pub const PASSWORD: &str = "xyzzy-plugh-42";
 
 /// A camera before a person who walks up and down for minutes: there is always somebody to follow.
 pub fn walking_person() -> Settings {
+    walking_person_for(Duration::from_secs(360))
+}
+
+/// A camera before a person who walks up and down for so long.
+pub fn walking_person_for(time: Duration) -> Settings {
     let turn = |seconds: u64| Duration::from_secs(seconds);
     let mut path = Vec::new();
-    for lap in 0..20 {
+    for lap in 0..time.as_secs().div_ceil(18) {
         path.extend(SyntheticSettings::walk((-22.0, -2.0), (22.0, -2.0), 5.0, turn(1 + lap * 18)));
         path.extend(SyntheticSettings::walk((22.0, -2.0), (-22.0, -2.0), 5.0, turn(10 + lap * 18)));
     }
@@ -70,18 +75,21 @@ pub fn wait_until_following(camera: &VirtualCamera) {
 /// The camera stops, and its last order is the reason; for a moment it may rest between two others.
 #[track_caller]
 pub fn assert_left_at_rest(camera: &VirtualCamera) {
-    let end = Instant::now() + PATIENCE;
+    assert!(left_at_rest(camera, PATIENCE), "left turning, or not by a stop: {:?}", camera.commands().last());
+}
+
+/// Whether that comes about within so long.
+pub fn left_at_rest(camera: &VirtualCamera, patience: Duration) -> bool {
+    let end = Instant::now() + patience;
     let moves = |command: &ReceivedCommand| command.query.contains("move");
     loop {
         let rests = camera.wait_for(MOMENT, |status| !status.moving);
         let last = camera.commands().into_iter().rfind(moves);
-        if rests && last.as_ref().is_some_and(|last| last.query.contains("continuouspantiltmove=0,0")) {
-            return;
+        if rests && last.is_some_and(|last| last.query.contains("continuouspantiltmove=0,0")) {
+            return true;
         }
-        assert!(
-            Instant::now() < end,
-            "left {}, the last order was {last:?}",
-            if rests { "at rest" } else { "moving" }
-        );
+        if Instant::now() >= end {
+            return false;
+        }
     }
 }

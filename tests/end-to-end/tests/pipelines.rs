@@ -4,16 +4,12 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
+use end_to_end::following::{pipeline, python, rust, script};
 use end_to_end::{GstLaunch, PATIENCE, plugin_folder, scene, tool};
 use virtual_camera::VirtualCamera;
 
-fn pipelines() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines")
-}
-
 /// A command that finds the camera by the pipelines' environment variables.
-fn against(camera: &VirtualCamera, program: impl AsRef<Path>) -> Command {
-    let mut command = tool(program.as_ref().to_str().unwrap());
+fn against(camera: &VirtualCamera, mut command: Command) -> Command {
     command
         .env("CAMERA", camera.url())
         .env("RTSP", camera.rtsp_url())
@@ -39,7 +35,7 @@ fn follows_until_interrupted(camera: &VirtualCamera, command: Command) -> String
 #[track_caller]
 fn follows(file: &str) {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let output = follows_until_interrupted(&camera, against(&camera, pipelines().join(file)));
+    let output = follows_until_interrupted(&camera, against(&camera, script(file)));
     assert!(output.contains("ptztrack-target, change=(string)acquired"), "{output}");
 }
 
@@ -63,11 +59,39 @@ fn headless() {
     follows("headless.sh");
 }
 
+/// Others on the same machine can read the arguments of every process.
+#[test]
+fn no_argument_has_the_password() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let launch = GstLaunch::spawn(against(&camera, script("headless.sh")));
+    let moved = camera.wait_for(PATIENCE, |status| status.moving);
+    let arguments = std::fs::read(format!("/proc/{}/cmdline", launch.id())).unwrap();
+    launch.signal("INT");
+    let (_, output) = launch.finish();
+    assert!(moved, "the camera never moved:\n{output}");
+    let arguments = String::from_utf8_lossy(&arguments);
+    assert!(arguments.contains(scene::USER) && !arguments.contains(scene::PASSWORD), "{arguments}");
+}
+
+#[test]
+fn a_camera_may_have_an_address_of_ipv6() {
+    let folder = plugin_folder().join(format!("ipv6-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    std::os::unix::fs::symlink("/bin/echo", folder.join("ptztrack-launch")).unwrap();
+    let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
+    let mut command = script("h264-rtsp.sh");
+    let output = command.env("PATH", path).env("CAMERA", "http://[2001:db8::1]:8080/").output().unwrap();
+    std::fs::remove_dir_all(&folder).unwrap();
+    let arguments = String::from_utf8_lossy(&output.stdout);
+    assert!(arguments.contains("location=rtsp://[2001:db8::1]:554/axis-media/"), "{output:?}");
+    assert!(arguments.contains("vapixptzsink location=http://[2001:db8::1]:8080"), "{output:?}");
+}
+
 #[test]
 fn recording_is_complete_and_playable() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let recording = plugin_folder().join(format!("recording-{}.mkv", std::process::id()));
-    let mut command = against(&camera, pipelines().join("record-overlay.sh"));
+    let mut command = against(&camera, script("record-overlay.sh"));
     command.env("OUT", &recording);
     follows_until_interrupted(&camera, command);
     let probe = Command::new("timeout")
@@ -94,7 +118,7 @@ fn recording_is_complete_and_playable() {
 #[test]
 fn detection_alone_tells_of_motion_and_moves_nothing() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let mut launch = GstLaunch::spawn(against(&camera, pipelines().join("detect-only.sh")));
+    let mut launch = GstLaunch::spawn(against(&camera, script("detect-only.sh")));
     launch.wait_for_line("ptztrack-motion, change=(string)start");
     launch.signal("INT");
     let (status, output) = launch.finish();
@@ -122,7 +146,7 @@ fn no_file_is_left_out_here() {
 }
 
 fn scripts() -> Vec<PathBuf> {
-    let files = std::fs::read_dir(pipelines()).unwrap().map(|entry| entry.unwrap().path());
+    let files = std::fs::read_dir(pipeline("")).unwrap().map(|entry| entry.unwrap().path());
     files
         .filter(|file| {
             file.extension().is_some_and(|extension| extension == "sh") && !file.ends_with("common.sh")
@@ -133,21 +157,14 @@ fn scripts() -> Vec<PathBuf> {
 #[test]
 fn embedded_in_python() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    // Debian's GStreamer bindings belong to Debian's Python, which another one may hide in PATH.
-    let mut command = against(&camera, "/usr/bin/python3");
-    command.arg(pipelines().join("embed/follow.py")).args([&camera.url(), scene::USER]);
-    let output = follows_until_interrupted(&camera, command);
+    let output = follows_until_interrupted(&camera, against(&camera, python(&camera.url())));
     assert!(output.contains("target 1 acquired"), "{output}");
 }
 
 #[test]
 fn embedded_in_rust() {
-    let example = plugin_folder().join("examples/follow");
-    assert!(example.exists(), "the example is not built: run `cargo build --examples` first");
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let mut command = against(&camera, example);
-    command.args([&camera.url(), scene::USER]);
-    let output = follows_until_interrupted(&camera, command);
+    let output = follows_until_interrupted(&camera, against(&camera, rust(&camera.url())));
     assert!(output.contains("target 1 acquired"), "{output}");
 }
 
@@ -175,7 +192,7 @@ fn the_demonstration_leaves_video_plot_and_summary() {
     std::fs::create_dir_all(&out).unwrap();
     let mut command = tool("python3");
     command
-        .arg(pipelines().join("demo/demo.py"))
+        .arg(pipeline("demo/demo.py"))
         .args(["--codec", "mjpeg", "--duration", "8", "--footage"])
         .arg(footage(&out))
         .arg("--camera")

@@ -378,9 +378,14 @@ impl VirtualCamera {
         format!("http://{}", self.http_address())
     }
 
+    /// Where RTSP is served.
+    pub fn rtsp_address(&self) -> SocketAddr {
+        self.rtsp.address()
+    }
+
     /// `rtsp://127.0.0.1:port`, without a slash at its end.
     pub fn rtsp_url(&self) -> String {
-        format!("rtsp://{}", self.rtsp.address())
+        format!("rtsp://{}", self.rtsp_address())
     }
 
     /// How late it is for the camera, since its start.
@@ -422,6 +427,11 @@ impl VirtualCamera {
     /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is not touched.
     pub fn set_fault(&self, fault: Fault) {
         self.camera.fault.send_replace(fault);
+    }
+
+    /// Forgets all RTSP sessions, as if its video server had been restarted; connections stay.
+    pub fn forget_rtsp_sessions(&self) {
+        self.rtsp.forget_sessions();
     }
 
     /// Lets the time of a camera with [`crate::Clock::Stepped`] go on to `time` since its start, and wakes whatever

@@ -71,15 +71,19 @@ impl RtspServer {
         self.address
     }
 
+    /// Ends all sessions and keeps the connections.
+    pub fn forget_sessions(&self) {
+        let server = self.server.clone();
+        self.context.invoke(move || remove_sessions(&server));
+    }
+
     /// Closes the port and all sessions. Pictures must still be coming: a session just being set up waits for one.
     pub fn close(&mut self) {
         let (server, door, main_loop) = (self.server.clone(), self.door.clone(), self.main_loop.clone());
         self.context.invoke(move || {
             door.destroy();
             server.client_filter(Some(&mut |_, _| RTSPFilterResult::Remove));
-            if let Some(sessions) = server.session_pool() {
-                sessions.filter(Some(&mut |_, _| RTSPFilterResult::Remove));
-            }
+            remove_sessions(&server);
             main_loop.quit();
         });
         if let Some(thread) = self.thread.take() {
@@ -91,6 +95,12 @@ impl RtspServer {
     /// Waits for the threads that drew for its clients, once the camera is stopping.
     pub fn join(&self) {
         self.feeders.join();
+    }
+}
+
+fn remove_sessions(server: &RTSPServer) {
+    if let Some(sessions) = server.session_pool() {
+        sessions.filter(Some(&mut |_, _| RTSPFilterResult::Remove));
     }
 }
 

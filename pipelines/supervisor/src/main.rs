@@ -1,0 +1,77 @@
+//! Runs a pipeline unattended, as `gst-launch-1.0 -e -m` does with somebody there: it ends the stream on Ctrl-C, SIGTERM and
+//! SIGHUP, starts anew where the picture is gone, and prints what elements have to say.
+//!
+//! ```sh
+//! CAMERA_PASSWORD=... ptztrack-launch souphttpsrc user-id=operator location=... ! ... ! vapixptzsink user=operator location=...
+//! ```
+//! Elements that are given a user get the password in the environment variable `CAMERA_PASSWORD`, so that no list of
+//! processes shows it. `{run}` in an argument is nothing in the first run, then `-2`, `-3` and so on.
+
+use std::cell::Cell;
+use std::error::Error;
+use std::process::ExitCode;
+
+use gst::prelude::*;
+
+/// What elements call a user, and the user's password.
+const CREDENTIALS: [(&str, &str); 2] = [("user", "password"), ("user-id", "user-pw")];
+
+fn main() -> ExitCode {
+    match run() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(err) => {
+            eprintln!("{err}\nNot started anew: that would end in the same way.");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run() -> Result<(), Box<dyn Error>> {
+    gst::init()?;
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let password = std::env::var("CAMERA_PASSWORD").unwrap_or_default();
+    let runs = Cell::new(0);
+    let next = || {
+        runs.set(runs.get() + 1);
+        if runs.get() > 1 {
+            eprintln!("The picture is gone; starting anew.");
+        }
+        pipeline(&arguments, runs.get(), &password)
+    };
+    pipeline_supervisor::run(next, print)
+}
+
+fn pipeline(arguments: &[String], run: u32, password: &str) -> Result<gst::Pipeline, Box<dyn Error>> {
+    let run = if run == 1 { String::new() } else { format!("-{run}") };
+    let arguments: Vec<String> = arguments.iter().map(|argument| argument.replace("{run}", &run)).collect();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let pipeline = gst::parse::launchv(&arguments)?
+        .downcast::<gst::Pipeline>()
+        .map_err(|_| "a pipeline has more than one element")?;
+    for element in pipeline.iterate_recurse().into_iter().flatten() {
+        for (user, property) in CREDENTIALS {
+            let given = element.has_property_with_type(user, glib::Type::STRING)
+                && element.property::<Option<String>>(user).is_some_and(|user| !user.is_empty());
+            if given && element.has_property_with_type(property, glib::Type::STRING) {
+                element.set_property(property, password);
+            }
+        }
+    }
+    Ok(pipeline)
+}
+
+/// Messages as `gst-launch-1.0 -m` has them, but only those that say something to a user.
+fn print(message: &gst::Message) {
+    let from = || message.src().map_or_else(String::new, |source| source.path_string().to_string());
+    match message.view() {
+        gst::MessageView::Error(err) => eprintln!("ERROR: {}: {}", from(), err.error()),
+        gst::MessageView::Warning(warning) => eprintln!("WARNING: {}: {}", from(), warning.error()),
+        gst::MessageView::Info(info) => println!("INFO: {}: {}", from(), info.error()),
+        gst::MessageView::Element(element) => {
+            if let Some(structure) = element.structure() {
+                println!("{structure}");
+            }
+        }
+        _ => {}
+    }
+}

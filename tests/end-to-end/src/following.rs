@@ -1,0 +1,118 @@
+//! Whoever follows with a camera behind a network that fails.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use virtual_camera::VirtualCamera;
+
+use crate::{Front, GstLaunch, PATIENCE, Way, plugin_folder, scene, tool};
+
+/// A camera behind a network that fails, and whoever follows with it.
+pub struct Following {
+    /// What it follows with.
+    pub camera: VirtualCamera,
+    /// PTZ, and MJPEG.
+    pub http: Front,
+    /// Video by RTSP.
+    pub rtsp: Front,
+    /// What follows.
+    pub launch: GstLaunch,
+}
+
+/// The way that the picture takes; PTZ goes by HTTP.
+pub type Video = fn(&Following) -> &Front;
+/// By HTTP.
+pub const MJPEG: Video = |following| &following.http;
+/// By RTSP.
+pub const RTSP: Video = |following| &following.rtsp;
+
+impl Following {
+    /// Once `command`, which is given the camera's address, follows.
+    #[track_caller]
+    pub fn start(command: impl FnOnce(&str) -> Command) -> Self {
+        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+        let http = Front::new(camera.http_address());
+        let rtsp = Front::new(camera.rtsp_address());
+        let mut command = command(&format!("http://{}", http.address()));
+        surroundings(&mut command, &http, &rtsp);
+        let mut following = Self { launch: GstLaunch::spawn(command), camera, http, rtsp };
+        following.follows();
+        following
+    }
+
+    /// Control is there, and so is the picture, without which nothing is moved.
+    #[track_caller]
+    pub fn follows(&mut self) {
+        let before = self.camera.status().commands;
+        let wanted = |status: &virtual_camera::Status| status.viewers > 0 && status.moving;
+        let back = self.camera.wait_for(PATIENCE, wanted)
+            && self.camera.wait_for(PATIENCE, |status| status.commands > before);
+        assert!(back, "{}", self.said());
+    }
+
+    /// The camera sends no picture to anybody.
+    #[track_caller]
+    pub fn is_lost(&self) {
+        assert!(self.camera.wait_for(PATIENCE, |status| status.viewers == 0), "the picture stayed");
+    }
+
+    fn said(&mut self) -> String {
+        self.launch.read_for(Duration::ZERO);
+        self.launch.seen().join("\n")
+    }
+
+    /// Both ways are like this.
+    pub fn set(&self, way: Way) {
+        self.http.set(way);
+        self.rtsp.set(way);
+    }
+
+    /// After this, another gets video and follows. How many watch tells nothing of that: the next may be there before the
+    /// camera misses the last.
+    #[track_caller]
+    pub fn starts_anew(&mut self, video: Video, fault: impl FnOnce(&Self)) {
+        let before = video(self).video_requests();
+        fault(self);
+        video(self).wait_for_picture(before);
+        self.follows();
+    }
+}
+
+/// What a follower is told of its camera.
+pub fn surroundings(command: &mut Command, http: &Front, rtsp: &Front) {
+    command
+        .env("CAMERA", format!("http://{}", http.address()))
+        .env("RTSP", format!("rtsp://{}", rtsp.address()))
+        .env("CAMERA_USER", scene::USER)
+        .env("CAMERA_PASSWORD", scene::PASSWORD)
+        .env("SIZE", "320x240");
+}
+
+/// A file in `pipelines/`.
+pub fn pipeline(file: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../pipelines").join(file)
+}
+
+/// A script in `pipelines/`, with what is built here.
+pub fn script(file: &str) -> Command {
+    let mut command = tool(pipeline(file).to_str().unwrap());
+    let path = std::env::var("PATH").unwrap();
+    command.env("PATH", format!("{}:{path}", plugin_folder().display()));
+    command
+}
+
+/// `pipelines/embed/follow.py`, for the camera at this address.
+pub fn python(camera: &str) -> Command {
+    // Debian's GStreamer bindings belong to Debian's Python, which another one may hide in PATH.
+    let mut command = tool("/usr/bin/python3");
+    command.arg(pipeline("embed/follow.py")).args([camera, scene::USER]);
+    command
+}
+
+/// The example `follow`, for the camera at this address.
+pub fn rust(camera: &str) -> Command {
+    let mut command = tool(plugin_folder().join("examples/follow").to_str().unwrap());
+    command.args([camera, scene::USER]);
+    command
+}
