@@ -72,7 +72,9 @@ fn pipeline(rtsp: bool) -> gst::Pipeline {
 fn disturb(current: Current, mut chance: Chance) {
     let after = Duration::from_secs(chance.within(EVERY_S));
     glib::timeout_add_local_once(after, move || {
-        if let Some(pipeline) = &*current.borrow() {
+        // One that has failed is left alone: it is over.
+        let runs = |pipeline: &&gst::Pipeline| pipeline.current_state() > gst::State::Ready;
+        if let Some(pipeline) = current.borrow().as_ref().filter(runs) {
             if chance.within((0, 3)) == 0 {
                 // Where either fails, a message says so, and the pipeline is built anew.
                 let _ = pipeline.set_state(gst::State::Ready);
