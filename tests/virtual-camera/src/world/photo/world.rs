@@ -33,6 +33,8 @@ const MAX_MAGNIFICATION: f64 = 4.0;
 const LIMITS: Limits = Limits { pan_deg: (-180.0, 180.0), tilt_deg: (-60.0, 30.0) };
 const OVERVIEW_SIZE: (u32, u32) = (1280, 480);
 const OVERVIEW_FOV_DEG: f64 = 130.0;
+/// Views that somebody may be wide or high: at a right angle to the camera they would be without end.
+const FARTHEST: f64 = 8.0;
 /// The soft shadow at the feet: half as wide and half as deep, in metres, and how dark.
 const SHADOW: (f64, f64, f64) = (0.38, 0.26, 0.5);
 /// Stream of chance of the sensor.
@@ -272,12 +274,14 @@ impl Photo {
         [whole, unhidden]
     }
 
-    /// The person in a view, inside of it or not; `None` unless they are ahead of the camera.
+    /// The person in a view, inside of it or not; `None` unless they are ahead of the camera, or where they are so far to
+    /// the side that the plane of the picture hardly meets them.
     fn person(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Sighting> {
         // All pictures were decoded when the world was opened.
         let figure = self.figure(exposure.time.as_secs_f64()).ok()?;
         let (pose, view) = (&exposure.opening, self.view(&exposure.opening, size));
-        let around = figure.bounds(&view)?;
+        let widest = FARTHEST * f64::from(size.0.max(size.1));
+        let around = figure.bounds(&view).filter(|around| around.width.max(around.height) < widest)?;
         let place = [figure.moment.x, 0.0, figure.moment.z];
         // Where in that the person really is.
         let corner = |place: f64| place.floor();
