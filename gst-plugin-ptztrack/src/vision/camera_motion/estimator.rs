@@ -154,8 +154,7 @@ impl Key {
         }
     }
 
-    /// How the picture moved from this one to `pyramid`, and where each point is now: first as near to where it is expected
-    /// as a camera mostly goes on, which costs half.
+    /// How the picture moved from this one to `pyramid`, and where each point is now.
     fn compare(
         &self,
         pyramid: &Pyramid,
@@ -164,10 +163,9 @@ impl Key {
     ) -> opencv::Result<Option<(Fit, Vec<Option<Point2f>>)>> {
         let places: Vec<Point2f> = self.points.iter().map(|point| point.place).collect();
         let from_key: Vec<Homography> = expected.iter().map(|motion| self.to_last.then(motion)).collect();
-        let near = from_key.iter().take(1).map(|guess| (guess, flow::NEAR_LEVELS));
-        for (guess, levels) in near.chain(from_key.iter().map(|guess| (guess, flow::LEVELS))) {
+        for guess in &from_key {
             let guesses: Vec<Point2f> = places.iter().map(|place| fit::apply(guess, *place)).collect();
-            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses, levels)?;
+            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses)?;
             let pairs: Vec<Pair> = self
                 .points
                 .iter()

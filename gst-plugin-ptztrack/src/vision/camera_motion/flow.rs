@@ -6,9 +6,7 @@ use opencv::video;
 /// Side of the window of a point.
 const WINDOW: i32 = 13;
 /// Halvings of the picture: the coarsest level sees motions of half its window, 8 times as large here.
-pub(super) const LEVELS: i32 = 3;
-/// Halvings that are enough where the motion is foreseen to some pixels.
-pub(super) const NEAR_LEVELS: i32 = 1;
+const LEVELS: i32 = 3;
 const ITERATIONS: i32 = 15;
 const PRECISION: f64 = 0.02;
 /// Smaller eigenvalue of the gradient matrix, per pixel, below which (3.11) is not worth solving.
@@ -45,14 +43,12 @@ impl Pyramid {
     }
 }
 
-/// Follows `points` of `from` into `to`, where each is expected at its `guess`, from at most `levels` halvings on; `None` for
-/// one that is lost.
+/// Follows `points` of `from` into `to`, where each is expected at its `guess`; `None` for one that is lost.
 pub(super) fn follow(
     from: &Pyramid,
     to: &Pyramid,
     points: &[Point2f],
     guesses: &[Point2f],
-    levels: i32,
 ) -> opencv::Result<Vec<Option<Point2f>>> {
     if points.is_empty() {
         return Ok(Vec::new());
@@ -68,7 +64,7 @@ pub(super) fn follow(
         &mut status,
         &mut residuals,
         Size::new(WINDOW, WINDOW),
-        levels.min(from.highest).min(to.highest),
+        from.highest.min(to.highest),
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,
             max_count: ITERATIONS,

@@ -5,7 +5,7 @@ use ptztrack_contract::{Homography, Point};
 
 /// Side of the squares that move as a whole: within one, a camera's map is a displacement. Small enough that
 /// this holds to a third of a pixel, large enough that the compiler makes vector code of a row of it.
-const BLOCK: usize = 16;
+const BLOCK: usize = 8;
 /// Displacements are rounded to this part of a pixel, which also keeps a camera at rest from being resampled.
 const PARTS: i32 = 16;
 
