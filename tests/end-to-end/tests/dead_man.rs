@@ -7,8 +7,8 @@ use end_to_end::scene::{assert_left_at_rest, wait_until_following};
 use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
-/// For as long an operator waits before the next turn.
-const LOOK: Duration = Duration::from_millis(700);
+/// How often the stick that an operator holds says where to.
+const HELD: Duration = Duration::from_millis(50);
 
 /// `gst-launch-1.0` that follows, with a watchdog of its own.
 struct Application {
@@ -159,12 +159,16 @@ fn an_operator_who_has_the_camera_keeps_it() {
     let Application { camera, mut launch, watchdog } = Application::following("operator", &["-m"]);
     let begin = Instant::now();
     let taken_over = |line: &String| line.contains("change=(string)taken-over");
-    // To and fro, so that no end of the travel is in his way.
-    let mut turns = ["rpan=-12", "rpan=12"].into_iter().cycle();
+    // He holds the stick, to and fro, so that no end of the travel is in his way.
+    let held = |to| [to; 20];
+    let mut turns = [held("continuouspantiltmove=-40,0"), held("continuouspantiltmove=40,0")]
+        .concat()
+        .into_iter()
+        .cycle();
     while !launch.seen().iter().any(taken_over) {
         assert!(begin.elapsed() < PATIENCE, "{:?}", launch.seen());
         assert!(turns.next().is_some_and(|turn| camera.operate(turn)));
-        launch.read_for(LOOK);
+        launch.read_for(HELD);
     }
     launch.signal("STOP");
     launch.signal("KILL");
