@@ -88,15 +88,7 @@ impl Warp {
 
     /// Samples `source` (rows packed) bilinearly; what it does not cover becomes `fill`.
     pub fn sample(&self, source: &[u8], fill: u8, out: &mut Vec<u8>) {
-        out.clear();
-        out.resize(self.size.0 * self.size.1, fill);
-        let width = self.source.0;
-        for (y, out) in out.chunks_exact_mut(self.size.0).enumerate() {
-            for ((first, last), shift) in self.pieces(y).filter(|(piece, _)| piece.0 < piece.1) {
-                let start = (y as i32 + shift.y) as usize * width + (first as i32 + shift.x) as usize;
-                blend(&source[start..], width, shift, &mut out[first..last]);
-            }
-        }
+        self.rows(source, fill, out, |source, shift, out| blend(source, self.source.0, shift, out));
     }
 
     /// The same of 16-bit numbers.
@@ -132,18 +124,25 @@ impl Warp {
     }
 
     fn each<T: Copy>(&self, source: &[T], fill: T, out: &mut Vec<T>, pick: impl Fn(&[T], Shift) -> T) {
+        self.rows(source, fill, out, |source, shift, out| {
+            for (index, out) in out.iter_mut().enumerate() {
+                *out = pick(&source[index..], shift);
+            }
+        });
+    }
+
+    /// Fills rows of pieces by `mix`, which is given the source from their first pixel on; whole pixels are only copied.
+    fn rows<T: Copy>(&self, source: &[T], fill: T, out: &mut Vec<T>, mix: impl Fn(&[T], Shift, &mut [T])) {
         out.clear();
         out.resize(self.size.0 * self.size.1, fill);
-        let width = self.source.0;
         for (y, out) in out.chunks_exact_mut(self.size.0).enumerate() {
             for ((first, last), shift) in self.pieces(y).filter(|(piece, _)| piece.0 < piece.1) {
-                let start = (y as i32 + shift.y) as usize * width + (first as i32 + shift.x) as usize;
+                let start = (y as i32 + shift.y) as usize * self.source.0 + (first as i32 + shift.x) as usize;
+                let (source, out) = (&source[start..], &mut out[first..last]);
                 if shift.part_x == 0 && shift.part_y == 0 {
-                    out[first..last].copy_from_slice(&source[start..start + last - first]);
-                    continue;
-                }
-                for (index, out) in out[first..last].iter_mut().enumerate() {
-                    *out = pick(&source[start + index..], shift);
+                    out.copy_from_slice(&source[..out.len()]);
+                } else {
+                    mix(source, shift, out);
                 }
             }
         }
@@ -154,10 +153,6 @@ impl Warp {
 #[multiversion(targets("x86_64+avx2"))]
 fn blend(source: &[u8], width: usize, shift: Shift, out: &mut [u8]) {
     let count = out.len();
-    if shift.part_x == 0 && shift.part_y == 0 {
-        out.copy_from_slice(&source[..count]);
-        return;
-    }
     let (x, y) = (shift.part_x, shift.part_y);
     let weights = [(16 - x) * (16 - y), x * (16 - y), (16 - x) * y, x * y];
     // Where a weight is nothing, its row or column may lie outside.
