@@ -16,7 +16,7 @@ mod walls;
 use std::{
     borrow::Cow,
     collections::BTreeMap,
-    sync::{Arc, Mutex, PoisonError, Weak},
+    sync::{Arc, Mutex, Weak},
 };
 
 use furniture::Piece;
@@ -32,7 +32,7 @@ use super::{
     raster::{Surface, cover},
     view::{Canvas, Vector, View},
 };
-use crate::{picture::Plane, seeded::Seeded};
+use crate::{picture::Plane, seeded::Seeded, sync::lock};
 
 /// What is put into the person's way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -76,8 +76,8 @@ impl Scene {
     /// The scene of a plan, shared by all rooms of that plan that there are: painting it takes longer than many a picture.
     pub fn of(plan: Plan) -> Arc<Self> {
         static SCENES: Mutex<Vec<(Plan, Weak<Scene>)>> = Mutex::new(Vec::new());
-        // Locked while one is painted, so that nobody paints the same one beside it. What a panic left is whole.
-        let mut scenes = SCENES.lock().unwrap_or_else(PoisonError::into_inner);
+        // Locked while one is painted, so that nobody paints the same one beside it.
+        let mut scenes = lock(&SCENES);
         scenes.retain(|(_, scene)| scene.strong_count() > 0);
         if let Some(scene) =
             scenes.iter().find(|(other, _)| *other == plan).and_then(|(_, scene)| scene.upgrade())
