@@ -42,7 +42,8 @@ impl Lease {
         self.renewed.map(|renewed| renewed + RENEWAL)
     }
 
-    /// Takes or renews it; to be awaited before a move is sent, which the order ends. Starts the watchdog where there is none. To be tried again where it fails.
+    /// Takes or renews it; to be awaited before a move is sent, which the order ends. Starts the watchdog where there is
+    /// none. To be tried again where it fails.
     ///
     /// # Errors
     /// Why there is no watchdog.
