@@ -56,26 +56,24 @@ const RTSP_LOSSES: [Loss; 3] = [
 
 fn reboot(following: &Following) {
     following.camera.set_fault(Fault::Reboot);
-    following.set(Way::Refused);
+    following.network.set(Way::Refused);
     thread::sleep(REBOOT);
     following.camera.set_fault(Fault::None);
-    following.set(Way::Open);
+    following.network.set(Way::Open);
 }
 
 fn reset(following: &Following) {
-    following.http.reset();
-    following.rtsp.reset();
+    following.network.reset();
 }
 
 fn close(following: &Following) {
-    following.http.close();
-    following.rtsp.close();
+    following.network.close();
 }
 
 fn stall(following: &Following) {
-    following.set(Way::Stalled);
+    following.network.set(Way::Stalled);
     thread::sleep(LASTS);
-    following.set(Way::Open);
+    following.network.set(Way::Open);
 }
 
 fn forget(following: &Following) {
@@ -83,15 +81,15 @@ fn forget(following: &Following) {
 }
 
 fn no_video(following: &Following) {
-    following.rtsp.set(Way::Refused);
+    following.network.rtsp.set(Way::Refused);
     thread::sleep(LASTS);
-    following.rtsp.set(Way::Open);
+    following.network.rtsp.set(Way::Open);
 }
 
 fn no_ptz(following: &Following) {
-    following.http.set(Way::Refused);
+    following.network.http.set(Way::Refused);
     thread::sleep(LASTS);
-    following.http.set(Way::Open);
+    following.network.http.set(Way::Open);
 }
 
 /// When each was back.
@@ -127,12 +125,12 @@ fn measure(name: &str, video: Video, more: &[Loss], command: fn(&str) -> Command
 impl Loss {
     fn measure(&self, following: &mut Following, video: Video) -> Back {
         // Everything that was asked for before the end does not count; what a moment that is over at once leads to does.
-        let asked = video(following).video_requests();
+        let asked = video(&following.network).video_requests();
         (self.happens)(following);
         let over = following.camera.now();
         let before = following.camera.status().commands;
         let picture = if self.video {
-            video(following).wait_for_picture(asked);
+            video(&following.network).wait_for_picture(asked);
             following.camera.now()
         } else {
             over

@@ -8,35 +8,80 @@ use virtual_camera::VirtualCamera;
 
 use crate::{Front, GstLaunch, PATIENCE, Way, plugin_folder, scene, tool};
 
-/// A camera behind a network that fails, and whoever follows with it.
-pub struct Following {
-    /// What it follows with.
-    pub camera: VirtualCamera,
+/// The ways to one camera.
+pub struct Network {
     /// PTZ, and MJPEG.
     pub http: Front,
     /// Video by RTSP.
     pub rtsp: Front,
+}
+
+impl Network {
+    /// Both are open.
+    pub fn before(camera: &VirtualCamera) -> Self {
+        Self { http: Front::new(camera.http_address()), rtsp: Front::new(camera.rtsp_address()) }
+    }
+
+    /// Where the camera is for who has to pass here.
+    pub fn url(&self) -> String {
+        format!("http://{}", self.http.address())
+    }
+
+    /// Both are like this.
+    pub fn set(&self, way: Way) {
+        self.http.set(way);
+        self.rtsp.set(way);
+    }
+
+    /// All connections are reset.
+    pub fn reset(&self) {
+        self.http.reset();
+        self.rtsp.reset();
+    }
+
+    /// All connections are closed.
+    pub fn close(&self) {
+        self.http.close();
+        self.rtsp.close();
+    }
+
+    /// What a follower is told of its camera.
+    pub fn surround(&self, command: &mut Command) {
+        command
+            .env("CAMERA", self.url())
+            .env("RTSP", format!("rtsp://{}", self.rtsp.address()))
+            .env("CAMERA_USER", scene::USER)
+            .env("CAMERA_PASSWORD", scene::PASSWORD)
+            .env("SIZE", "320x240");
+    }
+}
+
+/// A camera behind a network that fails, and whoever follows with it.
+pub struct Following {
+    /// What it follows with.
+    pub camera: VirtualCamera,
+    /// Between them.
+    pub network: Network,
     /// What follows.
     pub launch: GstLaunch,
 }
 
 /// The way that the picture takes; PTZ goes by HTTP.
-pub type Video = fn(&Following) -> &Front;
+pub type Video = fn(&Network) -> &Front;
 /// By HTTP.
-pub const MJPEG: Video = |following| &following.http;
+pub const MJPEG: Video = |network| &network.http;
 /// By RTSP.
-pub const RTSP: Video = |following| &following.rtsp;
+pub const RTSP: Video = |network| &network.rtsp;
 
 impl Following {
     /// Once `command`, which is given the camera's address, follows.
     #[track_caller]
     pub fn start(command: impl FnOnce(&str) -> Command) -> Self {
         let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-        let http = Front::new(camera.http_address());
-        let rtsp = Front::new(camera.rtsp_address());
-        let mut command = command(&format!("http://{}", http.address()));
-        surroundings(&mut command, &http, &rtsp);
-        let mut following = Self { launch: GstLaunch::spawn(command), camera, http, rtsp };
+        let network = Network::before(&camera);
+        let mut command = command(&network.url());
+        network.surround(&mut command);
+        let mut following = Self { launch: GstLaunch::spawn(command), camera, network };
         following.follows();
         following
     }
@@ -62,31 +107,16 @@ impl Following {
         self.launch.seen().join("\n")
     }
 
-    /// Both ways are like this.
-    pub fn set(&self, way: Way) {
-        self.http.set(way);
-        self.rtsp.set(way);
-    }
-
     /// After this, another gets video and follows. How many watch tells nothing of that: the next may be there before the
     /// camera misses the last.
     #[track_caller]
     pub fn starts_anew(&mut self, video: Video, fault: impl FnOnce(&Self)) {
-        let before = video(self).video_requests();
+        let front = video(&self.network);
+        let before = front.video_requests();
         fault(self);
-        video(self).wait_for_picture(before);
+        front.wait_for_picture(before);
         self.follows();
     }
-}
-
-/// What a follower is told of its camera.
-pub fn surroundings(command: &mut Command, http: &Front, rtsp: &Front) {
-    command
-        .env("CAMERA", format!("http://{}", http.address()))
-        .env("RTSP", format!("rtsp://{}", rtsp.address()))
-        .env("CAMERA_USER", scene::USER)
-        .env("CAMERA_PASSWORD", scene::PASSWORD)
-        .env("SIZE", "320x240");
 }
 
 /// A file in `pipelines/`.

@@ -1,5 +1,6 @@
 //! `gst-launch-1.0` and friends as a user starts them, with the freshly built plugins.
 
+use std::borrow::BorrowMut;
 use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -55,9 +56,9 @@ impl GstLaunch {
     }
 
     /// Starts any command whose output is to be read.
-    pub fn spawn(mut command: Command) -> Self {
-        let mut child =
-            command.stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null()).spawn().unwrap();
+    pub fn spawn(mut command: impl BorrowMut<Command>) -> Self {
+        let command = command.borrow_mut().stdout(Stdio::piped()).stderr(Stdio::piped()).stdin(Stdio::null());
+        let mut child = command.spawn().unwrap();
         let (sender, lines) = mpsc::channel();
         let streams: [Box<dyn Read + Send>; 2] =
             [Box::new(child.stdout.take().unwrap()), Box::new(child.stderr.take().unwrap())];

@@ -8,26 +8,20 @@ use virtual_camera::VirtualCamera;
 /// Everything that can become of a camera, one after the other.
 fn comes_back_from_everything(mut following: Following, video: Video, end: &str) {
     following.starts_anew(video, |following| {
-        following.set(Way::Refused);
+        following.network.set(Way::Refused);
         following.is_lost();
-        following.set(Way::Open);
+        following.network.set(Way::Open);
     });
 
-    following.starts_anew(video, |following| {
-        following.http.reset();
-        following.rtsp.reset();
-    });
-    following.starts_anew(video, |following| {
-        following.http.close();
-        following.rtsp.close();
-    });
+    following.starts_anew(video, |following| following.network.reset());
+    following.starts_anew(video, |following| following.network.close());
 
     // It gives up by itself: nobody closes.
     following.starts_anew(video, |following| {
-        let before = video(following).video_requests();
-        following.set(Way::Stalled);
-        video(following).wait_for_video_request(before);
-        following.set(Way::Open);
+        let before = video(&following.network).video_requests();
+        following.network.set(Way::Stalled);
+        video(&following.network).wait_for_video_request(before);
+        following.network.set(Way::Open);
     });
 
     following.launch.signal(end);
@@ -85,7 +79,7 @@ fn a_recording_goes_on_in_another_file() {
         command.env("OUT", &out);
         command
     });
-    following.starts_anew(MJPEG, |following| following.http.reset());
+    following.starts_anew(MJPEG, |following| following.network.http.reset());
     following.launch.signal("TERM");
     following.launch.finish();
     for file in ["a.mkv", "a-2.mkv"] {

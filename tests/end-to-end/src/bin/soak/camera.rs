@@ -6,9 +6,9 @@ use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use end_to_end::following::surroundings;
+use end_to_end::following::Network;
 use end_to_end::scene::{self, left_at_rest};
-use end_to_end::{Chance, Front, GstLaunch, Watchdog, Way, plugin_folder, tool};
+use end_to_end::{Chance, GstLaunch, Watchdog, Way, plugin_folder, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 use crate::account::Account;
@@ -25,11 +25,10 @@ const RESTS: Duration = Duration::from_secs(10);
 pub struct Camera {
     number: usize,
     camera: Arc<VirtualCamera>,
-    http: Front,
-    rtsp: Front,
+    network: Network,
     chance: Chance,
     follower: Option<GstLaunch>,
-    command: Box<dyn Fn() -> Command + Send>,
+    command: Command,
     process: Arc<AtomicU32>,
 }
 
@@ -47,26 +46,15 @@ impl Camera {
     pub fn start(number: usize, seed: u64, duration: Duration, watchdog: &Watchdog) -> Self {
         let settings = scene::walking_person_for(duration + 4 * LOST);
         let camera = Arc::new(VirtualCamera::start(settings).unwrap());
-        let http = Front::new(camera.http_address());
-        let rtsp = Front::new(camera.rtsp_address());
+        let network = Network::before(&camera);
         let seed = seed * 10 + number as u64;
         let mut command = watchdog.of(tool(plugin_folder().join("unattended").to_str().unwrap()));
         command.args([if number < 2 { "mjpeg" } else { "h264" }, &seed.to_string()]);
-        surroundings(&mut command, &http, &rtsp);
-        let command = move || copy(&command);
-        let follower = GstLaunch::spawn(command());
+        network.surround(&mut command);
+        let follower = GstLaunch::spawn(&mut command);
         let process = Arc::new(AtomicU32::new(follower.id()));
         let chance = Chance::new(seed);
-        Self {
-            number,
-            camera,
-            http,
-            rtsp,
-            chance,
-            follower: Some(follower),
-            command: Box::new(command),
-            process,
-        }
+        Self { number, camera, network, chance, follower: Some(follower), command, process }
     }
 
     pub fn probe(&self) -> Probe {
@@ -95,24 +83,18 @@ impl Camera {
         let lasts = happening.lasts(&mut self.chance);
         match happening {
             Happening::Network(way) => {
-                self.set(*way);
+                self.network.set(*way);
                 sleep(lasts);
-                self.set(Way::Open);
+                self.network.set(Way::Open);
             }
-            Happening::Reset => {
-                self.http.reset();
-                self.rtsp.reset();
-            }
-            Happening::Close => {
-                self.http.close();
-                self.rtsp.close();
-            }
+            Happening::Reset => self.network.reset(),
+            Happening::Close => self.network.close(),
             Happening::Reboot => {
                 self.camera.set_fault(Fault::Reboot);
-                self.set(Way::Refused);
+                self.network.set(Way::Refused);
                 sleep(lasts);
                 self.camera.set_fault(Fault::None);
-                self.set(Way::Open);
+                self.network.set(Way::Open);
             }
             Happening::Answers(fault) => {
                 self.camera.set_fault(fault.clone());
@@ -134,14 +116,9 @@ impl Camera {
             follower.finish();
         }
         account.rests(left_at_rest(&self.camera, RESTS));
-        let follower = GstLaunch::spawn((self.command)());
+        let follower = GstLaunch::spawn(&mut self.command);
         self.process.store(follower.id(), Ordering::Relaxed);
         self.follower = Some(follower);
-    }
-
-    fn set(&self, way: Way) {
-        self.http.set(way);
-        self.rtsp.set(way);
     }
 
     /// How long until it is moved again, where it is.
@@ -160,17 +137,4 @@ impl Camera {
             }
         }
     }
-}
-
-/// A command is run once; this is another.
-fn copy(command: &Command) -> Command {
-    let mut other = Command::new(command.get_program());
-    other.args(command.get_args());
-    for (name, value) in command.get_envs() {
-        match value {
-            Some(value) => other.env(name, value),
-            None => other.env_remove(name),
-        };
-    }
-    other
 }
