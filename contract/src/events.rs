@@ -1,5 +1,7 @@
 //! `GST_EVENT_CUSTOM_UPSTREAM` events: they pass tees and queues against the stream.
 
+use std::time::Duration;
+
 use crate::ContractError;
 use crate::codec::{self, Reader};
 use crate::{Rect, TargetState};
@@ -40,8 +42,8 @@ impl TrackerEvent {
     }
 }
 
-/// Servo to everyone upstream: what the camera does. Sent when it starts or stops moving and when
-/// its position becomes known.
+/// Servo to everyone upstream: what the camera does. Sent when it starts or stops moving, when its position becomes known,
+/// and again and again while it moves: who hears nothing for [`CameraEvent::MOVING_HOLDS`] takes it for resting.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct CameraEvent {
     /// Whether the camera was told to move and not yet told to stop.
@@ -61,6 +63,9 @@ pub struct CameraEvent {
 }
 
 impl CameraEvent {
+    /// That the camera moves is true for so long after it was said: the servo may be gone, or cut off.
+    pub const MOVING_HOLDS: Duration = Duration::from_secs(2);
+
     const NAME: &'static str = "ptztrack-camera-state";
 
     /// The event to push upstream.

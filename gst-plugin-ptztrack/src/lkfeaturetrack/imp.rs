@@ -1,5 +1,5 @@
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{LazyLock, Mutex};
+use std::time::Duration;
 
 use glib::Properties;
 use gst::prelude::*;
@@ -201,8 +201,8 @@ pub struct LkFeatureTrack {
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
     command: Mutex<Option<Command>>,
-    /// Whether a servo said that the camera turns.
-    camera_moves: AtomicBool,
+    /// How much longer the camera turns, by the word of a servo.
+    camera_moves: Mutex<Duration>,
 }
 
 #[glib::object_subclass]
@@ -287,7 +287,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         }
         *lock(&self.size) = None;
         *lock(&self.command) = None;
-        self.camera_moves.store(false, Ordering::Relaxed);
+        *lock(&self.camera_moves) = Duration::ZERO;
         Ok(())
     }
 
@@ -306,7 +306,8 @@ impl BaseTransformImpl for LkFeatureTrack {
         if event.type_() == gst::EventType::Navigation {
             self.navigate(&event);
         } else if let Some(Ok(camera)) = CameraEvent::of(&event) {
-            self.camera_moves.store(camera.moving, Ordering::Relaxed);
+            let holds = if camera.moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
+            *lock(&self.camera_moves) = holds;
         }
         self.parent_src_event(event)
     }
@@ -321,7 +322,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         let command = lock(&self.command).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
-        stream.tracker.set_camera_rests(!self.camera_moves.load(Ordering::Relaxed));
+        stream.tracker.set_camera_rests(lock(&self.camera_moves).is_zero());
         match command {
             Some(Command::Select(place)) => stream.tracker.select(place),
             Some(Command::Release) => stream.tracker.release(),
@@ -391,6 +392,10 @@ impl LkFeatureTrack {
         };
         let before = stream.last_time;
         let step = stream.step(times.running_time);
+        {
+            let mut moves = lock(&self.camera_moves);
+            *moves = moves.saturating_sub(step.into());
+        }
         let report = match self.look(stream, settings, buffer, step) {
             Ok(report) => report,
             Err(reason) => {

@@ -1,11 +1,14 @@
 use std::time::Duration;
 
+use ptztrack_contract::CameraEvent;
+
 /// Whether the picture is worth looking at: not while the tracker follows somebody, nor while the camera
 /// moves and the picture with it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Duty {
     asleep: bool,
-    moving: bool,
+    /// How much longer the camera moves, unless that is said again.
+    moving: Duration,
     /// How much longer the pictures may still show the camera moving.
     settling: Duration,
 }
@@ -19,19 +22,20 @@ impl Duty {
     /// The camera moves, or no longer does. It rests before its pictures do: they are older than the
     /// news, by `settle_time` at most.
     pub fn camera(&mut self, moving: bool, settle_time: Duration) {
-        if self.moving && !moving {
+        if !self.moving.is_zero() && !moving {
             self.settling = settle_time;
         }
-        self.moving = moving;
+        self.moving = if moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
     }
 
     /// Whether to look at the next picture, which comes `elapsed` after the one before.
     pub fn looks(&mut self, elapsed: Duration) -> bool {
-        let settled = self.settling.is_zero();
-        if !self.moving {
+        self.moving = self.moving.saturating_sub(elapsed);
+        let (settled, rests) = (self.settling.is_zero(), self.moving.is_zero());
+        if rests {
             self.settling = self.settling.saturating_sub(elapsed);
         }
-        settled && !self.moving && !self.asleep
+        settled && rests && !self.asleep
     }
 }
 
@@ -76,6 +80,22 @@ mod tests {
         duty.camera(false, 2 * STEP);
         let looks: Vec<bool> = (0..3).map(|_| duty.looks(STEP)).collect();
         assert_eq!(looks, [false, false, true]);
+    }
+
+    /// Whoever said so may be gone.
+    #[test]
+    fn a_camera_moves_for_two_seconds_unless_that_is_said_again() {
+        let mut duty = Duty::default();
+        let mut looks_within = |said: &[u32]| {
+            (0..25).position(|frame| {
+                if said.contains(&frame) {
+                    duty.camera(true, Duration::ZERO);
+                }
+                duty.looks(STEP)
+            })
+        };
+        assert_eq!(looks_within(&[0]), Some(19));
+        assert_eq!(looks_within(&[0, 10]), None);
     }
 
     #[test]

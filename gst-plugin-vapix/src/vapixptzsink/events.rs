@@ -1,10 +1,51 @@
 //! What upstream is told of the camera.
 
+use std::time::Duration;
+
 use ptztrack_contract::CameraEvent;
 
 use servo::{Mounting, View};
 
 use crate::control_loop::Status;
+
+/// What upstream is to be told, and what it was told last, at which time.
+#[derive(Debug, Default)]
+pub struct PendingStatus {
+    next: Option<Status>,
+    last: Option<(Status, Duration)>,
+}
+
+impl PendingStatus {
+    /// A camera that moves is said to move this often: a quarter of what [`CameraEvent::MOVING_HOLDS`] for.
+    const REPEAT: Duration = Duration::from_millis(500);
+
+    /// This is to be told.
+    pub fn changed(&mut self, status: Status) {
+        self.next = Some(status);
+    }
+
+    /// What was told last is to be told again, where it is time to.
+    pub fn repeat(&mut self, now: Duration) {
+        if let (None, Some((status, told))) = (self.next, self.last)
+            && status.moving
+            && now.saturating_sub(told) >= Self::REPEAT
+        {
+            self.next = Some(status);
+        }
+    }
+
+    /// Whether there is something to be told.
+    pub fn is_due(&self) -> bool {
+        self.next.is_some()
+    }
+
+    /// What is to be told now.
+    pub fn take(&mut self, now: Duration) -> Option<Status> {
+        let status = self.next.take()?;
+        self.last = Some((status, now));
+        Some(status)
+    }
+}
 
 /// The event for a status; `aspect` of the picture as it arrives, width by height as displayed, where it is known.
 pub fn camera_event(status: &Status, mounting: &Mounting, aspect: Option<f64>) -> CameraEvent {
@@ -27,6 +68,22 @@ pub fn camera_event(status: &Status, mounting: &Mounting, aspect: Option<f64>) -
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_camera_that_moves_is_said_to_again_and_again() {
+        let told = |moving: bool| {
+            let mut pending = PendingStatus::default();
+            pending.changed(Status { moving, ..Status::default() });
+            let told = (0..40).filter(|tick| {
+                let now = Duration::from_millis(100 * tick);
+                pending.repeat(now);
+                pending.take(now).is_some()
+            });
+            told.collect::<Vec<_>>()
+        };
+        assert_eq!(told(true), [0, 5, 10, 15, 20, 25, 30, 35]);
+        assert_eq!(told(false), [0]);
+    }
 
     #[test]
     fn the_vertical_field_of_view_follows_from_the_shape() {

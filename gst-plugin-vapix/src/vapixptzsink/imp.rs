@@ -11,7 +11,7 @@ use servo::Measurement;
 
 use super::camera_task::{self, CameraTask, Event, Predecessor};
 use super::clock::Clock;
-use super::events::camera_event;
+use super::events::{PendingStatus, camera_event};
 use super::outbox::Outbox;
 use super::picture::Picture;
 use super::properties::Property;
@@ -51,7 +51,7 @@ pub struct VapixPtzSink {
     stream: Mutex<Stream>,
     waiting: Mutex<Waiting>,
     /// What upstream was not told yet; never pushed by the camera task, which would wait for whoever hears it.
-    status_to_push: Mutex<Option<Status>>,
+    pending_status: Mutex<PendingStatus>,
     /// Held by whoever pushes it; nobody waits for this one.
     pushing: Mutex<()>,
 }
@@ -186,6 +186,8 @@ impl BaseSinkImpl for VapixPtzSink {
     }
 
     fn render(&self, buffer: &gst::Buffer) -> Result<gst::FlowSuccess, gst::FlowError> {
+        let now = self.time();
+        lock(&self.pending_status).repeat(now);
         self.push_status();
         let step = self.lockstep_time(buffer.pts());
         if let Some(time) = step {
@@ -247,7 +249,7 @@ impl VapixPtzSink {
         };
         *lock(&self.stream) = Stream::new(settings.lockstep);
         let clock = if settings.lockstep { Clock::held() } else { Clock::running() };
-        *lock(&self.status_to_push) = None;
+        *lock(&self.pending_status) = PendingStatus::default();
         gst::debug!(CAT, imp = self, "camera {} at {}", client.camera, client.location);
         let element = self.obj().downgrade();
         let told = element.clone();
@@ -391,9 +393,10 @@ impl VapixPtzSink {
     /// Tells upstream what the camera does, if that has changed. Whoever comes while somebody else does leaves it to him,
     /// so that the last to be told is the newest.
     pub(super) fn push_status(&self) {
-        while lock(&self.status_to_push).is_some() {
+        while lock(&self.pending_status).is_due() {
             let Ok(_pushing) = self.pushing.try_lock() else { return };
-            let Some(status) = lock(&self.status_to_push).take() else { continue };
+            let now = self.time();
+            let Some(status) = lock(&self.pending_status).take(now) else { continue };
             let aspect = lock(&self.stream).picture.map(|picture| picture.aspect);
             let mounting = lock(&self.settings).servo.mounting;
             let event = camera_event(&status, &mounting, aspect);
@@ -405,7 +408,7 @@ impl VapixPtzSink {
     /// Keeps what upstream is to be told; the streaming thread tells it. But that the camera rests is told where no buffer
     /// comes any more too: whoever believes that it moves looks for nobody.
     pub(super) fn status_changed(&self, status: Status, outbox: &Outbox) {
-        *lock(&self.status_to_push) = Some(status);
+        lock(&self.pending_status).changed(status);
         // In lockstep upstream hears of it with a buffer only, the same in every run.
         if !status.moving && !lock(&self.stream).lockstep {
             outbox.leave(Event::Status(status));
