@@ -29,6 +29,8 @@ impl VapixPtzSink {
     pub(super) fn tell(&self, event: Event) {
         match event {
             Event::Exchanged { .. } => {}
+            // Who waits no longer is awake already.
+            Event::Settled(waiting) => drop(waiting.try_send(())),
             Event::Status(_) => self.push_status(),
             Event::Loop(LoopEvent::Session(SessionEvent::Connection(change))) => self.link_changed(&change),
             Event::Loop(LoopEvent::Session(SessionEvent::Discovered(camera))) => gst::info!(CAT, imp = self, "the camera: {camera}"),

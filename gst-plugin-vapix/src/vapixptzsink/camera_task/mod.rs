@@ -6,7 +6,7 @@ mod state;
 
 use std::cell::Cell;
 use std::pin::pin;
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
@@ -56,6 +56,8 @@ pub enum Event {
     NoWatchdog(Unavailable),
     /// The camera task itself broke.
     Died(String),
+    /// Nothing is left to be done at this time; this one waits until that, and all before it, is told.
+    Settled(Arc<SyncSender<()>>),
 }
 
 thread_local! {

@@ -198,7 +198,7 @@ impl<O: Fn(Event)> TaskState<O> {
     /// Nothing is to be done at this time that has not been done.
     pub fn tell_settled(&mut self) {
         for settling in self.settling.drain(..) {
-            let _ = settling.try_send(());
+            (self.observer)(Event::Settled(settling));
         }
     }
 
