@@ -18,6 +18,22 @@ use surviving::scene::Trouble;
 use surviving::{Case, Outcome, cases, name_not_yet_known, survive, unknown_name, wrong_password};
 use virtual_camera::Fault;
 
+const HEADER: &str = "# What can go wrong with the camera
+
+Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the properties'
+defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s; the worst
+of three runs that end it at different moments between two attempts; of the last three rows one run.
+Where the user sees something, that is one warning as the fault begins and one `connected` as it is
+over. A request that hangs is waited for as long as `timeout` says, 1.5 s by default: with a longer one
+it takes that long to be back.
+
+Where PTZ alone is lost, the element took pictures at once all the time. Where video is lost too, it got
+none, and the first as the fault was over. How soon a pipeline whose source fails with the camera has
+video and control back, see [How soon video and control are back](coming-back.md).
+
+| Fault | Lost | What the user sees | Requests per second meanwhile | Back in control after |
+|---|---|---|---|---|";
+
 /// As the element has it by default.
 const TIMEOUT: Duration = Duration::from_millis(1500);
 
@@ -25,37 +41,22 @@ const TIMEOUT: Duration = Duration::from_millis(1500);
 const LAST: [Duration; 3] =
     [Duration::from_millis(4100), Duration::from_millis(5000), Duration::from_millis(5350)];
 
+/// What is lost where pictures go on coming.
+const PTZ: &str = "PTZ";
+
 /// A real camera needs about this long.
 const REBOOT: Duration = Duration::from_secs(60);
 
 fn main() {
     common::init();
-    println!("# What can go wrong with the camera\n");
-    println!(
-        "Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the properties'"
-    );
-    println!(
-        "defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s; the worst"
-    );
-    println!(
-        "of three runs that end it at different moments between two attempts; of the last three rows one run."
-    );
-    println!(
-        "The element took pictures at once all the time. Where the user sees something, that is one warning"
-    );
-    println!(
-        "as the fault begins and one `connected` as it is over. A request that hangs is waited for as long as"
-    );
-    println!("`timeout` says, 1.5 s by default: with a longer one it takes that long to be back.\n");
-    println!("| Fault | What the user sees | Requests per second meanwhile | Back in control after |");
-    println!("|---|---|---|---|");
+    println!("{HEADER}");
     for case in cases() {
         let lasts = if case.trouble == Trouble::Camera(Fault::Reboot) { [REBOOT; 3] } else { LAST };
         row(&case, lasts);
     }
-    print("host name unknown from the start, then known", "0", &name_not_yet_known(TIMEOUT));
-    print("unknown host name (then corrected)", "0", &unknown_name(TIMEOUT));
-    print("wrong password (then corrected)", "2 in all", &wrong_password());
+    print("host name unknown from the start, then known", PTZ, "0", &name_not_yet_known(TIMEOUT));
+    print("unknown host name (then corrected)", PTZ, "0", &unknown_name(TIMEOUT));
+    print("wrong password (then corrected)", PTZ, "2 in all", &wrong_password());
 }
 
 /// Runs a case three times at once.
@@ -67,13 +68,18 @@ fn row(case: &Case, lasts: [Duration; 3]) {
     let rate = |(outcome, lasts): &(Outcome, Duration)| outcome.requests as f64 / lasts.as_secs_f64();
     let most = outcomes.iter().map(rate).fold(0.0, f64::max);
     let worst = outcomes.iter().map(|(outcome, _)| outcome).max_by_key(|outcome| outcome.back_after);
-    print(case.name, &format!("{most:.1}"), worst.unwrap());
+    let lost = match (case.noticed, case.video_lost) {
+        (_, true) => "PTZ and video",
+        (true, false) => PTZ,
+        (false, false) => "nothing",
+    };
+    print(case.name, lost, &format!("{most:.1}"), worst.unwrap());
 }
 
-fn print(name: &str, requests: &str, outcome: &Outcome) {
+fn print(name: &str, lost: &str, requests: &str, outcome: &Outcome) {
     let (seen, back) = match &outcome.warning {
         Some(warning) => (warning.as_str(), format!("{:.2} s", outcome.back_after.as_secs_f64())),
         None => ("nothing, it goes on", "—".to_owned()),
     };
-    println!("| {name} | {seen} | {requests} | {back} |");
+    println!("| {name} | {lost} | {seen} | {requests} | {back} |");
 }

@@ -50,6 +50,10 @@ survives! {
     name_unknown: "the camera's name is unknown for a while";
     name_server_silent: "the name server does not answer";
     reboot: "camera reboots: refuses, then other realm and nonce";
+    refused_unseen: "connection refused, and no picture";
+    reset_unseen: "connection reset, and no picture";
+    black_hole_unseen: "black hole, and no picture";
+    reboot_unseen: "camera reboots, and no picture";
     redirect_301: "301 to another host";
     redirect_302: "302 to another host";
     redirect_307: "307 to another host";

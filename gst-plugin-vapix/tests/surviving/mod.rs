@@ -27,10 +27,16 @@ pub struct Case {
     pub trouble: Trouble,
     /// Whether it keeps the camera from being steered.
     pub noticed: bool,
+    /// Whether the pictures stay away too: as a rule they come from the same camera.
+    pub video_lost: bool,
 }
 
 fn case(name: &'static str, fault: Fault) -> Case {
-    Case { name, trouble: Trouble::Camera(fault), noticed: true }
+    Case { name, trouble: Trouble::Camera(fault), noticed: true, video_lost: false }
+}
+
+fn video_too(name: &'static str, fault: Fault) -> Case {
+    Case { video_lost: true, ..case(name, fault) }
 }
 
 fn unnoticed(name: &'static str, fault: Fault) -> Case {
@@ -38,11 +44,11 @@ fn unnoticed(name: &'static str, fault: Fault) -> Case {
 }
 
 fn name(name: &'static str, lookup: Lookup) -> Case {
-    Case { name, trouble: Trouble::Name(lookup), noticed: true }
+    Case { trouble: Trouble::Name(lookup), ..case(name, Fault::None) }
 }
 
 fn jump(name: &'static str, jump: Jump) -> Case {
-    Case { name, trouble: Trouble::Jump(jump), noticed: false }
+    Case { trouble: Trouble::Jump(jump), ..unnoticed(name, Fault::None) }
 }
 
 fn redirect(status: u16) -> Fault {
@@ -61,6 +67,10 @@ pub fn cases() -> Vec<Case> {
         name("the camera's name is unknown for a while", Lookup::Unknown),
         name("the name server does not answer", Lookup::Silent),
         case("camera reboots: refuses, then other realm and nonce", Fault::Reboot),
+        video_too("connection refused, and no picture", Fault::Refuse),
+        video_too("connection reset, and no picture", Fault::Reset),
+        video_too("black hole, and no picture", Fault::BlackHole),
+        video_too("camera reboots, and no picture", Fault::Reboot),
         case("301 to another host", redirect(301)),
         case("302 to another host", redirect(302)),
         case("307 to another host", redirect(307)),
@@ -102,7 +112,7 @@ pub struct Outcome {
 /// Lets a trouble last for a while after it was noticed. The sink waits `timeout` for answers.
 #[track_caller]
 pub fn survive(case: &Case, timeout: Duration, lasts: Duration) -> Outcome {
-    Scene::new(case.name, Lookup::LOOPBACK, timeout).survive(&case.trouble, case.noticed, lasts)
+    Scene::new(case.name, Lookup::LOOPBACK, timeout).survive(case, lasts)
 }
 
 /// From the start on nobody knows the name: there is no camera to come back, but the address can be corrected.

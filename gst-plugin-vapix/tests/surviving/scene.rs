@@ -7,7 +7,7 @@ use ptztrack_contract::{CameraChange, TargetMeta, TargetState};
 use virtual_camera::{Auth, Fault, ReceivedCommand, VirtualCamera};
 
 use super::names::{Lookup, Name};
-use super::{BURST, FRAME, Outcome};
+use super::{BURST, Case, FRAME, Outcome};
 use crate::common::{Heard, PATIENCE, Rig, Stamps, camera, target};
 
 /// Requests that back-off lets through at once and in each further second, with the repetitions that
@@ -86,15 +86,18 @@ impl Scene {
         Self { rig, camera, name, clock, title }
     }
 
-    /// Lets it last for a while after it was noticed, where it is to be `noticed` at all.
+    /// Lets it last for a while after it was noticed, where it is to be noticed at all.
     #[track_caller]
-    pub fn survive(mut self, trouble: &Trouble, noticed: bool, lasts: Duration) -> Outcome {
+    pub fn survive(mut self, case: &Case, lasts: Duration) -> Outcome {
+        let Case { trouble, noticed, .. } = case;
+        let noticed = *noticed;
         self.rig.set_going(&self.camera);
         self.rig.heard();
         let before = self.camera.status().requests;
         let begin = Instant::now();
         self.begin(trouble);
-        let (mut heard, pictures) = self.misbehave(noticed, lasts);
+        let (mut heard, pictures) =
+            if case.video_lost { (self.misbehave_unseen(lasts), 0) } else { self.misbehave(noticed, lasts) };
         let requests = self.camera.status().requests - before;
         if noticed {
             bounded(requests.max(self.name.asked()), begin.elapsed(), self.title);
@@ -192,6 +195,22 @@ impl Scene {
         }
         assert!(!heard.contains(&CONNECTED), "{}: {heard:?}", self.title);
         (heard, pictures)
+    }
+
+    /// The same without pictures: the camera is to be stopped, and cannot be.
+    #[track_caller]
+    fn misbehave_unseen(&mut self, lasts: Duration) -> Vec<Heard> {
+        let (begin, mut heard) = (Instant::now(), Vec::new());
+        let mut since = None;
+        while since.is_none_or(|since: Instant| since.elapsed() < lasts) {
+            heard.extend(self.rig.hear(FRAME));
+            if heard.iter().any(Heard::is_warning) {
+                since.get_or_insert_with(Instant::now);
+            }
+            assert!(begin.elapsed() < PATIENCE + lasts, "{}: heard only {heard:?}", self.title);
+        }
+        assert!(!heard.contains(&CONNECTED), "{}: {heard:?}", self.title);
+        heard
     }
 
     /// When the camera accepted a move again.
