@@ -6,7 +6,9 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use vapix::wire::{Authentication, Client, ClientSettings, Command, Error, Location, Trust};
+use vapix::wire::{
+    Authentication, Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust,
+};
 
 const RIGHT: Command = Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false };
 const CENTRE: Command = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: None };
@@ -30,15 +32,18 @@ fn camera(requests: usize, silent: fn(usize) -> bool) -> (Client, Asked) {
 }
 
 fn client(address: SocketAddr) -> Client {
-    let client = Client::new(ClientSettings {
+    Client::new(settings(address)).unwrap()
+}
+
+fn settings(address: SocketAddr) -> ClientSettings {
+    ClientSettings {
         location: Location::parse(&format!("http://{address}")).unwrap().0,
         camera: 1,
         credentials: None,
         authentication: Authentication::Auto,
         timeout: Duration::from_secs(60),
         trust: Trust::System,
-    });
-    client.unwrap()
+    }
 }
 
 fn serve(mut stream: TcpStream, requests: usize, silent: fn(usize) -> bool, asked: &Mutex<Vec<String>>) {
@@ -115,4 +120,37 @@ fn a_move_that_may_have_reached_the_camera_is_not_forgotten_where_it_cannot_be_s
     let sent = send(&mut camera_that_goes(), &[RIGHT, RIGHT]);
     assert!(sent[0].is_ok());
     assert!(sent[1].as_ref().is_err_and(Error::may_have_acted), "{sent:?}");
+}
+
+/// One that lets each answer wait, which is a challenge that makes the last one stale.
+fn camera_that_challenges_on_and_on(pause: Duration) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let lines = BufReader::new(stream.try_clone().unwrap()).lines().map_while(Result::ok);
+        for (number, _) in lines.filter(String::is_empty).enumerate() {
+            std::thread::sleep(pause);
+            let challenge = format!("Digest realm=\"camera\", nonce=\"{number}\", qop=\"auth\", stale=true");
+            let answer = format!("HTTP/1.1 401 Unauthorized\r\nWWW-Authenticate: {challenge}\r\n");
+            // The client may be gone.
+            let _ = stream.write_all(format!("{answer}Content-Length: 0\r\n\r\n").as_bytes());
+        }
+    });
+    address
+}
+
+/// Each answer comes in time, all of them together do not.
+#[test]
+fn all_attempts_together_take_no_longer_than_one_answer_may() {
+    let pause = Duration::from_millis(300);
+    let credentials = Credentials { user: "root".into(), password: Secret::new("pass") };
+    let address = camera_that_challenges_on_and_on(pause);
+    let mut client = Client::new(ClientSettings {
+        credentials: Some(credentials),
+        timeout: 2 * pause,
+        ..settings(address)
+    })
+    .unwrap();
+    assert_eq!(send(&mut client, &[RIGHT]), [Err(Error::Timeout(2 * pause))]);
 }
