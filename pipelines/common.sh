@@ -9,7 +9,7 @@
 #   VIDEO_SINK       element that shows the picture                  (default: autovideosink, fakesink without display)
 #
 # Ctrl-C, SIGTERM and SIGHUP end the stream and stop the camera. Where the picture ends for any other reason, the pipeline is
-# started anew until it is back: about twice a second, or where nothing is heard of the camera at all after 1 s (RTSP: 1.5 s) each.
+# started anew until it is back: about twice a second, or where nothing is heard of the camera at all after 1 s (RTSP: 1.2 s) each.
 set -eu
 
 repository=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -63,7 +63,7 @@ rtsp() {
     if [ -n "${CAMERA_USER:-}" ]; then stream+=("user-id=$CAMERA_USER"); fi
     # Milliseconds until the first packet, and between two. In a branch of its own, as any event resets a watchdog, and those that
     # the servo sends upstream come without packets too.
-    stream+=(! tee name=received received. ! watchdog timeout=1500 ! fakesink sync=false async=false received.)
+    stream+=(! tee name=received received. ! watchdog timeout=1200 ! fakesink sync=false async=false received.)
 }
 
 # Finds, follows, and hands on what it saw.

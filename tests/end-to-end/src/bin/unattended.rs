@@ -19,7 +19,7 @@ const SIZES: [(i32, i32); 3] = [(320, 240), (240, 180), (176, 144)];
 const MJPEG: &str =
     "souphttpsrc name=source is-live=true do-timestamp=true timeout=1 retries=0 ! multipartdemux ! jpegdec";
 const H264: &str = "rtspsrc name=source latency=0 protocols=tcp ! tee name=received \
-    received. ! watchdog timeout=1500 ! fakesink sync=false async=false received. ! rtph264depay ! avdec_h264";
+    received. ! watchdog timeout=1200 ! fakesink sync=false async=false received. ! rtph264depay ! avdec_h264";
 const FOLLOW: &str = "videoscale ! capsfilter name=size ! queue leaky=downstream max-size-buffers=1 ! bgavgdetect \
     ! lkfeaturetrack ! tee name=followed followed. ! queue leaky=downstream max-size-buffers=1 ! ptzoverlay ! fakesink \
     followed. ! queue leaky=downstream max-size-buffers=1 ! vapixptzsink name=servo";
