@@ -6,6 +6,7 @@
 //!
 //! The algorithms live in [`vision`], without a GStreamer type in sight.
 
+mod allocation;
 pub mod bgavgdetect;
 pub mod lkfeaturetrack;
 use ptztrack_contract::lock;

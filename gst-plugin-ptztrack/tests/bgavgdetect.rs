@@ -614,6 +614,7 @@ fn upstream_gets_what_downstream_proposes_where_frames_pass() {
         harness.element().unwrap().set_property_from_str("output", output);
         if supported {
             harness.add_propose_allocation_meta(gst_video::VideoMeta::meta_api(), None);
+            harness.add_propose_allocation_meta(gst_video::VideoCropMeta::meta_api(), None);
         }
         harness.set_src_caps(grey().to_caps().unwrap());
         harness.push_and_pull(picture(&grey(), &[])).unwrap();
@@ -621,6 +622,8 @@ fn upstream_gets_what_downstream_proposes_where_frames_pass() {
         assert!(harness.srcpad().unwrap().peer_query(&mut query));
         let has = query.find_allocation_meta::<gst_video::VideoMeta>().is_some();
         assert_eq!(has, gets, "{output} {supported}");
+        let crop = query.find_allocation_meta::<gst_video::VideoCropMeta>();
+        assert_eq!(crop, None, "pictures are looked at whole");
     }
 }
 

@@ -235,6 +235,20 @@ fn attaches_where_downstream_draws() {
 }
 
 #[test]
+fn upstream_gets_what_downstream_proposes_but_crops_itself() {
+    init();
+    let caps = info(VideoFormat::Gray8, 320, 240).to_caps().unwrap();
+    let mut harness = Harness::with_element(&overlay(&PARTS), Some("sink"), Some("src"));
+    harness.add_propose_allocation_meta(gst_video::VideoMeta::meta_api(), None);
+    harness.add_propose_allocation_meta(gst_video::VideoCropMeta::meta_api(), None);
+    harness.set_src_caps(caps.clone());
+    let mut query = gst::query::Allocation::new(Some(&caps), false);
+    assert!(harness.srcpad().unwrap().peer_query(&mut query));
+    assert!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some());
+    assert_eq!(query.find_allocation_meta::<gst_video::VideoCropMeta>(), None);
+}
+
+#[test]
 fn blends_where_downstream_only_lets_everything_pass() {
     init();
     let info = info(VideoFormat::I420, 320, 240);

@@ -74,6 +74,26 @@ fn a_picture_of_another_shape_is_not_steered_by() {
     assert_eq!(moves(&camera).len(), before);
 }
 
+/// Upstream is not told that cropping may be left to the sink; who does that all the same is not steered by.
+#[test]
+fn a_picture_that_is_still_to_be_cropped_is_not_steered_by() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    let caps = rig.sink.static_pad("sink").unwrap().current_caps().unwrap();
+    let mut query = gst::query::Allocation::new(Some(&caps), false);
+    assert!(rig.harness().srcpad().unwrap().peer_query(&mut query));
+    assert!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some());
+    assert_eq!(query.find_allocation_meta::<gst_video::VideoCropMeta>(), None);
+
+    let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
+    let content = buffer.get_mut().unwrap();
+    target(TargetState::Tracking, 0.9, 0.4).attach(content).unwrap();
+    gst_video::VideoCropMeta::add(content, (0, 0, 160, 120));
+    assert_eq!(rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
+    let warning = rig.heard().into_iter().find_map(Heard::into_warning).unwrap();
+    assert!(warning.contains("cropped"), "{warning}");
+}
+
 /// The sink's branch gets nothing any more, the detector's does: it is blind for as long as it believes that the camera
 /// moves.
 #[test]

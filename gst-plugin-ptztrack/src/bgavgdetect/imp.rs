@@ -17,6 +17,7 @@ use ptztrack_contract::{
 use super::settings::{Settings, ZoneSetting};
 use super::stream::{Stream, StreamError};
 use super::{Output, Profile, Selection, Test, caps};
+use crate::allocation::refuse_crop;
 use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
@@ -248,6 +249,16 @@ impl BaseTransformImpl for BgAvgDetect {
             Some(filter) => filter.intersect_with_mode(&caps, gst::CapsIntersectMode::First),
             None => caps,
         })
+    }
+
+    fn propose_allocation(
+        &self,
+        decided: Option<&gst::query::Allocation>,
+        query: &mut gst::query::Allocation,
+    ) -> Result<(), gst::LoggableError> {
+        self.parent_propose_allocation(decided, query)?;
+        refuse_crop(query);
+        Ok(())
     }
 
     fn sink_event(&self, event: gst::Event) -> bool {

@@ -13,6 +13,7 @@ use ptztrack_contract::{CameraEvent, MOTION_ROI, Point, TargetChange, TargetStat
 
 use super::scene_source::SceneSource;
 use super::{Profile, Selection, buffer};
+use crate::allocation::refuse_crop;
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
@@ -288,6 +289,16 @@ impl BaseTransformImpl for LkFeatureTrack {
         *lock(&self.size) = None;
         *lock(&self.command) = None;
         *lock(&self.camera_moves) = Duration::ZERO;
+        Ok(())
+    }
+
+    fn propose_allocation(
+        &self,
+        decided: Option<&gst::query::Allocation>,
+        query: &mut gst::query::Allocation,
+    ) -> Result<(), gst::LoggableError> {
+        self.parent_propose_allocation(decided, query)?;
+        refuse_crop(query);
         Ok(())
     }
 

@@ -7,6 +7,7 @@ use gst_video::{VideoFormat, VideoOverlayComposition, VideoOverlayCompositionMet
 use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, TargetState};
 
 use super::caps;
+use crate::allocation::refuse_crop;
 use crate::lock::lock;
 use crate::pad_templates;
 use crate::vision::{self, FrameSize, Parts, Patch, Seen, Shape, Trail};
@@ -215,7 +216,13 @@ impl PtzOverlay {
                 query.set_result(&filtered(caps::plain_first(&peer), query.filter()));
                 true
             }
-            _ => gst::Pad::query_default(pad, Some(&*self.obj()), query),
+            _ => {
+                let answered = gst::Pad::query_default(pad, Some(&*self.obj()), query);
+                if let gst::QueryViewMut::Allocation(query) = query.view_mut() {
+                    refuse_crop(query);
+                }
+                answered
+            }
         }
     }
 

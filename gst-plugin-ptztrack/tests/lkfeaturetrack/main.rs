@@ -371,6 +371,7 @@ fn upstream_gets_what_downstream_proposes() {
         let mut harness = Harness::new("lkfeaturetrack");
         if supported {
             harness.add_propose_allocation_meta(gst_video::VideoMeta::meta_api(), None);
+            harness.add_propose_allocation_meta(gst_video::VideoCropMeta::meta_api(), None);
         }
         harness.set_src_caps_str("video/x-raw,format=GRAY8,width=320,height=240,framerate=25/1");
         harness.push_and_pull(gst::Buffer::from_mut_slice(picture(None, None))).unwrap();
@@ -378,5 +379,7 @@ fn upstream_gets_what_downstream_proposes() {
         let mut query = gst::query::Allocation::new(Some(&caps), false);
         assert!(harness.srcpad().unwrap().peer_query(&mut query));
         assert_eq!(query.find_allocation_meta::<gst_video::VideoMeta>().is_some(), supported);
+        let crop = query.find_allocation_meta::<gst_video::VideoCropMeta>();
+        assert_eq!(crop, None, "pictures are looked at whole");
     }
 }
