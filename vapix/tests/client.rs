@@ -88,10 +88,13 @@ fn what_may_be_repeated_is_sent_again_where_the_connection_breaks() {
 /// It may have arrived, and would lead on from where it led.
 #[test]
 fn centring_is_never_sent_twice() {
-    let (mut client, asked) = camera(10, |number| number == 2);
-    let answers = send(&mut client, &[RIGHT, CENTRE]);
-    assert!(matches!(answers.as_slice(), [Ok(()), Err(Error::Broken(_))]), "{answers:?}");
-    assert_eq!(count(&asked, "center"), 1);
+    let zoomed = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: Some(150) };
+    for (command, words) in [(CENTRE, "center="), (zoomed, "areazoom=")] {
+        let (mut client, asked) = camera(10, |number| number == 2);
+        let answers = send(&mut client, &[RIGHT, command]);
+        assert!(matches!(answers.as_slice(), [Ok(()), Err(Error::Broken(_))]), "{answers:?}");
+        assert_eq!(count(&asked, words), 1);
+    }
 }
 
 /// As cameras close a connection that was idle for long.
