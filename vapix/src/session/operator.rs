@@ -13,8 +13,10 @@ pub struct CommandedMotion<'a> {
 
 /// Tells from the positions a camera reports whether somebody else moves it.
 ///
-/// An operator who is missed is fought for a moment; one who is seen where there is none costs the target. So only what no command of ours, however late, slow or fast, can explain counts: a turn or zoom
-/// of an axis in a direction that it was not told, of more than any noise, and still there when asked again.
+/// An operator who is missed is fought for a moment; one who is seen where there is none costs the target. So only what no
+/// command of ours, however late, slow or fast, can explain counts: a turn or zoom of an axis in a direction that it was not
+/// told, of more than any noise, and still there when asked again. A single short turn that our own outweighs before the
+/// camera is asked the next time is missed: a slow camera would have come as far.
 #[derive(Debug, Default)]
 pub struct OperatorDetector {
     /// Where the camera has stood since it last moved at our word, and when it was last asked.
@@ -263,6 +265,34 @@ mod tests {
         let mut rig = Rig::armed();
         rig.command(5.0, 0.0);
         assert_eq!(rig.tell(5.0, 4.0), Verdict::Suspicious, "an axis that was told nothing");
+    }
+
+    #[test]
+    fn a_single_turn_against_ours_is_noticed_where_ours_does_not_outweigh_it() {
+        const TURN_DEG: f64 = -12.0;
+        for (our_rate_deg_s, verdict) in [
+            (3.0, Verdict::Suspicious),
+            (10.0, Verdict::Suspicious),
+            (11.0, Verdict::Ours),
+            (20.0, Verdict::Ours),
+        ] {
+            let mut rig = Rig::armed();
+            rig.command(our_rate_deg_s, 0.0);
+            assert_eq!(rig.tell(our_rate_deg_s, 0.0), Verdict::Ours);
+            assert_eq!(rig.tell(2.0 * our_rate_deg_s + TURN_DEG, 0.0), verdict, "{our_rate_deg_s} deg/s");
+        }
+    }
+
+    #[test]
+    fn a_single_turn_just_after_we_turned_round_may_be_ours_that_came_late() {
+        let mut rig = Rig::armed();
+        rig.command(-10.0, 0.0);
+        assert_eq!(rig.tell(-10.0, 0.0), Verdict::Ours);
+        rig.command(10.0, 0.0);
+        assert_eq!(rig.tell(-22.0, 0.0), Verdict::Ours);
+        rig.tell(-12.0, 0.0);
+        rig.tell(-2.0, 0.0);
+        assert_eq!(rig.tell(-14.0, 0.0), Verdict::Suspicious, "what we told before is long over");
     }
 
     #[test]
