@@ -2,6 +2,7 @@
 
 mod robust;
 mod thesis;
+mod usual;
 
 use opencv::core::{Point2f, Rect2f};
 

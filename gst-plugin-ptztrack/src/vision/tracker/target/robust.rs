@@ -3,6 +3,7 @@
 
 use opencv::core::{Point2f, Rect2f};
 
+use super::usual::{Usual, of_whole};
 use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
 use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::corners::{self, Search};
@@ -45,21 +46,10 @@ const LEARNING_PER_S: f32 = 0.8;
 const MAX_LEARNING: f32 = 0.08;
 /// The ground beside the target changes as fast as the camera turns.
 const GROUND_LEARNING_PER_S: f32 = 4.0;
-/// Weight of the filter beside the fit of the silhouette, which counts the more the more it usually says.
-const FILTER_WEIGHT: f32 = 0.25;
-/// What the filter answers to anything, as a share of its answer to the target.
-const FILTER_NOISE: f32 = 0.35;
 /// Nobody changes their velocity faster than this, in heights of them per second squared: about 7 m/s².
 const ACCELERATION: f32 = 4.0;
 /// Deviation of the points' motion, pixels and shares of the height: limbs swing.
 const POINT_NOISE: (f32, f32) = (1.0, 0.015);
-/// What is taken for usual of the filter before it was asked, and of the silhouette at least.
-const FIRST_RESPONSE: Halves = Halves { upper: 0.25, lower: 0.25 };
-const LEAST_FIT: f32 = 0.02;
-const LEAST_RESPONSE: f32 = 0.05;
-const LEAST_LEVEL: f32 = 0.05;
-/// What the better half of the body is worth without the other.
-const HALF: f32 = 0.9;
 /// Time constant of the smoothed velocity, seconds: a stride is longer.
 const VELOCITY_TIME_S: f32 = 0.35;
 /// How much larger or smaller a box is tried, and what is then made of it.
@@ -81,51 +71,6 @@ const HIDDEN_TIME_S: f32 = 2.0;
 const ALIKE: f32 = 0.6;
 /// Pictures in a row in which a hidden target must be seen.
 const SEEN_AGAIN: u32 = 2;
-
-/// What is usually seen of the target while it is there.
-#[derive(Debug, Clone, Copy)]
-struct Usual {
-    fit: Halves,
-    /// How much of the silhouette is figure, by motion and colour alone.
-    level: Halves,
-    response: Halves,
-}
-
-impl Usual {
-    /// Share of the usual silhouette that is seen of either half, from 0 to about 1.
-    fn silhouette(self, fit: Halves) -> Halves {
-        fit.with(self.fit, |seen, usual| (seen / usual).clamp(0.0, 1.2))
-    }
-
-    /// Who stood out from the background stands out still, or is not there: whatever the looks say, known wall is wall.
-    fn stands_out(self, level: Halves) -> Halves {
-        level.with(self.level, |seen, usual| (seen / usual).clamp(0.0, 1.0))
-    }
-
-    /// Share of all that is usually seen of either half.
-    fn shares(self, fit: Halves, level: Halves, response: Halves) -> Halves {
-        let looks = response.with(self.response, |seen, usual| {
-            ((seen / usual - FILTER_NOISE) / (1.0 - FILTER_NOISE)).clamp(0.02, 1.2)
-        });
-        // Both must speak for it: somebody else moves as well, and the wall may look like anybody.
-        let usual = self.fit.mean().max(0.0);
-        let weight = usual / (usual + FILTER_WEIGHT);
-        let both = self.silhouette(fit).with(looks, |fit, looks| fit.powf(weight) * looks.powf(1.0 - weight));
-        both.with(self.stands_out(level), |both, stands_out| both * stands_out)
-    }
-
-    fn learn(&mut self, fit: Halves, level: Halves, response: Halves, rate: f32) {
-        let mix = |least: f32| move |old: f32, new: f32| (old + (new - old) * rate).max(least);
-        self.fit = self.fit.with(fit, mix(LEAST_FIT));
-        self.level = self.level.with(level, mix(LEAST_LEVEL));
-        self.response = self.response.with(response, mix(LEAST_RESPONSE));
-    }
-}
-
-/// Of a whole body: one half is enough, as a table may hide the other.
-fn of_whole(shares: Halves) -> f32 {
-    (HALF * shares.upper.max(shares.lower)).max(shares.mean())
-}
 
 /// The best place of the target around a box.
 #[derive(Debug, Clone, Copy)]
@@ -197,7 +142,7 @@ impl Robust {
             shape,
             colours: None,
             map,
-            usual: Usual { fit: Halves::default(), level: Halves::default(), response: FIRST_RESPONSE },
+            usual: Usual::at_first(Halves::default(), Halves::default()),
             presence: Presence::default(),
             ego: EgoMotion::default(),
             first_size: (bounds.width, bounds.height),
@@ -211,10 +156,8 @@ impl Robust {
             target.colours = Some(ColourModel::new([upper, lower], ground));
         }
         let (_, evidence) = target.look_closely(seen)?;
-        // Who was already there when the picture was first seen does not stand out from the background.
         let fit = target.shape.template(1.0).fit(&evidence, (0, 0));
-        target.usual.fit = fit.with(fit, |fit, _| fit.max(LEAST_FIT));
-        target.usual.level = target.shape.level(&evidence, (0, 0));
+        target.usual = Usual::at_first(fit, target.shape.level(&evidence, (0, 0)));
         target.filter.learn(&seen.luma, bounds, &target.map.reduced(FINER), 1.0)?;
         let corners = target.corners()?;
         let found = corners::reject_outliers(corners, 2.0);
@@ -304,7 +247,7 @@ impl Robust {
         (x, y): (i32, i32),
     ) -> f32 {
         let moved = (x * FINER as i32, y * FINER as i32);
-        let looks = 0.5 * response.at((x, y)).sum() / self.usual.response.sum();
+        let looks = 0.5 * response.at((x, y)).sum() / self.usual.response();
         looks.max(0.0) + silhouette.fit(evidence, moved).mean().max(0.0)
     }
 
@@ -364,7 +307,7 @@ impl Robust {
             |bounds| self.filter.respond(&seen.luma, bounds).map(|response| response.at((0, 0)).sum());
         let (now, other) = (respond(bounds)?, respond(scaled(bounds, growth, growth))?);
         let fit = |scale| self.shape.template(scale).fit(evidence, (0, 0)).mean();
-        let usual = self.usual.response.sum();
+        let usual = self.usual.response();
         if other / usual + fit(growth) > now / usual + fit(1.0) {
             self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
         }
