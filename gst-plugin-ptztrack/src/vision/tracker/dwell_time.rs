@@ -14,10 +14,13 @@ const MEMORY_S: f32 = 3.0;
 const REACH: f32 = 0.5;
 /// By which factor, as a logarithm, its size has changed then: it comes nearer, or leaves.
 const GROWTH: f32 = 0.2;
-/// What was chosen because it moves must go somewhere within so many seconds of being seen, in breadths of it: what a
+/// What was chosen because it moves must go somewhere, in breadths of it from one end of its way to the other: what a
 /// screen shows does not leave the screen.
-const TRIAL_S: f64 = 1.8;
 const TRIAL_REACH: f32 = 1.0;
+/// Until then its way must grow by a quarter of a breadth every so many seconds of being seen: who is near the camera is
+/// broad and takes longer, and what sways turns back.
+const TRIAL_S: f64 = 1.8;
+const TRIAL_STEP: f32 = 0.25;
 
 /// After how many seconds a target is given up; infinite: never.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,13 +42,45 @@ pub(super) struct DwellTime {
     offset: Point2f,
     /// From its average size, as a logarithm.
     growth: f32,
-    on_trial: bool,
+    /// The way of a target that has yet to go somewhere.
+    trial: Option<Way>,
+}
+
+/// Where something was since it was chosen, in breadths of it from there.
+#[derive(Debug, Clone, Copy, Default)]
+struct Way {
+    now: Point2f,
+    least: Point2f,
+    most: Point2f,
+    /// How long the way was when it last grew by a step.
+    grown: f32,
+}
+
+impl Way {
+    fn go(&mut self, step: Point2f) {
+        self.now += step;
+        self.least = Point2f::new(self.least.x.min(self.now.x), self.least.y.min(self.now.y));
+        self.most = Point2f::new(self.most.x.max(self.now.x), self.most.y.max(self.now.y));
+    }
+
+    fn length(&self) -> f32 {
+        length(self.most - self.least)
+    }
+
+    /// Whether it has grown by another step.
+    fn grows(&mut self) -> bool {
+        let grows = self.length() >= self.grown + TRIAL_STEP;
+        if grows {
+            self.grown = self.length();
+        }
+        grows
+    }
 }
 
 impl DwellTime {
     /// Of a target that has yet to go somewhere.
     pub fn on_trial() -> Self {
-        Self { on_trial: true, ..Self::default() }
+        Self { trial: Some(Way::default()), ..Self::default() }
     }
 
     /// Takes a frame, `dt_s` seconds after the last one, in which the target was seen or not.
@@ -58,19 +93,24 @@ impl DwellTime {
     /// Only frames in which both were seen tell whether the target stands: the others do not count.
     pub fn watch(&mut self, before: Rect2f, after: Rect2f, ego: EgoMotion, dt_s: f64) {
         let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
-        let own = centre(after) - ego.apply(centre(before));
-        self.offset = (self.offset + own / breadth(after).max(1.0)) * keep;
+        let step = (centre(after) - ego.apply(centre(before))) / breadth(after).max(1.0);
+        self.offset = (self.offset + step) * keep;
         let scale = ego.scale_at(centre(before));
         let (across, down) =
             ((after.width / (before.width * scale)).ln(), (after.height / (before.height * scale)).ln());
         // A side of the box that moves alone is no approach.
         let growth = if across * down > 0.0 { across.abs().min(down.abs()).copysign(down) } else { 0.0 };
         self.growth = (self.growth + growth) * keep;
+        let (stays, grows) = match &mut self.trial {
+            Some(way) => {
+                way.go(step);
+                (way.length() <= TRIAL_REACH, way.grows())
+            }
+            None => (length(self.offset) <= REACH, false),
+        };
         // What is not a number fails as well, and is forgotten.
-        let reach = if self.on_trial { TRIAL_REACH } else { REACH };
-        let stands = length(self.offset) <= reach && self.growth.abs() <= GROWTH;
-        *self = if stands {
-            Self { still_s: self.still_s + dt_s, ..*self }
+        *self = if stays && self.growth.abs() <= GROWTH {
+            Self { still_s: if grows { 0.0 } else { self.still_s + dt_s }, ..*self }
         } else {
             Self { tracked_s: self.tracked_s, ..Self::default() }
         };
@@ -78,7 +118,8 @@ impl DwellTime {
 
     /// Why the target is to be given up now, if it is.
     pub fn exhausted(&self, limits: Limits) -> Option<ReleaseReason> {
-        let patience_s = if self.on_trial { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
+        let patience_s =
+            if self.trial.is_some() { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
         if self.still_s > patience_s {
             Some(ReleaseReason::Stationary)
         } else {
@@ -180,6 +221,8 @@ mod tests {
         };
         assert!(given_up(|time| 0.4 * (4.0 * time).sin()), "what a screen shows stays on the screen");
         assert!(!given_up(|time| 1.5 * time), "a walker");
+        assert!(!given_up(|time| 0.3 * time), "a slow one, or near");
+        assert!(!given_up(|time| 0.7 * (1.5 * time).sin()), "who turns back and goes past where they began");
         assert!(!given_up(|time| 1.5 * time.min(1.2)), "who stops after a few steps");
     }
 
