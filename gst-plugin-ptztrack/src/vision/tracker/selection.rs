@@ -92,7 +92,7 @@ impl Candidate {
     fn continue_with(&mut self, sighting: Sighting, dt_s: f64) {
         const SMOOTHING: f32 = 0.5;
         let time_s = (f64::from(self.missed) * dt_s) as f32;
-        let velocity = (centre(sighting.bounds) - centre(self.sighting.bounds)) / time_s.max(f32::EPSILON);
+        let velocity = motion(self.sighting.bounds, sighting.bounds) / time_s.max(f32::EPSILON);
         let old = self.sighting.velocity;
         self.sighting = Sighting { velocity: old + (velocity - old) * SMOOTHING, ..sighting };
         self.frames += 1;
@@ -105,13 +105,13 @@ impl Candidate {
         let now = self.sighting.bounds;
         self.way.iter().any(|(then, _)| {
             let (left, right) = (now.x - then.x, now.br().x - then.br().x);
-            let (top, bottom) = (now.y - then.y, now.br().y - then.br().y);
-            let both = |a: f32, b: f32| if a * b > 0.0 { a.abs().min(b.abs()) } else { 0.0 };
+            let bottom = now.br().y - then.br().y;
+            let moved = motion(*then, now);
             let least = (TRAVELLED + self.sighting.restless) * breadth(now).min(breadth(*then));
             let nearer = (now.height / then.height.max(1.0) - 1.0).abs() >= APPROACHED
                 && bottom * left < 0.0
                 && bottom * right > 0.0;
-            both(left, right) >= least || both(top, bottom) >= least || nearer
+            moved.x.abs() >= least || moved.y.abs() >= least || nearer
         })
     }
 }
@@ -241,6 +241,13 @@ impl Selection {
     }
 }
 
+/// How far both sides of a box have moved: one that moves alone shows or hides a part of what is in it.
+fn motion(then: Rect2f, now: Rect2f) -> Point2f {
+    let both = |a: f32, b: f32| if a * b > 0.0 { a.abs().min(b.abs()).copysign(a) } else { 0.0 };
+    let (from, to) = (now.tl() - then.tl(), now.br() - then.br());
+    Point2f::new(both(from.x, to.x), both(from.y, to.y))
+}
+
 /// Whether a region can be a target at all.
 fn is_sound(sighting: &Sighting, frame: Frame) -> bool {
     let bounds = sighting.bounds;
@@ -339,6 +346,16 @@ mod tests {
         }
         let velocity = selection.choose(Choice::Largest, 3, false, FRAME).expect("confirmed").velocity;
         assert!((velocity.x - 60.0).abs() < 1.0 && velocity.y.abs() < 1e-3, "{velocity:?}");
+    }
+
+    #[test]
+    fn what_comes_into_view_or_goes_behind_something_does_not_move_by_that() {
+        let mut selection = Selection::default();
+        for n in 0..8 {
+            selection.update(vec![at(100.0, 100.0, 60.0 - 4.0 * n as f32, 90.0)], STILL, FRAME, DT);
+        }
+        let velocity = selection.choose(Choice::Largest, 3, false, FRAME).expect("confirmed").velocity;
+        assert_eq!(velocity, Point2f::default());
     }
 
     /// Whether what looks like `path` at each frame is chosen within two seconds, where it must travel.

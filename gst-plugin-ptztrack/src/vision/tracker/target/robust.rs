@@ -61,6 +61,8 @@ const WIDENING: f32 = 0.03;
 const MAX_GROWTH: f32 = 4.0;
 /// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
 const YOUNG_S: f32 = 1.0;
+/// How much of that it adopts in one picture.
+const ADOPTED: f32 = 0.3;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.15;
 /// How much farther, in heights of it a second, a hidden target may be than its last motion took it: whoever runs.
@@ -393,8 +395,9 @@ impl Robust {
         );
     }
 
-    /// A young target's box grows with the region that the detector sees it in.
-    fn adopt(&mut self, sightings: &[Sighting]) {
+    /// A young target's box grows with the region that the detector sees it in; by how much its middle shifts, which is no
+    /// motion of the target. It does not shrink with it: what is smaller is what something in front leaves of the target.
+    fn adopt(&mut self, sightings: &[Sighting]) -> Point2f {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let own = sightings.iter().find(|sighting| {
@@ -403,13 +406,20 @@ impl Robust {
                 && region.width <= 2.0 * bounds.width
                 && region.height <= 2.0 * bounds.height
         });
-        if let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) {
-            let mix = |old: f32, new: f32| old + 0.3 * (new - old);
-            let size = (mix(bounds.width, region.width), mix(bounds.height, region.height));
-            let place = middle + (centre(region) - middle) * 0.3;
-            self.estimate.bounds = around(place, size.0, size.1);
-            self.first_size = size;
-        }
+        let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) else {
+            return Point2f::default();
+        };
+        let share = |side: f32, of_region: f32| if of_region > side { ADOPTED } else { 0.0 };
+        let (across, down) = (share(bounds.width, region.width), share(bounds.height, region.height));
+        let away = centre(region) - middle;
+        let shift = Point2f::new(across * away.x, down * away.y);
+        let size = (
+            bounds.width + across * (region.width - bounds.width),
+            bounds.height + down * (region.height - bounds.height),
+        );
+        self.estimate.bounds = around(middle + shift, size.0, size.1);
+        self.first_size = size;
+        shift
     }
 
     /// The best of what the detector saw within reach that looks like the target.
@@ -490,7 +500,7 @@ impl Follow for Robust {
             self.estimate.bounds += (consensus.motion - carried) * trust;
         }
         self.patch = next;
-        self.adopt(sightings);
+        let start = start + self.adopt(sightings);
         let spread = WIDE_SPREAD + (SPREAD - WIDE_SPREAD) * trust;
         let mut place = self.locate(seen, self.estimate.bounds, spread)?;
         if place.share < FOUND
