@@ -17,12 +17,14 @@ const MANY: usize = 100;
 /// One after the other they would take 250 s; together one takes 2.5 s, and a busy machine takes longer.
 const TOGETHER: Duration = Duration::from_secs(30);
 
-/// Steers on after one picture, at little cost to the test.
+/// Steers on after one picture, at little cost to the test; and so slowly that it is not where it is to be, and at rest, before
+/// all of them steer.
 fn sink(camera: &VirtualCamera) -> gst::Element {
     gst::ElementFactory::make("vapixptzsink")
         .property("location", camera.url())
         .property("dead-man", false)
         .property("max-rate", 1.0)
+        .property("max-speed", 0.5)
         .property("stale-timeout", 60_000_000_000u64)
         .property("override-timeout", 0u64)
         .build()
