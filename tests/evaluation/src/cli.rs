@@ -64,8 +64,8 @@ pub struct Args {
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
-    /// Instead of running tests, write pictures of the room, or of the photographs, to look at: every subject, light and occlusion,
-    /// from far and near
+    /// Instead of running tests, write pictures of the room, of the hard tests or of the photographs, to look at: every
+    /// subject, light and occlusion, from far and near
     #[arg(long, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time", "record"])]
     pub gallery: bool,
     /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
@@ -222,6 +222,9 @@ impl Args {
     /// Where photographs cannot be used.
     pub fn gallery(&self) -> Result<Vec<Experiment>, SceneError> {
         let Some(&seed) = self.seeds().first().filter(|_| self.gallery) else { return Ok(Vec::new()) };
+        if self.suite == Some(Suite::Hard) {
+            return Ok(self.hard(&[TrackerName::Still]));
+        }
         // The first quarter of the tests has all lights, occlusions and subjects.
         let rooms = || (1..=18).filter_map(|test| Scene::room(TestId(test), seed)).collect();
         let scenes: Vec<Scene> = self.photographs(seed).transpose()?.unwrap_or_else(rooms);
@@ -395,6 +398,9 @@ mod tests {
         assert_eq!(seeds, [2, 2, 2, 4, 4, 4]);
         assert!(experiments.iter().all(|one| one.scene.suite == Suite::Hard));
         assert!(parse("--suite room").is_err());
+        let gallery = parse("--suite hard --gallery").unwrap().gallery().unwrap();
+        assert_eq!(gallery.len(), 38);
+        assert!(gallery.iter().all(|one| one.scene.suite == Suite::Hard));
     }
 
     #[test]

@@ -33,13 +33,17 @@ pub fn write(experiments: &[Experiment], folder: &Path) -> Result<usize, Box<dyn
     Ok(written)
 }
 
-/// One picture with the person in the middle of it, half hidden where they are ever hidden; so wide a part of the widest view.
+/// One picture with the person in the middle of it, half hidden where they are ever hidden, or of where nobody ever is; so wide
+/// a part of the widest view.
 fn shoot(experiment: &Experiment, part: f64) -> Result<Vec<u8>, RunError> {
     let Place::Camera(settings) = &experiment.scene.place else { return Err(RunError::Nobody) };
     let camera = experiment.camera(settings, Clock::Stepped)?;
-    let (exposure, person) = moment(experiment, &camera).ok_or(RunError::Nobody)?;
+    let period = camera.frame_period();
+    let empty = || (experiment::exposure(experiment.pictures(period).count() as u32 / 2, period), None);
+    let (exposure, person) =
+        moment(experiment, &camera).map_or_else(empty, |(exposure, person)| (exposure, Some(person)));
     camera.advance_to(exposure.saturating_sub(AIMING));
-    aim(&camera, &person, part)?;
+    aim(&camera, person.as_ref(), part)?;
     camera.advance_to(exposure + camera.frame_period());
     let picture = camera.picture(exposure, experiment.size)?;
     let (width, height) = experiment.size;
@@ -81,9 +85,11 @@ fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, 
     walk.into_iter().enumerate().min_by_key(half_hidden).map(|(_, moment)| moment)
 }
 
-/// Turns and zooms to where the person will be.
-fn aim(camera: &VirtualCamera, person: &GroundTruth, part: f64) -> Result<(), RunError> {
-    let (pan, tilt) = person.direction_deg.ok_or(RunError::Nobody)?;
+/// Turns and zooms to where the person will be, if anybody.
+fn aim(camera: &VirtualCamera, person: Option<&GroundTruth>, part: f64) -> Result<(), RunError> {
+    let home = camera.home();
+    let direction = person.map_or(Some((home.pan_deg, home.tilt_deg)), |person| person.direction_deg);
+    let (pan, tilt) = direction.ok_or(RunError::Nobody)?;
     let zoom = camera.optics().zoom_step(1.0 / part);
     let query = format!("pan={pan:.2}&tilt={tilt:.2}&zoom={zoom:.0}");
     if camera.operate(&query) { Ok(()) } else { Err(RunError::Aim(query)) }
