@@ -25,7 +25,7 @@ pub fn write(experiments: &[Experiment], folder: &Path) -> Result<usize, Box<dyn
     for experiment in experiments {
         for (name, part) in [("wide", 1.0), ("near", NEAR)] {
             let png = shoot(experiment, part)?;
-            let file = format!("{}-{name}.png", experiment.scene.title.replace(' ', "-"));
+            let file = format!("{}-{name}.png", report::slug(&experiment.scene.title));
             report::save(&folder.join(file), png)?;
             written += 1;
         }

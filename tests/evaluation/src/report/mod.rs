@@ -19,7 +19,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub(crate) use judged::place;
+pub(crate) use judged::{place, slug};
 use judged::{Judged, Section};
 use plot::Plot;
 use table::Table;
