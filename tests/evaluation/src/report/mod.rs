@@ -19,8 +19,8 @@ use std::{
     path::{Path, PathBuf},
 };
 
-pub(crate) use judged::{place, slug};
 use judged::{Judged, Section};
+pub(crate) use judged::{place, slug};
 use plot::Plot;
 use table::Table;
 

@@ -166,36 +166,6 @@ fn hidden_for_a_second_and_found_again() {
     assert_at(&last, 40.0 + 8.0 * 39.0, 100.0);
 }
 
-/// What the detector still sees of them is not all of them.
-#[test]
-fn who_goes_behind_something_as_soon_as_they_are_seen_keeps_their_size() {
-    let wall = Rect2f::new(90.0, 0.0, 80.0, 320.0);
-    let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
-    let mut changes = Vec::new();
-    for n in 1..30 {
-        let x = 40.0 + 8.0 * n as f32;
-        let mut picture = street((0.0, 0.0), &[(x, 100.0, 7)]);
-        picture.paint(wall, 4321);
-        let before = (x, (x + PERSON.0).min(wall.x));
-        let behind = (x.max(wall.br().x), x + PERSON.0);
-        let seen = [before, behind].into_iter().find(|(left, right)| right > left);
-        let part = seen.map(|(left, right)| Detection {
-            bounds: Rect {
-                x: f64::from(left) / SIZE.0 as f64,
-                y: 100.0 / SIZE.1 as f64,
-                width: f64::from(right - left) / SIZE.0 as f64,
-                height: f64::from(PERSON.1) / SIZE.1 as f64,
-            },
-            ..Detection::default()
-        });
-        let report = tracker.process(&picture, DT, part.as_slice());
-        changes.extend(report.changes);
-        let width = report.bounds.width * SIZE.0 as f64;
-        assert!((width - f64::from(PERSON.0)).abs() < 6.0, "{width} pixels wide in picture {n}");
-    }
-    assert_eq!(changes, [TargetChange::Occluded, TargetChange::Reacquired]);
-}
-
 #[test]
 fn the_same_pictures_give_the_same_answers() {
     let run = || {

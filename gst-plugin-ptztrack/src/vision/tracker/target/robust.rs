@@ -396,7 +396,7 @@ impl Robust {
     }
 
     /// A young target's box grows with the region that the detector sees it in; by how much its middle shifts, which is no
-    /// motion of the target. It does not shrink with it: what is smaller is what something in front leaves of the target.
+    /// motion of the target.
     fn adopt(&mut self, sightings: &[Sighting]) -> Point2f {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
@@ -409,14 +409,9 @@ impl Robust {
         let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) else {
             return Point2f::default();
         };
-        let share = |side: f32, of_region: f32| if of_region > side { ADOPTED } else { 0.0 };
-        let (across, down) = (share(bounds.width, region.width), share(bounds.height, region.height));
-        let away = centre(region) - middle;
-        let shift = Point2f::new(across * away.x, down * away.y);
-        let size = (
-            bounds.width + across * (region.width - bounds.width),
-            bounds.height + down * (region.height - bounds.height),
-        );
+        let mix = |old: f32, new: f32| old + ADOPTED * (new - old);
+        let shift = (centre(region) - middle) * ADOPTED;
+        let size = (mix(bounds.width, region.width), mix(bounds.height, region.height));
         self.estimate.bounds = around(middle + shift, size.0, size.1);
         self.first_size = size;
         shift
