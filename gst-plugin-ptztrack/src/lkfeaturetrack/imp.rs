@@ -1,5 +1,4 @@
 use std::sync::{LazyLock, Mutex};
-use std::time::Duration;
 
 use glib::Properties;
 use gst::prelude::*;
@@ -17,7 +16,7 @@ use crate::allocation::refuse_crop;
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
-use crate::vision::{self, Observation};
+use crate::vision::{self, CameraMoves, Observation};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("lkfeaturetrack", gst::DebugColorFlags::empty(), Some("Feature point tracker"))
@@ -202,8 +201,7 @@ pub struct LkFeatureTrack {
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
     command: Mutex<Option<Command>>,
-    /// How much longer the camera turns, by the word of a servo.
-    camera_moves: Mutex<Duration>,
+    camera: Mutex<CameraMoves>,
 }
 
 #[glib::object_subclass]
@@ -288,7 +286,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         }
         *lock(&self.size) = None;
         *lock(&self.command) = None;
-        *lock(&self.camera_moves) = Duration::ZERO;
+        *lock(&self.camera) = CameraMoves::default();
         Ok(())
     }
 
@@ -317,8 +315,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         if event.type_() == gst::EventType::Navigation {
             self.navigate(&event);
         } else if let Some(Ok(camera)) = CameraEvent::of(&event) {
-            let holds = if camera.moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
-            *lock(&self.camera_moves) = holds;
+            lock(&self.camera).hear(camera.moving);
         }
         self.parent_src_event(event)
     }
@@ -333,7 +330,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         let command = lock(&self.command).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
-        stream.tracker.set_camera_rests(lock(&self.camera_moves).is_zero());
+        stream.tracker.set_camera_rests(!lock(&self.camera).is_moving());
         match command {
             Some(Command::Select(place)) => stream.tracker.select(place),
             Some(Command::Release) => stream.tracker.release(),
@@ -403,10 +400,7 @@ impl LkFeatureTrack {
         };
         let before = stream.last_time;
         let step = stream.step(times.running_time);
-        {
-            let mut moves = lock(&self.camera_moves);
-            *moves = moves.saturating_sub(step.into());
-        }
+        lock(&self.camera).pass(step.into());
         let report = match self.look(stream, settings, buffer, step) {
             Ok(report) => report,
             Err(reason) => {

@@ -1,14 +1,13 @@
 use std::time::Duration;
 
-use ptztrack_contract::CameraEvent;
+use super::camera_moves::CameraMoves;
 
 /// Whether the picture is worth looking at: not while the tracker follows somebody, nor while the camera
 /// moves and the picture with it.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Duty {
     asleep: bool,
-    /// How much longer the camera moves, unless that is said again.
-    moving: Duration,
+    camera: CameraMoves,
     /// How much longer the pictures may still show the camera moving.
     settling: Duration,
 }
@@ -22,16 +21,16 @@ impl Duty {
     /// The camera moves, or no longer does. It rests before its pictures do: they are older than the
     /// news, by `settle_time` at most.
     pub fn camera(&mut self, moving: bool, settle_time: Duration) {
-        if !self.moving.is_zero() && !moving {
+        if self.camera.is_moving() && !moving {
             self.settling = settle_time;
         }
-        self.moving = if moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
+        self.camera.hear(moving);
     }
 
     /// Whether to look at the next picture, which comes `elapsed` after the one before.
     pub fn looks(&mut self, elapsed: Duration) -> bool {
-        self.moving = self.moving.saturating_sub(elapsed);
-        let (settled, rests) = (self.settling.is_zero(), self.moving.is_zero());
+        self.camera.pass(elapsed);
+        let (settled, rests) = (self.settling.is_zero(), !self.camera.is_moving());
         if rests {
             self.settling = self.settling.saturating_sub(elapsed);
         }

@@ -23,6 +23,7 @@
 mod afterimage;
 mod background;
 mod camera_motion;
+mod camera_moves;
 mod contours;
 mod detector;
 mod draw;
@@ -47,6 +48,7 @@ mod zones;
 
 pub use background::{Background, Criterion, ForegroundTest};
 pub use camera_motion::CameraMotionEstimator;
+pub use camera_moves::CameraMoves;
 pub use contours::{Grid, fill_regions, regions};
 pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, Patch, Shape, draw, text_width};

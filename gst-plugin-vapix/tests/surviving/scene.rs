@@ -173,38 +173,38 @@ impl Scene {
         }
         let answered = self.camera.status().requests - before;
         assert!(answered < BURST as u64 / 2, "{}: {answered} requests for {BURST} pictures", self.title);
-        let (begin, mut heard, mut pictures) = (Instant::now(), Vec::new(), BURST);
-        let mut since = None;
-        for side in sides.iter().cycle() {
-            self.rig.push(side);
+        let (mut pictures, mut sides) = (BURST, sides.iter().cycle());
+        let push = |scene: &mut Self| {
+            sides.by_ref().take(1).for_each(|side| scene.rig.push(side));
             pictures += 1;
-            heard.extend(self.rig.hear(FRAME));
-            // What is not to be noticed must not keep the camera from being steered.
-            let begun = if noticed {
-                heard.iter().any(Heard::is_warning)
-            } else {
-                self.was_moved_after(last).is_some()
-            };
-            if begun {
-                since.get_or_insert_with(Instant::now);
-            }
-            if since.is_some_and(|since| since.elapsed() >= lasts) {
-                break;
-            }
-            assert!(begin.elapsed() < PATIENCE + lasts, "{}: heard only {heard:?}", self.title);
-        }
-        assert!(!heard.contains(&CONNECTED), "{}: {heard:?}", self.title);
-        (heard, pictures)
+        };
+        // What is not to be noticed must not keep the camera from being steered.
+        let begun = |scene: &Self, heard: &[Heard]| {
+            if noticed { heard.iter().any(Heard::is_warning) } else { scene.was_moved_after(last).is_some() }
+        };
+        (self.hear_for(lasts, push, begun), pictures)
     }
 
     /// The same without pictures: the camera is to be stopped, and cannot be.
     #[track_caller]
     fn misbehave_unseen(&mut self, lasts: Duration) -> Vec<Heard> {
+        self.hear_for(lasts, |_| (), |_, heard| heard.iter().any(Heard::is_warning))
+    }
+
+    /// What is heard until so much time has passed since it has begun.
+    #[track_caller]
+    fn hear_for(
+        &mut self,
+        lasts: Duration,
+        mut push: impl FnMut(&mut Self),
+        begun: impl Fn(&Self, &[Heard]) -> bool,
+    ) -> Vec<Heard> {
         let (begin, mut heard) = (Instant::now(), Vec::new());
         let mut since = None;
         while since.is_none_or(|since: Instant| since.elapsed() < lasts) {
+            push(self);
             heard.extend(self.rig.hear(FRAME));
-            if heard.iter().any(Heard::is_warning) {
+            if begun(self, &heard) {
                 since.get_or_insert_with(Instant::now);
             }
             assert!(begin.elapsed() < PATIENCE + lasts, "{}: heard only {heard:?}", self.title);

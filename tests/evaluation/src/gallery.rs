@@ -38,12 +38,9 @@ pub fn write(experiments: &[Experiment], folder: &Path) -> Result<usize, Box<dyn
 fn shoot(experiment: &Experiment, part: f64) -> Result<Vec<u8>, RunError> {
     let Place::Camera(settings) = &experiment.scene.place else { return Err(RunError::Nobody) };
     let camera = experiment.camera(settings, Clock::Stepped)?;
-    let period = camera.frame_period();
-    let empty = || (experiment::exposure(experiment.pictures(period).count() as u32 / 2, period), None);
-    let (exposure, person) =
-        moment(experiment, &camera).map_or_else(empty, |(exposure, person)| (exposure, Some(person)));
+    let (exposure, direction) = moment(experiment, &camera)?;
     camera.advance_to(exposure.saturating_sub(AIMING));
-    aim(&camera, person.as_ref(), part)?;
+    aim(&camera, direction, part)?;
     camera.advance_to(exposure + camera.frame_period());
     let picture = camera.picture(exposure, experiment.size)?;
     let (width, height) = experiment.size;
@@ -67,8 +64,9 @@ fn shoot(experiment: &Experiment, part: f64) -> Result<Vec<u8>, RunError> {
 /// Where a moment is looked for; who is hidden shows in small pictures too.
 const SMALL: (u32, u32) = (160, 120);
 
-/// The exposure at which the person is most nearly half hidden; in the middle of the way where nothing hides them.
-fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, GroundTruth)> {
+/// The exposure at which the person is most nearly half hidden, in the middle of the way where nothing hides them, and the
+/// direction they are in, as pan and tilt in degrees. Where nobody comes, the middle of the run and home.
+fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Result<(Duration, (f64, f64)), RunError> {
     let (period, home) = (camera.frame_period(), camera.home());
     let seen = |number: u32| {
         let exposure = experiment::exposure(number, period);
@@ -82,14 +80,17 @@ fn moment(experiment: &Experiment, camera: &VirtualCamera) -> Option<(Duration, 
         // Thousandths, and where all are the same the nearest to the middle of the way.
         (((person.unhidden - 0.5).abs() * 1000.0) as u32, index.abs_diff(middle))
     };
-    walk.into_iter().enumerate().min_by_key(half_hidden).map(|(_, moment)| moment)
+    match walk.into_iter().enumerate().min_by_key(half_hidden) {
+        Some((_, (exposure, person))) => Ok((exposure, person.direction_deg.ok_or(RunError::Nobody)?)),
+        None => {
+            let middle = experiment.pictures(period).count() as u32 / 2;
+            Ok((experiment::exposure(middle, period), (home.pan_deg, home.tilt_deg)))
+        }
+    }
 }
 
-/// Turns and zooms to where the person will be, if anybody.
-fn aim(camera: &VirtualCamera, person: Option<&GroundTruth>, part: f64) -> Result<(), RunError> {
-    let home = camera.home();
-    let direction = person.map_or(Some((home.pan_deg, home.tilt_deg)), |person| person.direction_deg);
-    let (pan, tilt) = direction.ok_or(RunError::Nobody)?;
+/// Turns and zooms to a direction.
+fn aim(camera: &VirtualCamera, (pan, tilt): (f64, f64), part: f64) -> Result<(), RunError> {
     let zoom = camera.optics().zoom_step(1.0 / part);
     let query = format!("pan={pan:.2}&tilt={tilt:.2}&zoom={zoom:.0}");
     if camera.operate(&query) { Ok(()) } else { Err(RunError::Aim(query)) }
