@@ -99,31 +99,33 @@ impl Region {
 pub struct MotionMeta {
     /// The moving regions, longest perimeter first. Empty: it looked and nothing moved.
     pub regions: Vec<Region>,
+    /// Those outside of the detector's zones: nobody is chosen there, but who is followed may go there.
+    pub outside: Vec<Region>,
 }
+
+const REGIONS: &str = "regions";
+const OUTSIDE: &str = "outside";
 
 impl BufferMeta for MotionMeta {
     const NAME: &'static str = "PtzMotionMeta";
 
     fn write(&self, structure: &mut gst::StructureRef) {
-        let regions = self.regions.iter().map(|region| region.to_structure().to_send_value());
-        structure.set("regions", gst::Array::new(regions));
+        for (field, regions) in [(REGIONS, &self.regions), (OUTSIDE, &self.outside)] {
+            let regions = regions.iter().map(|region| region.to_structure().to_send_value());
+            structure.set(field, gst::Array::new(regions));
+        }
     }
 
     fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let array = reader.get::<gst::Array>("regions")?;
-        let regions = array
-            .as_slice()
-            .iter()
-            .map(|value| match value.get::<gst::Structure>() {
+        let read = |field: &str| {
+            let regions = reader.get::<gst::Array>(field)?;
+            let read = regions.as_slice().iter().map(|value| match value.get::<gst::Structure>() {
                 Ok(region) => Region::from_structure(&region),
-                Err(err) => Err(ContractError::Field {
-                    structure: Self::NAME.to_owned(),
-                    field: "regions".to_owned(),
-                    reason: err.to_string(),
-                }),
-            })
-            .collect::<Result<_, _>>()?;
-        Ok(Self { regions })
+                Err(err) => Err(reader.value_error(field, err.to_string())),
+            });
+            read.collect::<Result<_, _>>()
+        };
+        Ok(Self { regions: read(REGIONS)?, outside: read(OUTSIDE)? })
     }
 }

@@ -94,9 +94,11 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
 
     #[test]
-    fn motion_meta(regions in prop::collection::vec(region(), 0..4)) {
+    fn motion_meta(
+        regions in prop::collection::vec(region(), 0..4), outside in prop::collection::vec(region(), 0..3),
+    ) {
         gst::init().unwrap();
-        let meta = MotionMeta { regions };
+        let meta = MotionMeta { regions, outside };
         let mut buffer = gst::Buffer::new();
         meta.attach(buffer.get_mut().unwrap()).unwrap();
         prop_assert_eq!(MotionMeta::of(&buffer).unwrap().unwrap(), meta);

@@ -345,6 +345,50 @@ fn zones_choose_where_to_look() {
     assert_eq!(detector.see(&[BOX], 3), [Some(0), Some(1), Some(1)]);
 }
 
+/// Who is followed may go there.
+#[test]
+fn what_moves_outside_of_the_zones_is_told_apart() {
+    let mut detector = Detector::learned(&grey());
+    detector.element.set_property("zones", "0.5,0 1,0 1,1 0.5,1");
+    detector.see(&[BOX], 2);
+    let buffer = detector.buffer(&[BOX]);
+    let meta = MotionMeta::of(&detector.push(buffer)).unwrap().unwrap();
+    assert_eq!((meta.regions.len(), meta.outside.len()), (0, 1));
+    assert_eq!(detector.changes(), []);
+}
+
+/// A wall of patches, seen by a camera that has turned by so many pixels, and somebody before it.
+fn paint(buffer: &mut gst::BufferRef, turned: u32, walker: Option<u32>) {
+    let patch = |x: u32, y: u32| (x.wrapping_mul(2_654_435_761) ^ y.wrapping_mul(2_246_822_519)) >> 13;
+    let mut pixels = buffer.map_writable().unwrap();
+    for (at, pixel) in (0_u32..).zip(pixels.iter_mut()) {
+        let (x, y) = (at % 160, at / 160);
+        let before = walker.is_some_and(|left| (left..left + 14).contains(&x) && (40..100).contains(&y));
+        *pixel = if before { 230 } else { 40 + (patch((x + turned) / 6, y / 6) % 120) as u8 };
+    }
+}
+
+#[test]
+fn zones_go_with_the_background() {
+    let mut detector = Detector::new(&grey());
+    detector.element.set_property("zones", "0.5,0 1,0 1,1 0.5,1");
+    let mut look = |turned: u32, walker: Option<u32>| {
+        let mut buffer = detector.buffer(&[]);
+        paint(buffer.get_mut().unwrap(), turned, walker);
+        MotionMeta::of(&detector.push(buffer)).map(|meta| meta.unwrap())
+    };
+    for _ in 0..10 {
+        look(0, None);
+    }
+    for turned in 1..=40 {
+        look(2 * turned, None);
+    }
+    // The middle of the picture in which they were set lies at its left edge now.
+    let seen: Vec<_> = (0..8).filter_map(|step| look(80, Some(30 + 2 * step))).collect();
+    let last = seen.last().unwrap();
+    assert_eq!((last.regions.len(), last.outside.len()), (1, 0), "{last:?}");
+}
+
 #[test]
 fn zones_that_cannot_be_read_are_refused_with_a_warning() {
     let detector = Detector::learned(&grey());

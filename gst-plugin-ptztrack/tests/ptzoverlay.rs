@@ -60,7 +60,7 @@ fn target() -> TargetMeta {
 fn motion() -> MotionMeta {
     let contour = [(0.25, 0.55), (0.35, 0.55), (0.3, 0.9)].map(|(x, y)| Point { x, y }).to_vec();
     let bounds = Rect { x: 0.25, y: 0.55, width: 0.1, height: 0.35 };
-    MotionMeta { regions: vec![Region { bounds, contour, ..Region::default() }] }
+    MotionMeta { regions: vec![Region { bounds, contour, ..Region::default() }], ..MotionMeta::default() }
 }
 
 fn with_metas(info: &VideoInfo, index: u64) -> gst::Buffer {

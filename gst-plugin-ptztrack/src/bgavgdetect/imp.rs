@@ -22,7 +22,7 @@ use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
-use crate::vision::{Duty, Zones};
+use crate::vision::{Duty, Found, View, Zones};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("bgavgdetect", gst::DebugColorFlags::empty(), Some("Motion detector"))
@@ -108,12 +108,12 @@ pub struct BgAvgDetect {
         blurb = "Largest area of a region, as a fraction of the frame"
     )]
     #[property(
-        name = "zones", type = String, mutable_playing, blurb = "Where to look (empty = everywhere): polygons separated by `;`, each of three or more points `x,y` (0 to 1) separated by spaces",
+        name = "zones", type = String, mutable_playing, blurb = "Where people are chosen (empty = everywhere), in the picture in which it is set: polygons separated by `;`, each of three or more points `x,y` (0 to 1) separated by spaces",
         get = |imp: &Self| lock(&imp.settings).zones.text.clone(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("zones", text, |settings| &mut settings.zones)
     )]
     #[property(
-        name = "exclude-zones", type = String, mutable_playing, blurb = "Where not to look: polygons as in zones",
+        name = "exclude-zones", type = String, mutable_playing, blurb = "Where nobody is chosen: polygons as in zones",
         get = |imp: &Self| lock(&imp.settings).exclude_zones.text.clone(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("exclude-zones", text, |settings| &mut settings.exclude_zones)
     )]
@@ -165,6 +165,8 @@ pub struct BgAvgDetect {
     duty: Mutex<Duty>,
     /// Where the tracker last said that its target is, and nothing becomes background.
     target: Mutex<Option<Rect>>,
+    /// Where the camera looks, where it rests and a servo has said so.
+    view: Mutex<Option<View>>,
 }
 
 impl Default for BgAvgDetect {
@@ -176,6 +178,7 @@ impl Default for BgAvgDetect {
             stream: Mutex::default(),
             duty: Mutex::default(),
             target: Mutex::default(),
+            view: Mutex::default(),
         }
     }
 }
@@ -227,6 +230,7 @@ impl BaseTransformImpl for BgAvgDetect {
 
     fn start(&self) -> Result<(), gst::ErrorMessage> {
         *lock(&self.duty) = Duty::default();
+        *lock(&self.view) = None;
         *lock(&self.target) = None;
         self.apply_output();
         Ok(())
@@ -282,7 +286,7 @@ impl BaseTransformImpl for BgAvgDetect {
             }
         } else if let Some(camera) = CameraEvent::of(&event) {
             match camera {
-                Ok(camera) => self.heed_camera(camera.moving),
+                Ok(camera) => self.heed_camera(&camera),
                 Err(error) => gst::warning!(CAT, imp = self, "Unreadable event of a servo: {error}"),
             }
         }
@@ -315,7 +319,8 @@ impl BaseTransformImpl for BgAvgDetect {
         let output = *lock(&self.output);
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         let seen = self.look(&mut stream, inbuf);
-        let drawn = stream.draw(inbuf, outbuf, seen.regions.as_deref().unwrap_or_default(), output);
+        let regions = seen.found.as_ref().map_or(&[][..], |found| &found.regions);
+        let drawn = stream.draw(inbuf, outbuf, regions, output);
         let attached = attach(outbuf, &seen, &stream.in_info);
         if let Err(error) = &drawn {
             self.warn_once(&mut stream, error);
@@ -381,10 +386,11 @@ impl BgAvgDetect {
         *lock(&self.target) = tracker.bounds.filter(|_| follows);
     }
 
-    fn heed_camera(&self, moving: bool) {
+    fn heed_camera(&self, camera: &CameraEvent) {
         let settle_time = lock(&self.settings).settle_time_ns;
-        gst::debug!(CAT, imp = self, "Camera {}", if moving { "moves" } else { "is at rest" });
-        lock(&self.duty).camera(moving, Duration::from_nanos(settle_time));
+        gst::debug!(CAT, imp = self, "Camera {}", if camera.moving { "moves" } else { "is at rest" });
+        lock(&self.duty).camera(camera.moving, Duration::from_nanos(settle_time));
+        *lock(&self.view) = View::of(camera);
     }
 
     /// The regions of a frame, `None` where it was not looked at or while it learns, and the scene.
@@ -399,23 +405,27 @@ impl BgAvgDetect {
         }
         let seen = match settings.profile {
             Profile::Robust => {
-                let target = *lock(&self.target);
-                let seen = stream.look_at_scene(buffer, elapsed, &settings, target);
-                seen.map(|(regions, scene)| Seen { regions, scene: Some(scene) })
+                let (target, view) = (*lock(&self.target), *lock(&self.view));
+                let seen = stream.look_at_scene(buffer, elapsed, &settings, target, view);
+                seen.map(|(found, scene)| Seen { found, scene: Some(scene) })
             }
             Profile::Thesis => {
                 if !lock(&self.duty).looks(elapsed) {
                     stream.skip();
                     return Seen::default();
                 }
-                stream.look(buffer, elapsed, &settings).map(|regions| Seen { regions, scene: None })
+                let found = stream.look(buffer, elapsed, &settings);
+                found.map(|regions| Seen {
+                    found: regions.map(|regions| Found { regions, ..Found::default() }),
+                    scene: None,
+                })
             }
         };
         let seen = seen.unwrap_or_else(|error| {
             self.warn_once(stream, &error);
             Seen::default()
         });
-        if let Some(regions) = &seen.regions {
+        if let Some(Found { regions, .. }) = &seen.found {
             let change = stream.change(regions, elapsed, &settings);
             self.post(change, buffer.pts(), regions);
         }
@@ -459,7 +469,7 @@ impl BgAvgDetect {
 /// What there is to say of a frame.
 #[derive(Default)]
 struct Seen {
-    regions: Option<Vec<Region>>,
+    found: Option<Found>,
     scene: Option<SceneMeta>,
 }
 
@@ -468,11 +478,11 @@ fn attach(buffer: &mut gst::BufferRef, seen: &Seen, info: &VideoInfo) -> Result<
     if let Some(scene) = &seen.scene {
         scene.attach(buffer)?;
     }
-    let Some(regions) = &seen.regions else { return Ok(()) };
+    let Some(Found { regions, outside }) = &seen.found else { return Ok(()) };
     remove_regions_of_interest(buffer, MOTION_ROI);
     for region in regions {
         let pixels = region.bounds.to_pixels(info.width(), info.height());
         VideoRegionOfInterestMeta::add(buffer, MOTION_ROI, pixels);
     }
-    MotionMeta { regions: regions.clone() }.attach(buffer)
+    MotionMeta { regions: regions.clone(), outside: outside.clone() }.attach(buffer)
 }

@@ -20,14 +20,18 @@
 //! ## Regions
 //! The closing is upright, as people are: it joins head and legs and not neighbours. A region is reported in the
 //! `confirm-frames`th picture in a row that shows it, with a number, its velocity and how far it has travelled against
-//! the background; `selection` says which. Pixels outside `zones` or in `exclude-zones` are never foreground; both are
-//! polygons separated by `;`, each of three or more points `x,y` separated by spaces, with x and y from 0 (left, top) to
-//! 1 (right, bottom).
+//! the background; `selection` says which.
+//!
+//! Regions whose middle lies outside `zones` or in `exclude-zones` are not reported, and nobody is chosen there; whoever is
+//! followed may go there. Both are polygons separated by `;`, each of three or more points `x,y` separated by spaces, with
+//! x and y from 0 (left, top) to 1 (right, bottom) of the picture in which they are set. When the camera turns, they go
+//! with the background.
 //!
 //! ## Profiles
 //! `profile=thesis` takes the steps of the thesis alone, for a camera at rest: `alpha`, `test`, `threshold`,
 //! `spread-factor` and `window` are those of its equations 3.1 to 3.3, every picture is looked at in its own size and has
-//! the same weight, a region is reported as soon as it is seen, and the closing is square where no size is given. It
+//! the same weight, a region is reported as soon as it is seen, the closing is square where no size is given, and pixels
+//! outside the zones are never foreground. It
 //! sleeps while a tracker downstream says that it follows a target and while a servo says that the camera moves, and for
 //! `settle-time` after, and then learns anew from `warm-up` pictures. These properties do nothing in the other profile.
 //!

@@ -7,7 +7,7 @@ use ptztrack_contract::{MotionChange, Plane, Rect, Region, SceneMeta};
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{Detector, DetectorError, Luma, Presence, SceneModel};
+use crate::vision::{CarriedZones, Detector, DetectorError, Found, Luma, Presence, SceneModel, View};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -46,6 +46,7 @@ pub(super) struct Stream {
     source: LumaSource,
     detector: Detector,
     scene: SceneModel,
+    zones: CarriedZones,
     /// Timestamp of the last picture that the scene was seen in.
     scene_pts: Option<gst::ClockTime>,
     presence: Presence,
@@ -65,6 +66,7 @@ impl Stream {
             source: LumaSource::default(),
             detector: Detector::default(),
             scene: SceneModel::default(),
+            zones: CarriedZones::default(),
             scene_pts: None,
             presence: Presence::default(),
             converter: None,
@@ -75,11 +77,13 @@ impl Stream {
     }
 
     /// The stream after negotiation. Where only the output changed, what was learned still holds; other
-    /// frames are learned anew, which does not end the motion reported so far.
+    /// frames are learned anew, which neither ends the motion reported so far nor says that the camera looks elsewhere.
     pub fn negotiated(before: Option<Self>, in_info: VideoInfo, out_info: VideoInfo) -> Self {
         match before {
             Some(before) if before.in_info == in_info => Self { out_info, converter: None, ..before },
-            Some(before) => Self { presence: before.presence, ..Self::new(in_info, out_info) },
+            Some(before) => {
+                Self { presence: before.presence, zones: before.zones, ..Self::new(in_info, out_info) }
+            }
             None => Self::new(in_info, out_info),
         }
     }
@@ -150,33 +154,37 @@ impl Stream {
     }
 
     /// The moving regions of a frame, the camera at rest or not (`None` while it learns), and what everybody can
-    /// use of it: camera motion, foreground, background. What lies in `target` does not become background.
+    /// use of it: camera motion, foreground, background. What lies in `target` does not become background. `view` is where
+    /// the camera looks, where it rests and a servo has said so.
     pub fn look_at_scene(
         &mut self,
         buffer: &gst::BufferRef,
         elapsed: Duration,
         settings: &Settings,
         target: Option<Rect>,
-    ) -> Result<(Option<Vec<Region>>, SceneMeta), StreamError> {
+        view: Option<View>,
+    ) -> Result<(Option<Found>, SceneMeta), StreamError> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
             .map_err(|_| StreamError::Buffer)?;
         let picture = self.source.picture(&frame)?;
         let from_pts = std::mem::replace(&mut self.scene_pts, buffer.pts());
         let config = settings.detector();
         self.scene.protect(target);
-        let view =
+        let seen =
             self.scene.update(&picture, config.analysis_width, elapsed, None).map_err(StreamError::Scene)?;
+        self.zones.set(&config.zones, &config.exclude_zones);
+        self.zones.carry(seen.camera_motion.as_ref(), elapsed, view);
         let size = (frame.width() as usize, frame.height() as usize);
-        let regions = self.detector.process_likelihood(&view, size, elapsed, &config)?;
+        let found = self.detector.process_likelihood(&seen, size, elapsed, &config, &self.zones)?;
         let scene = SceneMeta {
             from_pts,
-            camera_motion: view.camera_motion,
-            luma: plane(view.luma),
-            chroma: view.chroma.map(|chroma| chroma.map(plane)),
-            foreground: plane(view.foreground),
-            background: plane(view.background),
+            camera_motion: seen.camera_motion,
+            luma: plane(seen.luma),
+            chroma: seen.chroma.map(|chroma| chroma.map(plane)),
+            foreground: plane(seen.foreground),
+            background: plane(seen.background),
         };
-        Ok((regions, scene))
+        Ok((found, scene))
     }
 
     /// Whether motion starts or ends with these regions.

@@ -18,12 +18,15 @@ pub(super) fn detections(
 ) -> Result<Vec<Detection>, ContractError> {
     let motion = (roi_type == MOTION_ROI).then(|| MotionMeta::of(buffer)).flatten();
     if let Some(motion) = motion {
-        let regions = motion?.regions.into_iter();
+        let MotionMeta { regions, outside } = motion?;
+        let regions = regions.into_iter().map(|region| (region, false));
         return Ok(regions
-            .map(|region| Detection {
+            .chain(outside.into_iter().map(|region| (region, true)))
+            .map(|(region, outside)| Detection {
                 bounds: region.bounds,
                 contour: region.contour,
                 restless: region.track.map_or(0.0, |track| track.restless as f32),
+                outside,
             })
             .collect());
     }

@@ -7,6 +7,7 @@ use ptztrack_contract::Region;
 
 use super::afterimage::Afterimage;
 use super::background::{Background, Criterion, ForegroundTest};
+use super::carried_zones::CarriedZones;
 use super::contours::{Grid, fill_regions, regions};
 use super::morphology::clean;
 use super::persistence::Persistence;
@@ -105,6 +106,25 @@ pub enum DetectorError {
     },
 }
 
+impl RegionChoice {
+    /// Of regions sorted by perimeter, the longest first.
+    fn of(self, mut regions: Vec<Region>) -> Vec<Region> {
+        if self == Self::LargestPerimeter {
+            regions.truncate(1);
+        }
+        regions
+    }
+}
+
+/// What moves in one picture.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Found {
+    /// In the zones, chosen as the configuration says.
+    pub regions: Vec<Region>,
+    /// Outside of them.
+    pub outside: Vec<Region>,
+}
+
 /// Finds what moves in a still picture: thesis 3.2 to 3.4 in a row.
 #[derive(Debug, Default)]
 pub struct Detector {
@@ -168,13 +188,16 @@ impl Detector {
     /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods in `scene`,
     /// `elapsed` after the one before. Gives the moving regions, longest perimeter first, or `None` while
     /// the background is learned.
+    ///
+    /// Who is followed may leave `zones`, so regions outside of them are given apart.
     pub fn process_likelihood(
         &mut self,
         scene: &SceneView,
         frame: (usize, usize),
         elapsed: Duration,
         config: &DetectorConfig,
-    ) -> Result<Option<Vec<Region>>, DetectorError> {
+        zones: &CarriedZones,
+    ) -> Result<Option<Found>, DetectorError> {
         let foreground = &scene.foreground;
         let divisor = (frame.0 / foreground.width().max(1)).max(1);
         if (self.frame, self.divisor) != (frame, divisor) {
@@ -188,10 +211,11 @@ impl Detector {
         }
         let (open_size, close_size) = self.sizes(config);
         self.mask = segment(foreground, open_size, close_size)?;
-        self.look_in_zones(config)?;
         let mut found = self.found(config)?;
         self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
-        Ok(Some(self.chosen(found, config)))
+        let confirmed = self.persistence.confirmed(found, config.confirm_pictures);
+        let (regions, outside) = confirmed.into_iter().partition(|region| zones.allow(region.centroid));
+        Ok(Some(Found { regions: config.choice.of(regions), outside }))
     }
 
     /// The same of the reduced picture.
@@ -264,11 +288,7 @@ impl Detector {
 
     /// Those that are reported.
     fn chosen(&mut self, found: Vec<Region>, config: &DetectorConfig) -> Vec<Region> {
-        let mut found = self.persistence.confirmed(found, config.confirm_pictures);
-        if config.choice == RegionChoice::LargestPerimeter {
-            found.truncate(1);
-        }
-        found
+        config.choice.of(self.persistence.confirmed(found, config.confirm_pictures))
     }
 
     fn look_in_zones(&mut self, config: &DetectorConfig) -> opencv::Result<()> {

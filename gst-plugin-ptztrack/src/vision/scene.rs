@@ -286,7 +286,7 @@ mod tests {
     fn shapes(parts: Parts, target: &TargetMeta) -> Vec<Shape> {
         let trail = [Point { x: 0.1, y: 0.1 }, Point { x: 0.2, y: 0.1 }, Point { x: 0.3, y: 0.1 }];
         let region = Region { contour: trail.to_vec(), ..Region::default() };
-        let motion = MotionMeta { regions: vec![region] };
+        let motion = MotionMeta { regions: vec![region], ..MotionMeta::default() };
         let seen = Seen { motion: Some(&motion), target: Some(target), trail: &trail };
         scene(FRAME, parts, seen).unwrap()
     }

@@ -27,6 +27,18 @@ impl Zones {
         self.0.is_empty()
     }
 
+    /// Whether a point lies in one of the polygons (even-odd rule).
+    pub(super) fn contain(&self, point: Point) -> bool {
+        self.0.iter().any(|polygon| {
+            let edges = polygon.iter().zip(polygon.iter().cycle().skip(1));
+            let right_of_it = edges.filter(|(a, b)| {
+                (a.y > point.y) != (b.y > point.y)
+                    && point.x < a.x + (point.y - a.y) / (b.y - a.y) * (b.x - a.x)
+            });
+            right_of_it.count() % 2 == 1
+        })
+    }
+
     /// Sets the pixels of `mask` that lie in one of the polygons (edges included) to `value`.
     fn fill(&self, mask: &mut Mat, width: usize, height: usize, value: f64) -> opencv::Result<()> {
         let pixel = |point: &Point| {

@@ -62,7 +62,9 @@ fn the_contour_of_the_motion_meta_is_used() {
         let whole = Region { contour: Vec::new(), ..region.clone() };
         // The contour of the first has no area, so no corner; the largest is taken, and it is the second.
         let small = Region { bounds: Rect { width: bounds.width / 2.0, ..bounds }, ..region };
-        MotionMeta { regions: vec![small, whole] }.attach(buffer.get_mut().unwrap()).unwrap();
+        MotionMeta { regions: vec![small, whole], ..MotionMeta::default() }
+            .attach(buffer.get_mut().unwrap())
+            .unwrap();
         let out = bench.harness.push_and_pull(buffer).unwrap();
         last = TargetMeta::of(&out).map(Result::unwrap);
     }

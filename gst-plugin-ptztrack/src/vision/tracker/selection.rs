@@ -50,6 +50,8 @@ pub(super) struct Sighting {
     pub contour: Vec<Point2f>,
     /// How much of it lies where much changed before and nothing came of it: 0 to 1.
     pub restless: f32,
+    /// Whether it lies where nobody is to be chosen.
+    pub outside: bool,
     /// Pixels per second; nothing where it was seen only once.
     pub velocity: Point2f,
 }
@@ -192,7 +194,8 @@ impl Selection {
     ) -> Option<&Sighting> {
         let ready = self.confirmed(confirm_frames).filter(|candidate| {
             let bounds = candidate.sighting.bounds;
-            (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
+            !candidate.sighting.outside
+                && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
                 && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
                 && !self.suppressed.holds(bounds)
                 && (!must_travel || candidate.travels())
@@ -275,12 +278,7 @@ mod tests {
     const STILL: Option<EgoMotion> = None;
 
     fn at(x: f32, y: f32, width: f32, height: f32) -> Sighting {
-        Sighting {
-            bounds: Rect2f::new(x, y, width, height),
-            contour: Vec::new(),
-            restless: 0.0,
-            velocity: Point2f::default(),
-        }
+        Sighting { bounds: Rect2f::new(x, y, width, height), ..Sighting::default() }
     }
 
     fn seen(frames: usize, sightings: &[Sighting]) -> Selection {
@@ -304,6 +302,16 @@ mod tests {
         assert_eq!(x(Choice::First), Some(300.0));
         assert_eq!(x(Choice::NearestCentre), Some(300.0));
         assert_eq!(x(Choice::Manual), None);
+    }
+
+    #[test]
+    fn outside_of_the_zones_nobody_is_chosen_but_seen() {
+        let outside = Sighting { outside: true, ..at(100.0, 100.0, 40.0, 90.0) };
+        let mut selection = seen(5, &[outside]);
+        assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_none());
+        assert_eq!(selection.current().count(), 1);
+        selection.update(vec![at(104.0, 100.0, 40.0, 90.0)], STILL, FRAME, DT);
+        assert!(selection.choose(Choice::Largest, 3, false, FRAME).is_some(), "who comes in");
     }
 
     #[test]

@@ -56,6 +56,8 @@ pub struct Detection {
     pub contour: Vec<Point>,
     /// How much of it lies where much changed before and nothing came of it: 0 to 1.
     pub restless: f32,
+    /// Whether it lies outside of the detector's zones: nobody is chosen there.
+    pub outside: bool,
 }
 
 /// What the tracker knows after one frame, in frame sizes (per second).
@@ -214,6 +216,7 @@ impl Tracker {
             bounds: frame.rect_to_pixels(detection.bounds),
             contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
             restless: detection.restless,
+            outside: detection.outside,
             velocity: Point2f::default(),
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));

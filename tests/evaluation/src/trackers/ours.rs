@@ -37,7 +37,8 @@ pub(super) fn attach(
         let cue = lock(&cue);
         if let Some((bounds, buffer)) = cue.given().zip(info.buffer_mut().map(gst::Buffer::make_mut)) {
             let region = Region { bounds: normalised(bounds, cue.size), ..Region::default() };
-            if let Err(error) = (MotionMeta { regions: vec![region] }).attach(buffer) {
+            if let Err(error) = (MotionMeta { regions: vec![region], ..MotionMeta::default() }).attach(buffer)
+            {
                 gst::error!(gst::CAT_DEFAULT, "no first box: {error}");
             }
         }

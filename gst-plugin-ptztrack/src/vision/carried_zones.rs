@@ -1,0 +1,236 @@
+//! Where zones lie in the picture of a camera that has turned since they were set.
+
+use std::time::Duration;
+
+use ptztrack_contract::{CameraEvent, CameraMotion, Homography, Point};
+
+use super::zones::Zones;
+
+/// The picture must have rested for so long before the servo's word is taken for it: words come before pictures do.
+const REST: Duration = Duration::from_millis(600);
+/// Frame widths and heights from one picture to the next below which it rests.
+const RESTS: f64 = 0.002;
+/// A picture that has moved by more than this since the zones were set is another view.
+const SAME_VIEW: f64 = 0.02;
+
+/// Where a camera looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    pan: f64,
+    tilt: f64,
+    /// Half the width and height of what it sees at a distance of 1.
+    reach: (f64, f64),
+}
+
+impl View {
+    /// Of a camera that rests and whose angles are known.
+    pub fn of(camera: &CameraEvent) -> Option<Self> {
+        let reach = |degrees: Option<f64>| {
+            degrees
+                .filter(|degrees| (1e-3..179.0).contains(degrees))
+                .map(|fov| (fov.to_radians() / 2.0).tan())
+        };
+        if camera.moving {
+            return None;
+        }
+        Some(Self {
+            pan: camera.pan_deg?.to_radians(),
+            tilt: camera.tilt_deg?.to_radians(),
+            reach: (reach(camera.horizontal_fov_deg)?, reach(camera.vertical_fov_deg)?),
+        })
+    }
+
+    /// The direction of a point of the picture: right, down, forward of pan and tilt 0.
+    fn direction(&self, point: Point) -> [f64; 3] {
+        let (x, y) = ((2.0 * point.x - 1.0) * self.reach.0, (2.0 * point.y - 1.0) * self.reach.1);
+        let (sin, cos) = self.tilt.sin_cos();
+        let (down, forward) = (y * cos - sin, y * sin + cos);
+        let (sin, cos) = self.pan.sin_cos();
+        [x * cos + forward * sin, down, forward * cos - x * sin]
+    }
+
+    /// Where a direction is seen; `None` behind the camera.
+    fn project(&self, [right, down, forward]: [f64; 3]) -> Option<Point> {
+        let (sin, cos) = self.pan.sin_cos();
+        let (x, forward) = (right * cos - forward * sin, right * sin + forward * cos);
+        let (sin, cos) = self.tilt.sin_cos();
+        let (y, z) = (down * cos + forward * sin, forward * cos - down * sin);
+        let place = |value: f64, reach: f64| (value / (z * reach) + 1.0) / 2.0;
+        (z > 1e-6).then(|| Point { x: place(x, self.reach.0), y: place(y, self.reach.1) })
+    }
+}
+
+/// Carries zones along: by the motion of the background while the camera turns, and by the servo's word once it rests, so
+/// that no errors add up.
+#[derive(Debug, Default)]
+pub struct CarriedZones {
+    zones: Zones,
+    exclude_zones: Zones,
+    /// Where the camera looked when the zones were set, where that is known.
+    set_in: Option<View>,
+    /// Where it looked when it last rested, and how the picture has moved since.
+    rested_in: Option<View>,
+    since: Homography,
+    rest: Duration,
+}
+
+impl CarriedZones {
+    /// The zones as they are set now; others begin where the camera looks.
+    pub fn set(&mut self, zones: &Zones, exclude_zones: &Zones) {
+        if (&self.zones, &self.exclude_zones) != (zones, exclude_zones) {
+            *self = Self { zones: zones.clone(), exclude_zones: exclude_zones.clone(), ..Self::default() };
+        }
+    }
+
+    /// Takes the next picture, to which the camera moved by `motion` within `elapsed`, and the servo's last word.
+    pub fn carry(&mut self, motion: Option<&CameraMotion>, elapsed: Duration, view: Option<View>) {
+        let step = motion.map_or(Homography::IDENTITY, |motion| motion.homography);
+        self.since = self.since.then(&step);
+        let rests = motion.is_some() && displacement(&step) < RESTS;
+        self.rest = if rests { self.rest.saturating_add(elapsed) } else { Duration::ZERO };
+        let Some(view) = view.filter(|_| self.rest >= REST) else { return };
+        if self.set_in.is_none() && self.rested_in.is_none() && displacement(&self.since) < SAME_VIEW {
+            self.set_in = Some(view);
+        }
+        if self.set_in.is_some() {
+            (self.rested_in, self.since) = (Some(view), Homography::IDENTITY);
+        }
+    }
+
+    /// Whether something at `point` of the last picture may be chosen: in `zones` (everywhere, where there are none) but
+    /// not in `exclude_zones`.
+    pub fn allow(&self, point: Point) -> bool {
+        if self.zones.is_empty() && self.exclude_zones.is_empty() {
+            return true;
+        }
+        let place = self.when_set(point);
+        let inside = |zones: &Zones| place.is_some_and(|place| zones.contain(place));
+        (self.zones.is_empty() || inside(&self.zones)) && !inside(&self.exclude_zones)
+    }
+
+    /// Where that point was in the picture in which the zones were set; `None` where that was behind the camera.
+    fn when_set(&self, point: Point) -> Option<Point> {
+        let point = self.since.inverse()?.apply(point);
+        match (self.rested_in, self.set_in) {
+            (Some(rested_in), Some(set_in)) => set_in.project(rested_in.direction(point)),
+            _ => Some(point),
+        }
+    }
+}
+
+/// How far the middle of the picture goes.
+fn displacement(motion: &Homography) -> f64 {
+    let to = motion.apply(Point { x: 0.5, y: 0.5 });
+    (to.x - 0.5).hypot(to.y - 0.5)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const STEP: Duration = Duration::from_millis(100);
+    const RIGHT_HALF: &str = "0.5,0 1,0 1,1 0.5,1";
+
+    fn view(pan_deg: f64, tilt_deg: f64) -> Option<View> {
+        View::of(&CameraEvent {
+            pan_deg: Some(pan_deg),
+            tilt_deg: Some(tilt_deg),
+            horizontal_fov_deg: Some(60.0),
+            vertical_fov_deg: Some(40.0),
+            ..CameraEvent::default()
+        })
+    }
+
+    fn motion(x: f64) -> CameraMotion {
+        CameraMotion { homography: Homography::translation(x, 0.0), ..CameraMotion::default() }
+    }
+
+    fn zones(zones: &str, exclude_zones: &str) -> CarriedZones {
+        let mut carried = CarriedZones::default();
+        carried.set(&zones.parse().unwrap(), &exclude_zones.parse().unwrap());
+        carried
+    }
+
+    fn at(x: f64) -> Point {
+        Point { x, y: 0.5 }
+    }
+
+    #[test]
+    fn a_camera_that_never_turns_has_them_where_they_were_set() {
+        let mut carried = zones(RIGHT_HALF, "0.8,0 1,0 1,1 0.8,1");
+        for _ in 0..100 {
+            carried.carry(Some(&motion(0.0)), STEP, None);
+        }
+        assert_eq!([0.3, 0.6, 0.9].map(|x| carried.allow(at(x))), [false, true, false]);
+    }
+
+    #[test]
+    fn without_zones_everything_is_allowed_everywhere() {
+        let mut carried = zones("", "");
+        carried.carry(Some(&motion(-0.7)), STEP, view(0.0, 0.0));
+        assert!(carried.allow(at(0.1)) && carried.allow(at(0.9)));
+    }
+
+    #[test]
+    fn they_go_with_the_background() {
+        let mut carried = zones(RIGHT_HALF, "");
+        for _ in 0..10 {
+            carried.carry(Some(&motion(-0.03)), STEP, None);
+        }
+        assert_eq!([0.1, 0.3, 0.9].map(|x| carried.allow(at(x))), [false, true, false]);
+    }
+
+    #[test]
+    fn the_servo_s_word_at_rest_makes_up_for_pictures_that_were_not_understood() {
+        let mut carried = zones("", RIGHT_HALF);
+        let rest = |carried: &mut CarriedZones, pan| {
+            for _ in 0..7 {
+                carried.carry(Some(&motion(0.0)), STEP, view(pan, 0.0));
+            }
+        };
+        rest(&mut carried, 0.0);
+        assert_eq!([0.4, 0.6].map(|x| carried.allow(at(x))), [true, false]);
+        carried.carry(None, STEP, None);
+        rest(&mut carried, 15.0);
+        // 15 of 60 degrees to the right, the middle of then is at tan(-15)/tan(30).
+        assert_eq!([0.25, 0.29].map(|x| carried.allow(at(x))), [true, false]);
+        rest(&mut carried, 180.0);
+        assert!(carried.allow(at(0.1)) && carried.allow(at(0.9)), "behind the camera");
+        rest(&mut carried, 0.0);
+        assert_eq!([0.49, 0.51].map(|x| carried.allow(at(x))), [true, false]);
+    }
+
+    #[test]
+    fn others_begin_where_the_camera_looks() {
+        let mut carried = zones(RIGHT_HALF, "");
+        carried.carry(Some(&motion(-0.5)), STEP, None);
+        assert!(carried.allow(at(0.1)));
+        let right: Zones = RIGHT_HALF.parse().unwrap();
+        carried.set(&right, &Zones::default());
+        assert!(carried.allow(at(0.1)), "the same");
+        carried.set(&right, &right);
+        carried.set(&right, &Zones::default());
+        assert!(!carried.allow(at(0.1)) && carried.allow(at(0.9)));
+    }
+
+    #[test]
+    fn a_camera_that_turns_says_nothing_of_where_it_looks() {
+        let still = CameraEvent { pan_deg: Some(0.0), tilt_deg: Some(0.0), ..CameraEvent::default() };
+        assert_eq!(View::of(&still), None, "no field of view");
+        let known = CameraEvent { horizontal_fov_deg: Some(60.0), vertical_fov_deg: Some(40.0), ..still };
+        assert!(View::of(&known).is_some());
+        assert_eq!(View::of(&CameraEvent { moving: true, ..known }), None);
+    }
+
+    proptest! {
+        #[test]
+        fn a_point_is_seen_in_the_direction_that_it_has(
+            pan in -170.0..170.0f64, tilt in -80.0..30.0f64, x in 0.0..1.0f64, y in 0.0..1.0f64,
+        ) {
+            let view = view(pan, tilt).unwrap();
+            let seen = view.project(view.direction(Point { x, y })).unwrap();
+            prop_assert!((seen.x - x).abs() < 1e-9 && (seen.y - y).abs() < 1e-9);
+        }
+    }
+}
