@@ -3,6 +3,7 @@
 //! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not
 //! the canvas on the picture, so that what is known is not blurred by being resampled in every picture.
 
+mod gain;
 mod model;
 mod noise;
 mod rows;
@@ -99,13 +100,19 @@ impl TravellingBackground {
         }
         self.move_on(motion, elapsed);
         let how = self.comparison(motion, elapsed);
-        self.lay(picture)?;
-        self.compare(how);
+        self.lay(picture);
+        self.model.relight(gain::light_gain(
+            &self.sampled.luma,
+            &self.model.luma,
+            &self.model.age,
+            self.forth.spans(),
+        ));
+        self.compare(how)?;
         let stale = self.changed() > if motion.is_some() { NEW_PICTURE } else { UNSEEN_MOTION };
         if stale {
             self.start();
-            self.lay(picture)?;
-            self.compare(how);
+            self.lay(picture);
+            self.compare(how)?;
         }
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
@@ -173,7 +180,7 @@ impl TravellingBackground {
     }
 
     /// Lays the picture on the canvas.
-    fn lay(&mut self, picture: &Reduced) -> opencv::Result<()> {
+    fn lay(&mut self, picture: &Reduced) {
         self.forth.prepare(self.model.size, self.size, &self.to_picture);
         self.forth.sample(picture.luma().bytes(), 0, &mut self.sampled.luma);
         self.sampled.chroma = picture.chroma().map(|planes| {
@@ -183,6 +190,10 @@ impl TravellingBackground {
             }
             sampled
         });
+    }
+
+    /// Holds the picture on the canvas against what is known.
+    fn compare(&mut self, how: Comparison) -> opencv::Result<()> {
         let model = &mut self.model;
         model
             .shown
@@ -198,11 +209,8 @@ impl TravellingBackground {
         })?;
         model.low.copy_from_slice(low.data_bytes()?);
         model.high.copy_from_slice(high.data_bytes()?);
+        model.compare(&self.sampled, self.forth.spans(), how, &self.noise);
         Ok(())
-    }
-
-    fn compare(&mut self, how: Comparison) {
-        self.model.compare(&self.sampled, self.forth.spans(), how, &self.noise);
     }
 
     /// Which fraction of what is known is foreground.

@@ -102,6 +102,21 @@ impl Model {
         std::mem::swap(&mut self.age, &mut narrow);
     }
 
+    /// Makes everything lighter or darker by a factor. Colours fade with the light.
+    pub fn relight(&mut self, gain: f32) {
+        if gain == 1.0 {
+            return;
+        }
+        let lit = |value: u16, black: f32| {
+            (black + gain * (f32::from(value) - black)).clamp(0.0, f32::from(u16::MAX)) as u16
+        };
+        self.luma.iter_mut().chain(&mut self.spread).for_each(|mean| *mean = lit(*mean, 0.0));
+        self.chroma.iter_mut().flatten().for_each(|mean| *mean = lit(*mean, f32::from(128_u16 << 8)));
+        for (plane, black) in self.candidate.iter_mut().zip([0.0, 128.0, 128.0]) {
+            plane.iter_mut().for_each(|seen| *seen = lit(u16::from(*seen), black).min(255) as u8);
+        }
+    }
+
     /// Holds the picture against the model where `spans` say that it covers it (3.3, with the deviation measured
     /// in units of what noise makes): leaves the likelihood of foreground.
     pub fn compare(&mut self, picture: &Sampled, spans: &[(usize, usize)], how: Comparison, noise: &Noise) {

@@ -127,6 +127,21 @@ fn lights_switched_off_are_no_motion() {
 }
 
 #[test]
+fn somebody_is_seen_while_lights_are_switched_and_the_rest_stays_known() {
+    let mut background = learned();
+    for (step, light) in [0.6, 0.6, 1.2, 0.8].into_iter().enumerate() {
+        let lit =
+            Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| light * room(x, y)).noisy(2.0, step as u32);
+        look(&mut background, &with_person(lit, PERSON), Some((0.0, 0.0)));
+        let (person, beside) =
+            (foreground(&background, PERSON), foreground(&background, (0.0, 0.0, 60.0, 120.0)));
+        assert!(person > 0.7 && beside < 0.03, "{light}: {person} {beside}");
+        let known = background.foreground().expect("seen").row(60)[10];
+        assert!(known < 128, "{light}: {known}");
+    }
+}
+
+#[test]
 fn an_unknown_motion_is_rest_where_the_picture_says_so_and_a_new_world_where_not() {
     let mut background = learned();
     look(&mut background, &with_person(seen(0.0, 0.0, 50), PERSON), None);

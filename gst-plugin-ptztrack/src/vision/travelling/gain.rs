@@ -1,0 +1,86 @@
+//! How much lighter or darker the pictures have become as a whole: lamps, clouds, and cameras that expose anew as they turn.
+
+use super::model::KNOWN;
+
+/// Pixels of each row, and rows, that are looked at: one in so many.
+const SAMPLING: usize = 5;
+/// Grey levels between which a pixel tells of light: below is noise, above the sensor is full.
+const TELLS: std::ops::Range<f32> = 16.0..240.0;
+/// Fewer pixels than this tell nothing.
+const MIN_SAMPLES: usize = 64;
+/// Grey levels within which a pixel shows the background.
+const ALIKE: f32 = 6.0;
+
+/// A pixel of the background, and what is seen of it now.
+#[derive(Debug, Clone, Copy)]
+struct Sample {
+    mean: f32,
+    seen: f32,
+}
+
+/// The factor by which the mean `mean` (8.8 fixed point) has to be multiplied to look like `seen`: the median ratio, where
+/// that explains more than half of what differs; else 1. Somebody who comes before the background is no change of light,
+/// however much of it they hide.
+pub(super) fn light_gain(seen: &[u8], mean: &[u16], age: &[u8], spans: &[(usize, usize)]) -> f32 {
+    let width = mean.len() / spans.len().max(1);
+    let mut samples = Vec::new();
+    for (y, &(start, end)) in spans.iter().enumerate().step_by(SAMPLING) {
+        let places = (start..end).skip(y % SAMPLING).step_by(SAMPLING).map(|x| y * width + x);
+        samples.extend(places.filter(|&at| age[at] >= KNOWN).filter_map(|at| {
+            let sample = Sample { mean: f32::from(mean[at]) / 256.0, seen: f32::from(seen[at]) };
+            (TELLS.contains(&sample.mean) && TELLS.contains(&sample.seen)).then_some(sample)
+        }));
+    }
+    if samples.len() < MIN_SAMPLES {
+        return 1.0;
+    }
+    let middle = samples.len() / 2;
+    let ratio = |sample: &Sample| sample.seen / sample.mean;
+    let (_, median, _) = samples.select_nth_unstable_by(middle, |a, b| ratio(a).total_cmp(&ratio(b)));
+    let gain = ratio(median);
+    let differ =
+        |gain: f32| samples.iter().filter(|sample| (sample.seen - gain * sample.mean).abs() > ALIKE).count();
+    if 2 * differ(gain) < differ(1.0) { gain } else { 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const SIZE: (usize, usize) = (100, 60);
+
+    fn room() -> Vec<u8> {
+        (0..SIZE.0 * SIZE.1).map(|at| 40 + (at * 37 % 97) as u8).collect()
+    }
+
+    fn gain(seen: &[u8], age: u8) -> f32 {
+        let mean: Vec<u16> = room().iter().map(|&grey| u16::from(grey) << 8).collect();
+        light_gain(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1])
+    }
+
+    #[test]
+    fn nothing_changes_where_nothing_is_known() {
+        let dark: Vec<u8> = room().iter().map(|grey| grey / 2).collect();
+        assert_eq!(gain(&dark, 0), 1.0);
+        assert_eq!(gain(&room(), KNOWN), 1.0);
+    }
+
+    #[test]
+    fn somebody_before_most_of_it_is_no_change_of_light() {
+        let mut seen = room();
+        seen[..SIZE.0 * SIZE.1 * 7 / 10].fill(30);
+        assert_eq!(gain(&seen, KNOWN), 1.0);
+    }
+
+    proptest! {
+        #[test]
+        fn all_of_it_lighter_or_darker_is(factor in 0.5_f32..1.6, hidden in 0usize..40) {
+            let mut seen: Vec<u8> = room().iter().map(|&grey| (factor * f32::from(grey)).round() as u8).collect();
+            seen[..SIZE.0 * SIZE.1 * hidden / 100].fill(200);
+            let gain = gain(&seen, KNOWN);
+            // A small change is learned like any other.
+            prop_assert!((gain - factor).abs() < 0.06 || (gain == 1.0 && (factor - 1.0).abs() < 0.15), "{gain} {factor}");
+        }
+    }
+}
