@@ -5,6 +5,7 @@ use ptztrack_contract::ReleaseReason;
 
 use super::ego_motion::EgoMotion;
 use super::geometry::{breadth, centre, length};
+use super::target::YOUNG_S;
 
 /// Time over which the place of a target is averaged, seconds: longer than a sway, shorter than it takes the
 /// errors of the measured camera motion to add up.
@@ -17,6 +18,9 @@ const GROWTH: f32 = 0.2;
 /// What was chosen because it moves must go somewhere, in breadths of it from one end of its way to the other: what a
 /// screen shows does not leave the screen.
 const TRIAL_REACH: f32 = 1.0;
+/// Breadths that count for a change of size by one, as a logarithm: who comes straight towards the camera goes somewhere,
+/// too.
+const NEARER: f32 = 2.0;
 /// Until then its way must grow by a quarter of a breadth every so many seconds of being seen: who is near the camera is
 /// broad and takes longer, and what sways turns back.
 const TRIAL_S: f64 = 1.8;
@@ -46,25 +50,28 @@ pub(super) struct DwellTime {
     trial: Option<Way>,
 }
 
-/// Where something was since it was chosen, in breadths of it from there.
+/// Where something was since it was chosen, in breadths of it from there: across, down and towards the camera.
 #[derive(Debug, Clone, Copy, Default)]
 struct Way {
-    now: Point2f,
-    least: Point2f,
-    most: Point2f,
+    now: [f32; 3],
+    least: [f32; 3],
+    most: [f32; 3],
     /// How long the way was when it last grew by a step.
     grown: f32,
 }
 
 impl Way {
-    fn go(&mut self, step: Point2f) {
-        self.now += step;
-        self.least = Point2f::new(self.least.x.min(self.now.x), self.least.y.min(self.now.y));
-        self.most = Point2f::new(self.most.x.max(self.now.x), self.most.y.max(self.now.y));
+    fn go(&mut self, step: Point2f, growth: f32) {
+        for (axis, step) in [step.x, step.y, NEARER * growth].into_iter().enumerate() {
+            self.now[axis] += step;
+            self.least[axis] = self.least[axis].min(self.now[axis]);
+            self.most[axis] = self.most[axis].max(self.now[axis]);
+        }
     }
 
     fn length(&self) -> f32 {
-        length(self.most - self.least)
+        let along = self.most.iter().zip(self.least).map(|(most, least)| most - least);
+        along.map(|along| along * along).sum::<f32>().sqrt()
     }
 
     /// Whether it has grown by another step.
@@ -103,13 +110,14 @@ impl DwellTime {
         self.growth = (self.growth + growth) * keep;
         let (stays, grows) = match &mut self.trial {
             Some(way) => {
-                way.go(step);
+                // A young box is still finding the size of what it lies on.
+                way.go(step, if self.tracked_s > f64::from(YOUNG_S) { growth } else { 0.0 });
                 (way.length() <= TRIAL_REACH, way.grows())
             }
-            None => (length(self.offset) <= REACH, false),
+            None => (length(self.offset) <= REACH && self.growth.abs() <= GROWTH, false),
         };
         // What is not a number fails as well, and is forgotten.
-        *self = if stays && self.growth.abs() <= GROWTH {
+        *self = if stays {
             Self { still_s: if grows { 0.0 } else { self.still_s + dt_s }, ..*self }
         } else {
             Self { tracked_s: self.tracked_s, ..Self::default() }
@@ -224,6 +232,24 @@ mod tests {
         assert!(!given_up(|time| 0.3 * time), "a slow one, or near");
         assert!(!given_up(|time| 0.7 * (1.5 * time).sin()), "who turns back and goes past where they began");
         assert!(!given_up(|time| 1.5 * time.min(1.2)), "who stops after a few steps");
+    }
+
+    #[test]
+    fn a_box_that_finds_its_size_goes_nowhere_but_who_comes_near_does() {
+        let given_up = |size: fn(f32) -> f32| {
+            let mut dwell = DwellTime::on_trial();
+            (0..150).any(|frame| {
+                let at = |frame: usize| {
+                    let size = size(frame as f32 * DT as f32);
+                    around(Point2f::default(), WIDTH * size, 90.0 * size)
+                };
+                dwell.pass(DT);
+                dwell.watch(at(frame), at(frame + 1), EgoMotion::default(), DT);
+                dwell.exhausted(LIMITS).is_some()
+            })
+        };
+        assert!(given_up(|time| 2.0_f32.powf((1.5 * time).min(1.0))), "a film, then the screen");
+        assert!(!given_up(|time| 8.0 / (8.0 - 1.2 * time.min(4.0))), "from eight metres to three");
     }
 
     #[test]

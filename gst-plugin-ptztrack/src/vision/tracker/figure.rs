@@ -131,7 +131,10 @@ impl Cells {
                 if map.probability[index] >= FIGURE { map.probability[index] * share } else { 0.0 }
             })
         };
-        let ground = chosen(&|index| if map.probability[index] <= GROUND { 1.0 } else { 0.0 });
+        // What moves beside the target is no ground: more of the same person, where only a part of them was seen at first.
+        let ground = chosen(&|index| {
+            if map.probability[index] <= GROUND && self.motion[index] <= 0.0 { 1.0 } else { 0.0 }
+        });
         ([figure(0.0), figure(1.0)], ground)
     }
 }

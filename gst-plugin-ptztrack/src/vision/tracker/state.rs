@@ -297,7 +297,7 @@ impl Tracker {
             return Ok(None);
         }
         for sighting in self.selection.travelling(self.config.confirm_frames, frame) {
-            if target.follow.resembles(seen, sighting)? {
+            if target.follow.may_be_in(sighting.bounds) && target.follow.resembles(seen, sighting)? {
                 return self.follow_anew(seen, sighting);
             }
         }

@@ -14,6 +14,8 @@ use super::points::Points;
 use super::selection::Sighting;
 use crate::vision::{Luma, Observation};
 
+/// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
+pub(super) const YOUNG_S: f32 = 1.0;
 /// Part of the box that must be in the picture.
 const MIN_INSIDE: f32 = 0.35;
 /// Window for lost points in the second attempt; the pyramids are built for it.
@@ -55,6 +57,9 @@ pub(super) trait Follow: Send {
 
     /// Whether `sighting` is the same person, wherever it is.
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool>;
+
+    /// Whether a target that is not seen may have come as far as `region` since it was.
+    fn may_be_in(&self, region: Rect2f) -> bool;
 
     /// What is known of the target now.
     fn estimate(&self) -> &Estimate;

@@ -4,7 +4,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::usual::{Usual, of_whole};
-use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
+use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, YOUNG_S, is_gone, spacing, window_for};
 use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
@@ -59,14 +59,13 @@ const GROWTH_GAIN: f32 = 0.5;
 const WIDENING: f32 = 0.03;
 /// The box never grows or shrinks further than this from its first size.
 const MAX_GROWTH: f32 = 4.0;
-/// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
-const YOUNG_S: f32 = 1.0;
 /// How much of that it adopts in one picture.
 const ADOPTED: f32 = 0.3;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.15;
-/// How much farther, in heights of it a second, a hidden target may be than its last motion took it: whoever runs.
-const HIDDEN_SPREAD_PER_S: f32 = 2.3;
+/// How much farther, in heights of it a second, a target that is not seen may be than its last motion took it: whoever
+/// runs.
+const UNSEEN_SPREAD_PER_S: f32 = 2.3;
 /// Time constant of what its last motion says of a hidden target, seconds: somebody may turn or stop behind a wall.
 const HIDDEN_TIME_S: f32 = 2.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
@@ -110,7 +109,7 @@ pub(in super::super) struct Robust {
     ego: EgoMotion,
     first_size: (f32, f32),
     age_s: f32,
-    hidden_s: f32,
+    unseen_s: f32,
     seen_in_a_row: u32,
     pictures: u32,
     pictures_since_replenished: u32,
@@ -149,7 +148,7 @@ impl Robust {
             ego: EgoMotion::default(),
             first_size: (bounds.width, bounds.height),
             age_s: 0.0,
-            hidden_s: 0.0,
+            unseen_s: 0.0,
             seen_in_a_row: 0,
             pictures: 0,
             pictures_since_replenished: 0,
@@ -418,19 +417,10 @@ impl Robust {
     }
 
     /// The best of what the detector saw within reach that looks like the target.
-    fn recognise(
-        &self,
-        seen: &Observation,
-        sightings: &[Sighting],
-        reach: f32,
-    ) -> opencv::Result<Option<Place>> {
-        let bounds = self.estimate.bounds;
+    fn recognise(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
         for sighting in sightings {
-            let place = self.box_in(sighting.bounds);
-            if length(centre(place) - centre(bounds)) > reach {
-                continue;
-            }
+            let Some(place) = self.box_in(sighting.bounds) else { continue };
             // Half hidden or turned it may look unlike what the filter knows; colours, motion and place must do.
             let place = self.locate(seen, place, WIDE_SPREAD)?;
             let shares = self
@@ -446,8 +436,8 @@ impl Robust {
     }
 
     /// The target's box in a region, which may show a part of it only or somebody else too: as near to where it is
-    /// expected as the region allows, heads level.
-    fn box_in(&self, region: Rect2f) -> Rect2f {
+    /// expected as the region allows, heads level. `None` where it cannot have come so far since it was seen.
+    fn box_in(&self, region: Rect2f) -> Option<Rect2f> {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let x = middle.x.clamp(region.x, region.x + region.width);
@@ -456,14 +446,15 @@ impl Robust {
         } else {
             middle.y.clamp(region.y, region.y + region.height)
         };
-        around(Point2f::new(x, y), bounds.width, bounds.height)
+        let place = Point2f::new(x, y);
+        let reach = bounds.height * (0.5 + UNSEEN_SPREAD_PER_S * self.unseen_s);
+        (length(place - middle) <= reach).then(|| around(place, bounds.width, bounds.height))
     }
 
     /// The best place where a hidden target may be by now.
     fn search(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let bounds = self.estimate.bounds;
-        let reach = bounds.height * (0.5 + HIDDEN_SPREAD_PER_S * self.hidden_s);
-        let mut best = self.recognise(seen, sightings, reach)?;
+        let mut best = self.recognise(seen, sightings)?;
         for sideways in [0.0, -0.6, 0.6] {
             let place = bounds + Point2f::new(sideways * bounds.width, 0.0);
             let place = self.locate(seen, place, WIDE_SPREAD)?;
@@ -498,8 +489,9 @@ impl Follow for Robust {
         let start = start + self.adopt(sightings);
         let spread = WIDE_SPREAD + (SPREAD - WIDE_SPREAD) * trust;
         let mut place = self.locate(seen, self.estimate.bounds, spread)?;
+        self.unseen_s = if place.share < FOUND { self.unseen_s + dt_s } else { 0.0 };
         if place.share < FOUND
-            && let Some(beside) = self.recognise(seen, sightings, self.estimate.bounds.height)?
+            && let Some(beside) = self.recognise(seen, sightings)?
         {
             place = beside;
         }
@@ -510,7 +502,6 @@ impl Follow for Robust {
         self.presence.update(place.share, dt_s);
         self.estimate.confidence = self.presence.confidence() * place.share.min(1.0);
         if !self.presence.is_here() {
-            self.hidden_s = 0.0;
             self.seen_in_a_row = 0;
             self.remember(&seen.luma)?;
             self.estimate.centroid = centre(self.estimate.bounds);
@@ -522,7 +513,7 @@ impl Follow for Robust {
 
     fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
-        self.hidden_s += dt_s;
+        self.unseen_s += dt_s;
         self.estimate.own_velocity *= (-dt_s / HIDDEN_TIME_S).exp();
         self.carry(self.estimate.own_velocity * dt_s);
         let found = self.search(seen, sightings)?;
@@ -539,6 +530,7 @@ impl Follow for Robust {
             return Ok(Sight::Hidden);
         }
         self.presence = Presence::default();
+        self.unseen_s = 0.0;
         self.look_closely(seen)?;
         self.seed()?;
         Ok(Sight::Seen)
@@ -550,6 +542,10 @@ impl Follow for Robust {
         let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
         let (figure, _) = cells.histograms(&map);
         Ok(colours.likeness(&figure) >= ALIKE)
+    }
+
+    fn may_be_in(&self, region: Rect2f) -> bool {
+        self.box_in(region).is_some()
     }
 
     fn estimate(&self) -> &Estimate {

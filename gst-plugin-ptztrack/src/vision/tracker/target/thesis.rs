@@ -117,6 +117,10 @@ impl Follow for Thesis {
         Ok(false)
     }
 
+    fn may_be_in(&self, _: Rect2f) -> bool {
+        false
+    }
+
     fn estimate(&self) -> &Estimate {
         &self.estimate
     }
