@@ -77,7 +77,7 @@ impl Samples {
 const PLOT: &str = "
 set terminal pngcairo size 1000,1000 font 'DejaVu Sans,10'; set output 'soak.png';
 set datafile separator ','; set multiplot layout 4,1; set grid; set key outside right; set yrange [0:*];
-name(n) = word('MJPEG MJPEG,killed H.264 H.264,killed', n + 1);
+name(n) = word('\"MJPEG\" \"MJPEG, killed\" \"H.264\" \"H.264, killed\"', n + 1);
 set ylabel 'memory, MB'; plot for [n=0:3] 'samples.csv' index n using 1:4 with lines title name(n);
 set ylabel 'threads'; plot for [n=0:3] 'samples.csv' index n using 1:5 with lines title name(n);
 set ylabel 'open files'; plot for [n=0:3] 'samples.csv' index n using 1:6 with lines title name(n);
