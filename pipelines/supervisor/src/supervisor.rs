@@ -1,0 +1,169 @@
+use std::cell::RefCell;
+use std::error::Error;
+use std::rc::Rc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use gst::prelude::*;
+
+use crate::backoff::Backoff;
+
+/// After being told to end, the stream's end is waited for this long, so that files are complete.
+const LONGEST_END: Duration = Duration::from_secs(10);
+
+/// Runs one pipeline after the other in one thread; a clone in another thread can end that.
+#[derive(Debug, Clone)]
+pub struct Supervisor(Arc<State>);
+
+/// What is happening now, shared with the handlers of messages and whoever ends it.
+#[derive(Debug)]
+struct State {
+    main_loop: glib::MainLoop,
+    pipeline: Mutex<Option<gst::Pipeline>>,
+    told_to_end: AtomicBool,
+    hopeless: Mutex<Option<glib::Error>>,
+}
+
+impl Default for Supervisor {
+    /// One that runs the main context of this thread: its own, or the default one.
+    fn default() -> Self {
+        Self::new(&glib::MainContext::ref_thread_default())
+    }
+}
+
+impl Supervisor {
+    /// One that runs a main context.
+    pub fn new(context: &glib::MainContext) -> Self {
+        Self(Arc::new(State {
+            main_loop: glib::MainLoop::new(Some(context), false),
+            pipeline: Mutex::default(),
+            told_to_end: AtomicBool::default(),
+            hopeless: Mutex::default(),
+        }))
+    }
+
+    /// Runs what `build` makes, again and again, until told to end; `on_message` hears every message. To be called in a
+    /// thread whose main context is the supervisor's.
+    ///
+    /// # Errors
+    /// Those of `build`, and an error after which a new start would end in the same way, as user and password are wrong:
+    /// to try that again and again could lock the account.
+    pub fn run(
+        &self,
+        mut build: impl FnMut() -> Result<gst::Pipeline, Box<dyn Error>>,
+        on_message: impl FnMut(&gst::Message) + 'static,
+    ) -> Result<(), Box<dyn Error>> {
+        let on_message = Rc::new(RefCell::new(on_message));
+        let mut backoff = Backoff::default();
+        while !self.told_to_end() {
+            let pipeline = build()?;
+            let begin = Instant::now();
+            self.play(&pipeline, on_message.clone())?;
+            if let Some(err) = lock(&self.0.hopeless).take() {
+                return Err(err.into());
+            }
+            if !self.told_to_end() {
+                self.wait_at_most(backoff.after(begin.elapsed()));
+                self.0.main_loop.run();
+            }
+        }
+        Ok(())
+    }
+
+    /// Ends the stream, and everything after it. From any thread; returns at once.
+    pub fn end(&self) {
+        self.0.told_to_end.store(true, Ordering::SeqCst);
+        let this = self.clone();
+        self.later(move || {
+            let pipeline = lock(&this.0.pipeline).clone();
+            match pipeline {
+                Some(pipeline) => {
+                    pipeline.send_event(gst::event::Eos::new());
+                    this.wait_at_most(LONGEST_END);
+                }
+                None => this.0.main_loop.quit(),
+            }
+        });
+    }
+
+    /// Starts the pipeline anew, as something is wrong that it did not notice. From any thread; returns at once.
+    pub fn restart(&self) {
+        let this = self.clone();
+        self.later(move || {
+            if lock(&this.0.pipeline).is_some() {
+                this.0.main_loop.quit();
+            }
+        });
+    }
+
+    /// Done by the loop, in its thread, even where it does not run yet.
+    fn later(&self, what: impl FnOnce() + Send + 'static) {
+        let source = glib::idle_source_new(None, glib::Priority::DEFAULT, {
+            let mut what = Some(what);
+            move || {
+                if let Some(what) = what.take() {
+                    what();
+                }
+                glib::ControlFlow::Break
+            }
+        });
+        source.attach(Some(&self.0.main_loop.context()));
+    }
+
+    fn told_to_end(&self) -> bool {
+        self.0.told_to_end.load(Ordering::SeqCst)
+    }
+
+    /// Plays it to its end, whatever that is.
+    fn play(
+        &self,
+        pipeline: &gst::Pipeline,
+        on_message: Rc<RefCell<impl FnMut(&gst::Message) + 'static>>,
+    ) -> Result<(), Box<dyn Error>> {
+        let bus = pipeline.bus().ok_or("a pipeline without a bus")?;
+        *lock(&self.0.pipeline) = Some(pipeline.clone());
+        let this = self.clone();
+        let watch = bus.add_watch_local(move |_, message| {
+            on_message.borrow_mut()(message);
+            this.heard(message);
+            glib::ControlFlow::Continue
+        })?;
+        // Where it fails, a message has the reason.
+        let _ = pipeline.set_state(gst::State::Playing);
+        self.0.main_loop.run();
+        drop(watch);
+        lock(&self.0.pipeline).take();
+        pipeline.set_state(gst::State::Null)?;
+        Ok(())
+    }
+
+    fn heard(&self, message: &gst::Message) {
+        match message.view() {
+            gst::MessageView::Eos(_) => self.0.main_loop.quit(),
+            gst::MessageView::Error(error) => {
+                let error = error.error();
+                if error.matches(gst::ResourceError::NotAuthorized) {
+                    *lock(&self.0.hopeless) = Some(error);
+                }
+                self.0.main_loop.quit();
+            }
+            _ => {}
+        }
+    }
+
+    /// Whatever the main loop runs for is over after this.
+    fn wait_at_most(&self, time: Duration) {
+        let main_loop = self.0.main_loop.clone();
+        let source = glib::timeout_source_new(time, None, glib::Priority::DEFAULT, move || {
+            main_loop.quit();
+            glib::ControlFlow::Break
+        });
+        source.attach(Some(&self.0.main_loop.context()));
+    }
+}
+
+/// Nothing panics while one of these is held.
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
