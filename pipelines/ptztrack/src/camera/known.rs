@@ -1,0 +1,161 @@
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+use axum::body::Bytes;
+use ptztrack_contract::lock::lock;
+use serde::Serialize;
+use tokio::sync::watch;
+
+use super::pipeline::Elements;
+use super::stopwatch::Stopwatch;
+
+/// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+
+/// What is known of one camera, for everybody who asks.
+#[derive(Debug)]
+pub struct Known {
+    pub name: String,
+    /// Since when.
+    begin: Instant,
+    pub state: Mutex<State>,
+    /// What runs now.
+    pub elements: Mutex<Option<Elements>>,
+    pub pictures: AtomicU64,
+    pub processed: AtomicU64,
+    /// By the pipelines before this one.
+    processed_before: AtomicU64,
+    pub rebuilt: AtomicU64,
+    pub failures: AtomicU64,
+    /// Nanoseconds after `begin`.
+    last_picture: AtomicU64,
+    last_heartbeat: AtomicU64,
+    pub steering: Mutex<Steering>,
+    /// How many look at the picture.
+    pub looking: AtomicUsize,
+    /// The last picture for who looks, as JPEG.
+    pub view: watch::Sender<Bytes>,
+    pub times: Vec<Stopwatch>,
+}
+
+/// What its messages told.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct State {
+    /// Pictures come.
+    pub picture: bool,
+    /// `searching`, `tracking`, `occluded` or `lost`.
+    pub target: String,
+    /// Number of the target, where there is one.
+    pub target_id: Option<u64>,
+    /// What was told last that is not as it should be.
+    pub trouble: Option<String>,
+    /// It will not be tried again by itself.
+    pub given_up: bool,
+}
+
+/// Who has the camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Steering {
+    /// It follows.
+    #[default]
+    Follow,
+    /// It was sent home then.
+    GoHome(Instant),
+    /// It is somebody else's, who asked for it.
+    HandedOver,
+}
+
+impl Known {
+    pub fn new(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            begin: Instant::now(),
+            state: Mutex::new(State { target: "searching".to_owned(), ..State::default() }),
+            elements: Mutex::default(),
+            pictures: AtomicU64::default(),
+            processed: AtomicU64::default(),
+            processed_before: AtomicU64::default(),
+            rebuilt: AtomicU64::default(),
+            failures: AtomicU64::default(),
+            last_picture: AtomicU64::default(),
+            last_heartbeat: AtomicU64::default(),
+            steering: Mutex::default(),
+            looking: AtomicUsize::default(),
+            view: watch::Sender::new(Bytes::new()),
+            times: Stopwatch::all(),
+        }
+    }
+
+    /// A picture went all the way.
+    pub fn saw_picture(&self) {
+        self.processed.fetch_add(1, Ordering::Relaxed);
+        self.last_picture.store(self.now(), Ordering::Relaxed);
+    }
+
+    /// The last picture counts from now: another pipeline begins.
+    pub fn begins_anew(&self) {
+        self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.last_picture.store(self.now(), Ordering::Relaxed);
+    }
+
+    /// The pipeline that runs now has had one.
+    pub fn has_picture(&self) -> bool {
+        self.processed.load(Ordering::Relaxed) > self.processed_before.load(Ordering::Relaxed)
+    }
+
+    pub fn since_picture(&self) -> Duration {
+        self.since(&self.last_picture)
+    }
+
+    /// Whoever runs the camera is alive.
+    pub fn beat(&self) {
+        self.last_heartbeat.store(self.now(), Ordering::Relaxed);
+    }
+
+    /// Whoever runs the camera has not been heard of for too long.
+    pub fn is_stuck(&self) -> bool {
+        self.since(&self.last_heartbeat) > LONGEST_PAUSE
+    }
+
+    fn since(&self, moment: &AtomicU64) -> Duration {
+        Duration::from_nanos(self.now().saturating_sub(moment.load(Ordering::Relaxed)))
+    }
+
+    fn now(&self) -> u64 {
+        u64::try_from(self.begin.elapsed().as_nanos()).unwrap_or(u64::MAX)
+    }
+
+    /// What `vapixptzsink` says of itself, where one runs.
+    pub fn servo(&self) -> Option<gst::Structure> {
+        lock(&self.elements).as_ref()?.servo_stats()
+    }
+
+    /// Its state in words.
+    pub fn in_words(&self) -> String {
+        let state = lock(&self.state).clone();
+        if state.given_up {
+            return format!("given up: {}", state.trouble.unwrap_or_default());
+        }
+        if !state.picture {
+            return format!("no picture: {}", state.trouble.as_deref().unwrap_or("none came yet"));
+        }
+        let target = match (state.target.as_str(), state.target_id) {
+            ("tracking", Some(id)) => format!("follows target {id}"),
+            ("occluded", Some(id)) => format!("target {id} is hidden"),
+            _ => "looks for somebody".to_owned(),
+        };
+        let camera = self.servo().and_then(|servo| servo.get::<String>("state").ok());
+        let camera = match (*lock(&self.steering), camera.as_deref()) {
+            (Steering::HandedOver, _) => "the camera is handed over",
+            (Steering::GoHome(_), _) => "the camera goes home",
+            (_, Some("at-rest")) => "the camera rests",
+            (_, Some("moving")) => "the camera turns",
+            (_, Some("taken-over")) => "an operator has the camera",
+            (_, Some("refused")) => "the camera refuses to be moved",
+            (_, Some("disconnected")) => "the camera does not answer",
+            _ => "the camera is not moved",
+        };
+        format!("{target}, {camera}")
+    }
+}

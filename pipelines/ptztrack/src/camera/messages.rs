@@ -1,0 +1,118 @@
+use std::collections::HashSet;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+
+use gst::MessageView;
+use ptztrack_contract::lock::lock;
+use ptztrack_contract::{CameraChange, CameraMessage, TargetChange, TargetMessage};
+
+use super::known::Known;
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// Makes events of what a pipeline says, and keeps what is to be known of the camera.
+pub struct Listener {
+    known: Arc<Known>,
+    log: Arc<Log>,
+    /// What was said already: pipelines that start one after the other without a picture all say the same.
+    said: HashSet<String>,
+}
+
+impl Listener {
+    pub fn new(known: Arc<Known>, log: Arc<Log>) -> Self {
+        Self { known, log, said: HashSet::new() }
+    }
+
+    pub fn hear(&mut self, message: &gst::Message) {
+        match message.view() {
+            MessageView::Error(error) => {
+                self.known.failures.fetch_add(1, Ordering::Relaxed);
+                let error = error.error();
+                lock(&self.known.state).picture = false;
+                if error.matches(gst::ResourceError::NotAuthorized) {
+                    // It is given up, and that is told elsewhere.
+                    return;
+                }
+                let text = error.message().to_owned();
+                self.trouble(Level::Error, "picture-gone", text, "; it is tried again until it is back");
+            }
+            MessageView::Eos(_) => {
+                lock(&self.known.state).picture = false;
+            }
+            MessageView::Warning(warning) => {
+                self.trouble(Level::Warning, "warning", warning.error().message().to_owned(), "");
+            }
+            MessageView::Element(element) => {
+                if let Some(structure) = element.structure() {
+                    self.element(structure);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// The first picture of a pipeline is what ends the trouble before it.
+    pub fn look_for_picture(&mut self) {
+        let comes = self.known.has_picture();
+        let mut state = lock(&self.known.state);
+        if comes && !state.picture {
+            state.picture = true;
+            state.trouble = None;
+            drop(state);
+            self.said.clear();
+            self.tell(Level::Info, "picture", "the picture is there");
+        }
+    }
+
+    fn element(&mut self, structure: &gst::StructureRef) {
+        if let Ok(target) = TargetMessage::from_structure(structure) {
+            self.target(&target);
+        } else if let Ok(camera) = CameraMessage::from_structure(structure) {
+            self.camera(&camera);
+        }
+    }
+
+    fn target(&mut self, target: &TargetMessage) {
+        let gone = matches!(target.change, TargetChange::Lost | TargetChange::Released);
+        let mut state = lock(&self.known.state);
+        state.target = target.state.name().to_owned();
+        state.target_id = (!gone).then_some(target.id);
+        drop(state);
+        let change = target.change.name();
+        if target.change != TargetChange::Position {
+            self.tell(Level::Info, &format!("target-{change}"), &format!("target {} {change}", target.id));
+        }
+    }
+
+    fn camera(&mut self, camera: &CameraMessage) {
+        let event = format!("camera-{}", camera.change.name());
+        let detail = format!("camera {}: {}", camera.change.name(), camera.detail);
+        match camera.change {
+            // They come all the time.
+            CameraChange::Moving | CameraChange::Stopped | CameraChange::AtLimit => {}
+            CameraChange::Disconnected | CameraChange::Refused => {
+                self.trouble(Level::Warning, &event, detail, "")
+            }
+            CameraChange::Connected => {
+                self.said.retain(|said| !said.starts_with("camera "));
+                lock(&self.known.state).trouble = None;
+                self.trouble(Level::Info, &event, detail, "");
+            }
+            CameraChange::TakenOver | CameraChange::Resumed => self.tell(Level::Info, &event, &detail),
+        }
+    }
+
+    /// Told once, until a picture is there again.
+    fn trouble(&mut self, level: Level, event: &str, text: String, what_now: &str) {
+        if level > Level::Info {
+            lock(&self.known.state).trouble = Some(text.clone());
+        }
+        if self.said.insert(format!("{event} {text}")) {
+            self.tell(level, event, &format!("{text}{what_now}"));
+        }
+    }
+
+    fn tell(&self, level: Level, event: &str, detail: &str) {
+        self.log.tell(&Event::new(level, Some(&self.known.name), event, detail));
+    }
+}

@@ -1,0 +1,210 @@
+//! One camera: a thread in which its pipeline runs, is watched, and comes back.
+
+mod known;
+mod messages;
+mod pipeline;
+mod recording;
+mod stopwatch;
+
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+use axum::body::Bytes;
+pub use known::{Known, Steering};
+use messages::Listener;
+use pipeline_supervisor::Supervisor;
+use ptztrack_contract::lock::lock;
+pub use stopwatch::Stopwatch;
+use tokio::sync::watch;
+
+use crate::config::CameraSettings;
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// A pipeline that gives no picture for so long is built anew.
+const LONGEST_SILENCE: Duration = Duration::from_secs(10);
+
+/// A camera that was sent home is not asked before whether it is there: it may not have set out yet.
+const SETS_OUT: Duration = Duration::from_secs(2);
+/// It follows again after this, wherever it is.
+const LONGEST_WAY_HOME: Duration = Duration::from_secs(30);
+
+/// A camera that is followed with.
+#[derive(Debug)]
+pub struct Camera {
+    pub settings: CameraSettings,
+    pub known: Arc<Known>,
+    supervisor: Supervisor,
+    thread: JoinHandle<()>,
+}
+
+impl Camera {
+    /// Starts it.
+    ///
+    /// # Errors
+    /// Where the system has no thread left.
+    pub fn start(settings: CameraSettings, log: Arc<Log>) -> std::io::Result<Self> {
+        let known = Arc::new(Known::new(&settings.name));
+        let context = glib::MainContext::new();
+        let supervisor = Supervisor::new(&context);
+        let run = {
+            let (settings, known, supervisor) = (settings.clone(), known.clone(), supervisor.clone());
+            move || {
+                // The context is new, so nobody else has it.
+                let _ = context.with_thread_default(|| run(&settings, &known, &supervisor, &log));
+            }
+        };
+        let thread = std::thread::Builder::new().name(settings.name.clone()).spawn(run)?;
+        Ok(Self { settings, known, supervisor, thread })
+    }
+
+    /// Ends it, without waiting.
+    pub fn end(&self) {
+        self.supervisor.end();
+    }
+
+    /// Waits until it has ended; the camera rests then.
+    pub fn join(self) {
+        // One that panicked has said so.
+        let _ = self.thread.join();
+    }
+
+    /// It was given up, or has ended.
+    pub fn is_over(&self) -> bool {
+        self.thread.is_finished()
+    }
+}
+
+fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, log: &Arc<Log>) {
+    let tell =
+        |level, event: &str, detail: String| log.tell(&Event::new(level, Some(&known.name), event, detail));
+    tell(Level::Info, "started", format!("starts with {}", settings.address));
+    let listener = Rc::new(RefCell::new(Listener::new(known.clone(), log.clone())));
+    let timer = glib::MainContext::ref_thread_default().spawn_local({
+        let (known, supervisor, log) = (known.clone(), supervisor.clone(), log.clone());
+        let listener = listener.clone();
+        async move {
+            loop {
+                glib::timeout_future_seconds(1).await;
+                listener.borrow_mut().look_for_picture();
+                look_after(&known, &supervisor, &log);
+            }
+        }
+    });
+    let build = || {
+        known.begins_anew();
+        known.rebuilt.fetch_add(1, Ordering::Relaxed);
+        pipeline::build(settings, known)
+    };
+    let result = supervisor.run(build, move |message| listener.borrow_mut().hear(message));
+    timer.abort();
+    lock(&known.elements).take();
+    let mut state = lock(&known.state);
+    state.picture = false;
+    if let Err(err) = result {
+        let reason = match err.downcast_ref::<glib::Error>() {
+            Some(err) if err.matches(gst::ResourceError::NotAuthorized) => {
+                "it refuses user and password".to_owned()
+            }
+            _ => err.to_string(),
+        };
+        state.given_up = true;
+        state.trouble = Some(reason.clone());
+        drop(state);
+        let what_now = "not tried again until the configuration is read again (SIGHUP)";
+        tell(Level::Error, "given-up", format!("given up: {reason}; {what_now}"));
+    } else {
+        drop(state);
+        tell(Level::Info, "stopped", "has stopped".to_owned());
+    }
+}
+
+/// Once a second.
+fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
+    known.beat();
+    let elements = lock(&known.elements).clone();
+    let Some(elements) = elements else { return };
+    elements.look(known.looking.load(Ordering::Relaxed) > 0);
+    let sent_home = *lock(&known.steering);
+    if let Steering::GoHome(since) = sent_home {
+        let there = since.elapsed() > SETS_OUT && elements.at_rest();
+        if there || since.elapsed() > LONGEST_WAY_HOME {
+            known.steer(Steering::Follow);
+        }
+    }
+    if known.since_picture() > LONGEST_SILENCE {
+        let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
+        log.tell(&Event::new(Level::Warning, Some(&known.name), "no-picture", detail));
+        known.begins_anew();
+        supervisor.restart();
+    }
+}
+
+/// What somebody at the page can ask for.
+impl Known {
+    /// Follows who is at this place of the picture, 0 to 1.
+    pub fn select(&self, x: f64, y: f64) {
+        self.with(|elements| elements.select(x, y));
+    }
+
+    pub fn release(&self) {
+        self.with(pipeline::Elements::release);
+    }
+
+    /// Lets it follow, or hands it over.
+    pub fn steer(&self, steering: Steering) {
+        *lock(&self.steering) = steering;
+        self.with(|elements| elements.steer(steering));
+    }
+
+    /// Lets the target go, and sends the camera home.
+    pub fn go_home(&self) {
+        self.release();
+        self.steer(Steering::GoHome(Instant::now()));
+    }
+
+    /// Whether the camera can be sent home, and whether it can be handed over.
+    pub fn abilities(&self) -> (bool, bool) {
+        let abilities = |elements: &pipeline::Elements| (elements.has_home(), elements.can_hand_over());
+        lock(&self.elements).as_ref().map(abilities).unwrap_or_default()
+    }
+
+    /// Pictures are made while this is held.
+    pub fn look(self: &Arc<Self>) -> Look {
+        self.looking.fetch_add(1, Ordering::Relaxed);
+        self.with(|elements| elements.look(true));
+        Look { pictures: self.view.subscribe(), known: self.clone() }
+    }
+
+    fn with(&self, what: impl FnOnce(&pipeline::Elements)) {
+        let elements = lock(&self.elements).clone();
+        if let Some(elements) = elements {
+            what(&elements);
+        }
+    }
+}
+
+/// Somebody looks; where nobody does any more, the camera's own timer ends it, as the next may come soon.
+#[derive(Debug)]
+pub struct Look {
+    known: Arc<Known>,
+    pictures: watch::Receiver<Bytes>,
+}
+
+impl Look {
+    /// The next picture, JPEG; `None` where the camera is no more.
+    pub async fn next(&mut self) -> Option<Bytes> {
+        self.pictures.changed().await.ok()?;
+        Some(self.pictures.borrow_and_update().clone())
+    }
+}
+
+impl Drop for Look {
+    fn drop(&mut self) {
+        self.known.looking.fetch_sub(1, Ordering::Relaxed);
+    }
+}

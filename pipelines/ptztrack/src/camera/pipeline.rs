@@ -1,0 +1,282 @@
+//! One camera's pipeline, as text and as elements.
+
+use std::error::Error;
+use std::fmt::Write;
+use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use axum::body::Bytes;
+use gst::prelude::*;
+use ptztrack_contract::lock::lock;
+
+use super::known::{Known, Steering};
+use super::recording;
+use crate::config::{CameraSettings, Codec, Credentials};
+
+/// Whatever the elements behind cannot keep up with is dropped here, oldest first.
+const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0";
+
+/// A few pictures a second for who looks, and none while nobody does.
+const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! ptzoverlay ! videoconvert \
+    ! jpegenc quality=75 ! appsink name=picture sync=false async=false max-buffers=1 drop=true";
+
+/// Between two pictures for who looks.
+const VIEW_EVERY: Duration = Duration::from_millis(200);
+
+/// Closed while the camera is not to follow anybody; the stream's end passes all the same.
+const STEER: &str = "valve name=steer drop-mode=forward-sticky-events";
+
+/// The pipeline, as `gst-launch-1.0` takes it; addresses and passwords are not in it.
+pub fn description(camera: &CameraSettings) -> String {
+    if let Some(pipeline) = &camera.pipeline {
+        return pipeline.clone();
+    }
+    let recording = camera.recording.as_ref();
+    let encoded = recording.filter(|recording| !recording.overlay).map(|_| recording::branch(camera.codec));
+    let mut text = source(camera.codec, encoded.as_deref());
+    write_all(
+        &mut text,
+        &format!(" ! {NEWEST} name=newest ! bgavgdetect ! lkfeaturetrack ! tee name=followed "),
+    );
+    write_all(&mut text, &format!("followed. ! {NEWEST} ! {STEER} ! vapixptzsink "));
+    write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
+    if recording.is_some_and(|recording| recording.overlay) {
+        write_all(
+            &mut text,
+            &format!("followed. ! queue ! ptzoverlay ! videoconvert ! {} ", recording::ENCODED),
+        );
+    }
+    if camera.show {
+        write_all(
+            &mut text,
+            &format!("followed. ! {NEWEST} ! ptzoverlay ! videoconvert ! autovideosink sync=false "),
+        );
+    }
+    text
+}
+
+/// Pictures of the camera; `encoded` takes them as they come too.
+fn source(codec: Codec, encoded: Option<&str>) -> String {
+    let tap =
+        encoded.map(|branch| format!(" ! tee name=encoded encoded. ! queue ! {branch} encoded. ! queue"));
+    let tap = tap.unwrap_or_default();
+    let rtsp = |depay: &str, decoder: &str| {
+        // Events of the servo, too, would reset a watchdog in the way of the pictures.
+        format!(
+            "rtspsrc name=source latency=0 protocols=tcp ! tee name=received \
+             received. ! watchdog timeout=1200 ! fakesink sync=false async=false \
+             received. ! {depay}{tap} ! {decoder}"
+        )
+    };
+    match codec {
+        Codec::Mjpeg => format!(
+            "souphttpsrc name=source is-live=true do-timestamp=true timeout=1 retries=0 ! multipartdemux{tap} ! jpegdec"
+        ),
+        Codec::Mpeg4 => rtsp("rtpmp4vdepay", "avdec_mpeg4"),
+        Codec::H264 => rtsp("rtph264depay", "avdec_h264"),
+    }
+}
+
+/// Writing to a text cannot fail.
+fn write_all(text: &mut String, more: &str) {
+    let _ = text.write_str(more);
+}
+
+/// Where the pictures of a camera are.
+fn location(camera: &CameraSettings) -> String {
+    let size = camera.size.map(|(width, height)| format!("resolution={width}x{height}"));
+    let rate = camera.rate.map(|rate| format!("fps={rate}"));
+    let (path, first) = match camera.codec {
+        Codec::Mjpeg => {
+            (format!("{}/axis-cgi/mjpg/video.cgi", camera.address), Some("compression=30".to_owned()))
+        }
+        Codec::Mpeg4 => {
+            (format!("{}/axis-media/media.amp", camera.rtsp), Some("videocodec=mpeg4".to_owned()))
+        }
+        Codec::H264 => (format!("{}/axis-media/media.amp", camera.rtsp), Some("videocodec=h264".to_owned())),
+    };
+    let query: Vec<String> = [first, size, rate].into_iter().flatten().collect();
+    format!("{path}?{}", query.join("&"))
+}
+
+/// Builds it, with everything that watches it.
+///
+/// # Errors
+/// Where GStreamer lacks an element, or a pipeline of one's own is none.
+pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipeline, Box<dyn Error>> {
+    let pipeline = gst::parse::launch(&description(camera))?
+        .downcast::<gst::Pipeline>()
+        .map_err(|_| "a pipeline has more than one element")?;
+    for element in pipeline.iterate_recurse().into_iter().flatten() {
+        configure(&element, camera);
+        known.times.iter().for_each(|stopwatch| stopwatch.watch(&element));
+    }
+    if let Some(recording) = &camera.recording {
+        recording::configure(&pipeline, recording, &camera.name);
+    }
+    count(&pipeline, known);
+    let elements = Elements::of(&pipeline);
+    elements.show_to(known);
+    elements.look(known.looking.load(Ordering::Relaxed) > 0);
+    elements.steer(*lock(&known.steering));
+    *lock(&known.elements) = Some(elements);
+    Ok(pipeline)
+}
+
+/// Address, password and properties.
+fn configure(element: &gst::Element, camera: &CameraSettings) {
+    let Some(factory) = element.factory() else { return };
+    if factory.name() == "vapixptzsink" {
+        element.set_property("location", &camera.address);
+        log_in(element, camera.credentials.as_ref(), ["user", "password"]);
+    } else if element.name() == "source" && element.has_property_with_type("location", glib::Type::STRING) {
+        element.set_property("location", location(camera));
+        if element.has_property_with_type("user-id", glib::Type::STRING) {
+            log_in(element, camera.credentials.as_ref(), ["user-id", "user-pw"]);
+        }
+    }
+    for property in camera.properties.iter().filter(|property| factory.name() == property.element) {
+        property.set(element);
+    }
+}
+
+fn log_in(element: &gst::Element, credentials: Option<&Credentials>, [user, password]: [&str; 2]) {
+    if let Some(credentials) = credentials {
+        element.set_property(user, &credentials.user);
+        element.set_property(password, credentials.password.reveal());
+    }
+}
+
+/// Counts pictures that come, and those that go all the way.
+fn count(pipeline: &gst::Pipeline, known: &Arc<Known>) {
+    let by_factory = |name: &str| of_factory(pipeline, name);
+    let tracker = by_factory("lkfeaturetrack").or_else(|| by_factory("bgavgdetect"));
+    let first = pipeline.by_name("newest").or_else(|| by_factory("bgavgdetect")).or_else(|| tracker.clone());
+    if let Some(pad) = first.and_then(|element| element.static_pad("sink")) {
+        let known = known.clone();
+        pad.add_probe(gst::PadProbeType::BUFFER, move |_, _| {
+            known.pictures.fetch_add(1, Ordering::Relaxed);
+            gst::PadProbeReturn::Ok
+        });
+    }
+    if let Some(pad) = tracker.and_then(|element| element.static_pad("src")) {
+        let known = known.clone();
+        pad.add_probe(gst::PadProbeType::BUFFER, move |_, _| {
+            known.saw_picture();
+            gst::PadProbeReturn::Ok
+        });
+    }
+}
+
+fn of_factory(pipeline: &gst::Pipeline, name: &str) -> Option<gst::Element> {
+    pipeline
+        .iterate_recurse()
+        .into_iter()
+        .flatten()
+        .find(|element| element.factory().is_some_and(|factory| factory.name() == name))
+}
+
+/// What can be told to a running pipeline.
+#[derive(Debug, Clone)]
+pub struct Elements {
+    tracker: Option<gst::Element>,
+    servo: Option<gst::Element>,
+    /// `home` and `home-timeout`, as they were set.
+    home: Option<String>,
+    home_timeout: u64,
+    steer: Option<gst::Element>,
+    view: Option<gst::Element>,
+    picture: Option<gst_app::AppSink>,
+}
+
+impl Elements {
+    fn of(pipeline: &gst::Pipeline) -> Self {
+        let servo = of_factory(pipeline, "vapixptzsink");
+        Self {
+            tracker: of_factory(pipeline, "lkfeaturetrack"),
+            home: servo.as_ref().and_then(|servo| servo.property("home")),
+            home_timeout: servo.as_ref().map_or(0, |servo| servo.property("home-timeout")),
+            servo,
+            steer: pipeline.by_name("steer"),
+            view: pipeline.by_name("view"),
+            picture: pipeline.by_name("picture").and_then(|element| element.downcast().ok()),
+        }
+    }
+
+    /// Hands a few pictures a second to who looks. Not by `videorate`: it ends the process where a picture has no duration.
+    fn show_to(&self, known: &Arc<Known>) {
+        let last = Mutex::new(None::<Instant>);
+        let few = move |_: &gst::Pad, _: &mut gst::PadProbeInfo| {
+            let mut last = lock(&last);
+            if last.is_some_and(|last| last.elapsed() < VIEW_EVERY) {
+                return gst::PadProbeReturn::Drop;
+            }
+            *last = Some(Instant::now());
+            gst::PadProbeReturn::Ok
+        };
+        if let Some(pad) = self.view.as_ref().and_then(|view| view.static_pad("src")) {
+            pad.add_probe(gst::PadProbeType::BUFFER, few);
+        }
+        let Some(picture) = &self.picture else { return };
+        let known = known.clone();
+        let show = move |sink: &gst_app::AppSink| {
+            let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
+            if let Some(map) = sample.buffer().and_then(|buffer| buffer.map_readable().ok()) {
+                known.view.send_replace(Bytes::copy_from_slice(&map));
+            }
+            Ok(gst::FlowSuccess::Ok)
+        };
+        picture.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(show).build());
+    }
+
+    /// Makes pictures for who looks, or none.
+    pub fn look(&self, somebody: bool) {
+        if let Some(view) = &self.view {
+            view.set_property("drop", !somebody);
+        }
+    }
+
+    /// Follows who is at this place of the picture, 0 to 1.
+    pub fn select(&self, x: f64, y: f64) {
+        if let Some(tracker) = &self.tracker {
+            tracker.emit_by_name::<()>("select-target", &[&x, &y]);
+        }
+    }
+
+    pub fn release(&self) {
+        if let Some(tracker) = &self.tracker {
+            tracker.emit_by_name::<()>("release-target", &[]);
+        }
+    }
+
+    /// Whether there is a home to go to.
+    pub fn has_home(&self) -> bool {
+        self.home.is_some() && self.steer.is_some()
+    }
+
+    /// Whether the camera can be handed over.
+    pub fn can_hand_over(&self) -> bool {
+        self.servo.is_some() && self.steer.is_some()
+    }
+
+    /// Lets the camera follow, sends it home, or leaves it to somebody else. Where no target comes, `vapixptzsink` stops it.
+    pub fn steer(&self, steering: Steering) {
+        let (Some(servo), Some(steer)) = (&self.servo, &self.steer) else { return };
+        steer.set_property("drop", steering != Steering::Follow);
+        let home = self.home.as_ref().filter(|_| steering != Steering::HandedOver);
+        servo.set_property("home", home);
+        let timeout = if matches!(steering, Steering::GoHome(_)) { 0 } else { self.home_timeout };
+        servo.set_property("home-timeout", timeout);
+    }
+
+    /// Whether the camera rests.
+    pub fn at_rest(&self) -> bool {
+        self.servo_stats().and_then(|stats| stats.get::<String>("state").ok()).as_deref() == Some("at-rest")
+    }
+
+    /// What `vapixptzsink` says of itself.
+    pub fn servo_stats(&self) -> Option<gst::Structure> {
+        self.servo.as_ref().map(|servo| servo.property("stats"))
+    }
+}

@@ -1,0 +1,221 @@
+use std::path::PathBuf;
+use std::time::Duration;
+
+use super::credentials::{self, Credentials};
+use super::properties::{self, ELEMENTS, Property};
+use super::table::{Read, Table, whole};
+use super::units;
+
+/// One camera.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraSettings {
+    pub name: String,
+    /// `http://` or `https://`, no path.
+    pub address: String,
+    /// `rtsp://`, no path.
+    pub rtsp: String,
+    pub codec: Codec,
+    /// Width and height in pixels; the camera's own where it is not said.
+    pub size: Option<(u32, u32)>,
+    /// Pictures per second; the camera's own where it is not said.
+    pub rate: Option<u32>,
+    pub credentials: Option<Credentials>,
+    pub properties: Vec<Property>,
+    pub recording: Option<Recording>,
+    /// A pipeline of one's own instead of ours, as `gst-launch-1.0` takes it.
+    pub pipeline: Option<String>,
+    /// In a window, too.
+    pub show: bool,
+}
+
+/// How pictures come.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Codec {
+    /// MJPEG over HTTP: the shortest delay, the most bandwidth
+    Mjpeg,
+    /// MPEG-4 part 2 over RTSP
+    Mpeg4,
+    /// H.264 over RTSP
+    H264,
+}
+
+/// What is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Recording {
+    pub folder: PathBuf,
+    /// Length of one file.
+    pub segment: Duration,
+    /// How long files are kept.
+    pub keep: Option<Duration>,
+    /// How many bytes of files are kept.
+    pub keep_bytes: Option<u64>,
+    /// With what was seen drawn in, instead of the camera's own stream.
+    pub overlay: bool,
+}
+
+impl Read for Codec {
+    const WHAT: &'static str = "\"mjpeg\", \"mpeg4\" or \"h264\"";
+
+    fn read(value: &toml::de::DeValue) -> Option<Self> {
+        match value.as_str()? {
+            "mjpeg" => Some(Self::Mjpeg),
+            "mpeg4" => Some(Self::Mpeg4),
+            "h264" => Some(Self::H264),
+            _ => None,
+        }
+    }
+}
+
+impl CameraSettings {
+    /// One at an address, with everything else as it is by default.
+    ///
+    /// # Errors
+    /// Where that is no address.
+    pub fn at(name: &str, address: &str) -> Result<Self, String> {
+        let address = address.trim_end_matches('/');
+        let host = host(address).ok_or_else(|| format!("`{address}` is not {ADDRESS}"))?;
+        Ok(Self {
+            name: name.to_owned(),
+            address: address.to_owned(),
+            rtsp: format!("rtsp://{host}:554"),
+            codec: Codec::Mjpeg,
+            size: None,
+            rate: None,
+            credentials: None,
+            properties: Vec::new(),
+            recording: None,
+            pipeline: None,
+            show: false,
+        })
+    }
+
+    /// Has the watchdog at this socket stop the camera, unless the file names another.
+    pub fn use_watchdog(&mut self, socket: &str) {
+        let (element, name) = ("vapixptzsink", "dead-man-socket");
+        if !self.properties.iter().any(|property| property.element == element && property.name == name) {
+            self.properties.push(Property { element, name: name.to_owned(), value: format!("{socket:?}") });
+        }
+    }
+
+    pub(super) fn read(name: String, mut table: Table) -> Option<Self> {
+        if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
+            table.wrong(format!("camera `{name}`: a name has letters, digits, `-` and `_` only"));
+        }
+        let address: Option<String> = table.need("address");
+        let camera =
+            address.and_then(|address| Self::at(&name, &address).inspect_err(|err| table.wrong(err)).ok());
+        // The rest is read all the same, so that every mistake is found at once.
+        let mut camera = camera.unwrap_or_else(|| Self { name, ..Self::unknown() });
+        let of_rtsp = |value: &toml::de::DeValue| {
+            value.as_str().filter(|text| text.starts_with("rtsp://")).map(str::to_owned)
+        };
+        if let Some(rtsp) = table.get_with("rtsp", "an address such as \"rtsp://192.168.0.90:554\"", of_rtsp)
+        {
+            camera.rtsp = rtsp.trim_end_matches('/').to_owned();
+        }
+        camera.codec = table.get("codec").unwrap_or(Codec::Mjpeg);
+        camera.size = table
+            .get_with("size", "width and height in pixels, as \"640x480\"", |value| size(value.as_str()?));
+        camera.rate = table.get_with("rate", "pictures per second, a whole number from 1 to 60", |value| {
+            whole(value).and_then(|rate| u32::try_from(rate).ok()).filter(|rate| (1..=60).contains(rate))
+        });
+        camera.credentials = credentials::read(&mut table);
+        camera.recording = table.table("recording").and_then(Recording::read);
+        camera.properties = zones(&mut table);
+        for element in ELEMENTS {
+            camera
+                .properties
+                .extend(table.table(element).iter().flat_map(|table| properties::read(element, table)));
+        }
+        camera.pipeline = pipeline(&mut table);
+        if camera.pipeline.is_some() && camera.recording.is_some() {
+            table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
+        }
+        table.no_more();
+        Some(camera)
+    }
+
+    fn unknown() -> Self {
+        Self {
+            name: String::new(),
+            address: String::new(),
+            rtsp: String::new(),
+            codec: Codec::Mjpeg,
+            size: None,
+            rate: None,
+            credentials: None,
+            properties: Vec::new(),
+            recording: None,
+            pipeline: None,
+            show: false,
+        }
+    }
+}
+
+const ADDRESS: &str = "an address such as http://192.168.0.90";
+
+/// Host of an address, in brackets where it is of IPv6.
+fn host(address: &str) -> Option<&str> {
+    let rest = address.strip_prefix("http://").or_else(|| address.strip_prefix("https://"))?;
+    let end = match rest.find(']') {
+        Some(end) => end + 1,
+        None => rest.find(':').unwrap_or(rest.len()),
+    };
+    let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
+    rest.get(..end).filter(|host| !host.is_empty() && !rest.contains(wrong))
+}
+
+/// Width and height, from `640x480`.
+pub fn size(text: &str) -> Option<(u32, u32)> {
+    let (width, height) = text.split_once('x')?;
+    let side = |text: &str| text.parse().ok().filter(|side| (16..=8192).contains(side));
+    Some((side(width)?, side(height)?))
+}
+
+/// Where to look, and where not.
+fn zones(table: &mut Table) -> Vec<Property> {
+    let mut found = Vec::new();
+    for key in ["zones", "exclude-zones"] {
+        let Some(zones) = table.get::<Vec<String>>(key) else { continue };
+        match properties::of("bgavgdetect", key, &zones.join(";")) {
+            Ok(property) => found.push(property),
+            Err(reason) => table.wrong(reason),
+        }
+    }
+    found
+}
+
+/// What GStreamer can make a pipeline of.
+fn pipeline(table: &mut Table) -> Option<String> {
+    let value = table.value("pipeline")?;
+    let text: Option<String> = Read::read(value.get_ref());
+    let parsed = text.as_deref().map(gst::parse::launch);
+    match parsed {
+        Some(Err(err)) => table.source.wrong(value.span(), format!("`pipeline`: {}", err.message())),
+        Some(Ok(_)) => {}
+        None => {
+            table.source.wrong(value.span(), "`pipeline` must be text in quotes, as gst-launch-1.0 takes it")
+        }
+    }
+    text
+}
+
+impl Recording {
+    fn read(mut table: Table) -> Option<Self> {
+        let folder: Option<String> = table.need("folder");
+        let segment = table.get("segment").unwrap_or(Duration::from_secs(600));
+        if segment < Duration::from_secs(1) {
+            table.wrong("`segment` must be 1 s or more");
+        }
+        let keep = table.get("keep");
+        let keep_bytes = table.get_with("keep-bytes", units::BYTES, |value| units::bytes(value.as_str()?));
+        if keep.is_none() && keep_bytes.is_none() {
+            table.wrong(
+                "a recording needs `keep` = \"7d\" or `keep-bytes` = \"20GB\", as it would fill the disk",
+            );
+        }
+        let overlay = table.get("overlay").unwrap_or(false);
+        table.no_more();
+        Some(Self { folder: folder?.into(), segment, keep, keep_bytes, overlay })
+    }
+}

@@ -1,0 +1,99 @@
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+use super::table::Table;
+
+/// A password, which is never printed.
+#[derive(Clone, PartialEq, Eq)]
+pub struct Secret(String);
+
+impl Secret {
+    pub fn new(text: impl Into<String>) -> Self {
+        Self(text.into())
+    }
+
+    /// The text of a file, without the end of its last line.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub fn from_file(path: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).map_err(|err| format!("{}: {err}", path.display()))?;
+        Ok(Self::new(text.trim_end_matches(['\r', '\n'])))
+    }
+
+    /// What goes to who asked for it.
+    pub fn reveal(&self) -> &str {
+        &self.0
+    }
+}
+
+impl fmt::Debug for Secret {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("***")
+    }
+}
+
+/// Who we are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Credentials {
+    pub user: String,
+    pub password: Secret,
+}
+
+/// The user and the password of a table, which must have both or neither.
+pub fn read(table: &mut Table) -> Option<Credentials> {
+    let user: Option<String> = table.get("user");
+    let password = password(table);
+    match (user, password) {
+        (Some(user), Ok(Some(password))) => Some(Credentials { user, password }),
+        (Some(_), Ok(None)) => {
+            table.wrong("`user` needs one of `password-file`, `password-environment`, `password-credential`");
+            None
+        }
+        (None, Ok(Some(_))) => {
+            table.wrong("a password needs `user`");
+            None
+        }
+        (None, Ok(None)) => None,
+        (_, Err(reason)) => {
+            table.wrong(reason);
+            None
+        }
+    }
+}
+
+/// The password of a table, from where the file says it is.
+fn password(table: &mut Table) -> Result<Option<Secret>, String> {
+    if let Some(value) = table.value("password") {
+        let text = "a password does not belong into this file: `password-file`, `password-environment` or \
+            `password-credential` say where it is";
+        table.source.wrong(value.span(), text);
+    }
+    let file = table.get("password-file").map(|path: String| Secret::from_file(Path::new(&path)));
+    let environment = table.get("password-environment").map(|name: String| {
+        std::env::var(&name).map(Secret::new).map_err(|err| format!("environment variable {name}: {err}"))
+    });
+    let credential = table.get("password-credential").map(|name: String| from_systemd(&name));
+    let mut given = [file, environment, credential].into_iter().flatten();
+    let first = given.next();
+    if given.next().is_some() {
+        return Err(
+            "there can be one only of `password-file`, `password-environment`, `password-credential`"
+                .to_owned(),
+        );
+    }
+    first.transpose().map_err(|reason| format!("no password: {reason}"))
+}
+
+/// `LoadCredential=NAME:...` in a unit of systemd; or a file in the folder that the package's unit loads as `passwords`.
+fn from_systemd(name: &str) -> Result<Secret, String> {
+    let folder = std::env::var_os("CREDENTIALS_DIRECTORY").ok_or(
+        "CREDENTIALS_DIRECTORY is not set: `LoadCredential=` in systemd's unit gives a service its passwords",
+    )?;
+    if name.contains('/') {
+        return Err(format!("`{name}` is a name, not a path"));
+    }
+    let folder = PathBuf::from(folder);
+    let own = folder.join(name);
+    Secret::from_file(&if own.exists() { own } else { folder.join(format!("passwords_{name}")) })
+}

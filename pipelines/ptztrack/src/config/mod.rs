@@ -1,0 +1,109 @@
+//! The file of cameras: what is in it, read whole before anything starts, every mistake named with its line.
+
+mod camera;
+mod credentials;
+mod problem;
+mod properties;
+mod table;
+mod units;
+
+use std::cell::RefCell;
+use std::net::SocketAddr;
+use std::path::Path;
+
+use toml::de::DeTable;
+
+pub use camera::{CameraSettings, Codec, Recording, size};
+pub use credentials::{Credentials, Secret};
+pub use problem::Problems;
+use table::{Source, Table};
+
+/// An example with everything in it, commented.
+pub const EXAMPLE: &str = include_str!("example.toml");
+
+/// All that the file says.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Config {
+    pub cameras: Vec<CameraSettings>,
+    pub http: Option<Http>,
+}
+
+/// The page, `/metrics` and `/healthz`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Http {
+    pub listen: SocketAddr,
+    /// Names by which the page may be asked for, besides its address.
+    pub hosts: Vec<String>,
+    pub credentials: Option<Credentials>,
+}
+
+impl Config {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// What is wrong with it, in words.
+    pub fn load(path: &Path) -> Result<Self, String> {
+        let text = std::fs::read_to_string(path).map_err(|err| format!("{}: {err}", path.display()))?;
+        Self::parse(&text).map_err(|problems| format!("{}:\n{problems}", path.display()))
+    }
+
+    /// Reads the text of a file. GStreamer has to be initialised, as it is asked for the properties of elements.
+    ///
+    /// # Errors
+    /// Every mistake.
+    pub fn parse(text: &str) -> Result<Self, Problems> {
+        let source = Source { text, problems: RefCell::default() };
+        let (root, errors) = DeTable::parse_recoverable(text);
+        for error in &errors {
+            source.wrong(error.span().unwrap_or(0..0), error.message());
+        }
+        let config = errors.is_empty().then(|| Self::read(Table::new(&source, root.get_ref(), 0..0)));
+        let problems = source.problems.into_inner().sorted();
+        config.filter(|_| problems.is_empty()).ok_or(problems)
+    }
+
+    fn read(mut root: Table) -> Self {
+        let http = root.table("http").and_then(Http::read);
+        let cameras = root.tables("camera");
+        if cameras.is_empty() {
+            root.wrong("there is no camera: [camera.door] begins one that is called door");
+        }
+        let cameras =
+            cameras.into_iter().filter_map(|(name, table)| CameraSettings::read(name, table)).collect();
+        root.no_more();
+        Self { cameras, http }
+    }
+}
+
+impl Http {
+    fn read(mut table: Table) -> Option<Self> {
+        let listen = table.get_with("listen", "an address and a port, as \"127.0.0.1:9100\"", |value| {
+            value.as_str()?.parse().ok()
+        });
+        let hosts = table.get("hosts").unwrap_or_default();
+        let credentials = credentials::read(&mut table);
+        let this = Self { listen: listen.unwrap_or(Self::LISTEN), hosts, credentials };
+        if let Err(reason) = this.check() {
+            table.wrong(reason);
+        }
+        table.no_more();
+        Some(this)
+    }
+
+    /// Where it listens by default.
+    const LISTEN: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 9100);
+
+    /// Nobody elsewhere sees and steers without a password.
+    pub fn check(&self) -> Result<(), String> {
+        if self.listen.ip().is_loopback() || self.credentials.is_some() {
+            return Ok(());
+        }
+        let listen = self.listen;
+        Err(format!(
+            "to listen on {listen}, beyond this machine, it needs `user` and `password-file` in [http]"
+        ))
+    }
+}
+
+#[cfg(test)]
+mod tests;

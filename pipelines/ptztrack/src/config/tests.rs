@@ -1,0 +1,120 @@
+use std::time::Duration;
+
+use super::*;
+
+fn parse(text: &str) -> Result<Config, String> {
+    gst::init().unwrap();
+    Config::parse(text).map_err(|problems| problems.to_string())
+}
+
+#[test]
+fn five_lines_are_enough() {
+    let config =
+        parse("[camera.door]\naddress = \"http://192.168.0.90/\"\nsize = \"640x480\"\nrate = 15\n").unwrap();
+    let [door] = config.cameras.as_slice() else { panic!("{config:?}") };
+    assert_eq!((door.name.as_str(), door.address.as_str()), ("door", "http://192.168.0.90"));
+    assert_eq!((door.rtsp.as_str(), door.codec), ("rtsp://192.168.0.90:554", Codec::Mjpeg));
+    assert_eq!((door.size, door.rate), (Some((640, 480)), Some(15)));
+    assert_eq!(config.http, None);
+}
+
+#[test]
+fn every_mistake_is_named_with_its_line_and_what_is_allowed() {
+    let wrong = parse(
+        "[http]\nlisten = \"everywhere\"\n[camera.door]\ncodec = \"vp9\"\nrate = 0\nsise = \"1x1\"\nuser = \"me\"\n\
+         [camera.door.recording]\nfolder = \"/tmp\"\nsegment = \"10 apples\"\n",
+    )
+    .unwrap_err();
+    let lines: Vec<&str> = wrong.lines().collect();
+    for expected in [
+        "line 2: `listen` must be an address and a port",
+        "line 3: `address` is missing",
+        "line 3: `user` needs one of `password-file`",
+        "line 4: `codec` must be \"mjpeg\", \"mpeg4\" or \"h264\"",
+        "line 5: `rate` must be pictures per second, a whole number from 1 to 60",
+        "line 6: `sise` is not known here; there are: address, rtsp, codec, size",
+        "line 8: a recording needs `keep`",
+        "line 10: `segment` must be a duration",
+    ] {
+        assert!(lines.iter().any(|line| line.starts_with(expected)), "{expected} is not in:\n{wrong}");
+    }
+    assert_eq!(lines.len(), 8, "{wrong}");
+}
+
+#[test]
+fn what_is_no_toml_is_named_with_its_line() {
+    let wrong = parse("[camera.door]\naddress = http://192.168.0.90\n").unwrap_err();
+    assert!(wrong.starts_with("line 2: "), "{wrong}");
+}
+
+#[test]
+fn a_password_does_not_belong_into_the_file() {
+    let wrong =
+        parse("[camera.a]\naddress = \"http://a\"\nuser = \"u\"\npassword = \"secret\"\n").unwrap_err();
+    assert!(
+        wrong.contains("line 4: a password does not belong into this file") && !wrong.contains("secret"),
+        "{wrong}"
+    );
+}
+
+#[test]
+fn passwords_come_from_a_file_and_are_never_printed() {
+    let file = std::env::temp_dir().join(format!("ptztrack-password-{}", std::process::id()));
+    std::fs::write(&file, "xyzzy\n").unwrap();
+    let text = format!("[camera.a]\naddress = \"http://a\"\nuser = \"u\"\npassword-file = {file:?}\n");
+    let config = parse(&text);
+    std::fs::remove_file(&file).unwrap();
+    let config = config.unwrap();
+    assert_eq!(config.cameras[0].credentials.as_ref().unwrap().password.reveal(), "xyzzy");
+    assert!(!format!("{config:?}").contains("xyzzy"));
+    let wrong = parse(&text).unwrap_err();
+    assert!(wrong.starts_with("line 1: no password: ") && wrong.contains("No such file"), "{wrong}");
+}
+
+#[test]
+fn an_address_is_a_camera_and_nothing_more() {
+    for (address, right) in [
+        ("http://10.0.0.1:8080", true),
+        ("https://[2001:db8::1]:443", true),
+        ("http://me:secret@10.0.0.1", false),
+        ("http://10.0.0.1/axis-cgi", false),
+        ("10.0.0.1", false),
+        ("http://", false),
+    ] {
+        assert_eq!(CameraSettings::at("a", address).is_ok(), right, "{address}");
+    }
+}
+
+#[test]
+fn the_page_is_for_this_machine_unless_it_has_a_password() {
+    let camera = "[camera.a]\naddress = \"http://a\"\n";
+    let wrong = parse(&format!("[http]\nlisten = \"0.0.0.0:9100\"\n{camera}")).unwrap_err();
+    assert!(wrong.starts_with("line 1: to listen on 0.0.0.0:9100, beyond this machine"), "{wrong}");
+    assert_eq!(
+        parse(&format!("[http]\n{camera}")).unwrap().http.unwrap().listen.to_string(),
+        "127.0.0.1:9100"
+    );
+}
+
+#[test]
+fn a_recording_is_kept_for_so_long_or_so_much() {
+    let recording =
+        "[camera.a]\naddress = \"http://a\"\n[camera.a.recording]\nfolder = \"/r\"\nkeep-bytes = \"2GB\"\n";
+    let recording = parse(recording).unwrap().cameras[0].recording.clone().unwrap();
+    assert_eq!(recording.keep_bytes, Some(2_000_000_000));
+    assert_eq!((recording.keep, recording.segment), (None, Duration::from_secs(600)));
+}
+
+/// A pipeline is tried by GStreamer itself.
+#[test]
+fn a_pipeline_of_ones_own_must_be_one() {
+    let wrong =
+        parse("[camera.a]\naddress = \"http://a\"\npipeline = \"fakesrc ! nosuchthing\"\n").unwrap_err();
+    assert!(wrong.starts_with("line 3: `pipeline`: no element \"nosuchthing\""), "{wrong}");
+    parse("[camera.a]\naddress = \"http://a\"\npipeline = \"fakesrc ! fakesink\"\n").unwrap();
+}
+
+#[test]
+fn the_example_is_right() {
+    parse(EXAMPLE).unwrap();
+}

@@ -1,0 +1,59 @@
+use std::fmt;
+
+use serde::Serialize;
+
+/// How much somebody should care.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    Info,
+    Warning,
+    Error,
+}
+
+/// Something that happened: a line in the log, and a message to the broker.
+#[derive(Debug, Clone, Serialize)]
+pub struct Event {
+    /// ISO 8601, UTC.
+    pub time: String,
+    pub level: Level,
+    /// Which camera; none where it is the program's own affair.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub camera: Option<String>,
+    /// What, in a word that stays the same.
+    pub event: String,
+    /// In words, for a person.
+    pub detail: String,
+}
+
+impl Event {
+    /// Now.
+    pub fn new(
+        level: Level,
+        camera: Option<&str>,
+        event: impl Into<String>,
+        detail: impl Into<String>,
+    ) -> Self {
+        let now = glib::DateTime::now_utc().and_then(|now| now.format("%Y-%m-%dT%H:%M:%SZ"));
+        Self {
+            time: now.map(String::from).unwrap_or_default(),
+            level,
+            camera: camera.map(str::to_owned),
+            event: event.into(),
+            detail: detail.into(),
+        }
+    }
+}
+
+impl fmt::Display for Event {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let camera = self.camera.as_deref().unwrap_or("ptztrack");
+        let level = match self.level {
+            Level::Info => "",
+            Level::Warning => "warning: ",
+            Level::Error => "error: ",
+        };
+        // One line, whatever the elements have to say.
+        write!(f, "{} {camera}: {level}{}", self.time, self.detail.replace('\n', " "))
+    }
+}

@@ -1,0 +1,74 @@
+use std::io::{IsTerminal, Write, stderr};
+use std::sync::Mutex;
+
+use ptztrack_contract::lock::lock;
+
+use crate::event::{Event, Level};
+
+/// How a line looks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// One readable line each
+    Text,
+    /// One object of JSON each
+    Json,
+}
+
+/// Where everything that happens is told.
+#[derive(Debug)]
+pub struct Log {
+    format: Format,
+    /// What stands below the log in a terminal.
+    status: Mutex<Vec<String>>,
+}
+
+impl Log {
+    pub fn new(format: Format) -> Self {
+        Self { format, status: Mutex::default() }
+    }
+
+    /// Whether there is somebody to show a status to.
+    pub fn has_terminal(&self) -> bool {
+        self.format == Format::Text && stderr().is_terminal()
+    }
+
+    /// Tells it.
+    pub fn tell(&self, event: &Event) {
+        let line = match self.format {
+            Format::Text => event.to_string(),
+            Format::Json => serde_json::to_string(event).unwrap_or_default(),
+        };
+        let status = lock(&self.status);
+        write(&format!("{}{line}\n{}", above(&status), below(&status)));
+    }
+
+    pub fn info(&self, event: &str, detail: impl Into<String>) {
+        self.tell(&Event::new(Level::Info, None, event, detail));
+    }
+
+    pub fn error(&self, event: &str, detail: impl Into<String>) {
+        self.tell(&Event::new(Level::Error, None, event, detail));
+    }
+
+    /// Shows these lines below the log, instead of those before.
+    pub fn show_status(&self, lines: Vec<String>) {
+        let mut status = lock(&self.status);
+        let text = format!("{}{}", above(&status), below(&lines));
+        *status = lines;
+        write(&text);
+    }
+}
+
+/// To the first line of the status, which is wiped.
+fn above(status: &[String]) -> String {
+    if status.is_empty() { String::new() } else { format!("\x1b[{}F\x1b[J", status.len()) }
+}
+
+fn below(status: &[String]) -> String {
+    status.iter().map(|line| format!("{line}\n")).collect()
+}
+
+/// Nobody can be told that standard error cannot be written.
+fn write(text: &str) {
+    let _ = stderr().lock().write_all(text.as_bytes());
+}

@@ -1,0 +1,79 @@
+//! `ptztrack`: follows people with the cameras of a file, unattended. The pipelines are text, the elements are as they are.
+
+mod camera;
+mod cli;
+mod config;
+mod event;
+mod fleet;
+mod http;
+mod log;
+mod service;
+mod shard;
+
+use std::process::ExitCode;
+use std::sync::Arc;
+
+use clap::{CommandFactory, Parser};
+use cli::{Command, Options, Serving};
+use config::{Config, Http};
+use log::Log;
+use service::Origin;
+
+fn main() -> ExitCode {
+    let options = Options::parse();
+    match run(options) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(reason) => {
+            eprintln!("{reason}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: Options) -> Result<(), String> {
+    gst::init().map_err(|err| err.to_string())?;
+    let log = Arc::new(Log::new(options.log_format));
+    match options.command {
+        Command::Run { file, serving, shard, watchdog } => {
+            follow(Origin::File { path: file, shard, watchdog }, &serving, log)
+        }
+        Command::Follow(follow_one) => {
+            let config = Config { cameras: vec![follow_one.camera()?], http: None };
+            follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
+        }
+        Command::Check { file } => {
+            let config = Config::load(&file)?;
+            println!("{} is right; cameras: {}", file.display(), config.cameras.len());
+            Ok(())
+        }
+        Command::Man { folder } => {
+            clap_mangen::generate_to(Options::command(), folder).map_err(|err| err.to_string())
+        }
+        Command::ExampleConfig => {
+            print!("{}", config::EXAMPLE);
+            Ok(())
+        }
+    }
+}
+
+fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), String> {
+    let mut config = origin.read()?;
+    if let Some(listen) = serving.http {
+        let (hosts, credentials) =
+            config.http.map_or((Vec::new(), None), |http| (http.hosts, http.credentials));
+        let http = Http { listen, hosts, credentials };
+        http.check()?;
+        config.http = Some(http);
+    }
+    // Libraries below GStreamer, GIO for one, count on somebody who runs the default main context.
+    std::thread::Builder::new()
+        .name("main-context".to_owned())
+        .spawn(|| glib::MainLoop::new(None, false).run())
+        .map_err(|err| err.to_string())?;
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .map_err(|err| err.to_string())?;
+    runtime.block_on(service::run(origin, config, log))
+}

@@ -1,0 +1,141 @@
+//! What runs until it is told to end.
+
+use std::future::pending;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::time::Duration;
+
+use sd_notify::NotifyState;
+use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::time::{Interval, interval};
+
+use crate::config::{Config, Http};
+use crate::fleet::Fleet;
+use crate::http;
+use crate::log::Log;
+use crate::shard::Shard;
+
+/// Where the cameras come from, and come from again on SIGHUP.
+pub enum Origin {
+    File { path: PathBuf, shard: Option<Shard>, watchdog: Option<String> },
+    CommandLine(Box<Config>),
+}
+
+impl Origin {
+    /// # Errors
+    /// What is wrong with the file.
+    pub fn read(&self) -> Result<Config, String> {
+        match self {
+            Self::File { path, shard, watchdog } => {
+                let mut config = Config::load(path)?;
+                if let Some(socket) = watchdog {
+                    config.cameras.iter_mut().for_each(|camera| camera.use_watchdog(socket));
+                }
+                config.cameras.retain(|camera| shard.is_none_or(|shard| shard.has(camera)));
+                Ok(config)
+            }
+            Self::CommandLine(config) => Ok(config.as_ref().clone()),
+        }
+    }
+}
+
+/// Follows with all cameras until SIGTERM or SIGINT.
+///
+/// # Errors
+/// Why it cannot start; or, of one camera from the command line, why it was given up.
+pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), String> {
+    let said = |err: std::io::Error| err.to_string();
+    let mut ends = [SignalKind::terminate(), SignalKind::interrupt()].map(signal).into_iter();
+    let (Some(terminate), Some(interrupt)) = (ends.next(), ends.next()) else { return Ok(()) };
+    let (mut terminate, mut interrupt) = (terminate.map_err(said)?, interrupt.map_err(said)?);
+    let mut hangup = signal(SignalKind::hangup()).map_err(said)?;
+
+    let fleet = Arc::new(Fleet::new(log.clone()));
+    if let Some(http) = &config.http {
+        serve(http, &fleet, &log).await?;
+    }
+    apply(&fleet, config.clone()).await;
+    notify(&[NotifyState::Ready]);
+    let mut alive = alive();
+    let mut second = interval(Duration::from_secs(1));
+    let mut current = config;
+    loop {
+        tokio::select! {
+            () = end(&mut terminate, &mut interrupt) => break,
+            _ = hangup.recv() => current = read_again(&origin, current, &fleet, &log).await,
+            () = tick(&mut alive) => if fleet.stuck().is_empty() {
+                notify(&[NotifyState::Watchdog]);
+            },
+            _ = second.tick() => {
+                if log.has_terminal() {
+                    log.show_status(fleet.known().iter().map(|known| format!("{}: {}", known.name, known.in_words())).collect());
+                }
+                if matches!(origin, Origin::CommandLine(_)) && fleet.is_over() {
+                    return Err("Nothing is left to follow with.".to_owned());
+                }
+            }
+        }
+    }
+    notify(&[NotifyState::Stopping]);
+    log.show_status(Vec::new());
+    log.info("ending", "ends: every camera is brought to rest");
+    let ending = fleet.clone();
+    let _ = tokio::task::spawn_blocking(move || ending.end()).await;
+    Ok(())
+}
+
+async fn serve(http: &Http, fleet: &Arc<Fleet>, log: &Log) -> Result<(), String> {
+    let address = http::serve(http, fleet.clone())
+        .await
+        .map_err(|err| format!("cannot listen on {}: {err}", http.listen))?;
+    log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
+    Ok(())
+}
+
+async fn apply(fleet: &Arc<Fleet>, config: Config) {
+    let fleet = fleet.clone();
+    // A panic in there has been said.
+    let _ = tokio::task::spawn_blocking(move || fleet.apply(config.cameras)).await;
+}
+
+/// A file with mistakes changes nothing.
+async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &Log) -> Config {
+    match origin.read() {
+        Ok(config) => {
+            log.info("read-again", "the configuration was read again");
+            if config.http != current.http {
+                log.error("restart-needed", "what changed in [http] counts from the next start on");
+            }
+            apply(fleet, config.clone()).await;
+            config
+        }
+        Err(reason) => {
+            log.error("not-read", format!("everything stays as it was: {reason}"));
+            current
+        }
+    }
+}
+
+async fn end(terminate: &mut Signal, interrupt: &mut Signal) {
+    tokio::select! {
+        _ = terminate.recv() => {}
+        _ = interrupt.recv() => {}
+    }
+}
+
+/// How often systemd wants to hear of us, if it does: twice in the time that it waits.
+fn alive() -> Option<Interval> {
+    sd_notify::watchdog_enabled().map(|time| interval(time / 2))
+}
+
+async fn tick(interval: &mut Option<Interval>) {
+    match interval {
+        Some(interval) => drop(interval.tick().await),
+        None => pending().await,
+    }
+}
+
+/// Without systemd there is nobody to tell.
+fn notify(state: &[NotifyState]) {
+    let _ = sd_notify::notify(state);
+}
