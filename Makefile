@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo evaluate evaluate-all soak deny fuzz install packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo evaluate evaluate-all soak deny fuzz install deb test-packages packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -21,8 +21,9 @@ CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 25m
 
-# Both plugins; the watchdog, which is a program of crate `vapix`; and what `pipelines/` are run with.
-PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix --package pipeline-supervisor
+# Both plugins; the watchdog, which is a program of crate `vapix`; what `pipelines/` are run with; and the program `ptztrack`.
+PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix --package pipeline-supervisor \
+	--package ptztrack
 
 CODEC ?= mjpeg
 DURATION ?= 60
@@ -100,6 +101,18 @@ fuzz: packages-build
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)
 install:
 	scripts/install-plugins target/release "$(PREFIX)" "$(DESTDIR)"
+
+## deb: make a Debian package of plugins, watchdog and program for the release that this runs on, in target/deb
+deb: packages-build
+	@scripts/install-packages dpkg-dev
+	$(CARGO) build --release $(PRODUCT)
+	scripts/make-deb target/release target/deb
+
+## test-packages: make it, check it, and install, use and purge it in a bare Debian; as root
+test-packages: deb
+	@scripts/install-packages $(RUN_PACKAGES) lintian mmdebstrap
+	$(CARGO) build --release --package virtual-camera
+	scripts/test-packages "$$(ls target/deb/*.deb | tail -1)" target/release/virtual-camera
 
 packages-build:
 	@scripts/install-packages $(BUILD_PACKAGES)
