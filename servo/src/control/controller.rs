@@ -50,8 +50,7 @@ impl Controller {
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        let scale = self.oscillation.gain_scale();
-        assert!(scale > 0.0 && scale <= 1.0, "a gain scaled by {scale}");
+        self.oscillation.check_invariants();
         let (pan, tilt) = self.speed_steps;
         assert!(pan.unsigned_abs() <= 100 && tilt.unsigned_abs() <= 100, "speed steps {pan}, {tilt}");
     }

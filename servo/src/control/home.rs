@@ -66,10 +66,7 @@ pub struct HomeReturn {
     /// A direction beyond them is not gone to; a preset is the camera's own business.
     limits: SoftLimits,
     timeout: Duration,
-    /// When it was first seen that nobody is there.
-    alone_since: Option<Duration>,
-    /// Pictures are coming until about then: without any it is not known that nobody is there.
-    looking_until: Duration,
+    absence: Option<Absence>,
     /// Nothing was commanded since the camera was met.
     untouched: bool,
     at_start: bool,
@@ -78,10 +75,17 @@ pub struct HomeReturn {
     preset: Option<u32>,
     /// When to ask for it.
     presets_at: Duration,
-    /// The speed step of moves to a position.
-    move_speed: Option<u8>,
     /// It is there, or on its way, or cannot get there.
     settled: bool,
+}
+
+/// That nobody is there.
+#[derive(Debug, Clone, Copy)]
+struct Absence {
+    /// When that was first seen.
+    since: Duration,
+    /// When the next picture is due: without pictures it is not known that nobody is there.
+    until: Duration,
 }
 
 impl HomeReturn {
@@ -103,13 +107,13 @@ impl HomeReturn {
 
     /// A picture came without a target; the next is awaited until `next`.
     pub fn alone(&mut self, now: Duration, next: Duration) {
-        self.alone_since.get_or_insert(now);
-        self.looking_until = next;
+        self.absence =
+            Some(Absence { since: self.absence.map_or(now, |absence| absence.since), until: next });
     }
 
     /// Somebody is there, or it is not known whether anybody is.
     pub fn not_alone(&mut self) {
-        self.alone_since = None;
+        self.absence = None;
     }
 
     /// The camera looks there; the first place is where it started.
@@ -134,7 +138,7 @@ impl HomeReturn {
 
     /// It was stopped, perhaps on its way, and what was seen before is void.
     pub fn interrupt(&mut self) {
-        self.alone_since = None;
+        self.absence = None;
         self.settled &= self.home == Some(Home::Start) && self.untouched;
     }
 
@@ -154,11 +158,6 @@ impl HomeReturn {
         self.presets_at = at;
     }
 
-    /// The camera told how fast its moves to a position are.
-    pub fn told_move_speed(&mut self, step: u8) {
-        self.move_speed = Some(step);
-    }
-
     /// The camera told its presets; returns the name where it has none of that name.
     pub fn told_presets(&mut self, presets: &Presets) -> Option<String> {
         let Some(Home::Preset(name)) = &self.home else { return None };
@@ -172,32 +171,38 @@ impl HomeReturn {
         self.told_presets(&Presets::default())
     }
 
-    /// The command to go home, where it is time.
-    pub fn due(&self, now: Duration) -> Option<Actuation> {
+    /// The command to go home, at this speed step, if it is time for it.
+    pub fn due(&self, now: Duration, speed: u8) -> Option<Actuation> {
         let wait = if self.at_start { Duration::ZERO } else { self.timeout };
-        let alone = self.alone_since.is_some_and(|since| since + wait <= now) && now <= self.looking_until;
-        if self.settled || !alone { None } else { self.actuation() }
+        let alone = self.absence.is_some_and(|absence| absence.since + wait <= now && now <= absence.until);
+        if self.settled || !alone { None } else { self.actuation(speed) }
     }
 
-    /// Whether this command leads home.
-    pub fn leads(&self, actuation: &Actuation) -> bool {
-        self.actuation().as_ref() == Some(actuation)
+    /// Whether this command, of that speed step, leads home.
+    pub fn leads(&self, actuation: &Actuation, speed: u8) -> bool {
+        self.actuation(speed).as_ref() == Some(actuation)
     }
 
-    fn actuation(&self) -> Option<Actuation> {
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(!self.at_start || self.untouched, "it goes home for the start after a command");
+        assert!(self.preset.is_none() || matches!(self.home, Some(Home::Preset(_))), "a preset of no name");
+    }
+
+    fn actuation(&self, speed: u8) -> Option<Actuation> {
         match self.home.as_ref()? {
-            Home::Start => self.start.and_then(|start| self.go_to(start)),
-            Home::Position(position) => self.go_to(*position),
+            Home::Start => self.start.and_then(|start| self.go_to(start, speed)),
+            Home::Position(position) => self.go_to(*position, speed),
             Home::Preset(_) => self.preset.map(|number| Actuation::Preset { number }),
         }
     }
 
-    fn go_to(&self, position: Position) -> Option<Actuation> {
+    fn go_to(&self, position: Position, speed: u8) -> Option<Actuation> {
         let place = self.limits.nearest(PanTilt::new(position.pan_deg?, position.tilt_deg?));
         Some(Actuation::Absolute {
             pan_deg: place.pan,
             tilt_deg: place.tilt,
-            speed: self.move_speed.unwrap_or(Actuation::FULL_SPEED),
+            speed,
             // Within 1 to 9999.
             zoom: position
                 .zoom_steps
@@ -228,7 +233,7 @@ mod tests {
         (from..to)
             .filter_map(|second| {
                 home_return.alone(s(second), s(second + 1));
-                let command = home_return.due(s(second))?;
+                let command = home_return.due(s(second), Actuation::FULL_SPEED)?;
                 home_return.settled();
                 Some((second, command))
             })
@@ -256,7 +261,7 @@ mod tests {
         assert_eq!(alone(&mut home_return, 3, 60), [(13, there)]);
         home_return.not_alone();
         home_return.strayed();
-        assert_eq!(home_return.due(s(61)), None);
+        assert_eq!(home_return.due(s(61), Actuation::FULL_SPEED), None);
         assert_eq!(alone(&mut home_return, 70, 100), [(80, there)]);
         home_return.strayed();
         assert_eq!(alone(&mut home_return, 100, 110), [(100, there)], "somebody else took it away");
@@ -266,7 +271,7 @@ mod tests {
     fn without_pictures_nobody_knows_that_nobody_is_there() {
         let mut home_return = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
         home_return.alone(s(0), s(1));
-        assert_eq!(home_return.due(s(20)), None);
+        assert_eq!(home_return.due(s(20), Actuation::FULL_SPEED), None);
     }
 
     #[test]

@@ -24,11 +24,16 @@ impl Default for OscillationGuard {
 }
 
 impl OscillationGuard {
+    /// The gain is scaled by this at each oscillation ...
     const LOWER: f64 = 0.6;
+
+    /// ... down to this part of what was set: slow, but still following.
     const LOWEST: f64 = 0.2;
+
+    /// It is scaled by this, up to what was set, ...
     const RAISE: f64 = 1.2;
 
-    /// After so long without an oscillation the gain is raised a little.
+    /// ... after each such time without an oscillation.
     const CALM: Duration = Duration::from_secs(30);
 
     /// Takes the error of a picture, and the target's own rate, where the background tells that; what each axis
@@ -59,6 +64,15 @@ impl OscillationGuard {
     /// What part of the wanted rate is to be commanded, up to 1.
     pub fn gain_scale(&self) -> f64 {
         self.gain_scale
+    }
+
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        let scale = self.gain_scale;
+        assert!((Self::LOWEST..=1.0).contains(&scale), "a gain scaled by {scale}");
+        for axis in [&self.pan, &self.tilt] {
+            assert!(axis.steady < HalfCycles::ENOUGH, "{} half-cycles and no lower gain", axis.steady);
+        }
     }
 
     /// Another target: what was seen so far tells nothing of it.

@@ -67,6 +67,13 @@ impl PointToPoint {
         self.lasted + delays.sum()
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        if let Phase::UnderWay { since, seen: Some((_, at)) } = &self.phase {
+            assert!(at >= since, "seen under way at {at:?}, begun at {since:?}");
+        }
+    }
+
     /// A move that was sent then was accepted.
     pub fn begin(&mut self, sent: Duration) {
         self.phase = Phase::UnderWay { since: sent, seen: None };

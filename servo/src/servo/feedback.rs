@@ -27,7 +27,7 @@ impl Servo {
         if actuation.is_rest() {
             self.controller.speed_steps = (0, 0);
         }
-        if self.home.leads(actuation) {
+        if self.leads_home(actuation) {
             self.home.settled();
         } else if !actuation.is_rest() {
             self.home.strayed();
@@ -84,9 +84,6 @@ impl Servo {
 
     /// The camera told what it can. What was learned by other assumptions is void; what is told once more is no other.
     pub fn told_capabilities(&mut self, capabilities: Capabilities) {
-        if let Some(step) = capabilities.move_speed {
-            self.home.told_move_speed(step);
-        }
         let before = mem::replace(&mut self.camera.capabilities, capabilities);
         let now = &self.camera.capabilities;
         let wide_deg = self.settings.fov_deg;

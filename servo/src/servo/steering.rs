@@ -106,8 +106,7 @@ impl Servo {
                 centre(place, measurement.size, jump.map(|jump| jump.factor))
             }
             _ => position.map_or(Actuation::Continue, |position| {
-                let speed = self.camera.capabilities.move_speed;
-                absolute(position + turn, speed, jump.map(|jump| jump.step))
+                absolute(position + turn, self.move_speed(), jump.map(|jump| jump.step))
             }),
         }
     }
@@ -128,6 +127,16 @@ impl Servo {
         self.way_home(actuator, now).unwrap_or(Actuation::Rest)
     }
 
+    /// Whether this command takes the camera home.
+    pub fn leads_home(&self, actuation: &Actuation) -> bool {
+        self.home.leads(actuation, self.move_speed())
+    }
+
+    /// Speed step of moves to a position.
+    fn move_speed(&self) -> u8 {
+        self.camera.capabilities.move_speed.unwrap_or(Actuation::FULL_SPEED)
+    }
+
     /// Whether the camera is on its way home, or is to go there.
     pub fn is_homeward(&self, actuator: &ActuatorStatus, now: Duration) -> bool {
         self.moves.under_way() && self.home.is_settled() || self.way_home(actuator, now).is_some()
@@ -137,7 +146,7 @@ impl Servo {
     /// move, and has to be ended first.
     fn way_home(&self, actuator: &ActuatorStatus, now: Duration) -> Option<Actuation> {
         let zooms = self.zoom.is_moving(now) || actuator.in_doubt;
-        self.home.due(now).filter(|_| actuator.access == Access::Ours && !zooms)
+        self.home.due(now, self.move_speed()).filter(|_| actuator.access == Access::Ours && !zooms)
     }
 }
 
@@ -158,11 +167,11 @@ fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Ac
 }
 
 /// The actuation to look there, the short way round.
-fn absolute(position: PanTilt, speed: Option<u8>, zoom: Option<u16>) -> Actuation {
+fn absolute(position: PanTilt, speed: u8, zoom: Option<u16>) -> Actuation {
     Actuation::Absolute {
         pan_deg: around_deg(0.0, position.pan),
         tilt_deg: position.tilt.clamp(-180.0, 180.0),
-        speed: speed.unwrap_or(Actuation::FULL_SPEED),
+        speed,
         zoom,
     }
 }

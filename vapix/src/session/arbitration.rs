@@ -91,6 +91,13 @@ impl Arbitration {
         moves || zooms
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        self.watch.check_invariants();
+        self.queue.check_invariants();
+        assert!(self.met || self.found.is_none(), "found where it was before it was met");
+    }
+
     /// We moved the camera, or may have, in a way that nobody can foresee.
     pub fn excuse(&mut self, now: Duration) {
         self.watch.excuse(now);

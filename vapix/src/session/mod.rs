@@ -179,7 +179,7 @@ impl Session {
         self.connection.check_invariants();
         self.discovery.check_invariants();
         self.scheduler.check_invariants();
-        self.arbitration.queue.check_invariants();
+        self.arbitration.check_invariants();
         self.modes.check_invariants();
     }
 

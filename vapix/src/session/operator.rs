@@ -127,6 +127,11 @@ impl OperatorDetector {
         self.suspects = false;
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(!self.suspects || self.armed && self.place.is_some(), "it suspects somebody by no place");
+    }
+
     /// Whether pan or tilt turned otherwise than commanded when last seen.
     pub fn turns_otherwise(&self) -> bool {
         self.turns_otherwise

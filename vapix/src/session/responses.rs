@@ -72,7 +72,7 @@ impl Session {
         if matches!(command, Command::Velocity { .. }) && self.refused_freedom(command, servo) {
             return true;
         }
-        if servo.home().leads(&command.actuation()) {
+        if servo.leads_home(&command.actuation()) {
             servo.home().settled();
             self.events.push(SessionEvent::HomeRefused(err.clone()));
             return true;
@@ -123,7 +123,7 @@ impl Session {
         self.arbitration.commanded();
         self.arbitration.queue.obeyed();
         let actuation = command.actuation();
-        let homeward = servo.home().leads(&actuation);
+        let homeward = servo.leads_home(&actuation);
         servo.accepted(&actuation, sent, now);
         if actuation.is_point_to_point() {
             self.arbitration.excuse(now);
