@@ -6,8 +6,6 @@ use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
-use ptztrack_contract::{BufferMeta, TargetMeta};
-use servo::Measurement;
 
 use super::camera_task::{self, CameraTask, Event, Predecessor};
 use super::clock::Clock;
@@ -17,7 +15,7 @@ use super::picture::Picture;
 use super::properties::Property;
 use super::settings::{Settings, environment};
 use super::statistics::Statistics;
-use super::stream::{Fault, Stream};
+use super::stream::Stream;
 use super::watchdog::watchdog;
 use crate::control_loop::Status;
 use crate::lock::lock;
@@ -48,7 +46,7 @@ pub struct VapixPtzSink {
     pub(super) task: Mutex<Option<CameraTask>>,
     /// Of the camera tasks so far, that may still be about to stop their cameras.
     predecessors: Mutex<Vec<Predecessor>>,
-    stream: Mutex<Stream>,
+    pub(super) stream: Mutex<Stream>,
     waiting: Mutex<Waiting>,
     /// What upstream was not told yet; never pushed by the camera task, which would wait for whoever hears it.
     pending_status: Mutex<PendingStatus>,
@@ -195,17 +193,7 @@ impl BaseSinkImpl for VapixPtzSink {
             self.settle();
             self.with_task(|task| task.mailbox().hold_at(time));
         }
-        let target = TargetMeta::of(buffer);
-        self.miss_meta(target.is_some());
-        match target {
-            Some(Ok(target)) => self.see(&target, buffer),
-            Some(Err(err)) => self.warn(Fault::UnreadableMeta, || {
-                format!(
-                    "a target meta cannot be read ({err}); check that all plugins are of the same version"
-                )
-            }),
-            None => {}
-        }
+        self.measure(buffer);
         if step.is_some() {
             self.settle();
         }
@@ -287,37 +275,6 @@ impl VapixPtzSink {
         drop(task);
     }
 
-    /// Leaves the target for the camera task.
-    fn see(&self, target: &TargetMeta, buffer: &gst::BufferRef) {
-        let Some(picture) = lock(&self.stream).picture else { return };
-        if !picture.shows(target) || buffer.meta::<gst_video::VideoCropMeta>().is_some() {
-            return self.warn(Fault::OtherPicture, || {
-                "the picture has been cropped, or its shape changed, since the target was found in it: the camera cannot be steered by it. Put `vapixptzsink` in front of the element that does that, or have it done before the tracker".to_owned()
-            });
-        }
-        let age = self.age(target, buffer.pts());
-        let stale_timeout = lock(&self.settings).servo.stale_timeout;
-        if age > stale_timeout {
-            return self.warn(Fault::OldPictures, || {
-                format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
-            });
-        }
-        self.with_task(|task| {
-            let mailbox = task.mailbox();
-            mailbox.see(Measurement {
-                visibility: target.state.into(),
-                id: target.id,
-                centroid: target.centroid,
-                bounds: target.bounds,
-                velocity: target.velocity,
-                ego_velocity: target.ego_velocity,
-                size: picture.size,
-                aspect: picture.aspect,
-                taken_at: mailbox.now().saturating_sub(age),
-            });
-        });
-    }
-
     /// The time of a step, where time goes by the stream's.
     fn lockstep_time(&self, pts: Option<gst::ClockTime>) -> Option<Duration> {
         lock(&self.stream).lockstep.then(|| self.running_time(pts)).flatten().map(Duration::from)
@@ -336,22 +293,8 @@ impl VapixPtzSink {
         let _ = settled.recv();
     }
 
-    fn running_time(&self, pts: Option<gst::ClockTime>) -> Option<gst::ClockTime> {
+    pub(super) fn running_time(&self, pts: Option<gst::ClockTime>) -> Option<gst::ClockTime> {
         self.obj().segment().downcast_ref::<gst::ClockTime>().and_then(|segment| segment.to_running_time(pts))
-    }
-
-    /// How long ago the picture was taken, as far as its timestamp tells.
-    fn age(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) -> Duration {
-        if lock(&self.stream).lockstep {
-            return Duration::ZERO;
-        }
-        let captured = target.capture_time.or_else(|| self.running_time(pts));
-        let Some((now, captured)) = self.obj().current_running_time().zip(captured) else {
-            return Duration::ZERO;
-        };
-        let nanoseconds = |time: gst::ClockTime| i64::try_from(time.nseconds()).unwrap_or(i64::MAX);
-        let arrived = self.time();
-        lock(&self.stream).age.of(nanoseconds(captured), nanoseconds(now), arrived)
     }
 
     fn rest(&self) {
@@ -368,26 +311,9 @@ impl VapixPtzSink {
         }
     }
 
-    /// Warns where no buffer has had a target meta for long.
-    fn miss_meta(&self, has_meta: bool) {
-        let now = self.time();
-        if lock(&self.stream).lacks_meta(has_meta, now) {
-            self.warn(Fault::NoMeta, || {
-                "no buffer has had a PtzTargetMeta for a second: there is no target to follow. Put `lkfeaturetrack` in front, with no element in between that drops metas".to_owned()
-            });
-        }
-    }
-
     /// The camera task's.
-    fn time(&self) -> Duration {
+    pub(super) fn time(&self) -> Duration {
         lock(&self.task).as_ref().map_or(Duration::ZERO, |task| task.mailbox().now())
-    }
-
-    /// Warns once a stream.
-    fn warn(&self, fault: Fault, text: impl FnOnce() -> String) {
-        if lock(&self.stream).is_news(fault) {
-            gst::element_imp_warning!(self, gst::StreamError::Format, ("{}", text()));
-        }
     }
 
     /// Tells upstream what the camera does, if that has changed. Whoever comes while somebody else does leaves it to him,

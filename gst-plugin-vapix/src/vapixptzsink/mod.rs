@@ -102,6 +102,7 @@ mod camera_task;
 mod clock;
 mod events;
 mod imp;
+mod measure;
 mod messages;
 mod outbox;
 mod picture;
