@@ -6,59 +6,57 @@
 //! (thesis 3.6). Takes the video with the target meta that `lkfeaturetrack` attaches; it never reads the
 //! pixels, so any raw video in any memory will do.
 //!
-//! The streaming thread never waits for the network: it leaves the newest target for a task that talks to
-//! the camera, with one request in flight and at most `max-rate` commands a second. All durations are nanoseconds. `sync` and `async` are off by default: a late target is worth
-//! nothing, and a pipeline must not wait for this sink to preroll.
+//! The streaming thread never waits for the network: it leaves the newest target for a task that talks to the camera, with
+//! one request in flight and at most `max-rate` commands a second. All durations are nanoseconds. `sync` and `async` are
+//! off by default: a late target is worth nothing, and a pipeline must not wait for this sink to preroll.
 //!
-//! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a
-//! flush, when leaving PLAYING, when the element goes to READY or NULL, and when it is disposed of. A
-//! stop is repeated until the camera says yes; EOS waits for that at most 1 s, leaving PLAYING not at all,
-//! READY until 2.5 s after leaving PLAYING: a bin pauses all its sinks first, so many take no longer than one. In PAUSED the camera is asked, never moved; in READY nothing is connected.
+//! The camera is stopped when the target is lost, hidden or not seen for `stale-timeout`, on EOS, on a flush, when leaving
+//! PLAYING, when the element goes to READY or NULL, and when it is disposed of. A stop is repeated until the camera confirms
+//! it. EOS waits for that for up to 1 s, leaving PLAYING does not wait, and READY waits until 2.5 s after PLAYING was left: a
+//! bin pauses all its sinks first, so many take no longer than one. In PAUSED the camera is queried but never moved; in
+//! READY nothing is connected.
 //!
-//! Whatever this process was about to do it cannot do once it is dead: with `dead-man` the process `vapix-watchdog` holds a
-//! lease for as long as the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is
-//! started with the first move. `stats` has it as `dead-man`; where there is none, one warning says so.
+//! A process that has died can stop nothing. With `dead-man`, another process, `vapix-watchdog`, holds a lease for as long as
+//! the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is started with the
+//! first move. `stats` shows its state as `dead-man`; if it cannot be started, one warning says so.
 //!
-//! The password is never sent in clear: a camera is answered by Digest, or over https by Basic if it never asked for Digest.
-//! `auth=basic` allows Basic over http too.
+//! The password is never sent in clear: it is used for Digest, or, over https, for Basic if the camera has never asked for
+//! Digest. `auth=basic` allows Basic over http too.
 //!
-//! User and password are taken from `user` and `password`, from `location`
-//! (`http://user:password@host`, where they are taken out at once), or from the environment variables
-//! `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process lists and of the parser's log.
-//! `user`, `password` and everything about the servo can be changed while playing; `location`,
-//! `camera`, `auth`, `timeout`, `ca-file`, `insecure` and `lockstep` count from the next READY to PAUSED on.
+//! User and password are taken from `user` and `password`, from `location` (`http://user:password@host`; they are removed
+//! from it at once), or from the environment variables `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process
+//! lists and of the parser's log. `user`, `password` and everything about the servo can be changed while playing;
+//! `location`, `camera`, `auth`, `timeout`, `ca-file`, `insecure` and `lockstep` take effect at the next change from READY
+//! to PAUSED.
 //!
-//! With `lockstep` the servo's time is the stream's running time and stands still between buffers: each
-//! buffer waits until the camera has answered what is due at its time. A simulated camera that moves on only
-//! then gives the same run every time, at any speed. It is for simulations: a camera that does not answer
-//! holds the stream for up to `timeout`.
+//! With `lockstep` the servo's time is the stream's running time and stands still between buffers: each buffer waits until
+//! the camera has answered what is due at its time. A simulated camera that advances only then gives the same run every
+//! time, at any speed. It is for simulations: a camera that does not answer holds the stream for up to `timeout`.
 //!
 //! ## What it learns
-//! What the camera tells of itself (field of view, zoom, speed table, limits) is used. The rest is learned while
-//! a target is followed, from how the background moves in the picture against what was commanded: `latency`,
-//! `field-of-view`, and `camera-speed` with `speed-curve` are only the starting point; `learn=false` keeps them as set.
-//! What is known by now is in `stats`: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the
-//! steps 1 to 100), and the camera's own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What
-//! the camera told of itself is one line of INFO.
-//! A loop that oscillates all the same is calmed by lowering the gain, with a warning.
+//! What the camera reports about itself (field of view, zoom, speed table, limits) is used. The rest is learned while a
+//! target is followed, by comparing the background's motion in the picture with the commands: `latency`, `field-of-view`,
+//! `camera-speed` and `speed-curve` are only the starting point; `learn=false` keeps them as set. `stats` has the current
+//! values: `latency` (ns), `field-of-view` (degrees), `speeds` (degrees per second of the steps 1 to 100), and the camera's
+//! own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What the camera reported is logged in one line
+//! at level INFO. If the loop oscillates, the gain is lowered, with a warning.
 //!
 //! ## Between tracker and camera
-//! A picture may be scaled between the tracker and this sink, where the target's place stays what it was. One that is
-//! cropped or gets borders is refused, with a warning. One that is flipped or turned (`videoflip`) looks just like any
-//! other: put that element in front of the tracker, and see the next section.
+//! A picture may be scaled between the tracker and this sink. One that is cropped or gets borders is refused, with a
+//! warning. One that is flipped or turned (`videoflip`) cannot be told from any other: put that element in front of the
+//! tracker, and see the next section.
 //!
 //! ## Mounting
 //! `rotation` is for pictures that arrive turned clockwise; `invert-pan` and `invert-tilt` are for a camera that hangs, or
 //! whose axis turns the picture the other way. Positions, limits and `home` stay those that the camera reports.
 //!
 //! ## Zoom and limits
-//! With `auto-zoom` the target is kept `target-height` of the picture tall, and the zoom goes out where the target is
-//! not seen well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does,
-//! within what the camera can; an operator may go beyond them. Zoom steps are those of the lens, 1 to 9999: digital
-//! zoom, beyond, shows no more, and is not used. As no camera tells how much it magnifies, the view is taken to be as wide
-//! as at the lens' end where an operator uses it. In `mode=centre` the place in the picture is chosen
-//! within them, as well as field of view and position are known. A pair of which the lower is the higher is refused
-//! with a warning, from READY to PAUSED and while playing, and stays as it was.
+//! With `auto-zoom` the target's height is kept at `target-height`, and the camera zooms out when the target is not seen
+//! well. `pan-min`, `pan-max`, `tilt-min`, `tilt-max`, `zoom-min` and `zoom-max` bound what the servo does, within what the
+//! camera can do; an operator may go beyond them. Zoom steps are those of the lens, 1 to 9999. Digital zoom, beyond that,
+//! shows no more detail and is not used; since no camera reports how much it magnifies, the field of view is assumed to be
+//! that at the long end of the lens while an operator uses it. In `mode=centre` the limits are kept as exactly as field of
+//! view and position are known. A minimum above its maximum is refused with a warning, and the pair keeps its old values.
 //!
 //! ## Modes
 //! A camera that does not support `mode`, by its parameters or because it refuses such commands while it answers
@@ -66,32 +64,31 @@
 //! `mode`; the property stays as it is. A refused mode is retried every minute, and when `mode` changes.
 //!
 //! ## Home
-//! Without a target for `home-timeout` the camera goes to `home`, where one is set: `pan,tilt` or `pan,tilt,zoom`, the
-//! name of a preset, or `start`, where it looked when it connected; with `home-at-start` on start-up too.
-//! All but a preset is kept within the limits that are set.
+//! After `home-timeout` without a target the camera goes to `home`, if that is set: `pan,tilt` or `pan,tilt,zoom`, the
+//! name of a preset, or `start`, where it looked when it connected. With `home-at-start` it also goes there on start-up.
+//! `home` is kept within the limits, unless it is a preset.
 //!
 //! ## Operators
-//! An operator comes first. When the camera's position contradicts what it was told, or its control queue says
-//! that it is somebody else's turn, steering pauses until nobody has moved it for `override-timeout`, or until it is
-//! our turn. Only a turn of more than 1.5 degrees that no command explains counts; zooming by hand counts only with
-//! `auto-zoom`. A camera that is found moving at the start is stopped: whoever started the move may be gone.
+//! An operator comes first. When the camera's position contradicts the commands, or its control queue says that it is
+//! somebody else's turn, steering pauses until nobody has moved it for `override-timeout`, or until it is our turn. Only a
+//! turn of more than 1.5 degrees that no command explains counts; zooming by hand counts only with `auto-zoom`. A camera
+//! that is already moving when the connection is made is stopped, as whoever started the move may be gone.
 //!
 //! ## Messages and events
-//! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`,
-//! `at-limit`, `taken-over`, `resumed`, `moving`, `stopped`; a fault is one warning at its begin and one `connected` at
-//! its end, and one that comes and goes is said no more often than every 10 s.
-//! Upstream events `ptztrack-camera-state` tell detector and tracker what the camera does.
+//! Element messages `ptztrack-camera` with `change` = `connected`, `disconnected`, `refused`, `at-limit`, `taken-over`,
+//! `resumed`, `moving`, `stopped`. A fault is one warning when it begins and one `connected` when it ends; one that comes
+//! and goes is reported at most every 10 s. Upstream events `ptztrack-camera-state` tell detector and tracker what the
+//! camera does.
 //!
 //! ## Example pipelines
 //! ```sh
 //! gst-launch-1.0 videotestsrc num-buffers=25 ! video/x-raw,width=320,height=240 ! vapixptzsink location=http://192.168.0.90 user=root password=pass
 //! ```
-//! A camera that is spoken to over HTTPS with a certificate of its own making, which was saved in a file, and never
-//! faster than 30 degrees a second:
+//! A camera with a self-signed certificate, saved in a file, over HTTPS; never faster than 30 degrees a second:
 //! ```sh
 //! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=https://192.168.0.90 ca-file=camera.pem max-speed=30 mode=velocity
 //! ```
-//! One that goes back to its preset "Door" after 20 s without anybody, zooms, and never looks to the left of 60 degrees:
+//! A camera that returns to its preset "Door" after 20 s without a target, zooms, and never pans farther left than 60 degrees:
 //! ```sh
 //! gst-launch-1.0 videotestsrc num-buffers=25 ! vapixptzsink location=http://192.168.0.90 home=Door home-timeout=20000000000 auto-zoom=true target-height=0.5 pan-min=-60
 //! ```
@@ -125,24 +122,24 @@ pub enum Mode {
     #[enum_value(name = "From position to position (pan, tilt)", nick = "absolute")]
     Absolute,
     /// `center`
-    #[enum_value(name = "By pixels, the camera works out the angles (center)", nick = "centre")]
+    #[enum_value(name = "By pixels; the camera works out the angles (center)", nick = "centre")]
     Centre,
 }
 
-/// How user and password may be proved to the camera.
+/// How to authenticate to the camera.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
 #[enum_type(name = "GstVapixPtzSinkAuthentication")]
 pub enum Authentication {
     /// Never in clear.
     #[default]
     #[enum_value(
-        name = "By Digest, or over https by Basic where the camera never asked for Digest",
+        name = "Digest; over https also Basic, if the camera has never asked for Digest",
         nick = "auto"
     )]
     Auto,
     /// In clear too.
     #[enum_value(
-        name = "Also by Basic over http: anybody on the network path can then read the password",
+        name = "Basic over http too: anybody on the network path can then read the password",
         nick = "basic"
     )]
     Basic,
