@@ -56,7 +56,7 @@ impl SceneModel {
         self.picture.fill(picture, size);
         let foreground = self.background.foreground();
         self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), hint)?;
-        self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed)?;
+        self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed);
         Ok(self.view())
     }
 

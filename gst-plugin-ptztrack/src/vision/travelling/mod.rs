@@ -11,9 +11,6 @@ mod warp;
 
 use std::time::Duration;
 
-use opencv::core::{self, Mat};
-use opencv::imgproc;
-use opencv::prelude::*;
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
@@ -83,17 +80,12 @@ impl TravellingBackground {
 
     /// Tells foreground from background in the next picture, to which the camera moved by `motion`, then learns
     /// from it. Where `motion` is not known, the camera may still rest, if the picture shows what is known.
-    pub fn update(
-        &mut self,
-        picture: &Reduced,
-        motion: Option<&CameraMotion>,
-        elapsed: Duration,
-    ) -> opencv::Result<()> {
+    pub fn update(&mut self, picture: &Reduced, motion: Option<&CameraMotion>, elapsed: Duration) {
         if picture.size() != self.size {
             *self = Self { size: picture.size(), ..Self::default() };
         }
         if self.size.0 == 0 || self.size.1 == 0 {
-            return Ok(());
+            return;
         }
         if self.model.size == (0, 0) {
             self.start();
@@ -107,12 +99,12 @@ impl TravellingBackground {
             &self.model.age,
             self.forth.spans(),
         ));
-        self.compare(how)?;
+        self.compare(how);
         let stale = self.changed() > if motion.is_some() { NEW_PICTURE } else { UNSEEN_MOTION };
         if stale {
             self.start();
             self.lay(picture);
-            self.compare(how)?;
+            self.compare(how);
         }
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
@@ -122,7 +114,6 @@ impl TravellingBackground {
             |x: usize, y: usize| held.is_some_and(|held| held.contains(Point { x: x as f64, y: y as f64 }));
         self.model.learn(&self.sampled, self.forth.spans(), how, holds);
         self.show();
-        Ok(())
     }
 
     /// A canvas of which nothing is known.
@@ -193,24 +184,9 @@ impl TravellingBackground {
     }
 
     /// Holds the picture on the canvas against what is known.
-    fn compare(&mut self, how: Comparison) -> opencv::Result<()> {
-        let model = &mut self.model;
-        model
-            .shown
-            .iter_mut()
-            .zip(&model.luma)
-            .for_each(|(shown, mean)| *shown = (mean.saturating_add(128) >> 8) as u8);
-        let shown = Luma::packed(&model.shown, model.size.0);
-        let around = imgproc::get_structuring_element_def(imgproc::MORPH_RECT, core::Size::new(3, 3))?;
-        let (mut low, mut high) = (Mat::default(), Mat::default());
-        shown.with_mat(|shown| {
-            imgproc::erode_def(shown, &mut low, &around)?;
-            imgproc::dilate_def(shown, &mut high, &around)
-        })?;
-        model.low.copy_from_slice(low.data_bytes()?);
-        model.high.copy_from_slice(high.data_bytes()?);
-        model.compare(&self.sampled, self.forth.spans(), how, &self.noise);
-        Ok(())
+    fn compare(&mut self, how: Comparison) {
+        self.model.survey(self.forth.spans());
+        self.model.compare(&self.sampled, self.forth.spans(), how, &self.noise);
     }
 
     /// Which fraction of what is known is foreground.
@@ -218,8 +194,8 @@ impl TravellingBackground {
         let (mut known, mut changed) = (1_u32, 0_u32);
         for (y, &(start, end)) in self.forth.spans().iter().enumerate() {
             let row = &self.model.likelihood[y * self.model.size.0..][start..end];
-            known += row.iter().map(|&likelihood| u32::from(likelihood != UNKNOWN)).sum::<u32>();
-            changed += row.iter().map(|&likelihood| u32::from(likelihood > UNKNOWN)).sum::<u32>();
+            let (some, foreground) = rows::count(row);
+            (known, changed) = (known + some, changed + foreground);
         }
         f64::from(changed) / f64::from(known)
     }

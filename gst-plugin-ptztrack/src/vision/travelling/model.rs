@@ -8,7 +8,7 @@ use super::warp::Warp;
 const UNSEEN: u8 = 0;
 /// From this age (pictures) on, a pixel is known: before, who can tell what is foreground?
 pub(super) const KNOWN: u8 = 4;
-const MAX_AGE: u8 = 250;
+pub(super) const MAX_AGE: u8 = 250;
 /// Likelihood of a pixel of which nothing is known.
 pub(super) const UNKNOWN: u8 = 128;
 /// Pixels of each row that the noise is learned from: one in so many.
@@ -59,11 +59,12 @@ pub(super) struct Model {
     pub waited: Vec<u8>,
     /// The mean's luma in whole grey levels, and the range of it within one pixel.
     pub shown: Vec<u8>,
-    pub low: Vec<u8>,
-    pub high: Vec<u8>,
+    range: Vec<u8>,
     pub likelihood: Vec<u8>,
-    /// Mean absolute deviation of one row, kept as memory.
+    /// Deviations, weights and extremes of one row, kept as memory.
     row: Vec<f32>,
+    alphas: Vec<u16>,
+    extremes: [Vec<u8>; 2],
 }
 
 impl Model {
@@ -78,10 +79,11 @@ impl Model {
             candidate: [vec![0; count], vec![0; count], vec![0; count]],
             waited: vec![0; count],
             shown: vec![0; count],
-            low: vec![0; count],
-            high: vec![0; count],
+            range: vec![0; count],
             likelihood: vec![UNKNOWN; count],
             row: Vec::new(),
+            alphas: Vec::new(),
+            extremes: Default::default(),
         }
     }
 
@@ -117,6 +119,18 @@ impl Model {
         }
     }
 
+    /// Leaves the mean in whole grey levels, and its range within one pixel in the rows that `spans` say are compared.
+    pub fn survey(&mut self, spans: &[(usize, usize)]) {
+        rows::whole(&mut self.shown, &self.luma);
+        let (width, last) = (self.size.0, self.size.1.saturating_sub(1));
+        let [least, most] = &mut self.extremes;
+        for (y, _) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
+            let around =
+                [y.saturating_sub(1), y, (y + 1).min(last)].map(|y| &self.shown[y * width..][..width]);
+            rows::ranges(&mut self.range[y * width..][..width], around, least, most);
+        }
+    }
+
     /// Holds the picture against the model where `spans` say that it covers it (3.3, with the deviation measured
     /// in units of what noise makes): leaves the likelihood of foreground.
     pub fn compare(&mut self, picture: &Sampled, spans: &[(usize, usize)], how: Comparison, noise: &Noise) {
@@ -135,8 +149,7 @@ impl Model {
                 mean: &self.luma[row.clone()],
                 spread: &self.spread[row.clone()],
                 age: &self.age[row.clone()],
-                low: &self.low[row.clone()],
-                high: &self.high[row.clone()],
+                range: &self.range[row.clone()],
             };
             let out = &mut self.likelihood[row.clone()];
             rows::likelihoods(out, &picture.luma[row], &self.row, known, how.misplaced, line);
@@ -148,7 +161,7 @@ impl Model {
         for (y, &(start, end)) in spans.iter().enumerate() {
             for x in (start..end).skip(y % SAMPLING).step_by(SAMPLING) {
                 let at = y * self.size.0 + x;
-                let flat = self.high[at].saturating_sub(self.low[at]) <= FLAT;
+                let flat = self.range[at] <= FLAT;
                 if self.likelihood[at] < UNKNOWN && self.age[at] > 2 * KNOWN && flat {
                     let off = |seen: u8, mean: u16| (f32::from(seen) - f32::from(mean) / 256.0).abs();
                     let luma = off(picture.luma[at], self.luma[at]);
@@ -172,20 +185,12 @@ impl Model {
         how: Comparison,
         held: impl Fn(usize, usize) -> bool,
     ) {
-        let weights: Vec<u16> = (0..=u8::MAX)
-            .map(|age| (65536.0 * (1.0 / (f32::from(age) + 1.0)).max(how.min_weight)).min(65535.0) as u16)
-            .collect();
-        let mut alphas = Vec::new();
+        let weights = rows::Weights::new(how.min_weight);
+        let mut alphas = std::mem::take(&mut self.alphas);
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
-            alphas.clear();
-            let seen = self.likelihood[row.clone()].iter().zip(&self.age[row.clone()]);
-            // What is unknown is learned, too: it is 128 and no more.
-            alphas.extend(seen.map(
-                |(&likelihood, &age)| {
-                    if likelihood <= UNKNOWN { weights[usize::from(age)] } else { 0 }
-                },
-            ));
+            alphas.resize(row.len(), 0);
+            rows::alphas(&mut alphas, &self.likelihood[row.clone()], &self.age[row.clone()], &weights);
             let (mean, spread) = (&mut self.luma[row.clone()], &mut self.spread[row.clone()]);
             rows::learn_spread(spread, mean, &picture.luma[row.clone()], &alphas);
             rows::learn_mean(mean, &picture.luma[row.clone()], &alphas);
@@ -194,18 +199,17 @@ impl Model {
                     rows::learn_mean(&mut mean[row.clone()], &seen[row.clone()], &alphas);
                 }
             }
-            for (age, &alpha) in self.age[row.clone()].iter_mut().zip(&alphas) {
-                *age = age.saturating_add(u8::from(alpha > 0)).min(MAX_AGE);
-            }
-            for (waited, &alpha) in self.waited[row.clone()].iter_mut().zip(&alphas) {
-                *waited = if alpha > 0 { 0 } else { *waited };
-            }
-            for x in start..end {
-                if alphas[x - start] == 0 {
-                    self.wait(picture, y * self.size.0 + x, how, || held(x, y));
+            rows::grow_older(&mut self.age[row.clone()], &mut self.waited[row.clone()], &alphas);
+            for (part, alphas) in alphas.chunks(rows::PART).enumerate() {
+                if rows::any_foreground(alphas) {
+                    let first = start + rows::PART * part;
+                    for (x, _) in (first..).zip(alphas).filter(|(_, alpha)| **alpha == 0) {
+                        self.wait(picture, y * self.size.0 + x, how, || held(x, y));
+                    }
                 }
             }
         }
+        self.alphas = alphas;
     }
 
     /// What a foreground pixel's candidate makes of the picture.

@@ -3,7 +3,7 @@
 
 use multiversion::multiversion;
 
-use super::model::KNOWN;
+use super::model::{KNOWN, MAX_AGE, UNKNOWN};
 use super::noise::{Line, PER_MEAN_DEVIATION};
 
 /// Squared deviations (of luma and chroma together) at which foreground is as likely as background. The noise of
@@ -11,6 +11,9 @@ use super::noise::{Line, PER_MEAN_DEVIATION};
 const EVEN: f32 = 16.0;
 /// Light varies by this part of what it is: clouds, exposure, faint shadows (a part of the mean, as thesis 3.3).
 const LIGHT: f32 = 0.04;
+/// Pixels that are looked at together.
+pub(super) const PART: usize = 64;
+
 /// What is known of a row of the background.
 #[derive(Clone, Copy)]
 pub(super) struct Known<'a> {
@@ -18,8 +21,7 @@ pub(super) struct Known<'a> {
     pub spread: &'a [u16],
     pub age: &'a [u8],
     /// The mean's range within one pixel.
-    pub low: &'a [u8],
-    pub high: &'a [u8],
+    pub range: &'a [u8],
 }
 
 /// Adds the squared deviations from the mean, in units of the noise's variance.
@@ -45,7 +47,7 @@ pub(super) fn likelihoods(
     let count = out.len();
     let (seen, colour) = (&seen[..count], &colour[..count]);
     let (mean, spread, age) = (&known.mean[..count], &known.spread[..count], &known.age[..count]);
-    let (low, high) = (&known.low[..count], &known.high[..count]);
+    let range = &known.range[..count];
     for index in 0..count {
         let (mean, age) = (f32::from(mean[index]) / 256.0, f32::from(age[index]));
         let spread = f32::from(spread[index]) * (PER_MEAN_DEVIATION / 256.0);
@@ -53,13 +55,117 @@ pub(super) fn likelihoods(
         // A spread of a few pictures says less than what is known of all pixels.
         let light = LIGHT * mean;
         let variance = ((age * spread * spread + 8.0 * sensor) / (age + 8.0)).max(sensor) + light * light;
-        let range = f32::from(high[index].saturating_sub(low[index]));
-        let off = ((f32::from(seen[index]) - mean).abs() - misplaced * range).max(0.0);
+        let off = ((f32::from(seen[index]) - mean).abs() - misplaced * f32::from(range[index])).max(0.0);
         let squares = off * off / variance + colour[index];
         let known = age.min(f32::from(KNOWN)) / f32::from(KNOWN);
         let level = 128.0 + known * (squares * (128.0 / EVEN) - 128.0);
         out[index] = level.clamp(0.0, 255.0) as u8;
     }
+}
+
+/// Means in whole grey levels.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn whole(out: &mut [u8], mean: &[u16]) {
+    for (out, mean) in out.iter_mut().zip(mean) {
+        *out = (mean.saturating_add(128) >> 8) as u8;
+    }
+}
+
+/// The range of grey levels within one pixel, of the row in the middle of three. `least` and `most` are memory.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn ranges(
+    out: &mut [u8],
+    [above, here, below]: [&[u8]; 3],
+    least: &mut Vec<u8>,
+    most: &mut Vec<u8>,
+) {
+    let width = out.len();
+    // A pixel more on either side: beyond the border there is nothing, so it is repeated.
+    for extreme in [&mut *least, &mut *most] {
+        extreme.clear();
+        extreme.resize(width + 2, 0);
+    }
+    let columns = above[..width].iter().zip(&here[..width]).zip(&below[..width]);
+    for (((above, here), below), (least, most)) in
+        columns.zip(least[1..=width].iter_mut().zip(&mut most[1..=width]))
+    {
+        *least = (*above).min(*here).min(*below);
+        *most = (*above).max(*here).max(*below);
+    }
+    for extreme in [&mut *least, &mut *most] {
+        (extreme[0], extreme[width + 1]) = (extreme[1], extreme[width]);
+    }
+    let least = least[..width].iter().zip(&least[1..=width]).zip(&least[2..]);
+    let most = most[..width].iter().zip(&most[1..=width]).zip(&most[2..]);
+    for (out, (((a, b), c), ((d, e), f))) in out.iter_mut().zip(least.zip(most)) {
+        *out = (*d).max(*e).max(*f) - (*a).min(*b).min(*c);
+    }
+}
+
+/// How many pixels of a row are known, and how many are foreground.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn count(likelihoods: &[u8]) -> (u32, u32) {
+    let (mut known, mut foreground) = (0, 0);
+    // In each chunk the numbers stay below 2^16.
+    for chunk in likelihoods.chunks(1 << 15) {
+        known += u32::from(chunk.iter().map(|value| u16::from(*value != UNKNOWN)).sum::<u16>());
+        foreground += u32::from(chunk.iter().map(|value| u16::from(*value > UNKNOWN)).sum::<u16>());
+    }
+    (known, foreground)
+}
+
+/// By how many of 65536 parts a picture is learned at each age: the younger, the more.
+#[derive(Debug)]
+pub(super) struct Weights {
+    of_age: [u16; 256],
+    /// From this age on they stay the same.
+    settled: u8,
+}
+
+impl Weights {
+    /// Of ages in pictures, none below `min_weight`.
+    pub fn new(min_weight: f32) -> Self {
+        let weight = |age: u8| (1.0 / (f32::from(age) + 1.0)).max(min_weight);
+        let mut of_age = [0; 256];
+        for (alpha, age) in of_age.iter_mut().zip(0..=u8::MAX) {
+            *alpha = (65536.0 * weight(age)).min(65535.0) as u16;
+        }
+        let settled = of_age.iter().position(|alpha| *alpha == of_age[255]).unwrap_or(255);
+        Self { of_age, settled: settled as u8 }
+    }
+}
+
+/// By how many of 65536 parts each pixel is learned; nothing of what is foreground.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn alphas(out: &mut [u16], likelihood: &[u8], age: &[u8], weights: &Weights) {
+    // What is unknown is learned, too: it is 128 and no more.
+    let learned = |likelihood: u8, weight: u16| if likelihood <= UNKNOWN { weight } else { 0 };
+    let settled = weights.of_age[255];
+    let parts = likelihood.chunks(PART).zip(age.chunks(PART));
+    for (out, (likelihood, age)) in out.chunks_mut(PART).zip(parts) {
+        if age.iter().fold(u8::MAX, |least, &age| least.min(age)) >= weights.settled {
+            out.iter_mut().zip(likelihood).for_each(|(out, &likely)| *out = learned(likely, settled));
+        } else {
+            for (out, (&likely, &age)) in out.iter_mut().zip(likelihood.iter().zip(age)) {
+                *out = learned(likely, weights.of_age[usize::from(age)]);
+            }
+        }
+    }
+}
+
+/// Pixels that are learned from grow older, and nothing waits to take their place.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn grow_older(age: &mut [u8], waited: &mut [u8], alphas: &[u16]) {
+    for ((age, waited), &alpha) in age.iter_mut().zip(waited).zip(alphas) {
+        *age = age.saturating_add(u8::from(alpha > 0)).min(MAX_AGE);
+        *waited = if alpha > 0 { 0 } else { *waited };
+    }
+}
+
+/// Whether any of a few pixels is foreground, from which nothing is learned.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn any_foreground(alphas: &[u16]) -> bool {
+    alphas.iter().fold(false, |any, &alpha| any | (alpha == 0))
 }
 
 /// Takes the deviations from the mean into the spread (3.2), each by `alpha` of 65536 parts of the way.

@@ -32,7 +32,7 @@ fn look(background: &mut TravellingBackground, picture: &Canvas, shift: Option<(
         homography: Homography::translation(x / SIZE.0 as f64, y / SIZE.1 as f64),
         ..CameraMotion::default()
     });
-    background.update(&reduced, motion.as_ref(), STEP).expect("OpenCV");
+    background.update(&reduced, motion.as_ref(), STEP);
 }
 
 /// One that has seen the empty room for a second.

@@ -1,5 +1,7 @@
 //! Pictures sampled through a projective map.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use ptztrack_contract::{Homography, Point};
 
@@ -18,12 +20,23 @@ struct Shift {
     part_y: u16,
 }
 
+/// Blocks beside each other that move alike.
+#[derive(Debug, Clone)]
+struct Run {
+    shift: Shift,
+    /// Columns and rows of them that the source covers.
+    columns: Range<usize>,
+    rows: Range<usize>,
+}
+
 /// A map worked out for every block, to be applied to several planes of one size.
 #[derive(Debug, Default)]
 pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
+    /// Of one row of blocks, kept as memory.
     shifts: Vec<Shift>,
+    runs: Vec<Run>,
     /// For every row, from where to where it is covered by the source.
     spans: Vec<(usize, usize)>,
 }
@@ -32,20 +45,22 @@ impl Warp {
     /// Prepares a picture of `size` whose pixels lie in one of size `source` where `to_source` (of pixels) says.
     pub fn prepare(&mut self, size: (usize, usize), source: (usize, usize), to_source: &Homography) {
         (self.size, self.source) = (size, source);
-        let columns = size.0.div_ceil(BLOCK);
-        let middle = |index: usize| (index * BLOCK) as f64 + (BLOCK as f64 - 1.0) / 2.0;
-        self.shifts.clear();
-        self.shifts.extend((0..columns * size.1.div_ceil(BLOCK)).map(|index| {
-            let (x, y) = (middle(index % columns), middle(index / columns));
-            let to = to_source.apply(Point { x, y });
-            // `as` saturates: what goes to infinity is outside.
-            let parts = |d: f64| ((d * f64::from(PARTS)).round() as i32).clamp(-1 << 24, 1 << 24);
-            let (x, y) = (parts(to.x - x), parts(to.y - y));
-            let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
-            Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) }
-        }));
-        let spans = (0..size.1).map(|y| self.span(y)).collect();
-        self.spans = spans;
+        self.runs.clear();
+        self.spans.clear();
+        self.spans.resize(size.1, (0, 0));
+        for top in (0..size.1).step_by(BLOCK) {
+            shifts(size.0.div_ceil(BLOCK), top, to_source, &mut self.shifts);
+            let mut next = 0;
+            for alike in self.shifts.chunk_by(|a, b| a == b) {
+                let start = next;
+                next = (start + alike.len() * BLOCK).min(size.0);
+                let run = covered(alike[0], start..next, top..(top + BLOCK).min(size.1), source);
+                if !run.columns.is_empty() {
+                    self.spans[run.rows.clone()].iter_mut().for_each(|span| widen(span, &run.columns));
+                    self.runs.push(run);
+                }
+            }
+        }
     }
 
     /// For every row, from where to where the source covers it; outside, planes hold what they are filled with.
@@ -53,42 +68,11 @@ impl Warp {
         &self.spans
     }
 
-    fn span(&self, y: usize) -> (usize, usize) {
-        let mut span = (0, 0);
-        for (start, end) in self.pieces(y).map(|(piece, _)| piece).filter(|piece| piece.0 < piece.1) {
-            if span.0 == span.1 {
-                span = (start, end);
-            } else if span.1 == start {
-                span.1 = end;
-            }
-        }
-        span
-    }
-
-    /// The blocks of a row, those beside each other that move alike as one: from where to where each is covered, and its
-    /// shift.
-    fn pieces(&self, y: usize) -> impl Iterator<Item = ((usize, usize), Shift)> + '_ {
-        let columns = self.size.0.div_ceil(BLOCK);
-        let shifts = &self.shifts[y / BLOCK * columns..][..columns];
-        let mut next = 0;
-        shifts.chunk_by(|a, b| a == b).map(move |alike| {
-            let (start, shift) = (next, alike[0]);
-            let end = (start + alike.len() * BLOCK).min(self.size.0);
-            next = end;
-            let (width, height) = (self.source.0 as i32, self.source.1 as i32);
-            let row = y as i32 + shift.y;
-            if row < 0 || row + i32::from(shift.part_y > 0) >= height {
-                return ((start, start), shift);
-            }
-            let first = (-shift.x).clamp(start as i32, end as i32);
-            let last = (width - shift.x - i32::from(shift.part_x > 0)).clamp(first, end as i32);
-            ((first as usize, last as usize), shift)
-        })
-    }
-
     /// Samples `source` (rows packed) bilinearly; what it does not cover becomes `fill`.
     pub fn sample(&self, source: &[u8], fill: u8, out: &mut Vec<u8>) {
-        self.rows(source, fill, out, |source, shift, out| blend(source, self.source.0, shift, out));
+        out.clear();
+        out.resize(self.size.0 * self.size.1, fill);
+        blend(self, source, out);
     }
 
     /// The same of 16-bit numbers.
@@ -123,47 +107,145 @@ impl Warp {
         });
     }
 
+    /// Fills what is covered by `pick`, which is given the source from the pixel on that a shift of whole pixels leads to;
+    /// where there is nothing else to a shift, pixels are only copied.
     fn each<T: Copy>(&self, source: &[T], fill: T, out: &mut Vec<T>, pick: impl Fn(&[T], Shift) -> T) {
-        self.rows(source, fill, out, |source, shift, out| {
-            for (index, out) in out.iter_mut().enumerate() {
-                *out = pick(&source[index..], shift);
-            }
-        });
-    }
-
-    /// Fills rows of pieces by `mix`, which is given the source from their first pixel on; whole pixels are only copied.
-    fn rows<T: Copy>(&self, source: &[T], fill: T, out: &mut Vec<T>, mix: impl Fn(&[T], Shift, &mut [T])) {
         out.clear();
         out.resize(self.size.0 * self.size.1, fill);
-        for (y, out) in out.chunks_exact_mut(self.size.0).enumerate() {
-            for ((first, last), shift) in self.pieces(y).filter(|(piece, _)| piece.0 < piece.1) {
-                let start = (y as i32 + shift.y) as usize * self.source.0 + (first as i32 + shift.x) as usize;
-                let (source, out) = (&source[start..], &mut out[first..last]);
-                if shift.part_x == 0 && shift.part_y == 0 {
+        for run in &self.runs {
+            for y in run.rows.clone() {
+                let source = &source[self.source_index(run, y)..];
+                let out = &mut out[y * self.size.0..][run.columns.clone()];
+                if run.shift.is_whole() {
                     out.copy_from_slice(&source[..out.len()]);
                 } else {
-                    mix(source, shift, out);
+                    for (index, out) in out.iter_mut().enumerate() {
+                        *out = pick(&source[index..], run.shift);
+                    }
                 }
             }
         }
     }
+
+    /// Where the first pixel of a run's row lies in the source.
+    #[inline(always)]
+    fn source_index(&self, run: &Run, y: usize) -> usize {
+        (y as i32 + run.shift.y) as usize * self.source.0 + (run.columns.start as i32 + run.shift.x) as usize
+    }
 }
 
-/// One row of a block: the weights are the same for all of it.
-#[multiversion(targets("x86_64+avx2"))]
-fn blend(source: &[u8], width: usize, shift: Shift, out: &mut [u8]) {
-    let count = out.len();
-    let (x, y) = (shift.part_x, shift.part_y);
-    let weights = [(16 - x) * (16 - y), x * (16 - y), (16 - x) * y, x * y];
-    // Where a weight is nothing, its row or column may lie outside.
-    let (right, below) = (usize::from(x > 0), if y > 0 { width } else { 0 });
-    let upper = source[..count].iter().zip(&source[right..right + count]);
-    let lower = source[below..below + count].iter().zip(&source[below + right..below + right + count]);
-    for (out, ((a, b), (c, d))) in out.iter_mut().zip(upper.zip(lower)) {
-        let sum =
-            [a, b, c, d].into_iter().zip(weights).map(|(&p, weight)| u16::from(p) * weight).sum::<u16>();
-        *out = ((sum + 128) >> 8) as u8;
+impl Shift {
+    #[inline(always)]
+    fn is_whole(self) -> bool {
+        self.part_x == 0 && self.part_y == 0
     }
+}
+
+/// The shifts of the blocks from row `top` on.
+#[multiversion(targets("x86_64+avx2"))]
+fn shifts(columns: usize, top: usize, to_source: &Homography, out: &mut Vec<Shift>) {
+    let middle = |first: usize| first as f64 + (BLOCK as f64 - 1.0) / 2.0;
+    let y = middle(top);
+    out.clear();
+    out.extend((0..columns).map(|column| {
+        let x = middle(column * BLOCK);
+        let to = to_source.apply(Point { x, y });
+        // `as` saturates: what goes to infinity is outside.
+        let parts = |d: f64| ((d * f64::from(PARTS)).round() as i32).clamp(-1 << 24, 1 << 24);
+        let (x, y) = (parts(to.x - x), parts(to.y - y));
+        let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
+        Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) }
+    }));
+}
+
+/// What of these columns and rows a source of that size covers.
+fn covered(shift: Shift, columns: Range<usize>, rows: Range<usize>, source: (usize, usize)) -> Run {
+    let within = |places: Range<usize>, shift: i32, part: u16, size: usize| {
+        let (start, end) = (places.start as i32, places.end as i32);
+        let first = (-shift).clamp(start, end);
+        let last = (size as i32 - shift - i32::from(part > 0)).clamp(first, end);
+        first as usize..last as usize
+    };
+    Run {
+        shift,
+        columns: within(columns, shift.x, shift.part_x, source.0),
+        rows: within(rows, shift.y, shift.part_y, source.1),
+    }
+}
+
+/// Takes columns into a span that they follow on.
+fn widen(span: &mut (usize, usize), columns: &Range<usize>) {
+    if span.0 == span.1 {
+        *span = (columns.start, columns.end);
+    } else if span.1 == columns.start {
+        span.1 = columns.end;
+    }
+}
+
+/// Fills what is covered bilinearly.
+#[multiversion(targets("x86_64+avx2"))]
+fn blend(warp: &Warp, source: &[u8], out: &mut [u8]) {
+    for run in &warp.runs {
+        let Range { start, end } = run.columns;
+        if run.shift.is_whole() {
+            for y in run.rows.clone() {
+                let first = warp.source_index(run, y);
+                out[y * warp.size.0..][start..end].copy_from_slice(&source[first..first + end - start]);
+            }
+            continue;
+        }
+        let mut x = start;
+        while x + 2 * BLOCK <= end {
+            blend_columns::<{ 2 * BLOCK }>(warp, run, x, source, out);
+            x += 2 * BLOCK;
+        }
+        while x + BLOCK <= end {
+            blend_columns::<BLOCK>(warp, run, x, source, out);
+            x += BLOCK;
+        }
+        while x < end {
+            blend_columns::<1>(warp, run, x, source, out);
+            x += 1;
+        }
+    }
+}
+
+/// `N` columns of a run, from column `x` on.
+#[inline(always)]
+fn blend_columns<const N: usize>(warp: &Warp, run: &Run, x: usize, source: &[u8], out: &mut [u8]) {
+    let Range { start: top, end: bottom } = run.rows;
+    if top >= bottom {
+        return;
+    }
+    let (part_x, part_y) = (run.shift.part_x, run.shift.part_y);
+    let first = warp.source_index(run, top) + (x - run.columns.start);
+    let mut upper = across::<N>(&source[first..], part_x);
+    for row in 0..bottom - top {
+        let next = if part_y > 0 || top + row + 1 < bottom {
+            across::<N>(&source[first + (row + 1) * warp.source.0..], part_x)
+        } else {
+            upper
+        };
+        let lower = if part_y > 0 { next } else { upper };
+        let first = (top + row) * warp.size.0 + x;
+        for (i, out) in out[first..first + N].iter_mut().enumerate() {
+            *out = ((upper[i] * (16 - part_y) + lower[i] * part_y + 128) >> 8) as u8;
+        }
+        upper = next;
+    }
+}
+
+/// Sixteen times what lies `part` sixteenths of the way from the first `N` pixels to the next ones.
+#[inline(always)]
+fn across<const N: usize>(pixels: &[u8], part: u16) -> [u16; N] {
+    // Where a weight is nothing, its column may lie outside.
+    let right = usize::from(part > 0);
+    let (left, right) = (&pixels[..N], &pixels[right..right + N]);
+    let mut mixed = [0; N];
+    for (mixed, (&left, &right)) in mixed.iter_mut().zip(left.iter().zip(right)) {
+        *mixed = u16::from(left) * (16 - part) + u16::from(right) * part;
+    }
+    mixed
 }
 
 #[cfg(test)]
