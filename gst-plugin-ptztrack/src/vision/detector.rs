@@ -9,12 +9,13 @@ use super::afterimage::Afterimage;
 use super::background::{Background, Criterion, ForegroundTest};
 use super::carried_zones::CarriedZones;
 use super::contours::{Grid, fill_regions, regions};
+use super::extremes::Extremes;
 use super::morphology::clean;
 use super::persistence::Persistence;
 use super::reduce::{divisor, with_reduced};
 use super::region_tracks::RegionTracks;
 use super::scene_model::SceneView;
-use super::segmentation::segment;
+use super::segmentation::Segmentation;
 use super::zones::{Zones, zone_mask};
 use super::{Luma, LumaError};
 
@@ -139,6 +140,8 @@ pub struct Detector {
     reduced: Mat,
     /// Foreground of the last picture, cleaned; as large as the reduced picture.
     mask: Mat,
+    segmentation: Segmentation,
+    extremes: Extremes,
     zones: Option<ZoneCache>,
 }
 
@@ -210,7 +213,8 @@ impl Detector {
             return Ok(None);
         }
         let (open_size, close_size) = self.sizes(config);
-        self.mask = segment(foreground, open_size, close_size)?;
+        self.fit_mask(foreground.width(), foreground.height())?;
+        self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?)?;
         let mut found = self.found(config)?;
         self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
         let confirmed = self.persistence.confirmed(found, config.confirm_pictures);
@@ -250,14 +254,21 @@ impl Detector {
             return Err(DetectorError::Window { window, width, height });
         }
         let (rows, columns) = (height as i32, width as i32);
-        if (self.mask.rows(), self.mask.cols()) != (rows, columns) {
-            self.mask = Mat::new_rows_cols_with_default(rows, columns, CV_8UC1, Scalar::all(0.0))?;
-        }
+        self.fit_mask(width, height)?;
         // While it learns, the mean is the plain average of all pictures.
         let average = if self.learned < config.warm_up { 1.0 / f64::from(self.learned + 1) } else { 0.0 };
         let weight = config.weight(elapsed).max(average);
         self.background.update(luma, weight, config.criterion, self.mask.data_bytes_mut()?);
         Ok(f64::from(core::count_non_zero(&self.mask)?) / (f64::from(rows) * f64::from(columns)))
+    }
+
+    /// Sees to it that `mask` has that size.
+    fn fit_mask(&mut self, width: usize, height: usize) -> opencv::Result<()> {
+        let (rows, columns) = (height as i32, width as i32);
+        if (self.mask.rows(), self.mask.cols()) != (rows, columns) {
+            self.mask = Mat::new_rows_cols_with_default(rows, columns, CV_8UC1, Scalar::all(0.0))?;
+        }
+        Ok(())
     }
 
     /// The regions of the foreground in `mask`, which was won from `luma`.
@@ -269,7 +280,8 @@ impl Detector {
     ) -> Result<Vec<Region>, DetectorError> {
         self.look_in_zones(config)?;
         let (open_size, close_size) = self.sizes(config);
-        clean(&mut self.mask, open_size, close_size)?;
+        let width = luma.width();
+        clean(self.mask.data_bytes_mut()?, width, open_size, close_size, &mut self.extremes);
         if config.shed_trail {
             self.afterimage.shed(luma, elapsed, config.criterion.noise_floor, &mut self.mask)?;
         } else {

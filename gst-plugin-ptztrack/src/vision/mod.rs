@@ -29,6 +29,7 @@ mod contours;
 mod detector;
 mod draw;
 mod duty;
+mod extremes;
 mod luma;
 mod morphology;
 mod observation;

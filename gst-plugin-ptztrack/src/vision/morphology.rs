@@ -1,41 +1,27 @@
-use opencv::core::{self, Mat, Rect, Scalar, Size};
-use opencv::imgproc;
-use opencv::prelude::*;
+use super::extremes::Extremes;
 
 /// Opening with a square of that many pixels a side, then closing with a rectangle of that width and height
-/// (thesis 3.3.1) of the binary `mask`; 0 and 1 leave it out. An even side counts as the next odd one: only those have a middle, without which
-/// the picture would move.
-pub fn clean(mask: &mut Mat, open_size: usize, close_size: (usize, usize)) -> opencv::Result<()> {
-    // An element as large as the picture does all that a larger one could, which would only cost memory.
-    let largest = mask.rows().max(mask.cols()) as usize;
-    let (open_size, close_size) =
-        (open_size.min(largest), (close_size.0.min(largest), close_size.1.min(largest)));
-    if open_size > 1 {
-        let mut opened = Mat::default();
-        imgproc::morphology_ex_def(mask, &mut opened, imgproc::MORPH_OPEN, &element(open_size, open_size)?)?;
-        *mask = opened;
+/// (thesis 3.3.1) of the binary `mask`, whose rows are `width` pixels; 0 and 1 leave it out. An even side counts as the next odd
+/// one: only those have a middle, without which the picture would move.
+pub fn clean(
+    mask: &mut [u8],
+    width: usize,
+    open_size: usize,
+    close_size: (usize, usize),
+    extremes: &mut Extremes,
+) {
+    // A rectangle as large as the picture does all that a larger one could, which would only cost memory.
+    let largest = mask.len().checked_div(width).unwrap_or(0).max(width);
+    let odd = |side: usize| side.clamp(1, largest.max(1)) | 1;
+    let open = odd(open_size);
+    if open > 1 {
+        extremes.erode(mask, width, (open, open));
+        extremes.dilate(mask, width, (open, open));
     }
-    if close_size.0 > 1 || close_size.1 > 1 {
-        *mask = closed(mask, close_size)?;
+    let close = (odd(close_size.0), odd(close_size.1));
+    if close != (1, 1) {
+        extremes.close(mask, width, close);
     }
-    Ok(())
-}
-
-fn element(width: usize, height: usize) -> opencv::Result<Mat> {
-    let odd = |side: usize| i32::try_from(side).unwrap_or(i32::MAX) | 1;
-    imgproc::get_structuring_element_def(imgproc::MORPH_RECT, Size::new(odd(width), odd(height)))
-}
-
-/// Closing with room around the picture for what the dilation adds: without it, whatever lies within half
-/// an element of the edge would grow to the edge.
-fn closed(mask: &Mat, side: (usize, usize)) -> opencv::Result<Mat> {
-    let room = side.0.max(side.1) as i32;
-    let (mut padded, mut closed) = (Mat::default(), Mat::default());
-    let black = Scalar::all(0.0);
-    core::copy_make_border(mask, &mut padded, room, room, room, room, core::BORDER_CONSTANT, black)?;
-    imgproc::morphology_ex_def(&padded, &mut closed, imgproc::MORPH_CLOSE, &element(side.0, side.1)?)?;
-    let inside = closed.roi(Rect::new(room, room, mask.cols(), mask.rows()))?;
-    inside.try_clone()
 }
 
 #[cfg(test)]
@@ -44,11 +30,10 @@ mod tests {
 
     fn cleaned(rows: &[&str], open_size: usize, close_size: (usize, usize)) -> Vec<String> {
         let bytes: Vec<u8> = rows.concat().bytes().map(|pixel| if pixel == b'#' { 255 } else { 0 }).collect();
-        let mat = Mat::from_slice(&bytes).unwrap();
-        let mut mask = mat.reshape(1, rows.len() as i32).unwrap().try_clone().unwrap();
-        clean(&mut mask, open_size, close_size).unwrap();
+        let mut mask = bytes;
+        clean(&mut mask, rows[0].len(), open_size, close_size, &mut Extremes::default());
         let row = |row: &[u8]| row.iter().map(|pixel| if *pixel == 255 { '#' } else { '.' }).collect();
-        mask.data_bytes().unwrap().chunks_exact(rows[0].len()).map(row).collect()
+        mask.chunks_exact(rows[0].len()).map(row).collect()
     }
 
     #[test]

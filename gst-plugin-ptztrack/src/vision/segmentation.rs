@@ -1,41 +1,130 @@
 use std::ops::Range;
 
-use opencv::core::{self, CV_8UC1, DataType, Mat, Scalar, Size};
+use multiversion::multiversion;
+use opencv::core::Mat;
 use opencv::imgproc;
 use opencv::prelude::*;
 
 use super::Luma;
+use super::extremes::Extremes;
 use super::morphology::clean;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
 /// unknown ...
-const WEAK: f64 = 136.0;
+const WEAK: u16 = 137;
 /// ... and from which it makes one by itself.
-const STRONG: f64 = 240.0;
+const STRONG: u16 = 241;
 /// Pixels that make a region, as a part of the picture: a few bright specks do not.
 const MIN_STRONG: f64 = 1.0 / 8000.0;
 
-/// The foreground as a mask of 255 and 0 from the likelihood of each pixel: what is likely, cleaned by opening and
-/// closing (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
-pub fn segment(likelihood: &Luma, open_size: usize, close_size: (usize, usize)) -> opencv::Result<Mat> {
-    let (mut smooth, mut mask, mut strong) = (Mat::default(), Mat::default(), Mat::default());
-    likelihood.with_mat(|likelihood| imgproc::blur_def(likelihood, &mut smooth, Size::new(3, 3)))?;
-    imgproc::threshold(&smooth, &mut mask, WEAK, 255.0, imgproc::THRESH_BINARY)?;
-    imgproc::threshold(&smooth, &mut strong, STRONG, 255.0, imgproc::THRESH_BINARY)?;
-    let needed = (MIN_STRONG * (likelihood.width() * likelihood.height()) as f64).ceil() as usize;
-    if (core::count_non_zero(&strong)? as usize) < needed {
-        return Mat::new_size_with_default(mask.size()?, CV_8UC1, Scalar::all(0.0));
+/// Tells foreground from the likelihood of each pixel.
+#[derive(Debug, Default)]
+pub struct Segmentation {
+    strong: Vec<u8>,
+    labels: Mat,
+    extremes: Extremes,
+    /// Of one row: sums of three pixels above each other.
+    sums: Vec<u16>,
+}
+
+impl Segmentation {
+    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by opening and closing
+    /// (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
+    pub fn segment(
+        &mut self,
+        likelihood: &Luma,
+        open_size: usize,
+        close_size: (usize, usize),
+        mask: &mut [u8],
+    ) -> opencv::Result<()> {
+        let (width, height) = (likelihood.width(), likelihood.height());
+        let needed = (MIN_STRONG * (width * height) as f64).ceil() as usize;
+        if self.threshold(likelihood, mask) < needed {
+            mask.fill(0);
+            return Ok(());
+        }
+        clean(mask, width, open_size, close_size, &mut self.extremes);
+        let Some((columns, rows)) = extent(mask, width) else { return Ok(()) };
+        let mut boxes = Mat::default();
+        let part = Luma::packed(mask, width).crop(columns.start, rows.start, columns.len(), rows.len());
+        let count = part.with_mat(|part| {
+            imgproc::connected_components_with_stats_def(
+                part,
+                &mut self.labels,
+                &mut boxes,
+                &mut Mat::default(),
+            )
+        })?;
+        for label in 1..count {
+            let part = Part::of(&boxes, label, (columns.start, rows.start))?;
+            let is_sure = part.count(&self.labels, &self.strong, width)? >= needed;
+            let kept = if is_sure { part.upright(&self.labels)? } else { 0..0 };
+            part.keep(kept, &self.labels, mask, width)?;
+        }
+        Ok(())
     }
-    clean(&mut mask, open_size, close_size)?;
-    let (mut labels, mut boxes, mut centres) = (Mat::default(), Mat::default(), Mat::default());
-    let count = imgproc::connected_components_with_stats_def(&mask, &mut labels, &mut boxes, &mut centres)?;
-    for label in 1..count {
-        let part = Part::of(&boxes, label)?;
-        let is_sure = part.count(&labels, &strong)? >= needed;
-        let kept = if is_sure { part.upright(&labels)? } else { 0..0 };
-        part.keep(kept, &labels, &mut mask)?;
+
+    /// Leaves what is likely in `mask` and what is sure in `strong`, and counts that.
+    fn threshold(&mut self, likelihood: &Luma, mask: &mut [u8]) -> usize {
+        let (width, height) = (likelihood.width(), likelihood.height());
+        self.strong.resize(mask.len(), 0);
+        let rows = mask.chunks_exact_mut(width.max(1)).zip(self.strong.chunks_exact_mut(width.max(1)));
+        let count = rows.enumerate().map(|(y, (weak, strong))| {
+            let around = [mirrored(y as isize - 1, height), y, mirrored(y as isize + 1, height)];
+            threshold_row(around.map(|y| likelihood.row(y)), &mut self.sums, weak, strong)
+        });
+        count.sum()
     }
-    Ok(mask)
+}
+
+/// A place just beyond the border stands for the one as far inside, the border itself not repeated.
+fn mirrored(place: isize, size: usize) -> usize {
+    let last = size.saturating_sub(1);
+    let place = place.unsigned_abs();
+    if place > last { (2 * last).saturating_sub(place) } else { place }
+}
+
+/// Marks in a row, of which and of its neighbours the likelihoods are given, what is likely and what is sure, by the means of
+/// 3x3 pixels; counts what is sure. `sums` is memory.
+#[multiversion(targets("x86_64+avx2"))]
+fn threshold_row(
+    [above, here, below]: [&[u8]; 3],
+    sums: &mut Vec<u16>,
+    weak: &mut [u8],
+    strong: &mut [u8],
+) -> usize {
+    let width = here.len();
+    sums.clear();
+    sums.resize(width + 2, 0);
+    for (sum, ((above, here), below)) in sums[1..=width].iter_mut().zip(above.iter().zip(here).zip(below)) {
+        *sum = u16::from(*above) + u16::from(*here) + u16::from(*below);
+    }
+    (sums[0], sums[width + 1]) = (sums[1 + mirrored(-1, width)], sums[1 + mirrored(width as isize, width)]);
+    let around = sums[..width].iter().zip(&sums[1..=width]).zip(&sums[2..]);
+    // A mean is rounded: from so many on it is at least the limit.
+    let least = |mean: u16| 9 * mean - 4;
+    let mut count = 0_u16;
+    for ((weak, strong), ((left, middle), right)) in weak.iter_mut().zip(strong.iter_mut()).zip(around) {
+        let sum = left + middle + right;
+        *weak = if sum >= least(WEAK) { u8::MAX } else { 0 };
+        *strong = if sum >= least(STRONG) { u8::MAX } else { 0 };
+        count += u16::from(sum >= least(STRONG));
+    }
+    usize::from(count)
+}
+
+/// The columns and rows that hold all that is set; `None` where nothing is.
+fn extent(mask: &[u8], width: usize) -> Option<(Range<usize>, Range<usize>)> {
+    let is_set = |row: &[u8]| row.iter().fold(0, |any, pixel| any | pixel) > 0;
+    let rows = || mask.chunks_exact(width.max(1));
+    let (first, last) = (rows().position(is_set)?, rows().rposition(is_set)?);
+    let mut columns = vec![0; width];
+    for row in rows().take(last + 1).skip(first) {
+        columns.iter_mut().zip(row).for_each(|(any, pixel)| *any |= pixel);
+    }
+    let set = |any: &u8| *any > 0;
+    let (left, right) = (columns.iter().position(set)?, columns.iter().rposition(set)?);
+    Some((left..right + 1, first..last + 1))
 }
 
 /// Columns of a region with less than this part of its tallest one may be a shadow on the floor beside somebody upright ...
@@ -43,26 +132,27 @@ const LOW: f32 = 0.3;
 /// ... and are one where they go on for so many heights of it: farther than a foot or a hand reaches.
 const LONG: f32 = 0.25;
 
-/// A connected part of the mask: its number among the labels, and its box in pixels.
+/// A connected part of the mask: its number among the labels, its box in pixels of these, and where they begin.
 struct Part {
     label: i32,
+    first: (usize, usize),
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 impl Part {
-    fn of(boxes: &Mat, label: i32) -> opencv::Result<Self> {
+    fn of(boxes: &Mat, label: i32, first: (usize, usize)) -> opencv::Result<Self> {
         let side = |side: i32| boxes.at_2d::<i32>(label, side).map(|value| *value as usize);
         let (left, top) = (side(imgproc::CC_STAT_LEFT)?, side(imgproc::CC_STAT_TOP)?);
         let (width, height) = (side(imgproc::CC_STAT_WIDTH)?, side(imgproc::CC_STAT_HEIGHT)?);
-        Ok(Self { label, columns: left..left + width, rows: top..top + height })
+        Ok(Self { label, first, columns: left..left + width, rows: top..top + height })
     }
 
-    /// Its pixels that are set in another mask.
-    fn count(&self, labels: &Mat, other: &Mat) -> opencv::Result<usize> {
+    /// Its pixels that are set in another mask, whose rows are `width` pixels.
+    fn count(&self, labels: &Mat, other: &[u8], width: usize) -> opencv::Result<usize> {
         let mut count = 0;
         for row in self.rows.clone() {
-            let set = self.line::<u8>(other, row)?.iter().zip(self.line::<i32>(labels, row)?);
+            let set = other[self.pixels(row, width)].iter().zip(self.line(labels, row)?);
             count += set.filter(|(pixel, label)| **pixel > 0 && **label == self.label).count();
         }
         Ok(count)
@@ -73,7 +163,7 @@ impl Part {
     fn upright(&self, labels: &Mat) -> opencv::Result<Range<usize>> {
         let mut heights = vec![0_usize; self.columns.len()];
         for row in self.rows.clone() {
-            let line = self.line::<i32>(labels, row)?;
+            let line = self.line(labels, row)?;
             line.iter()
                 .zip(&mut heights)
                 .for_each(|(label, height)| *height += usize::from(*label == self.label));
@@ -87,13 +177,13 @@ impl Part {
     }
 
     /// Clears its pixels in the mask but for those in these columns.
-    fn keep(&self, kept: Range<usize>, labels: &Mat, mask: &mut Mat) -> opencv::Result<()> {
+    fn keep(&self, kept: Range<usize>, labels: &Mat, mask: &mut [u8], width: usize) -> opencv::Result<()> {
         if kept == self.columns {
             return Ok(());
         }
         for row in self.rows.clone() {
-            let line = self.line::<i32>(labels, row)?;
-            let pixels = &mut mask.at_row_mut::<u8>(row as i32)?[self.columns.clone()];
+            let line = self.line(labels, row)?;
+            let pixels = &mut mask[self.pixels(row, width)];
             for ((column, pixel), label) in self.columns.clone().zip(pixels).zip(line) {
                 if *label == self.label && !kept.contains(&column) {
                     *pixel = 0;
@@ -103,9 +193,15 @@ impl Part {
         Ok(())
     }
 
-    /// A row of a picture within its box.
-    fn line<'a, T: DataType>(&self, picture: &'a Mat, row: usize) -> opencv::Result<&'a [T]> {
-        Ok(&picture.at_row::<T>(row as i32)?[self.columns.clone()])
+    /// A row of the labels within its box.
+    fn line<'a>(&self, labels: &'a Mat, row: usize) -> opencv::Result<&'a [i32]> {
+        Ok(&labels.at_row::<i32>(row as i32)?[self.columns.clone()])
+    }
+
+    /// Where that row lies in a mask.
+    fn pixels(&self, row: usize, width: usize) -> Range<usize> {
+        let start = (self.first.1 + row) * width + self.first.0;
+        start + self.columns.start..start + self.columns.end
     }
 }
 
@@ -126,8 +222,10 @@ mod tests {
                 row[*x..x + width].fill(*value);
             }
         }
-        let mask = segment(&Luma::packed(&likelihood, SIZE.0), 3, (3, 7)).unwrap();
-        core::count_non_zero(&mask).unwrap()
+        let mut mask = vec![0; SIZE.0 * SIZE.1];
+        let luma = Luma::packed(&likelihood, SIZE.0);
+        Segmentation::default().segment(&luma, 3, (3, 7), &mut mask).unwrap();
+        mask.iter().map(|pixel| i32::from(*pixel > 0)).sum()
     }
 
     #[test]
