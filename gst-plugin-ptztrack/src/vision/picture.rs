@@ -124,8 +124,14 @@ const MIN_COLOURED: f64 = 0.001;
 
 /// Whether a plane of U or V has any colour.
 fn has_colour(plane: &[u8]) -> bool {
-    let coloured: u32 = plane.iter().map(|value| u32::from(value.abs_diff(128) > GREY)).sum();
-    f64::from(coloured) > MIN_COLOURED * plane.len() as f64
+    f64::from(count_coloured(plane)) > MIN_COLOURED * plane.len() as f64
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn count_coloured(plane: &[u8]) -> u32 {
+    // In each chunk the number stays below 2^16.
+    let count = |chunk: &[u8]| -> u16 { chunk.iter().map(|v| u16::from(v.abs_diff(128) > GREY)).sum() };
+    plane.chunks(1 << 15).map(|chunk| u32::from(count(chunk))).sum()
 }
 
 /// Means of rectangles of `samples`, `size` of them; where that is more than there are, the nearest sample.
@@ -153,6 +159,14 @@ fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>
         }
         return;
     }
+    let side = columns / width;
+    if samples.bytes.width() == side * width && rows == side * height && [2, 4].contains(&side) {
+        for (y, out) in out.chunks_exact_mut(width).enumerate() {
+            let row = |index: usize| samples.bytes.row(side * y + index);
+            if side == 2 { pairs([0, 1].map(row), out) } else { quads([0, 1, 2, 3].map(row), out) }
+        }
+        return;
+    }
     let span = |at: usize, count: usize, of: usize| {
         let (first, next) = (at * of / count, (at + 1) * of / count);
         (first.min(of - 1), next.max(first + 1).min(of))
@@ -164,9 +178,7 @@ fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>
         add_rows(samples.bytes, top, bottom, sums);
         match uniform {
             Some(1) => means::<1>(sums, bottom - top, out),
-            Some(2) => means::<2>(sums, bottom - top, out),
             Some(3) => means::<3>(sums, bottom - top, out),
-            Some(4) => means::<4>(sums, bottom - top, out),
             Some(6) => means::<6>(sums, bottom - top, out),
             _ => {
                 for (value, &(left, right)) in out.iter_mut().zip(&spans) {
@@ -186,6 +198,34 @@ fn add_rows(bytes: Luma, top: usize, bottom: usize, sums: &mut Vec<u16>) {
     sums.extend(bytes.row(top).iter().map(|&byte| u16::from(byte)));
     for y in top + 1..bottom.min(top + 257) {
         sums.iter_mut().zip(bytes.row(y)).for_each(|(sum, &byte)| *sum += u16::from(byte));
+    }
+}
+
+/// Means of squares of two a side, whose pixels lie beside each other in a word: nothing is shuffled.
+#[multiversion(targets("x86_64+avx2"))]
+fn pairs(rows: [&[u8]; 2], out: &mut [u8]) {
+    let sum = |bytes: &[u8; 2]| {
+        let word = u16::from_le_bytes(*bytes);
+        (word & 0xff) + (word >> 8)
+    };
+    let [above, below] = rows.map(|row| row.as_chunks().0);
+    for (out, (above, below)) in out.iter_mut().zip(above.iter().zip(below)) {
+        *out = ((sum(above) + sum(below) + 2) >> 2) as u8;
+    }
+}
+
+/// Means of squares of four a side.
+#[multiversion(targets("x86_64+avx2"))]
+fn quads(rows: [&[u8]; 4], out: &mut [u8]) {
+    // Two sums in one word: they stay below 2^16.
+    let sums = |bytes: &[u8; 4]| {
+        let word = u32::from_le_bytes(*bytes);
+        (word & 0x00ff_00ff) + ((word >> 8) & 0x00ff_00ff)
+    };
+    let [a, b, c, d] = rows.map(|row| row.as_chunks().0);
+    for (out, ((a, b), (c, d))) in out.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
+        let sum = sums(a) + sums(b) + sums(c) + sums(d);
+        *out = (((sum & 0xffff) + (sum >> 16) + 8) >> 4) as u8;
     }
 }
 
