@@ -97,25 +97,33 @@ pub(super) struct ColourModel {
     /// Upper body, lower body.
     figure: [Histogram; 2],
     ground: Histogram,
+    /// Logarithms of odds of either half, worked out once.
+    odds: [Odds; 2],
+}
+
+/// Logarithms of the odds of each brightness and each tint.
+#[derive(Debug, Clone, PartialEq)]
+struct Odds {
+    greys: [f32; 256],
+    tints: [f32; TINTS * TINTS],
 }
 
 impl ColourModel {
     pub fn new(figure: [Histogram; 2], ground: Histogram) -> Self {
-        Self { figure, ground }
+        let odds = odds(&figure, &ground);
+        Self { figure, ground, odds }
     }
 
     /// Logarithm of the odds that a cell of that colour belongs to the target; `lower` 0 (upper body) to 1 (lower).
     pub fn log_odds(&self, (grey, tint): Colour, lower: f32) -> f32 {
-        let (low, high, share) = grey_bins(grey);
-        let brightness = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
-        let either = |of: &dyn Fn(&Histogram) -> f32| {
-            of(&self.figure[0]) * (1.0 - lower) + of(&self.figure[1]) * lower
-        };
-        let odds =
-            |figure: f32, ground: f32| ((figure + FLOOR) / (ground + FLOOR)).ln().clamp(-LARGEST, LARGEST);
-        let tinted =
-            tint.map(tint_bin).map_or(0.0, |bin| odds(either(&|h| h.tints[bin]), self.ground.tints[bin]));
-        odds(either(&brightness), brightness(&self.ground)) + tinted
+        let tint = tint.map(tint_bin);
+        // Near the middle of the body both halves count; everywhere else there is a table.
+        if lower == 0.0 || lower == 1.0 {
+            let odds = &self.odds[usize::from(lower == 1.0)];
+            return odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]);
+        }
+        let tinted = tint.map_or(0.0, |bin| tint_odds(&self.figure, &self.ground, bin, lower));
+        grey_odds(&self.figure, &self.ground, grey, lower) + tinted
     }
 
     /// How alike somebody else's figure is by brightness and tint, 0 to 1: the Bhattacharyya coefficient, the mean of upper
@@ -142,7 +150,34 @@ impl ColourModel {
         if let Some(new) = ground {
             self.ground.blend(&new, ground_rate);
         }
+        self.odds = odds(&self.figure, &self.ground);
     }
+}
+
+fn odds(figure: &[Histogram; 2], ground: &Histogram) -> [Odds; 2] {
+    [0.0, 1.0].map(|lower| Odds {
+        greys: std::array::from_fn(|grey| grey_odds(figure, ground, grey as u8, lower)),
+        tints: std::array::from_fn(|bin| tint_odds(figure, ground, bin, lower)),
+    })
+}
+
+fn grey_odds(figure: &[Histogram; 2], ground: &Histogram, grey: u8, lower: f32) -> f32 {
+    let (low, high, share) = grey_bins(grey);
+    let brightness = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
+    log_odds(either(figure, lower, brightness), brightness(ground))
+}
+
+fn tint_odds(figure: &[Histogram; 2], ground: &Histogram, bin: usize, lower: f32) -> f32 {
+    log_odds(either(figure, lower, |h| h.tints[bin]), ground.tints[bin])
+}
+
+/// Of the upper and the lower body as `lower` says.
+fn either(figure: &[Histogram; 2], lower: f32, of: impl Fn(&Histogram) -> f32) -> f32 {
+    of(&figure[0]) * (1.0 - lower) + of(&figure[1]) * lower
+}
+
+fn log_odds(figure: f32, ground: f32) -> f32 {
+    ((figure + FLOOR) / (ground + FLOOR)).ln().clamp(-LARGEST, LARGEST)
 }
 
 #[cfg(test)]

@@ -8,58 +8,77 @@ use crate::vision::Luma;
 /// Parts of a pixel that samples are taken at.
 const PARTS: u16 = 64;
 
-/// Where a sample lies: from the middle of pixel `before`, `part` sixty-fourths of the way to that of `after`.
+/// Where a sample lies: from the middle of pixel `before`, `part` sixty-fourths of the way to that of the next.
 #[derive(Debug, Clone, Copy)]
 struct Tap {
     before: usize,
-    after: usize,
     part: u16,
 }
 
 impl Tap {
     /// The `index`th of samples that are `step` pixels apart, the first of which lies `step / 2` after `start`. The border
-    /// of the picture, of `size` pixels, is repeated.
+    /// of the picture, of `size` pixels, is repeated: then nothing is taken of the next pixel.
     fn at(index: usize, start: f32, step: f32, size: usize) -> Self {
         let last = size.saturating_sub(1);
         let place = (start + (index as f32 + 0.5) * step - 0.5).clamp(0.0, last as f32);
         let before = (place as usize).min(last);
         let part = ((place - before as f32) * f32::from(PARTS)).round() as u16;
-        Self { before, after: (before + 1).min(last), part }
+        Self { before, part }
+    }
+
+    fn after(self, size: usize) -> usize {
+        (self.before + 1).min(size.saturating_sub(1))
     }
 }
 
 /// `area` of the picture at `width` x `height`, rows packed, bilinear, the border repeated where it leaves the picture.
 pub(super) fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
     // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
-    let fine = (area.width / width as f32).round().clamp(1.0, 3.0) as usize;
+    match (area.width / width as f32).round().clamp(1.0, 3.0) as usize {
+        1 => averaged::<1>(luma, area, width, height),
+        2 => averaged::<2>(luma, area, width, height),
+        _ => averaged::<3>(luma, area, width, height),
+    }
+}
+
+/// The same with `FINE` x `FINE` samples for each pixel.
+fn averaged<const FINE: usize>(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
     let taps = |start: f32, length: f32, count: usize, size: usize| -> Vec<Tap> {
-        let step = length / (count * fine) as f32;
-        (0..count * fine).map(|index| Tap::at(index, start, step, size)).collect()
+        let step = length / (count * FINE) as f32;
+        (0..count * FINE).map(|index| Tap::at(index, start, step, size)).collect()
     };
-    let across = taps(area.x, area.width, width, luma.width());
+    let mut across = taps(area.x, area.width, width, luma.width());
     let down = taps(area.y, area.height, height, luma.height());
     let mut pixels = vec![0; width * height];
     if luma.width() * luma.height() == 0 {
         return pixels;
     }
     let (Some(first), Some(last)) = (across.first(), across.last()) else { return pixels };
-    let (left, right) = (first.before, last.after + 1);
-    let mut sums = vec![0_u16; right - left];
-    let scale = (fine * fine) as u32 * u32::from(PARTS) * u32::from(PARTS);
-    for (row, taps) in pixels.chunks_exact_mut(width).zip(down.chunks_exact(fine)) {
+    let (left, right) = (first.before, last.after(luma.width()) + 1);
+    across.iter_mut().for_each(|tap| tap.before -= left);
+    // One more, of which nothing is taken, beyond the border.
+    let mut sums = vec![0_u16; right - left + 1];
+    for (row, taps) in pixels.chunks_exact_mut(width).zip(down.as_chunks::<FINE>().0) {
         sums.fill(0);
         for tap in taps {
-            add(&mut sums, &luma.row(tap.before)[left..right], &luma.row(tap.after)[left..right], tap.part);
+            let (upper, lower) = (luma.row(tap.before), luma.row(tap.after(luma.height())));
+            add(&mut sums, &upper[left..right], &lower[left..right], tap.part);
         }
-        for (pixel, taps) in row.iter_mut().zip(across.chunks_exact(fine)) {
-            let at = |tap: &Tap| {
-                let (before, after) = (sums[tap.before - left], sums[tap.after - left]);
-                u32::from(before) * u32::from(PARTS - tap.part) + u32::from(after) * u32::from(tap.part)
-            };
-            *pixel = ((taps.iter().map(at).sum::<u32>() + scale / 2) / scale) as u8;
-        }
+        average::<FINE>(row, &sums, &across);
     }
     pixels
+}
+
+/// Averages the samples of a row of pixels, from the sums of their columns.
+fn average<const FINE: usize>(row: &mut [u8], sums: &[u16], across: &[Tap]) {
+    let scale = (FINE * FINE) as u32 * u32::from(PARTS) * u32::from(PARTS);
+    for (pixel, taps) in row.iter_mut().zip(across.as_chunks::<FINE>().0) {
+        let at = |tap: &Tap| {
+            let pair = &sums[tap.before..tap.before + 2];
+            u32::from(pair[0]) * u32::from(PARTS - tap.part) + u32::from(pair[1]) * u32::from(tap.part)
+        };
+        *pixel = ((taps.iter().map(at).sum::<u32>() + scale / 2) / scale) as u8;
+    }
 }
 
 /// Adds what lies `part` of the way from one row to the next.
