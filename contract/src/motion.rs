@@ -122,7 +122,11 @@ impl BufferMeta for MotionMeta {
             let regions = reader.get::<gst::Array>(field)?;
             let read = regions.as_slice().iter().map(|value| match value.get::<gst::Structure>() {
                 Ok(region) => Region::from_structure(&region),
-                Err(err) => Err(reader.value_error(field, err.to_string())),
+                Err(err) => Err(ContractError::Field {
+                    structure: Self::NAME.to_owned(),
+                    field: field.to_owned(),
+                    reason: err.to_string(),
+                }),
             });
             read.collect::<Result<_, _>>()
         };

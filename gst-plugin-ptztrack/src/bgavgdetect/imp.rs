@@ -22,7 +22,7 @@ use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
-use crate::vision::{Duty, Found, View, Zones};
+use crate::vision::{Duty, View, Zones};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("bgavgdetect", gst::DebugColorFlags::empty(), Some("Motion detector"))
@@ -319,7 +319,7 @@ impl BaseTransformImpl for BgAvgDetect {
         let output = *lock(&self.output);
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         let seen = self.look(&mut stream, inbuf);
-        let regions = seen.found.as_ref().map_or(&[][..], |found| &found.regions);
+        let regions = seen.motion.as_ref().map_or(&[][..], |motion| &motion.regions);
         let drawn = stream.draw(inbuf, outbuf, regions, output);
         let attached = attach(outbuf, &seen, &stream.in_info);
         if let Err(error) = &drawn {
@@ -407,7 +407,7 @@ impl BgAvgDetect {
             Profile::Robust => {
                 let (target, view) = (*lock(&self.target), *lock(&self.view));
                 let seen = stream.look_at_scene(buffer, elapsed, &settings, target, view);
-                seen.map(|(found, scene)| Seen { found, scene: Some(scene) })
+                seen.map(|(motion, scene)| Seen { motion, scene: Some(scene) })
             }
             Profile::Thesis => {
                 if !lock(&self.duty).looks(elapsed) {
@@ -416,7 +416,7 @@ impl BgAvgDetect {
                 }
                 let found = stream.look(buffer, elapsed, &settings);
                 found.map(|regions| Seen {
-                    found: regions.map(|regions| Found { regions, ..Found::default() }),
+                    motion: regions.map(|regions| MotionMeta { regions, ..MotionMeta::default() }),
                     scene: None,
                 })
             }
@@ -425,7 +425,7 @@ impl BgAvgDetect {
             self.warn_once(stream, &error);
             Seen::default()
         });
-        if let Some(Found { regions, .. }) = &seen.found {
+        if let Some(MotionMeta { regions, .. }) = &seen.motion {
             let change = stream.change(regions, elapsed, &settings);
             self.post(change, buffer.pts(), regions);
         }
@@ -469,7 +469,7 @@ impl BgAvgDetect {
 /// What there is to say of a frame.
 #[derive(Default)]
 struct Seen {
-    found: Option<Found>,
+    motion: Option<MotionMeta>,
     scene: Option<SceneMeta>,
 }
 
@@ -478,11 +478,11 @@ fn attach(buffer: &mut gst::BufferRef, seen: &Seen, info: &VideoInfo) -> Result<
     if let Some(scene) = &seen.scene {
         scene.attach(buffer)?;
     }
-    let Some(Found { regions, outside }) = &seen.found else { return Ok(()) };
+    let Some(motion) = &seen.motion else { return Ok(()) };
     remove_regions_of_interest(buffer, MOTION_ROI);
-    for region in regions {
+    for region in &motion.regions {
         let pixels = region.bounds.to_pixels(info.width(), info.height());
         VideoRegionOfInterestMeta::add(buffer, MOTION_ROI, pixels);
     }
-    MotionMeta { regions: regions.clone(), outside: outside.clone() }.attach(buffer)
+    motion.attach(buffer)
 }

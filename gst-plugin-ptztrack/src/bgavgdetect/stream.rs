@@ -2,12 +2,12 @@ use std::time::Duration;
 
 use gst_video::prelude::*;
 use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{MotionChange, Plane, Rect, Region, SceneMeta};
+use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta};
 
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{CarriedZones, Detector, DetectorError, Found, Luma, Presence, SceneModel, View};
+use crate::vision::{CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -163,7 +163,7 @@ impl Stream {
         settings: &Settings,
         target: Option<Rect>,
         view: Option<View>,
-    ) -> Result<(Option<Found>, SceneMeta), StreamError> {
+    ) -> Result<(Option<MotionMeta>, SceneMeta), StreamError> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
             .map_err(|_| StreamError::Buffer)?;
         let picture = self.source.picture(&frame)?;
@@ -175,7 +175,7 @@ impl Stream {
         self.zones.set(&config.zones, &config.exclude_zones);
         self.zones.carry(seen.camera_motion.as_ref(), elapsed, view);
         let size = (frame.width() as usize, frame.height() as usize);
-        let found = self.detector.process_likelihood(&seen, size, elapsed, &config, &self.zones)?;
+        let motion = self.detector.process_likelihood(&seen, size, elapsed, &config, &self.zones)?;
         let scene = SceneMeta {
             from_pts,
             camera_motion: seen.camera_motion,
@@ -184,7 +184,7 @@ impl Stream {
             foreground: plane(seen.foreground),
             background: plane(seen.background),
         };
-        Ok((found, scene))
+        Ok((motion, scene))
     }
 
     /// Whether motion starts or ends with these regions.

@@ -3,7 +3,7 @@ use std::time::Duration;
 
 use opencv::core::{self, CV_8UC1, Mat, Scalar};
 use opencv::prelude::*;
-use ptztrack_contract::Region;
+use ptztrack_contract::{MotionMeta, Region};
 
 use super::afterimage::Afterimage;
 use super::background::{Background, Criterion, ForegroundTest};
@@ -117,15 +117,6 @@ impl RegionChoice {
     }
 }
 
-/// What moves in one picture.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Found {
-    /// In the zones, chosen as the configuration says.
-    pub regions: Vec<Region>,
-    /// Outside of them.
-    pub outside: Vec<Region>,
-}
-
 /// Finds what moves in a still picture: thesis 3.2 to 3.4 in a row.
 #[derive(Debug, Default)]
 pub struct Detector {
@@ -200,7 +191,7 @@ impl Detector {
         elapsed: Duration,
         config: &DetectorConfig,
         zones: &CarriedZones,
-    ) -> Result<Option<Found>, DetectorError> {
+    ) -> Result<Option<MotionMeta>, DetectorError> {
         let foreground = &scene.foreground;
         let divisor = (frame.0 / foreground.width().max(1)).max(1);
         if (self.frame, self.divisor) != (frame, divisor) {
@@ -219,7 +210,7 @@ impl Detector {
         self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
         let confirmed = self.persistence.confirmed(found, config.confirm_pictures);
         let (regions, outside) = confirmed.into_iter().partition(|region| zones.allow(region.centroid));
-        Ok(Some(Found { regions: config.choice.of(regions), outside }))
+        Ok(Some(MotionMeta { regions: config.choice.of(regions), outside }))
     }
 
     /// The same of the reduced picture.

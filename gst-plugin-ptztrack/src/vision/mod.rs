@@ -53,7 +53,7 @@ pub use camera_motion::CameraMotionEstimator;
 pub use camera_moves::CameraMoves;
 pub use carried_zones::{CarriedZones, View};
 pub use contours::{Grid, fill_regions, regions};
-pub use detector::{Detector, DetectorConfig, DetectorError, Found, RegionChoice};
+pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, Patch, Shape, draw, text_width};
 pub use duty::Duty;
 pub use luma::{Luma, LumaError};
