@@ -11,7 +11,7 @@ pub enum Level {
     Error,
 }
 
-/// Something that happened: a line in the log, and a message to the broker.
+/// Something that happened: a line in the log.
 #[derive(Debug, Clone, Serialize)]
 pub struct Event {
     /// ISO 8601, UTC.

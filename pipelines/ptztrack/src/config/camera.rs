@@ -75,17 +75,9 @@ impl CameraSettings {
         let address = address.trim_end_matches('/');
         let host = host(address).ok_or_else(|| format!("`{address}` is not {ADDRESS}"))?;
         Ok(Self {
-            name: name.to_owned(),
             address: address.to_owned(),
             rtsp: format!("rtsp://{host}:554"),
-            codec: Codec::Mjpeg,
-            size: None,
-            rate: None,
-            credentials: None,
-            properties: Vec::new(),
-            recording: None,
-            pipeline: None,
-            show: false,
+            ..Self::without_address(name)
         })
     }
 
@@ -105,7 +97,7 @@ impl CameraSettings {
         let camera =
             address.and_then(|address| Self::at(&name, &address).inspect_err(|err| table.wrong(err)).ok());
         // The rest is read all the same, so that every mistake is found at once.
-        let mut camera = camera.unwrap_or_else(|| Self { name, ..Self::unknown() });
+        let mut camera = camera.unwrap_or_else(|| Self::without_address(&name));
         let of_rtsp = |value: &toml::de::DeValue| {
             value.as_str().filter(|text| text.starts_with("rtsp://")).map(str::to_owned)
         };
@@ -135,9 +127,9 @@ impl CameraSettings {
         Some(camera)
     }
 
-    fn unknown() -> Self {
+    fn without_address(name: &str) -> Self {
         Self {
-            name: String::new(),
+            name: name.to_owned(),
             address: String::new(),
             rtsp: String::new(),
             codec: Codec::Mjpeg,
