@@ -16,7 +16,7 @@ pub fn plugin_folder() -> PathBuf {
     // target/<profile>, and `deps` or `examples` in it.
     let within = |folder: &&Path| !folder.ends_with("deps") && !folder.ends_with("examples");
     let folder = program.ancestors().skip(1).find(within).expect("target/<profile>").to_owned();
-    for file in ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog", "ptztrack-launch"] {
+    for file in ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog", "ptztrack-launch", "ptztrack"] {
         assert!(folder.join(file).exists(), "{file} is not built: run `cargo build` first");
     }
     folder

@@ -7,6 +7,7 @@ pub mod following;
 mod front;
 mod launch;
 mod pipeline;
+mod program;
 pub mod scene;
 mod watchdog;
 
@@ -14,6 +15,7 @@ pub use chance::Chance;
 pub use front::{Front, Way};
 pub use launch::{GstLaunch, plugin_folder, signal, tool};
 pub use pipeline::{Running, init};
+pub use program::Program;
 pub use watchdog::Watchdog;
 
 use std::time::Duration;

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use virtual_camera::{ReceivedCommand, Settings, SyntheticSettings, Video, VirtualCamera, World};
+use virtual_camera::{ReceivedCommand, Settings, SyntheticSettings, Video, VirtualCamera, Waypoint, World};
 
 use crate::PATIENCE;
 
@@ -28,12 +28,17 @@ pub fn walking_person_for(time: Duration) -> Settings {
     world(path)
 }
 
+/// A camera before a person who stands still, whom nobody notices who looks for what moves.
+pub fn standing_person() -> Settings {
+    world(vec![Waypoint { time: Duration::ZERO, pan_deg: 0.0, tilt_deg: -2.0 }])
+}
+
 /// A camera before an empty wall.
 pub fn nobody() -> Settings {
     world(Vec::new())
 }
 
-fn world(path: Vec<virtual_camera::Waypoint>) -> Settings {
+fn world(path: Vec<Waypoint>) -> Settings {
     Settings {
         user: USER.into(),
         password: PASSWORD.into(),

@@ -2,13 +2,14 @@
 
 use std::error::Error;
 use std::fmt::Write;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
 use ptztrack_contract::lock::lock;
+use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::known::{Known, Steering};
 use super::recording;
@@ -24,7 +25,7 @@ const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! 
 /// Between two pictures for who looks.
 const VIEW_EVERY: Duration = Duration::from_millis(200);
 
-/// Closed while the camera is not to follow anybody; the stream's end passes all the same.
+/// Closed while the camera is somebody else's; the stream's end passes all the same.
 const STEER: &str = "valve name=steer drop-mode=forward-sticky-events";
 
 /// The pipeline, as `gst-launch-1.0` takes it; addresses and passwords are not in it.
@@ -118,6 +119,7 @@ pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipelin
     count(&pipeline, known);
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
+    elements.hide_target();
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
     elements.steer(*lock(&known.steering));
     *lock(&known.elements) = Some(elements);
@@ -186,6 +188,8 @@ pub struct Elements {
     home: Option<String>,
     home_timeout: u64,
     steer: Option<gst::Element>,
+    /// On the way home: `vapixptzsink` goes there while it sees pictures with nobody in them.
+    goes_home: Arc<AtomicBool>,
     view: Option<gst::Element>,
     picture: Option<gst_app::AppSink>,
 }
@@ -199,6 +203,7 @@ impl Elements {
             home_timeout: servo.as_ref().map_or(0, |servo| servo.property("home-timeout")),
             servo,
             steer: pipeline.by_name("steer"),
+            goes_home: Arc::default(),
             view: pipeline.by_name("view"),
             picture: pipeline.by_name("picture").and_then(|element| element.downcast().ok()),
         }
@@ -228,6 +233,26 @@ impl Elements {
             Ok(gst::FlowSuccess::Ok)
         };
         picture.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(show).build());
+    }
+
+    /// On the way home, `vapixptzsink` sees the pictures, but not who is in them.
+    fn hide_target(&self) {
+        let goes_home = self.goes_home.clone();
+        let hide = move |_: &gst::Pad, info: &mut gst::PadProbeInfo| {
+            if let Some(buffer) = info.buffer_mut().filter(|_| goes_home.load(Ordering::Relaxed))
+                && let Some(Ok(target)) = TargetMeta::of(buffer)
+            {
+                let TargetMeta { aspect, capture_time, .. } = target;
+                let nobody = TargetMeta { aspect, capture_time, ..TargetMeta::default() };
+                if nobody.attach(buffer.make_mut()).is_err() {
+                    return gst::PadProbeReturn::Drop;
+                }
+            }
+            gst::PadProbeReturn::Ok
+        };
+        if let Some(pad) = self.steer.as_ref().and_then(|steer| steer.static_pad("src")) {
+            pad.add_probe(gst::PadProbeType::BUFFER, hide);
+        }
     }
 
     /// Makes pictures for who looks, or none.
@@ -263,11 +288,12 @@ impl Elements {
     /// Lets the camera follow, sends it home, or leaves it to somebody else. Where no target comes, `vapixptzsink` stops it.
     pub fn steer(&self, steering: Steering) {
         let (Some(servo), Some(steer)) = (&self.servo, &self.steer) else { return };
-        steer.set_property("drop", steering != Steering::Follow);
+        let goes_home = matches!(steering, Steering::GoHome(_));
+        self.goes_home.store(goes_home, Ordering::Relaxed);
+        steer.set_property("drop", steering == Steering::HandedOver);
         let home = self.home.as_ref().filter(|_| steering != Steering::HandedOver);
         servo.set_property("home", home);
-        let timeout = if matches!(steering, Steering::GoHome(_)) { 0 } else { self.home_timeout };
-        servo.set_property("home-timeout", timeout);
+        servo.set_property("home-timeout", if goes_home { 0 } else { self.home_timeout });
     }
 
     /// Whether the camera rests.

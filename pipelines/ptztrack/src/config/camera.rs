@@ -168,10 +168,11 @@ pub fn size(text: &str) -> Option<(u32, u32)> {
 fn zones(table: &mut Table) -> Vec<Property> {
     let mut found = Vec::new();
     for key in ["zones", "exclude-zones"] {
+        let Some(value) = table.value(key) else { continue };
         let Some(zones) = table.get::<Vec<String>>(key) else { continue };
         match properties::of("bgavgdetect", key, &zones.join(";")) {
             Ok(property) => found.push(property),
-            Err(reason) => table.wrong(reason),
+            Err(reason) => table.source.wrong(value.span(), reason),
         }
     }
     found

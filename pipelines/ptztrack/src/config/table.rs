@@ -46,7 +46,9 @@ impl<'a> Table<'a> {
 
     /// A value, where there is one.
     pub fn value(&mut self, key: &'static str) -> Option<&'a Value<'a>> {
-        self.asked.push(key);
+        if !self.asked.contains(&key) {
+            self.asked.push(key);
+        }
         self.entries.get(key)
     }
 

@@ -1,0 +1,100 @@
+//! The program `ptztrack` with a file of cameras, as a service has it.
+
+use std::fs;
+use std::io::{Read, Write};
+use std::net::TcpStream;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use crate::{GstLaunch, PATIENCE, plugin_folder, scene, tool};
+
+/// It runs, with a folder of its own.
+pub struct Program {
+    /// Its process, and what it says.
+    pub launch: GstLaunch,
+    folder: PathBuf,
+    /// Where its page is: host and port.
+    page: String,
+}
+
+impl Program {
+    /// With what `file` makes for it in its folder, named after the test.
+    #[track_caller]
+    pub fn start(test: &str, file: impl FnOnce(&Path) -> String, more: &[&str]) -> Self {
+        let folder = plugin_folder().join(format!("program-{test}-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        fs::write(folder.join("password"), scene::PASSWORD).unwrap();
+        let cameras = folder.join("cameras.toml");
+        fs::write(&cameras, file(&folder)).unwrap();
+        let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
+        command.arg("run").arg(&cameras).args(["--http", "127.0.0.1:0"]).args(more);
+        let mut launch = GstLaunch::spawn(command);
+        let line = launch.wait_for_line("/healthz at http://");
+        let page = line.split("http://").nth(1).and_then(|page| page.split('/').next()).unwrap().to_owned();
+        Self { launch, folder, page }
+    }
+
+    /// A camera's entry in the file.
+    pub fn entry(name: &str, address: &str, password_file: &Path) -> String {
+        format!(
+            "[camera.{name}]\naddress = \"{address}\"\nsize = \"320x240\"\nuser = \"{}\"\npassword-file = {password_file:?}\n",
+            scene::USER
+        )
+    }
+
+    /// Its folder.
+    pub fn folder(&self) -> &Path {
+        &self.folder
+    }
+
+    /// The address of its page.
+    pub fn url(&self) -> String {
+        format!("http://{}/", self.page)
+    }
+
+    /// Status and body of what is asked of the page.
+    pub fn ask(&self, method: &str, path: &str) -> (u16, String) {
+        self.ask_as(&self.page, method, path)
+    }
+
+    /// The same by another name.
+    pub fn ask_as(&self, host: &str, method: &str, path: &str) -> (u16, String) {
+        let mut stream = TcpStream::connect(&self.page).unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
+        write!(
+            stream,
+            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
+        )
+        .unwrap();
+        let mut answer = Vec::new();
+        stream.read_to_end(&mut answer).unwrap();
+        let answer = String::from_utf8_lossy(&answer);
+        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
+        (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
+    }
+
+    /// Asks again and again until this is so of the answer.
+    #[track_caller]
+    pub fn wait_for(&self, path: &str, wanted: impl Fn(&str) -> bool) -> String {
+        let begin = Instant::now();
+        loop {
+            let (_, body) = self.ask("GET", path);
+            if wanted(&body) {
+                return body;
+            }
+            assert!(begin.elapsed() < PATIENCE, "never came at {path}:\n{body}");
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+    }
+
+    /// Ends it by a signal; gives what it said.
+    #[track_caller]
+    pub fn end(self, signal: &str) -> String {
+        self.launch.signal(signal);
+        let (status, output) = self.launch.finish();
+        // Where a test fails, it stays for a look.
+        fs::remove_dir_all(&self.folder).unwrap();
+        assert!(status.success(), "{output}");
+        output
+    }
+}

@@ -1,0 +1,281 @@
+//! The program `ptztrack` as a user and as a service starts it, against virtual cameras.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+#[path = "../../virtual-camera/tests/common/browser.rs"]
+mod browser;
+
+use std::fs;
+use std::process::Command;
+
+use browser::Browser;
+use end_to_end::following::Network;
+use end_to_end::{GstLaunch, PATIENCE, Program, Way, plugin_folder, scene, tool};
+use serde_json::{Value, json};
+use virtual_camera::VirtualCamera;
+
+fn camera() -> VirtualCamera {
+    VirtualCamera::start(scene::walking_person()).unwrap()
+}
+
+#[track_caller]
+fn follows(camera: &VirtualCamera) {
+    scene::wait_until_following(camera);
+}
+
+fn ptztrack() -> Command {
+    tool(plugin_folder().join("ptztrack").to_str().unwrap())
+}
+
+#[test]
+fn one_camera_is_followed_without_a_file() {
+    for codec in ["mjpeg", "h264", "mpeg4"] {
+        let camera = camera();
+        let mut command = ptztrack();
+        command.args([
+            "follow",
+            &camera.url(),
+            "--user",
+            scene::USER,
+            "--codec",
+            codec,
+            "--rtsp",
+            &camera.rtsp_url(),
+        ]);
+        command.env("CAMERA_PASSWORD", scene::PASSWORD);
+        let mut launch = GstLaunch::spawn(command);
+        launch.wait_for_line("acquired");
+        follows(&camera);
+        launch.signal("TERM");
+        let (status, output) = launch.finish();
+        assert!(status.success() && output.contains("has stopped"), "{output}");
+        scene::assert_left_at_rest(&camera);
+    }
+}
+
+#[test]
+fn a_camera_with_a_wrong_password_is_given_up_and_no_matter_to_the_others() {
+    let (good, other) = (camera(), camera());
+    let network = Network::before(&good);
+    let other_url = other.url();
+    let file = |folder: &std::path::Path| {
+        fs::write(folder.join("other"), "wrong").unwrap();
+        let good = Program::entry("good", &network.url(), &folder.join("password"));
+        good + &Program::entry("other", &other_url, &folder.join("other"))
+    };
+    let mut program = Program::start("wrong-password", file, &["--log-format", "json"]);
+    let line = program.launch.wait_for_line("given-up");
+    let event: Value = serde_json::from_str(&line).unwrap();
+    assert_eq!((&event["camera"], &event["level"]), (&json!("other"), &json!("error")), "{line}");
+    follows(&good);
+    assert!(program.ask("GET", "/metrics").1.contains("ptztrack_picture_up{camera=\"good\"} 1.0"));
+
+    // The file is read again, and only what changed is touched.
+    let before = network.http.video_requests();
+    fs::write(program.folder().join("other"), scene::PASSWORD).unwrap();
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("read-again");
+    follows(&other);
+    assert_eq!(network.http.video_requests(), before);
+
+    // One with mistakes changes nothing.
+    fs::write(program.folder().join("cameras.toml"), "[camera.good]\naddress = 7\n").unwrap();
+    program.launch.signal("HUP");
+    let line = program.launch.wait_for_line("not-read");
+    assert!(line.contains("line 2: `address` must be text in quotes"), "{line}");
+    assert_eq!(network.http.video_requests(), before);
+    let said = program.end("TERM");
+    assert!(!said.contains(scene::PASSWORD), "{said}");
+    for camera in [&good, &other] {
+        scene::assert_left_at_rest(camera);
+    }
+}
+
+#[test]
+fn a_camera_that_reboots_is_told_of_once_and_comes_back() {
+    let camera = camera();
+    let network = Network::before(&camera);
+    let file = |folder: &std::path::Path| Program::entry("door", &network.url(), &folder.join("password"));
+    let mut program = Program::start("reboot", file, &[]);
+    program.launch.wait_for_line("door: the picture is there");
+    network.set(Way::Refused);
+    network.reset();
+    program.launch.wait_for_line("tried again until it is back");
+    // It is tried about twice a second.
+    program.wait_for("/metrics", |metrics| count(metrics, "ptztrack_failures_total{camera=\"door\"}") > 3.0);
+    network.set(Way::Open);
+    program.launch.wait_for_line("door: the picture is there");
+    follows(&camera);
+    let said = program.end("INT");
+    let gone = said.matches("it is tried again until it is back").count();
+    assert!((1..=3).contains(&gone), "{gone} lines:\n{said}");
+}
+
+fn count(metrics: &str, name: &str) -> f64 {
+    let line = metrics.lines().find_map(|line| line.strip_prefix(name)).unwrap_or("0");
+    line.trim().parse().unwrap()
+}
+
+#[test]
+fn a_pipeline_that_gives_no_picture_is_built_anew() {
+    let file = |_: &std::path::Path| {
+        "[camera.door]\naddress = \"http://127.0.0.1:1\"\npipeline = \"appsrc is-live=true ! bgavgdetect ! fakesink\"\n"
+            .to_owned()
+    };
+    let mut program = Program::start("silent", file, &[]);
+    program.launch.wait_for_line("door: warning: no picture for 10 s: the pipeline is built anew");
+    program
+        .wait_for("/metrics", |metrics| count(metrics, "ptztrack_pipelines_total{camera=\"door\"}") == 2.0);
+    assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
+    program.end("TERM");
+}
+
+#[test]
+fn metrics_and_page_are_for_who_asks_by_the_right_name() {
+    let camera = camera();
+    let file = |folder: &std::path::Path| Program::entry("door", &camera.url(), &folder.join("password"));
+    let program = Program::start("metrics", file, &[]);
+    follows(&camera);
+    let metrics = program.wait_for("/metrics", |metrics| {
+        count(metrics, "ptztrack_commands_total{camera=\"door\"}") > 0.0
+            && metrics.contains("ptztrack_camera_state{camera=\"door\",state=\"moving\"} 1")
+    });
+    for name in [
+        "ptztrack_pictures_total{camera=\"door\"}",
+        "ptztrack_element_seconds_total{camera=\"door\",element=\"lkfeaturetrack\"}",
+        "ptztrack_command_round_trip_seconds{camera=\"door\"}",
+    ] {
+        assert!(count(&metrics, name) > 0.0, "{name} in:\n{metrics}");
+    }
+    assert!(metrics.trim_end().ends_with("# EOF"), "{metrics}");
+    assert_eq!(program.ask_as("evil.example", "GET", "/metrics").0, 421);
+    assert_eq!(program.ask_as("evil.example", "POST", "/cameras/door/release").0, 421);
+    assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
+    assert_eq!(program.ask("POST", "/cameras/nobody/release").0, 404);
+    assert_eq!(program.ask("POST", "/cameras/door/select?x=7&y=0").0, 400);
+    program.end("TERM");
+}
+
+#[test]
+fn the_page_shows_every_camera_and_steers_it() {
+    let Some(mut browser) = Browser::start("chromium-program") else { return };
+    let door = camera();
+    let hall = VirtualCamera::start(scene::standing_person()).unwrap();
+    let file = |folder: &std::path::Path| {
+        let password = folder.join("password");
+        let home = "[camera.door.vapixptzsink]\nhome = \"10,8\"\nhome-timeout = \"1h\"\n";
+        Program::entry("door", &door.url(), &password)
+            + home
+            + &Program::entry("hall", &hall.url(), &password)
+    };
+    let program = Program::start("page", file, &[]);
+    browser.open(&program.url());
+    let of = |name: &str| format!("document.querySelector('[data-name={name}]')");
+    for name in ["door", "hall"] {
+        browser.wait_for(&format!("{}?.querySelector('img').naturalWidth == 320", of(name)));
+    }
+    browser.wait_for(&format!("{}.innerText.includes('follows target')", of("door")));
+    browser.wait_for(&format!("{}.innerText.includes('looks for somebody, the camera rests')", of("hall")));
+    browser.save_picture("ptztrack-page.png");
+    let click = |browser: &mut Browser, what: &str| {
+        let button = format!("{}.querySelector('[data-order={what}]')", of("door"));
+        browser.wait_for(&format!("!{button}.hidden"));
+        browser.value(&format!("{button}.click()"));
+    };
+
+    // Handed over, the camera is left alone; taken back, it follows again.
+    click(&mut browser, "hand-over");
+    browser.wait_for(&format!("{}.innerText.includes('handed over')", of("door")));
+    scene::assert_left_at_rest(&door);
+    click(&mut browser, "take-back");
+    follows(&door);
+
+    click(&mut browser, "home");
+    // Higher than anybody is.
+    let there = |status: &virtual_camera::Status| (status.tilt_deg - 8.0).abs() < 0.5;
+    assert!(door.wait_for(PATIENCE, there), "{:?}", door.status());
+    assert!(door.wait_for(PATIENCE, |status| status.tilt_deg < 4.0), "it does not follow again");
+
+    // A click at somebody who stands still makes him the target; a button lets him go.
+    browser.wait_for(&format!("{}.querySelector('[data-order=release]').hidden", of("hall")));
+    let image = format!("{}.querySelector('img')", of("hall"));
+    let at = format!(
+        "{{ const r = {image}.getBoundingClientRect(); {image}.dispatchEvent(new MouseEvent('click', \
+         {{ clientX: r.x + r.width / 2, clientY: r.y + r.height / 2, bubbles: true }})); }}"
+    );
+    browser.value(&at);
+    browser.wait_for(&format!("{}.innerText.includes('follows target')", of("hall")));
+    browser.value(&format!("{}.querySelector('[data-order=release]').click()", of("hall")));
+    browser.wait_for(&format!("{}.innerText.includes('looks for somebody')", of("hall")));
+    program.end("TERM");
+    scene::assert_left_at_rest(&door);
+}
+
+#[test]
+fn the_cameras_own_stream_is_recorded_as_it_comes() {
+    let camera = camera();
+    let file = |folder: &std::path::Path| {
+        let recording = folder.join("recordings");
+        let more = format!("codec = \"h264\"\nrtsp = \"{}\"\n", camera.rtsp_url());
+        let recording =
+            format!("[camera.door.recording]\nfolder = {recording:?}\nsegment = \"2s\"\nkeep = \"1h\"\n");
+        Program::entry("door", &camera.url(), &folder.join("password")) + &more + &recording
+    };
+    let program = Program::start("recording", file, &[]);
+    let folder = program.folder().join("recordings");
+    let files = || fs::read_dir(&folder).map_or(0, Iterator::count);
+    let begin = std::time::Instant::now();
+    while files() < 3 {
+        assert!(begin.elapsed() < PATIENCE, "only {} files", files());
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    let kept = plugin_folder().join(format!("kept-{}", std::process::id()));
+    fs::rename(&folder, &kept).unwrap();
+    program.end("TERM");
+    let mut names: Vec<_> = fs::read_dir(&kept).unwrap().map(|entry| entry.unwrap().path()).collect();
+    names.sort();
+    let probe = Command::new("ffprobe")
+        .args([
+            "-v",
+            "error",
+            "-count_frames",
+            "-show_entries",
+            "stream=codec_name,width,height,nb_read_frames",
+        ])
+        .args(["-of", "csv=p=0"])
+        .arg(&names[0])
+        .output()
+        .unwrap();
+    fs::remove_dir_all(&kept).unwrap();
+    let found = String::from_utf8_lossy(&probe.stdout).trim().to_owned();
+    let frames = found.strip_prefix("h264,320,240,").and_then(|frames| frames.parse().ok());
+    assert!(frames.is_some_and(|frames: u32| frames > 5) && probe.stderr.is_empty(), "{probe:?}");
+}
+
+#[test]
+fn mistakes_are_named_and_the_example_is_right() {
+    let example = ptztrack().arg("example-config").output().unwrap();
+    let file = plugin_folder().join(format!("example-{}.toml", std::process::id()));
+    fs::write(&file, &example.stdout).unwrap();
+    let right = ptztrack().arg("check").arg(&file).output().unwrap();
+    assert!(right.status.success(), "{right:?}");
+    fs::write(
+        &file,
+        "[camera.door]\naddress = \"http://door\"\nzones = [\"0,0 1,1\"]\n[camera.door.vapixptzsink]\ngain = 99\n\
+         home-timeout = \"soon\"\nmode = \"fast\"\npassword = \"x\"\nlatency = \"500ms\"\n",
+    )
+    .unwrap();
+    let wrong = ptztrack().arg("check").arg(&file).output().unwrap();
+    fs::remove_file(&file).unwrap();
+    let said = String::from_utf8_lossy(&wrong.stderr);
+    assert_eq!(wrong.status.code(), Some(1), "{said}");
+    for expected in [
+        "line 3: `zones` cannot be 0,0 1,1: ",
+        "line 5: `gain` must be a number from 0 to 20",
+        "line 6: `home-timeout` must be a duration such as \"2s\"",
+        "line 7: `mode` must be one of ",
+        "line 8: `password` is no property that can be set here; there are: ",
+    ] {
+        assert!(said.contains(expected), "{expected} is not in:\n{said}");
+    }
+    assert!(!said.contains("latency` must") && !said.contains("line 9"), "{said}");
+}
