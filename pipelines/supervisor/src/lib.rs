@@ -19,7 +19,7 @@ const ENDS: [i32; 3] = [1, 2, 15];
 /// # Errors
 /// Those of [`Supervisor::run`].
 pub fn run(
-    build: impl FnMut() -> Result<gst::Pipeline, Box<dyn Error>>,
+    mut build: impl FnMut() -> Result<gst::Pipeline, Box<dyn Error>>,
     on_message: impl FnMut(&gst::Message) + 'static,
 ) -> Result<(), Box<dyn Error>> {
     let supervisor = Supervisor::default();
@@ -30,7 +30,7 @@ pub fn run(
             glib::ControlFlow::Continue
         })
     });
-    let result = supervisor.run(build, on_message);
+    let result = supervisor.run(|| build().map(Some), on_message);
     signals.into_iter().for_each(glib::SourceId::remove);
     result
 }

@@ -43,15 +43,16 @@ impl Supervisor {
         }))
     }
 
-    /// Runs what `build` makes, again and again, until told to end; `on_message` hears every message. To be called in a
-    /// thread whose main context is the supervisor's.
+    /// Runs what `build` makes, again and again, until told to end; where it makes nothing, as there is nobody to connect to,
+    /// it is asked again after a pause. `on_message` hears every message. To be called in a thread whose main context is the
+    /// supervisor's.
     ///
     /// # Errors
     /// Those of `build`, and an error after which a new start would end in the same way, as user and password are wrong:
     /// to try that again and again could lock the account.
     pub fn run(
         &self,
-        mut build: impl FnMut() -> Result<gst::Pipeline, Box<dyn Error>>,
+        mut build: impl FnMut() -> Result<Option<gst::Pipeline>, Box<dyn Error>>,
         on_message: impl FnMut(&gst::Message) + 'static,
     ) -> Result<(), Box<dyn Error>> {
         let on_message = Rc::new(RefCell::new(on_message));
@@ -59,7 +60,9 @@ impl Supervisor {
         while !self.told_to_end() {
             let pipeline = build()?;
             let begin = Instant::now();
-            self.play(&pipeline, on_message.clone())?;
+            if let Some(pipeline) = pipeline {
+                self.play(&pipeline, on_message.clone())?;
+            }
             if let Some(err) = lock(&self.0.hopeless).take() {
                 return Err(err.into());
             }

@@ -110,6 +110,35 @@ fn a_camera_that_reboots_is_told_of_once_and_comes_back() {
     assert!((1..=3).contains(&gone), "{gone} lines:\n{said}");
 }
 
+/// A camera whose power is on, but that accepts no connection any more, as one that hangs.
+#[test]
+fn a_camera_that_hangs_costs_nothing_but_time() {
+    let hanging = socket2::Socket::new(socket2::Domain::IPV4, socket2::Type::STREAM, None).unwrap();
+    hanging.bind(&std::net::SocketAddr::from(([127, 0, 0, 1], 0)).into()).unwrap();
+    hanging.listen(0).unwrap();
+    let address = hanging.local_addr().unwrap().as_socket().unwrap();
+    // Nobody accepts these, and no more fit.
+    let moment = std::time::Duration::from_millis(300);
+    let waiting: Vec<_> =
+        (0..4).map_while(|_| std::net::TcpStream::connect_timeout(&address, moment).ok()).collect();
+    assert!(!waiting.is_empty());
+    let file = |folder: &std::path::Path| {
+        Program::entry("door", &format!("http://{address}"), &folder.join("password"))
+    };
+    let mut program = Program::start("hangs", file, &[]);
+    let line = program.launch.wait_for_line("tried again until it is back");
+    assert!(line.contains(&format!("port {}: ", address.port())), "{line}");
+    let failures = "ptztrack_failures_total{camera=\"door\"}";
+    let descriptors = || fs::read_dir(format!("/proc/{}/fd", program.launch.id())).unwrap().count();
+    program.wait_for("/metrics", |metrics| count(metrics, failures) > 3.0);
+    let before = descriptors();
+    program.wait_for("/metrics", |metrics| count(metrics, failures) > 9.0);
+    let after = descriptors();
+    // One may be open at that moment.
+    assert!(after <= before + 2, "{before} descriptors, then {after}");
+    program.end("TERM");
+}
+
 fn count(metrics: &str, name: &str) -> f64 {
     let line = metrics.lines().find_map(|line| line.strip_prefix(name)).unwrap_or("0");
     line.trim().parse().unwrap()

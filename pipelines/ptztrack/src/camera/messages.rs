@@ -26,15 +26,13 @@ impl Listener {
     pub fn hear(&mut self, message: &gst::Message) {
         match message.view() {
             MessageView::Error(error) => {
-                self.known.failures.fetch_add(1, Ordering::Relaxed);
+                self.fails();
                 let error = error.error();
-                lock(&self.known.state).picture = false;
                 if error.matches(gst::ResourceError::NotAuthorized) {
                     // It is given up, and that is told elsewhere.
                     return;
                 }
-                let text = error.message().to_owned();
-                self.trouble(Level::Error, "picture-gone", text, "; it is tried again until it is back");
+                self.picture_gone(error.message().to_owned());
             }
             MessageView::Eos(_) => {
                 lock(&self.known.state).picture = false;
@@ -49,6 +47,21 @@ impl Listener {
             }
             _ => {}
         }
+    }
+
+    /// Nobody is there to send pictures.
+    pub fn out_of_reach(&mut self, reason: String) {
+        self.fails();
+        self.picture_gone(reason);
+    }
+
+    fn fails(&self) {
+        self.known.failures.fetch_add(1, Ordering::Relaxed);
+        lock(&self.known.state).picture = false;
+    }
+
+    fn picture_gone(&mut self, reason: String) {
+        self.trouble(Level::Error, "picture-gone", reason, "; it is tried again until it is back");
     }
 
     /// The first picture of a pipeline is what ends the trouble before it.

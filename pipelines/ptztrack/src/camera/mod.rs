@@ -3,6 +3,7 @@
 mod known;
 mod messages;
 mod pipeline;
+mod reach;
 mod recording;
 mod stopwatch;
 
@@ -95,10 +96,16 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             }
         }
     });
+    let waits = listener.clone();
     let build = || {
+        if let Err(reason) = reach::check(settings) {
+            lock(&known.elements).take();
+            waits.borrow_mut().out_of_reach(reason);
+            return Ok(None);
+        }
         known.begins_anew();
         known.rebuilt.fetch_add(1, Ordering::Relaxed);
-        pipeline::build(settings, known)
+        pipeline::build(settings, known).map(Some)
     };
     let result = supervisor.run(build, move |message| listener.borrow_mut().hear(message));
     timer.abort();

@@ -54,7 +54,7 @@ impl Collector for Cameras {
         counter(
             e,
             "failures",
-            "Errors that ended a pipeline",
+            "Errors that ended a pipeline, or kept one from being built",
             None,
             count(|k| k.failures.load(Ordering::Relaxed)),
         )?;
