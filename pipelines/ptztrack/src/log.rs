@@ -2,6 +2,7 @@ use std::io::{IsTerminal, Write, stderr};
 use std::sync::Mutex;
 
 use ptztrack_contract::lock::lock;
+use tokio::sync::broadcast;
 
 use crate::event::{Event, Level};
 
@@ -20,11 +21,16 @@ pub struct Log {
     format: Format,
     /// What stands below the log in a terminal.
     status: Mutex<Vec<String>>,
+    /// For whoever tells it elsewhere too.
+    events: broadcast::Sender<Event>,
 }
+
+/// So many events wait for somebody who is slow; those before are lost to them.
+const WAITING: usize = 256;
 
 impl Log {
     pub fn new(format: Format) -> Self {
-        Self { format, status: Mutex::default() }
+        Self { format, status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
     }
 
     /// Whether there is somebody to show a status to.
@@ -40,6 +46,14 @@ impl Log {
         };
         let status = lock(&self.status);
         write(&format!("{}{line}\n{}", above(&status), below(&status)));
+        drop(status);
+        // Where nobody listens, that is no fault.
+        let _ = self.events.send(event.clone());
+    }
+
+    /// Everything that is told from now on.
+    pub fn subscribe(&self) -> broadcast::Receiver<Event> {
+        self.events.subscribe()
     }
 
     pub fn info(&self, event: &str, detail: impl Into<String>) {

@@ -7,6 +7,7 @@ mod event;
 mod fleet;
 mod http;
 mod log;
+mod mqtt;
 mod service;
 mod shard;
 
@@ -38,7 +39,7 @@ fn run(options: Options) -> Result<(), String> {
             follow(Origin::File { path: file, shard, watchdog }, &serving, log)
         }
         Command::Follow(follow_one) => {
-            let config = Config { cameras: vec![follow_one.camera()?], http: None };
+            let config = Config { cameras: vec![follow_one.camera()?], http: None, mqtt: None };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Command::Check { file } => {

@@ -13,6 +13,7 @@ use crate::config::{Config, Http};
 use crate::fleet::Fleet;
 use crate::http;
 use crate::log::Log;
+use crate::mqtt::Publisher;
 use crate::shard::Shard;
 
 /// Where the cameras come from, and come from again on SIGHUP.
@@ -22,6 +23,14 @@ pub enum Origin {
 }
 
 impl Origin {
+    /// Which share of the cameras is ours.
+    fn shard(&self) -> Option<Shard> {
+        match self {
+            Self::File { shard, .. } => *shard,
+            Self::CommandLine(_) => None,
+        }
+    }
+
     /// # Errors
     /// What is wrong with the file.
     pub fn read(&self) -> Result<Config, String> {
@@ -54,6 +63,8 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     if let Some(http) = &config.http {
         serve(http, &fleet, &log).await?;
     }
+    let publisher =
+        config.mqtt.as_ref().map(|mqtt| Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone()));
     apply(&fleet, config.clone()).await;
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
@@ -81,6 +92,9 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     log.info("ending", "ends: every camera is brought to rest");
     let ending = fleet.clone();
     let _ = tokio::task::spawn_blocking(move || ending.end()).await;
+    if let Some(publisher) = publisher {
+        publisher.end().await;
+    }
     Ok(())
 }
 
@@ -103,8 +117,11 @@ async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &
     match origin.read() {
         Ok(config) => {
             log.info("read-again", "the configuration was read again");
-            if config.http != current.http {
-                log.error("restart-needed", "what changed in [http] counts from the next start on");
+            if config.http != current.http || config.mqtt != current.mqtt {
+                log.error(
+                    "restart-needed",
+                    "what changed in [http] and [mqtt] counts from the next start on",
+                );
             }
             apply(fleet, config.clone()).await;
             config

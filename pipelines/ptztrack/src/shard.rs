@@ -23,6 +23,11 @@ impl FromStr for Shard {
 }
 
 impl Shard {
+    /// Which one it is.
+    pub fn number(self) -> u32 {
+        self.number
+    }
+
     /// Whether a camera is in it. By the name alone, so that no other entry of the file changes it: while some processes have
     /// read a new file and others have not, none of them takes a camera that another has.
     pub fn has(self, camera: &CameraSettings) -> bool {

@@ -2,6 +2,7 @@
 
 mod camera;
 mod credentials;
+mod mqtt;
 mod problem;
 mod properties;
 mod table;
@@ -15,6 +16,7 @@ use toml::de::DeTable;
 
 pub use camera::{CameraSettings, Codec, Recording, size};
 pub use credentials::{Credentials, Secret};
+pub use mqtt::Mqtt;
 pub use problem::Problems;
 use table::{Source, Table};
 
@@ -26,6 +28,7 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Config {
     pub cameras: Vec<CameraSettings>,
     pub http: Option<Http>,
+    pub mqtt: Option<Mqtt>,
 }
 
 /// The page, `/metrics` and `/healthz`.
@@ -64,6 +67,7 @@ impl Config {
 
     fn read(mut root: Table) -> Self {
         let http = root.table("http").and_then(Http::read);
+        let mqtt = root.table("mqtt").and_then(Mqtt::read);
         let cameras = root.tables("camera");
         if cameras.is_empty() {
             root.wrong("there is no camera: [camera.door] begins one that is called door");
@@ -71,7 +75,7 @@ impl Config {
         let cameras =
             cameras.into_iter().filter_map(|(name, table)| CameraSettings::read(name, table)).collect();
         root.no_more();
-        Self { cameras, http }
+        Self { cameras, http, mqtt }
     }
 }
 

@@ -97,6 +97,24 @@ fn the_page_is_for_this_machine_unless_it_has_a_password() {
 }
 
 #[test]
+fn a_broker_has_a_host_and_topics_without_wildcards() {
+    let camera = "[camera.a]\naddress = \"http://a\"\n";
+    let mqtt = parse(&format!("[mqtt]\nhost = \"broker\"\n{camera}")).unwrap().mqtt.unwrap();
+    assert_eq!(
+        (mqtt.port, mqtt.topic.as_str(), mqtt.discovery.as_deref()),
+        (1883, "ptztrack", Some("homeassistant"))
+    );
+    let wrong = parse(&format!("[mqtt]\nport = 70000\ntopic = \"a/#\"\n{camera}")).unwrap_err();
+    for expected in [
+        "line 1: `host` is missing",
+        "line 2: `port` must be a port, a whole number from 1 to 65535",
+        "line 3: `topic` must be the beginning of a topic",
+    ] {
+        assert!(wrong.contains(expected), "{expected} is not in:\n{wrong}");
+    }
+}
+
+#[test]
 fn a_recording_is_kept_for_so_long_or_so_much() {
     let recording =
         "[camera.a]\naddress = \"http://a\"\n[camera.a.recording]\nfolder = \"/r\"\nkeep-bytes = \"2GB\"\n";

@@ -1,0 +1,41 @@
+use super::credentials::{self, Credentials};
+use super::table::{Read, Table, whole};
+
+/// The broker that is told what happens.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Mqtt {
+    pub host: String,
+    pub port: u16,
+    pub credentials: Option<Credentials>,
+    /// What all topics of ours begin with.
+    pub topic: String,
+    /// Home Assistant's prefix of discovery; `None` where it is not to be told.
+    pub discovery: Option<String>,
+}
+
+impl Mqtt {
+    /// MQTT without TLS, as IANA has it.
+    const PORT: u16 = 1883;
+
+    pub(super) fn read(mut table: Table) -> Option<Self> {
+        let host: Option<String> = table.need("host");
+        let port = table.get_with("port", "a port, a whole number from 1 to 65535", |value| {
+            whole(value).and_then(|port| u16::try_from(port).ok()).filter(|port| *port > 0)
+        });
+        let credentials = credentials::read(&mut table);
+        let topic = topic(&mut table, "topic").unwrap_or_else(|| "ptztrack".to_owned());
+        let prefix =
+            self::topic(&mut table, "discovery-prefix").unwrap_or_else(|| "homeassistant".to_owned());
+        let discovery = table.get("discovery").unwrap_or(true).then_some(prefix);
+        table.no_more();
+        Some(Self { host: host?, port: port.unwrap_or(Self::PORT), credentials, topic, discovery })
+    }
+}
+
+/// The beginning of topics (MQTT 3.1.1, 4.7): no wildcards, and no `$`, which is the broker's own.
+fn topic(table: &mut Table, key: &'static str) -> Option<String> {
+    table.get_with(key, "the beginning of a topic, without `+`, `#`, `$` and `/` at its ends", |value| {
+        String::read(value)
+            .filter(|topic| !topic.contains(['+', '#', '$', '\0']) && topic.trim_matches('/') == topic)
+    })
+}

@@ -1,0 +1,163 @@
+//! What happens, told to an MQTT broker: events as they come, and what is kept there for who comes later.
+
+mod topics;
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use rumqttc::{AsyncClient, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS};
+use tokio::sync::broadcast::error::RecvError;
+use tokio::task::JoinHandle;
+use topics::{OFFLINE, ONLINE, Topics};
+
+use crate::config::Mqtt;
+use crate::event::Event;
+use crate::fleet::Fleet;
+use crate::log::Log;
+use crate::shard::Shard;
+
+/// Between two tries to reach the broker.
+const PAUSE: Duration = Duration::from_secs(5);
+/// Between two looks at what is kept by the broker.
+const EVERY: Duration = Duration::from_secs(1);
+/// A connection on which nothing was said for so long is tried.
+const KEEP_ALIVE: Duration = Duration::from_secs(20);
+/// So many messages wait for a broker that is away.
+const WAITING: usize = 256;
+/// For the last words.
+const LONGEST_END: Duration = Duration::from_secs(1);
+
+/// A connection to a broker, until [`Publisher::end`].
+pub struct Publisher {
+    client: AsyncClient,
+    availability: String,
+    connection: JoinHandle<()>,
+    publishing: JoinHandle<()>,
+}
+
+impl Publisher {
+    /// Connects, and tells from now on what happens.
+    pub fn start(settings: &Mqtt, shard: Option<Shard>, fleet: Arc<Fleet>, log: Arc<Log>) -> Self {
+        let topics = Topics::new(settings, shard);
+        let id = format!("ptztrack-{}-{}", glib::host_name(), std::process::id());
+        let mut options = MqttOptions::new(id, &settings.host, settings.port);
+        options.set_keep_alive(KEEP_ALIVE);
+        options.set_last_will(LastWill::new(topics.availability(), OFFLINE, QoS::AtLeastOnce, true));
+        if let Some(credentials) = &settings.credentials {
+            options.set_credentials(&credentials.user, credentials.password.reveal());
+        }
+        let (client, events) = AsyncClient::new(options, WAITING);
+        let connected = Arc::new(AtomicBool::default());
+        let broker = format!("{}:{}", settings.host, settings.port);
+        Self {
+            availability: topics.availability(),
+            connection: tokio::spawn(keep_connected(events, connected.clone(), broker, log.clone())),
+            publishing: tokio::spawn(publish(client.clone(), connected, topics, fleet, log)),
+            client,
+        }
+    }
+
+    /// Says that we are gone.
+    pub async fn end(self) {
+        self.publishing.abort();
+        // For a broker that is away our last will does that.
+        let _ = self.client.try_publish(self.availability, QoS::AtLeastOnce, true, OFFLINE);
+        let _ = self.client.try_disconnect();
+        let _ = tokio::time::timeout(LONGEST_END, self.connection).await;
+    }
+}
+
+/// Says once that the broker is away, and once that it is there.
+async fn keep_connected(mut events: EventLoop, connected: Arc<AtomicBool>, broker: String, log: Arc<Log>) {
+    let mut told = false;
+    loop {
+        match events.poll().await {
+            Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
+                told = false;
+                connected.store(true, Ordering::Relaxed);
+                log.info("mqtt-connected", format!("connected to the MQTT broker {broker}"));
+            }
+            Ok(rumqttc::Event::Outgoing(Outgoing::Disconnect)) => return,
+            Ok(_) => {}
+            Err(err) => {
+                if !std::mem::replace(&mut told, true) {
+                    let detail =
+                        format!("no connection to the MQTT broker {broker}: {err}; it is tried again");
+                    log.error("mqtt-disconnected", detail);
+                }
+                tokio::time::sleep(PAUSE).await;
+            }
+        }
+    }
+}
+
+/// Events as they come, and what is kept as it changes.
+async fn publish(
+    client: AsyncClient,
+    connected: Arc<AtomicBool>,
+    topics: Topics,
+    fleet: Arc<Fleet>,
+    log: Arc<Log>,
+) {
+    let mut events = log.subscribe();
+    let mut timer = tokio::time::interval(EVERY);
+    let mut kept = BTreeMap::new();
+    loop {
+        tokio::select! {
+            event = events.recv() => match event {
+                Ok(event) => publish_event(&client, &topics, &event),
+                Err(RecvError::Lagged(_)) => {}
+                Err(RecvError::Closed) => return,
+            },
+            _ = timer.tick() => {
+                if connected.swap(false, Ordering::Relaxed) {
+                    // It may have forgotten, or be another one.
+                    kept.clear();
+                }
+                let mut wanted = BTreeMap::from([(topics.availability(), ONLINE.to_owned())]);
+                wanted.extend(fleet.known().iter().flat_map(|known| topics.kept(known)));
+                for (topic, payload) in changes(&kept, &wanted) {
+                    if client.try_publish(&topic, QoS::AtLeastOnce, true, payload.as_str()).is_ok() {
+                        kept.insert(topic, payload);
+                    }
+                }
+                kept.retain(|_, payload| !payload.is_empty());
+            }
+        }
+    }
+}
+
+/// One that finds no place is lost: what is kept tells how things are.
+fn publish_event(client: &AsyncClient, topics: &Topics, event: &Event) {
+    if let Ok(payload) = serde_json::to_string(event) {
+        let _ = client.try_publish(topics.event(event.camera.as_deref()), QoS::AtMostOnce, false, payload);
+    }
+}
+
+/// What is to be published, by topic; with an empty payload the broker forgets it.
+fn changes(kept: &BTreeMap<String, String>, wanted: &BTreeMap<String, String>) -> Vec<(String, String)> {
+    let new = wanted.iter().filter(|(topic, payload)| kept.get(*topic) != Some(payload));
+    let gone = kept.keys().filter(|topic| !wanted.contains_key(*topic));
+    new.map(|(topic, payload)| (topic.clone(), payload.clone()))
+        .chain(gone.map(|topic| (topic.clone(), String::new())))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_changed_is_published_and_what_is_gone_forgotten() {
+        let map = |pairs: &[(&str, &str)]| {
+            pairs.iter().map(|(topic, payload)| ((*topic).to_owned(), (*payload).to_owned())).collect()
+        };
+        let kept = map(&[("a", "1"), ("b", "1"), ("c", "1")]);
+        let wanted = map(&[("a", "1"), ("b", "2"), ("d", "1")]);
+        let pairs = changes(&kept, &wanted);
+        let pairs: Vec<_> = pairs.iter().map(|(topic, payload)| (topic.as_str(), payload.as_str())).collect();
+        assert_eq!(pairs, [("b", "2"), ("d", "1"), ("c", "")]);
+    }
+}
