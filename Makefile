@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo evaluate evaluate-all soak deny fuzz install deb test-packages packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench evaluate evaluate-all soak deny fuzz install deb test-packages packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -33,6 +33,11 @@ WORLD ?= footage
 ROOM_TEST ?= 1
 SEED ?= 1
 INPUTS ?= 10000000
+BENCH_SIZE ?= 1280x720
+BENCH_SECONDS ?= 16
+ROUNDS ?= 5
+# A package of its own, which shares what is compiled.
+BENCHMARKS := --manifest-path benchmarks/Cargo.toml --target-dir target
 
 ## help: list the targets
 help:
@@ -66,6 +71,17 @@ demo: packages-demo
 	esac; \
 	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
+
+## bench: measure what following costs beside decoding and other elements, on recordings of the room by a still and by a turning
+##       camera, and leave a table and a plot in target/bench (ROUNDS=5  BENCH_SIZE=1280x720)
+bench: packages-evaluate
+	$(CARGO) build --release $(PRODUCT)
+	$(CARGO) build --release $(BENCHMARKS)
+	mkdir -p target/bench
+	target/release/record target/bench/still.avi $(BENCH_SIZE) $(BENCH_SECONDS) 0
+	target/release/record target/bench/turning.avi $(BENCH_SIZE) $(BENCH_SECONDS) 5
+	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/still.avi target/bench/turning.avi \
+		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
 ##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;
