@@ -136,9 +136,12 @@ fn count_coloured(plane: &[u8]) -> u32 {
 
 /// Means of rectangles of `samples`, `size` of them; where that is more than there are, the nearest sample.
 fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>, out: &mut Vec<u8>) {
-    out.clear();
-    out.resize(width * height, 0);
     let (columns, rows) = (samples.width, samples.bytes.height());
+    if columns == 0 || rows == 0 || width == 0 {
+        out.clear();
+    }
+    // What is left of the picture before is written over.
+    out.resize(width * height, 0);
     if columns == 0 || rows == 0 || width == 0 {
         return;
     }

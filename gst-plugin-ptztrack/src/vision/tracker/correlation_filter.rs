@@ -7,10 +7,7 @@
 //! oriented gradients in cells of 4x4 pixels. All of it happens on a grid of some 500 cells, whatever the size
 //! of the target.
 
-use opencv::core::{
-    BORDER_REPLICATE, CV_32F, DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Rect2f, Size,
-    ToInputArray, Vec2f,
-};
+use opencv::core::{DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Rect2f, Size, Vec2f};
 use opencv::imgproc;
 use opencv::prelude::*;
 
@@ -148,9 +145,7 @@ impl CorrelationFilter {
     fn describe(&self, luma: &Luma, bounds: Rect2f) -> opencv::Result<Vec<Vec<f32>>> {
         let (width, height) = (self.columns * CELL, self.rows * CELL);
         let pixels = sample(luma, scaled(bounds, CONTEXT.0, CONTEXT.1), width, height);
-        let grey = Mat::from_slice(&pixels)?;
-        let grey = grey.reshape(1, height as i32)?;
-        let mut channels = features(&grey, self.columns, self.rows)?;
+        let mut channels = features(&Luma::packed(&pixels, width), self.columns, self.rows)?;
         for channel in &mut channels {
             channel.iter_mut().zip(&self.window).for_each(|(value, weight)| *value *= weight);
         }
@@ -206,12 +201,16 @@ fn label(columns: usize, rows: usize) -> Vec<f32> {
 }
 
 /// Normalised histograms of oriented gradients of each cell, and its grey: one plane for each.
-fn features(grey: &impl ToInputArray, columns: usize, rows: usize) -> opencv::Result<Vec<Vec<f32>>> {
-    let (mut dx, mut dy) = (Mat::default(), Mat::default());
-    imgproc::sobel(grey, &mut dx, CV_32F, 1, 0, 1, 1.0, 0.0, BORDER_REPLICATE)?;
-    imgproc::sobel(grey, &mut dy, CV_32F, 0, 1, 1, 1.0, 0.0, BORDER_REPLICATE)?;
+fn features(grey: &Luma, columns: usize, rows: usize) -> opencv::Result<Vec<Vec<f32>>> {
+    let [dx, dy] = gradients(grey);
     let (mut strength, mut angle) = (Mat::default(), Mat::default());
-    opencv::core::cart_to_polar(&dx, &dy, &mut strength, &mut angle, false)?;
+    opencv::core::cart_to_polar(
+        &Mat::from_slice(&dx)?,
+        &Mat::from_slice(&dy)?,
+        &mut strength,
+        &mut angle,
+        false,
+    )?;
     let (strength, angle) = (strength.data_typed::<f32>()?, angle.data_typed::<f32>()?);
     let mut channels = vec![vec![0.0; columns * rows]; ORIENTATIONS];
     let width = columns * CELL;
@@ -236,6 +235,29 @@ fn features(grey: &impl ToInputArray, columns: usize, rows: usize) -> opencv::Re
     normalise(&mut channels, columns, rows);
     channels.push(grey_cells(grey, columns, rows)?);
     Ok(channels)
+}
+
+/// Central differences across and down, the border repeated, rows packed.
+fn gradients(grey: &Luma) -> [Vec<f32>; 2] {
+    let (width, height) = (grey.width(), grey.height());
+    let [mut across, mut down] = [0, 1].map(|_| vec![0.0; width * height]);
+    let rows = across.chunks_exact_mut(width.max(1)).zip(down.chunks_exact_mut(width.max(1)));
+    for (y, (across, down)) in rows.enumerate() {
+        let row = grey.row(y);
+        let (above, below) = (grey.row(y.saturating_sub(1)), grey.row((y + 1).min(height - 1)));
+        for (out, (above, below)) in down.iter_mut().zip(above.iter().zip(below)) {
+            *out = f32::from(*below) - f32::from(*above);
+        }
+        let inner = &mut across[1.min(width)..];
+        for (out, (left, right)) in inner.iter_mut().zip(row.iter().zip(row.iter().skip(2))) {
+            *out = f32::from(*right) - f32::from(*left);
+        }
+        if let [first, second, .., before, last] = *row {
+            across[0] = f32::from(second) - f32::from(first);
+            across[width - 1] = f32::from(last) - f32::from(before);
+        }
+    }
+    [across, down]
 }
 
 /// Divides by the gradient energy of the 3x3 cells around, so that shade and contrast do not count.
@@ -264,10 +286,10 @@ fn normalise(channels: &mut [Vec<f32>], columns: usize, rows: usize) {
     }
 }
 
-fn grey_cells(grey: &impl ToInputArray, columns: usize, rows: usize) -> opencv::Result<Vec<f32>> {
+fn grey_cells(grey: &Luma, columns: usize, rows: usize) -> opencv::Result<Vec<f32>> {
     let mut cells = Mat::default();
     let size = Size::new(columns as i32, rows as i32);
-    imgproc::resize(grey, &mut cells, size, 0.0, 0.0, imgproc::INTER_AREA)?;
+    grey.with_mat(|grey| imgproc::resize(grey, &mut cells, size, 0.0, 0.0, imgproc::INTER_AREA))?;
     let cells: Vec<f32> = cells.data_typed::<u8>()?.iter().map(|cell| f32::from(*cell)).collect();
     let count = cells.len().max(1) as f32;
     let mean = cells.iter().sum::<f32>() / count;
