@@ -8,7 +8,8 @@ const SHIFT: i32 = 4;
 /// Height of a capital letter of the font at scale 1, in pixels.
 const CAPITAL_HEIGHT: f64 = 21.0;
 const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;
-/// More patches than this are drawn as one: each costs a blender a pass over the rows that it covers.
+/// Where there are more patches than this, those in the same rows are drawn as one: each costs a blender a pass over the
+/// whole width of the rows that it covers.
 const MAX_PATCHES: usize = 8;
 /// Strokes lie on this, so that they are readable on any ground.
 const OUTLINE: Colour = Colour { red: 0, green: 0, blue: 0, alpha: 0.55 };
@@ -262,34 +263,32 @@ pub struct Patch {
 /// Draws `shapes`, later ones over earlier ones, into as few and small patches as hold them; patches
 /// never overlap and lie inside the frame.
 pub fn draw(shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
-    let mut areas = Vec::new();
-    for shape in shapes {
-        let bounds = shape.bounds(frame)?;
-        if !bounds.empty() {
-            join(&mut areas, bounds);
-        }
-    }
+    let bounded = shapes.iter().map(|shape| Ok((shape, shape.bounds(frame)?)));
+    let bounded = bounded.collect::<opencv::Result<Vec<_>>>()?;
+    let mut areas = joined(bounded.iter().map(|(_, bounds)| *bounds), |a, b| !(*a & *b).empty());
     if areas.len() > MAX_PATCHES {
-        areas = areas.into_iter().reduce(|a, b| a | b).into_iter().collect();
+        areas = joined(areas, |a, b| a.y < b.y + b.height && b.y < a.y + a.height);
     }
-    areas.into_iter().map(|area| draw_patch(shapes, area, frame)).collect()
+    areas.into_iter().map(|area| draw_patch(&bounded, area)).collect()
 }
 
-/// Adds `area`, in one with all that it touches.
-fn join(areas: &mut Vec<Rect>, mut area: Rect) {
-    while let Some(index) = areas.iter().position(|other| !(*other & area).empty()) {
-        area |= areas.swap_remove(index);
+/// Areas, each in one with all that it is near to.
+fn joined(areas: impl IntoIterator<Item = Rect>, near: impl Fn(&Rect, &Rect) -> bool) -> Vec<Rect> {
+    let mut joined: Vec<Rect> = Vec::new();
+    for mut area in areas.into_iter().filter(|area| !area.empty()) {
+        while let Some(index) = joined.iter().position(|other| near(other, &area)) {
+            area |= joined.swap_remove(index);
+        }
+        joined.push(area);
     }
-    areas.push(area);
+    joined
 }
 
-fn draw_patch(shapes: &[Shape], area: Rect, frame: FrameSize) -> opencv::Result<Patch> {
+fn draw_patch(shapes: &[(&Shape, Rect)], area: Rect) -> opencv::Result<Patch> {
     let mut pixels = vec![0; area.width as usize * area.height as usize * size_of::<Vec4b>()];
     let mut picture = Mat::new_rows_cols_with_bytes_mut::<Vec4b>(area.height, area.width, &mut pixels)?;
-    for shape in shapes {
-        if !(shape.bounds(frame)? & area).empty() {
-            shape.draw(&mut picture, area)?;
-        }
+    for (shape, _) in shapes.iter().filter(|(_, bounds)| !(*bounds & area).empty()) {
+        shape.draw(&mut picture, area)?;
     }
     Ok(Patch { x: area.x, y: area.y, width: area.width as u32, height: area.height as u32, pixels })
 }
@@ -354,10 +353,11 @@ mod tests {
     }
 
     #[test]
-    fn many_shapes_end_in_one_patch() {
+    fn many_shapes_share_a_patch_with_those_in_their_rows() {
         let frame = FrameSize { width: 1000, height: 100 };
-        let dots: Vec<_> = (0..20).map(|index| dot(f64::from(index) * 50.0, 50.0)).collect();
-        assert_eq!(draw(&dots, frame).unwrap().len(), 1);
+        let row = |y: f64| (0..20).map(move |index| dot(f64::from(index) * 50.0, y));
+        assert_eq!(draw(&row(50.0).collect::<Vec<_>>(), frame).unwrap().len(), 1);
+        assert_eq!(draw(&row(20.0).chain(row(80.0)).collect::<Vec<_>>(), frame).unwrap().len(), 2);
     }
 
     #[test]
