@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MPL-2.0
 # What the pipelines share; each sources it. Settings come from environment variables:
 #
 #   CAMERA           address of the camera, e.g. http://192.168.0.90 (required; https:// works too)

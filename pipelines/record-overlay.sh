@@ -1,4 +1,5 @@
 #!/bin/bash
+# SPDX-License-Identifier: MPL-2.0
 # Follows with an Axis PTZ camera and records the picture with what was seen drawn in.
 #
 #   OUT              the recording, Matroska with H.264              (default: followed.mkv)

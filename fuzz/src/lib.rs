@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is fuzzed: each parser of something a camera says. `cargo +nightly fuzz run TARGET` feeds one of
 //! them; a test of the crate vapix runs all of them over the seeds in `corpus`.
 #![allow(missing_docs)]

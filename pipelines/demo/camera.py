@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MPL-2.0
 """The virtual camera as a child process."""
 
 import json

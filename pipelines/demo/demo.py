@@ -1,4 +1,5 @@
 #!/usr/bin/env python3
+# SPDX-License-Identifier: MPL-2.0
 """The demonstration: a virtual camera in front of real footage or in a room, its person followed by plain gst-launch-1.0.
 
 Leaves in --out: followed.mkv (what the camera saw, with what was seen drawn in), plot.png (offset, pan and

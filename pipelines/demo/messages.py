@@ -1,3 +1,4 @@
+# SPDX-License-Identifier: MPL-2.0
 """What `gst-launch-1.0 -m` prints, and what it tells about the run."""
 
 import re

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `ptztrack`: follows people with the cameras of a file, unattended. The pipelines are text, the elements are as they are.
 
 mod camera;

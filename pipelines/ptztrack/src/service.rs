@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What runs until it is told to end.
 
 use std::future::pending;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::time::Duration;
 
 /// How long to wait before the next start: longer while it comes to nothing, and never so long that a camera that is back

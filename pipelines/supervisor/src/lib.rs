@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Runs a pipeline until Ctrl-C, SIGTERM or SIGHUP, and starts it anew where it ends for any other reason: the video of a
 //! camera that reboots ends, or fails, and `vapixptzsink` alone cannot bring that back.
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Runs a pipeline unattended, as `gst-launch-1.0 -e -m` does with somebody there: it ends the stream on Ctrl-C, SIGTERM and
 //! SIGHUP, starts anew where the picture is gone, and prints what elements have to say.
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Takes a camera away from whoever follows with it, video and PTZ, and prints a table in Markdown of how soon each is back:
 //!
 //! ```sh

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Lets applications die in every way while they turn a camera, and prints a table in Markdown of what stops the camera
 //! and how soon:
 //!

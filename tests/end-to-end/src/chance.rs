@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 /// Numbers that are the same for the same seed (SplitMix64: Steele, Lea and Flood, 2014).
 #[derive(Debug, Clone)]
 pub struct Chance(u64);

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whoever follows with a camera behind a network that fails.
 
 use std::path::{Path, PathBuf};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stands between a camera and its user: the network, and the camera's own power supply.
 
 use std::io::{Read, Write};

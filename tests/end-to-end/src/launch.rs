@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `gst-launch-1.0` and friends as a user starts them, with the freshly built plugins.
 
 use std::borrow::BorrowMut;

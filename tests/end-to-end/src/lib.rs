@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the whole-system tests share: finding the built plugins, running `gst-launch-1.0`, pipelines
 //! inside the test, and waiting for something to happen without sleeping.
 #![allow(clippy::unwrap_used, clippy::expect_used)]

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pipelines inside the test process.
 
 use std::sync::Once;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The program `ptztrack` with a file of cameras, as a service has it.
 
 use std::fs;

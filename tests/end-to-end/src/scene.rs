@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The scene that most tests play: a virtual camera, a person who crosses its world, a pipeline that follows.
 
 use std::time::{Duration, Instant};

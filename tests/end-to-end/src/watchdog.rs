@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The watchdog of one test's application: under a name of its own, by which its processes are found.
 
 use std::fs;

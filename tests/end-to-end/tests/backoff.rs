@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How long the example in Python waits before it starts anew, with nothing real to wait for.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

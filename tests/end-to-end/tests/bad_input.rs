@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Input that no camera should send and some do.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Video and PTZ are lost together, and both come back when the camera does.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! However an application dies, in the middle of a pan, the camera's last order is a stop.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

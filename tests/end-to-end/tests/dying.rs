@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! However a pipeline ends, the camera ends at rest: it moves until told otherwise.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

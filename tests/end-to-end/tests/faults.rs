@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera that answers late, never or nonsense: the video goes on, the user hears of it once, control comes back.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The main job, closed loop: a person walks, the camera turns after them; nobody walks, it stays.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

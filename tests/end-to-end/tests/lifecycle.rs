@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Two hundred lives of a pipeline, each with caps that change mid-stream: nothing is left over.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the program tells an MQTT broker, the one of Debian.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

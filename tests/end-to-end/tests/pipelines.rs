@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Every file in `pipelines/` as a user runs it, against the virtual camera.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The public surface of the elements is a checked-in file: a change of it is a decision, not an accident.
 //!
 //! `UPDATE_SURFACE=1 cargo test -p end-to-end --test public_surface` writes the file anew.

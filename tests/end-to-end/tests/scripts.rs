@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the Makefile calls, on systems that lack something: in a folder with nothing in PATH but what each needs.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

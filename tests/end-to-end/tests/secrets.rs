@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The password stays where it was put: not in a log at any level, not in a graph of the pipeline.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

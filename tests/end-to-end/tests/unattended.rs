@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The program `ptztrack` as a user and as a service starts it, against virtual cameras.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One camera: a thread in which its pipeline runs, is watched, and comes back.
 
 mod known;

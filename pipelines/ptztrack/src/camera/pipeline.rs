@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One camera's pipeline, as text and as elements.
 
 use std::error::Error;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whether a camera accepts connections, asked before a pipeline is built for it.
 //!
 //! A connection that `souphttpsrc` gives up before the camera has answered costs a file descriptor for good: libsoup keeps

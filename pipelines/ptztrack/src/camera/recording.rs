@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is recorded, and how long it is kept.
 
 use std::fs;

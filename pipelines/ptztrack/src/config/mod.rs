@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The file of cameras: what is in it, read whole before anything starts, every mistake named with its line.
 
 mod camera;

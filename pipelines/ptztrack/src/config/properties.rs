@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Properties of elements, by their names.
 
 use gst::prelude::*;

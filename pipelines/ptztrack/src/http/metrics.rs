@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What Prometheus asks for, worked out when it does.
 
 use std::fmt;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The page, what it asks for, `/metrics` and `/healthz`.
 
 mod access;

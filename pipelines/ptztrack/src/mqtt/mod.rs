@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What happens, told to an MQTT broker: events as they come, and what is kept there for who comes later.
 
 mod topics;

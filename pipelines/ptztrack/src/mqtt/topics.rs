@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use ptztrack_contract::lock::lock;
 use serde_json::{Value, json};
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The application of a user who embeds the elements: run by tests that need a process of its own, with its
 //! own `GST_DEBUG` and tracers.
 //!

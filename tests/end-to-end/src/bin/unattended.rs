@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! An application that follows unattended while everything happens to it: run by `soak`, one process for each camera.
 //!
 //! `unattended mjpeg|h264 SEED`, with CAMERA, RTSP, CAMERA_USER and CAMERA_PASSWORD in the environment. At random, by the

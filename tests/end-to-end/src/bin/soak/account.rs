@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What became of it all.
 
 use std::collections::BTreeMap;

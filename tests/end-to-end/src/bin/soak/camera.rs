@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One of the cameras, what happens to it, and who follows with it.
 
 use std::process::Command;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What happens to a camera, or to who follows with it.
 
 use std::time::Duration;

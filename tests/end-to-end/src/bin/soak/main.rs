@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Lets four cameras be followed for a while, by two codecs, while everything happens to them and to those who follow; and
 //! gives an account: every camera at rest, nothing grown, nothing lost. Otherwise the exit status is 1.
 //!

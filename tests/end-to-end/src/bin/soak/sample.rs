@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the processes that follow take, over time.
 
 use std::fmt::Write;
