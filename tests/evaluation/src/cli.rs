@@ -16,7 +16,7 @@ use crate::{
 #[derive(Debug, Clone, Parser)]
 #[command(name = "evaluate", version, after_help = EXAMPLES)]
 pub struct Args {
-    /// Tests by number, `7` or `1-6`; all of the suite unless given
+    /// Tests by number, or ways through photographs, `7` or `1-6`; all of the suite unless given
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
     pub test: Vec<Tests>,
     /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests, numbered
@@ -88,10 +88,10 @@ pub struct Args {
     pub person: Whom,
     /// Instead of the tests, twelve ways through each photograph of a folder: panoramas in panoramas/, in walker/ somebody cut out
     /// of film
-    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "test", "sweep_delay", "matrix"])]
+    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "sweep_delay", "matrix"])]
     pub photos: Option<PathBuf>,
     /// Instead of the tests, twelve ways through this equirectangular panorama
-    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "test", "sweep_delay", "matrix"])]
+    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "sweep_delay", "matrix"])]
     pub photo: Option<PathBuf>,
     /// Folder of somebody cut out of film: walker.csv, and the pictures that it lists
     #[arg(long, value_name = "FOLDER", requires = "photo")]
@@ -194,11 +194,11 @@ const SWEPT: [u32; 4] = [1, 19, 37, 55];
 impl Args {
     /// The tests asked for, in order and each once.
     pub fn tests(&self) -> Vec<TestId> {
-        TestId::all().filter(|test| self.asks_for(*test)).collect()
+        TestId::all().filter(|test| self.asks_for(test.0)).collect()
     }
 
-    fn asks_for(&self, test: TestId) -> bool {
-        self.test.is_empty() || self.test.iter().any(|Tests(range)| range.contains(&test.0))
+    fn asks_for(&self, number: u32) -> bool {
+        self.test.is_empty() || self.test.iter().any(|Tests(range)| range.contains(&number))
     }
 
     /// The trackers asked for, in the order of the tables, and what is to be said of those that are left out.
@@ -266,13 +266,15 @@ impl Args {
 
     /// Ways through photographs; `None` where none are asked for.
     fn photographs(&self, seed: u64) -> Option<Result<Vec<Scene>, PhotosError>> {
-        match (&self.photos, &self.photo, &self.walker) {
-            (Some(folder), ..) => Some(Scene::photos(folder, seed)),
-            (None, Some(file), Some(walker)) => {
-                Some(Scene::photo(file, walker, self.photo_place.as_deref(), seed))
-            }
-            _ => None,
+        let mut scenes = match (&self.photos, &self.photo, &self.walker) {
+            (Some(folder), ..) => Scene::photos(folder, seed),
+            (None, Some(file), Some(walker)) => Scene::photo(file, walker, self.photo_place.as_deref(), seed),
+            _ => return None,
+        };
+        if let Ok(scenes) = &mut scenes {
+            scenes.retain(|scene| scene.way().is_none_or(|way| self.asks_for(way)));
         }
+        Some(scenes)
     }
 
     /// What is to be followed, and the number of its world.
@@ -326,7 +328,7 @@ impl Args {
         {
             let Some(scene) = Scene::room(TestId(1), seed) else { continue };
             let all = (1..).zip(hard::experiments(name, seed, &self.experiment(scene, name, seed)));
-            let asked = |(number, _): &(u32, Experiment)| self.asks_for(TestId(*number));
+            let asked = |(number, _): &(u32, Experiment)| self.asks_for(*number);
             experiments.extend(all.filter(asked).map(|(_, experiment)| experiment));
         }
         experiments
@@ -475,7 +477,7 @@ mod tests {
             ("--still-recording x.avi --truth x.csv --size 320x240", "cannot be used with"),
             ("--person somebody", "auto"),
             ("--photo x.jpg", "--walker"),
-            ("--photos x --test 3", "cannot be used with"),
+            ("--photos x --footage y.avi --truth z.csv", "cannot be used with"),
             ("--photos x --photo y.jpg --walker z", "cannot be used with"),
         ] {
             let error = parse(line).unwrap_err().to_string();

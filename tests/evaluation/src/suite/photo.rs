@@ -67,6 +67,17 @@ impl Scene {
         Ok((1..=PhotoSettings::WAYS).filter_map(settings).map(scene).collect())
     }
 
+    /// Number of the way through a photograph, from 1; `None` in any other scene.
+    pub fn way(&self) -> Option<u32> {
+        match &self.place {
+            Place::Camera(camera) => match &camera.world {
+                World::Photo(photo) => Some(photo.way),
+                _ => None,
+            },
+            Place::Recording(_) => None,
+        }
+    }
+
     /// All ways through all panoramas of a folder.
     ///
     /// # Errors
@@ -151,6 +162,7 @@ mod tests {
         let scenes = Scene::photos(&folder, 1).unwrap();
         assert_eq!(scenes.len(), PhotoSettings::WAYS as usize);
         assert!(scenes.iter().all(|scene| scene.suite == Suite::Photo && scene.path == "lake"));
+        assert!(scenes.iter().map(Scene::way).eq((1..=PhotoSettings::WAYS).map(Some)));
         std::fs::write(panoramas.join("unknown.jpg"), "").unwrap();
         let told = Scene::photos(&folder, 1).unwrap_err().to_string();
         std::fs::remove_dir_all(&folder).unwrap();
