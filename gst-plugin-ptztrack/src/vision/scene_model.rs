@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography, Rect};
+use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use super::Luma;
 use super::camera_motion::CameraMotionEstimator;
@@ -64,6 +64,12 @@ impl SceneModel {
     /// [`TravellingBackground::protect`].
     pub fn protect(&mut self, bounds: Option<Rect>) {
         self.background.protect(bounds);
+    }
+
+    /// What has stayed the same within `contour` (normalised, in the last picture) is background at once: see
+    /// [`TravellingBackground::adopt`].
+    pub fn adopt(&mut self, contour: &[Point]) -> opencv::Result<()> {
+        self.background.adopt(contour)
     }
 
     /// What the last picture showed.

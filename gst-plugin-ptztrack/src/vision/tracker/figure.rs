@@ -111,7 +111,8 @@ impl Cells {
             let both = self.motion[index] + colours.map_or(0.0, colour);
             if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
         });
-        Evidence { grid: self.lattice.grid, odds: odds.collect() }
+        let unknown = self.motion.iter().map(|motion| *motion == 0.0);
+        Evidence { grid: self.lattice.grid, odds: odds.collect(), unknown: unknown.collect() }
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -149,15 +150,19 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 pub(super) struct Evidence {
     grid: Grid,
     odds: Vec<f32>,
+    /// Whether nothing is known of the background there.
+    unknown: Vec<bool>,
 }
 
 impl Evidence {
-    /// Of the cell in a column and row; `None` beyond those there are.
+    /// Of the cell in a column and row, and whether it is unknown; `None` beyond those there are.
     #[inline]
-    fn at(&self, column: i32, row: i32) -> Option<f32> {
+    fn at(&self, column: i32, row: i32) -> Option<(f32, bool)> {
         let inside = |place: i32, count: usize| (0..count as i32).contains(&place);
-        (inside(column, self.grid.columns) && inside(row, self.grid.rows))
-            .then(|| self.odds[row as usize * self.grid.columns + column as usize])
+        (inside(column, self.grid.columns) && inside(row, self.grid.rows)).then(|| {
+            let index = row as usize * self.grid.columns + column as usize;
+            (self.odds[index], self.unknown[index])
+        })
     }
 
     /// The cells of a row from a column on, and how many columns before the first cell there are.
@@ -273,15 +278,18 @@ impl Shape {
         Template { first, columns: window_x.len(), upper_rows, weights, norm }
     }
 
-    /// How likely the silhouette, moved by so many cells, is figure by motion and colour alone: 0 to 1.
-    pub fn level(&self, evidence: &Evidence, moved: (i32, i32)) -> Halves {
+    /// How likely the silhouette, moved by so many cells, is figure by motion and colour alone: 0 to 1. Where nothing is
+    /// known of the background it is as likely as `usual`.
+    pub fn level(&self, evidence: &Evidence, moved: (i32, i32), usual: Halves) -> Halves {
         let Grid { columns, rows } = self.grid;
         let mut sums = [(0.0_f32, 0.0_f32); 2];
+        let usual = [usual.upper, usual.lower];
         for (index, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.5) {
             let (x, y) = ((index % columns) as i32 + moved.0, (index / columns) as i32 + moved.1);
-            if let Some(odds) = evidence.at(x, y) {
-                let (sum, weight) = &mut sums[usize::from(2 * (index / columns) >= rows)];
-                *sum += share / (1.0 + (-odds).exp());
+            if let Some((odds, unknown)) = evidence.at(x, y) {
+                let half = usize::from(2 * (index / columns) >= rows);
+                let (sum, weight) = &mut sums[half];
+                *sum += share * if unknown { usual[half] } else { 1.0 / (1.0 + (-odds).exp()) };
                 *weight += share;
             }
         }
@@ -487,6 +495,18 @@ mod tests {
         let gone = Scene::new(Rect2f::default(), 60, 128).cells(BOX);
         let fit = Shape::upright(GRID).template(1.0).fit(&gone.evidence(Some(&model)), (0, 0));
         assert!(fit.mean().abs() < 0.05, "{fit:?}");
+    }
+
+    #[test]
+    fn where_no_background_is_known_the_silhouette_is_as_likely_as_usual() {
+        let usual = Halves { upper: 0.8, lower: 0.7 };
+        let level = |seen_to_move| {
+            let cells = Scene::new(BOX, 60, seen_to_move).cells(BOX);
+            Shape::upright(GRID).level(&cells.evidence(None), (0, 0), usual)
+        };
+        let off = |level: Halves| (level.upper - usual.upper).abs().max((level.lower - usual.lower).abs());
+        assert!(off(level(128)) < 0.01, "{:?}", level(128));
+        assert!(level(0).upper < 0.3 && level(255).upper > 0.8, "{:?} {:?}", level(0), level(255));
     }
 
     #[test]

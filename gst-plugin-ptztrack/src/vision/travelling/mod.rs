@@ -11,6 +11,7 @@ mod warp;
 
 use std::time::Duration;
 
+use opencv::core::Point as Pixel;
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
@@ -110,10 +111,20 @@ impl TravellingBackground {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
         let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
-        let holds =
-            |x: usize, y: usize| held.is_some_and(|held| held.contains(Point { x: x as f64, y: y as f64 }));
-        self.model.learn(&self.sampled, self.forth.spans(), how, holds);
+        self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.show();
+    }
+
+    /// Makes what has stayed the same for a moment within `contour` (normalised, in the last picture) background, protected
+    /// or not: nobody is there.
+    pub fn adopt(&mut self, contour: &[Point]) -> opencv::Result<()> {
+        let Some(to_canvas) = self.to_picture.inverse() else { return Ok(()) };
+        let (width, height) = (self.size.0 as f64, self.size.1 as f64);
+        let pixels = contour.iter().map(|point| {
+            let place = to_canvas.apply(Point { x: point.x * width - 0.5, y: point.y * height - 0.5 });
+            Pixel::new(place.x.round() as i32, place.y.round() as i32)
+        });
+        self.model.adopt_within(&pixels.collect())
     }
 
     /// A canvas of which nothing is known.

@@ -1,5 +1,11 @@
 //! What is known of each pixel of the background, and how a picture is held against it.
 
+use opencv::core::{CV_8UC1, Mat, Point as Pixel, Scalar, Vector};
+use opencv::imgproc;
+use opencv::prelude::*;
+
+use ptztrack_contract::{Point, Rect};
+
 use super::noise::Noise;
 use super::rows;
 use super::warp::Warp;
@@ -177,20 +183,33 @@ impl Model {
     }
 
     /// Takes the picture into the model: (3.1) and the spread where it is background, or else into the candidate,
-    /// which becomes background when it has waited long enough. Nothing becomes background where `held` says.
+    /// which becomes background when it has waited long enough. Nothing does in the box `held`, where somebody is. What
+    /// was never seen before, there and around, has to stay the same for a moment first: it may be them, who reach
+    /// farther than the box.
     pub fn learn(
         &mut self,
         picture: &Sampled,
         spans: &[(usize, usize)],
         how: Comparison,
-        held: impl Fn(usize, usize) -> bool,
+        held: Option<Rect>,
     ) {
         let weights = rows::Weights::new(how.min_weight);
         let mut alphas = std::mem::take(&mut self.alphas);
+        let around = held.map(|held| Rect {
+            x: held.x - AROUND * held.width,
+            y: held.y - AROUND * held.height,
+            width: (1.0 + 2.0 * AROUND) * held.width,
+            height: (1.0 + 2.0 * AROUND) * held.height,
+        });
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
             alphas.resize(row.len(), 0);
             rows::alphas(&mut alphas, &self.likelihood[row.clone()], &self.age[row.clone()], &weights);
+            if let Some(around) = around.filter(|_| self.age[row.clone()].contains(&UNSEEN)) {
+                let unseen = alphas.iter_mut().zip(&self.age[row.clone()]).zip(start..);
+                let unseen = unseen.filter(|((_, age), x)| **age == UNSEEN && lies_in(around, *x, y));
+                unseen.for_each(|((alpha, _), _)| *alpha = 0);
+            }
             let (mean, spread) = (&mut self.luma[row.clone()], &mut self.spread[row.clone()]);
             rows::learn_spread(spread, mean, &picture.luma[row.clone()], &alphas);
             rows::learn_mean(mean, &picture.luma[row.clone()], &alphas);
@@ -204,7 +223,8 @@ impl Model {
                 if rows::any_foreground(alphas) {
                     let first = start + rows::PART * part;
                     for (x, _) in (first..).zip(alphas).filter(|(_, alpha)| **alpha == 0) {
-                        self.wait(picture, y * self.size.0 + x, how, || held(x, y));
+                        let held = || held.is_some_and(|held| lies_in(held, x, y));
+                        self.wait(picture, y * self.size.0 + x, how, held);
                     }
                 }
             }
@@ -226,13 +246,26 @@ impl Model {
         self.waited[at] = if alike { self.waited[at].saturating_add(how.ticks) } else { 0 };
         // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
         let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);
-        if self.waited[at] >= how.patience.min(seen_for) && !held() {
+        if self.waited[at] >= how.patience.min(seen_for) && (self.age[at] == UNSEEN || !held()) {
             self.adopt(at);
         }
     }
 
+    /// Makes what has waited a moment within a polygon background.
+    pub fn adopt_within(&mut self, polygon: &Vector<Pixel>) -> opencv::Result<()> {
+        let (width, height) = (self.size.0 as i32, self.size.1 as i32);
+        let mut mask = Mat::new_rows_cols_with_default(height, width, CV_8UC1, Scalar::all(0.0))?;
+        imgproc::fill_poly_def(&mut mask, polygon, Scalar::all(255.0))?;
+        for (at, _) in mask.data_bytes()?.iter().enumerate().filter(|(_, inside)| **inside > 0) {
+            if self.waited[at] >= MIN_PATIENCE {
+                self.adopt(at);
+            }
+        }
+        Ok(())
+    }
+
     /// Makes the candidate background.
-    pub fn adopt(&mut self, at: usize) {
+    fn adopt(&mut self, at: usize) {
         let [luma, u, v] = [0, 1, 2].map(|k| u16::from(self.candidate[k][at]) << 8);
         (self.luma[at], self.chroma[0][at], self.chroma[1][at]) = (luma, u, v);
         (self.age[at], self.waited[at]) = (KNOWN, 0);
@@ -241,6 +274,13 @@ impl Model {
 
 /// Grey levels within which a candidate is still the same.
 const CANDIDATE_TOLERANCE: u8 = 12;
+
+/// How far around somebody's box nothing is learned that is seen for the first time, in sizes of the box.
+const AROUND: f64 = 0.4;
+
+fn lies_in(bounds: Rect, x: usize, y: usize) -> bool {
+    bounds.contains(Point { x: x as f64, y: y as f64 })
+}
 
 /// A quarter of the way.
 fn near(from: u8, to: u8) -> u8 {

@@ -1,6 +1,6 @@
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography, Rect};
+use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use super::TravellingBackground;
 use crate::vision::picture::{Picture, Reduced};
@@ -149,4 +149,47 @@ fn an_unknown_motion_is_rest_where_the_picture_says_so_and_a_new_world_where_not
     let elsewhere = Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| 0.5 * texture(77, x, y));
     look(&mut background, &elsewhere, None);
     assert!(background.foreground().expect("seen").bytes().iter().all(|value| *value == 128));
+}
+
+#[test]
+fn what_somebody_left_becomes_background_at_once_where_nobody_is() {
+    let mut background = TravellingBackground::default();
+    for seed in 0..25 {
+        look(&mut background, &with_person(seen(0.0, 0.0, seed), PERSON), Some((0.0, 0.0)));
+    }
+    let (x, y, width, height) = PERSON;
+    let bounds = Rect { x: x / 160.0, y: y / 120.0, width: width / 160.0, height: height / 120.0 };
+    for seed in 25..40 {
+        background.protect(Some(bounds));
+        look(&mut background, &seen(0.0, 0.0, seed), Some((0.0, 0.0)));
+    }
+    assert!(foreground(&background, PERSON) > 0.7, "a ghost");
+    let (right, bottom) = (bounds.x + bounds.width, bounds.y + bounds.height);
+    let contour = [(bounds.x, bounds.y), (bounds.x, bottom), (right, bottom), (right, bounds.y)];
+    background.adopt(&contour.map(|(x, y)| Point { x, y })).expect("adopted");
+    look(&mut background, &seen(0.0, 0.0, 41), Some((0.0, 0.0)));
+    assert!(foreground(&background, PERSON) < 0.15, "{}", foreground(&background, PERSON));
+}
+
+#[test]
+fn who_stands_before_a_new_border_is_not_its_background() {
+    let left_behind = |protected: bool| {
+        let mut background = learned();
+        let (x, y, width, height) = (148.0, 30.0, 12.0, 60.0);
+        let bounds = Rect { x: x / 160.0, y: y / 120.0, width: width / 160.0, height: height / 120.0 };
+        for step in 1..=6_u32 {
+            background.protect(protected.then_some(bounds));
+            let at = -4.0 * f64::from(step);
+            look(
+                &mut background,
+                &with_person(seen(at, 0.0, step), (x, y, width, height)),
+                Some((-4.0, 0.0)),
+            );
+        }
+        look(&mut background, &seen(-24.0, 0.0, 7), Some((0.0, 0.0)));
+        foreground(&background, (x, y, width, height))
+    };
+    assert!(left_behind(false) > 0.3, "{}", left_behind(false));
+    // What was already known under them is not protected from being seen again.
+    assert!(left_behind(true) < 0.5 * left_behind(false), "{}", left_behind(true));
 }

@@ -52,6 +52,12 @@ const ACCELERATION: f32 = 4.0;
 const POINT_NOISE: (f32, f32) = (1.0, 0.015);
 /// Time constant of the smoothed velocity, seconds: a stride is longer.
 const VELOCITY_TIME_S: f32 = 0.35;
+/// Time constant of a hidden silhouette's correction of where the points say that the target is, seconds: they drift slowly.
+const CORRECTION_TIME_S: f32 = 0.12;
+/// How much the points lead where nothing of the target is hidden, and the missing share of what is usually seen of it from
+/// which they lead alone.
+const POINTS_LEAD: f32 = 0.5;
+const CLEARLY_HIDDEN: f32 = 0.1;
 /// How much larger or smaller a box is tried, and what is then made of it.
 const TRIED_GROWTH: f32 = 0.06;
 const GROWTH_GAIN: f32 = 0.5;
@@ -70,6 +76,8 @@ const UNSEEN_SPREAD_PER_S: f32 = 2.3;
 const HIDDEN_TIME_S: f32 = 2.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
+/// Of a silhouette of which nothing is known yet.
+const EVEN: Halves = Halves { upper: 0.5, lower: 0.5 };
 /// Pictures in a row in which a hidden target must be seen.
 const SEEN_AGAIN: u32 = 2;
 
@@ -158,7 +166,8 @@ impl Robust {
         }
         let (_, evidence) = target.look_closely(seen)?;
         let fit = target.shape.template(1.0).fit(&evidence, (0, 0));
-        target.usual = Usual::at_first(fit, target.shape.level(&evidence, (0, 0)));
+        let level = target.shape.level(&evidence, (0, 0), EVEN);
+        target.usual = Usual::at_first(fit, level);
         target.filter.learn(&seen.luma, bounds, &target.map.reduced(FINER), 1.0)?;
         let corners = target.corners()?;
         let found = corners::reject_outliers(corners, 2.0);
@@ -234,7 +243,7 @@ impl Robust {
         let moved = (x * FINER as i32, y * FINER as i32);
         let fit = silhouette.fit(&evidence, moved);
         let answer = response.at(best);
-        let level = self.shape.level(&evidence, moved);
+        let level = self.shape.level(&evidence, moved, self.usual.level());
         let shares = self.usual.shares(fit, level, answer);
         Ok(Place { bounds: bounds + offset, fit, level, response: answer, shares, share: of_whole(shares) })
     }
@@ -253,13 +262,8 @@ impl Robust {
     }
 
     /// Takes a place over as the target's own.
-    fn settle(&mut self, seen: &Observation, place: &Place, start: Point2f, dt_s: f32) -> opencv::Result<()> {
+    fn settle(&mut self, seen: &Observation, place: &Place, dt_s: f32) -> opencv::Result<()> {
         self.estimate.bounds = place.bounds;
-        let own = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
-        if place.share >= LEARNT {
-            self.estimate.own_velocity +=
-                (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
-        }
         let (cells, evidence) = self.look_closely(seen)?;
         if place.is_unhidden() {
             self.learn(seen, place, &cells, &evidence, dt_s)?;
@@ -408,9 +412,15 @@ impl Robust {
         let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) else {
             return Point2f::default();
         };
-        let mix = |old: f32, new: f32| old + ADOPTED * (new - old);
-        let shift = (centre(region) - middle) * ADOPTED;
-        let size = (mix(bounds.width, region.width), mix(bounds.height, region.height));
+        // Along an axis in which the region is the smaller, part of the target is hidden or not seen.
+        let adopted = |old: f32, new: f32| if new > old { ADOPTED } else { 0.0 };
+        let (across, down) = (adopted(bounds.width, region.width), adopted(bounds.height, region.height));
+        let off = centre(region) - middle;
+        let shift = Point2f::new(off.x * across, off.y * down);
+        let size = (
+            bounds.width + across * (region.width - bounds.width),
+            bounds.height + down * (region.height - bounds.height),
+        );
         self.estimate.bounds = around(middle + shift, size.0, size.1);
         self.first_size = size;
         shift
@@ -486,6 +496,7 @@ impl Follow for Robust {
             self.estimate.bounds += (consensus.motion - carried) * trust;
         }
         self.patch = next;
+        let by_points = (consensus.map_or(carried, |consensus| consensus.motion) - self.ego.at(start)) / dt_s;
         let start = start + self.adopt(sightings);
         let spread = WIDE_SPREAD + (SPREAD - WIDE_SPREAD) * trust;
         let mut place = self.locate(seen, self.estimate.bounds, spread)?;
@@ -497,8 +508,12 @@ impl Follow for Robust {
         }
         // The less is seen of it, the more counts where it was going.
         let gain = ((place.share - FOUND / 2.0) / (LEARNT - FOUND / 2.0)).clamp(0.0, 1.0);
+        // A silhouette that is hidden on one side seems to stay behind; the points on what is left of it do not.
+        let hidden = ((1.0 - place.share) / CLEARLY_HIDDEN).clamp(POINTS_LEAD, 1.0);
+        let lead = trust * hidden;
+        let correction = 1.0 + (dt_s / (dt_s + CORRECTION_TIME_S) - 1.0) * lead;
         let predicted = self.estimate.bounds;
-        place.bounds = predicted + (centre(place.bounds) - centre(predicted)) * gain;
+        place.bounds = predicted + (centre(place.bounds) - centre(predicted)) * (gain * correction);
         self.presence.update(place.share, dt_s);
         self.estimate.confidence = self.presence.confidence() * place.share.min(1.0);
         if !self.presence.is_here() {
@@ -507,7 +522,13 @@ impl Follow for Robust {
             self.estimate.centroid = centre(self.estimate.bounds);
             return Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Hidden });
         }
-        self.settle(seen, &place, start, dt_s)?;
+        let by_places = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
+        if place.share >= LEARNT {
+            let own = by_places + (by_points - by_places) * lead;
+            self.estimate.own_velocity +=
+                (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+        }
+        self.settle(seen, &place, dt_s)?;
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
     }
 

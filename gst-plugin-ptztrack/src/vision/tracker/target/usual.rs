@@ -30,6 +30,11 @@ impl Usual {
         Self { fit: fit.with(fit, |fit, _| fit.max(LEAST_FIT)), level, response: FIRST_RESPONSE }
     }
 
+    /// How much of the silhouette is usually figure, by motion and colour alone.
+    pub fn level(self) -> Halves {
+        self.level
+    }
+
     /// What the filter usually answers.
     pub fn response(self) -> f32 {
         self.response.sum()
@@ -66,7 +71,8 @@ impl Usual {
     }
 }
 
-/// Of a whole body: one half is enough, as a table may hide the other.
+/// Of a whole body: one half is enough, as a table may hide the other, but then it must be seen well.
 pub(super) fn of_whole(shares: Halves) -> f32 {
-    (HALF * shares.upper.max(shares.lower)).max(shares.mean())
+    let better = shares.upper.max(shares.lower);
+    (HALF * better * better).max(shares.mean())
 }

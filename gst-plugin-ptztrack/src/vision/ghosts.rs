@@ -1,0 +1,175 @@
+//! Ghosts: what was taken for background while somebody stood before it, and is foreground now that they have gone.
+//!
+//! Somebody's outline is an edge of the picture, and runs across a background that has none there. The outline of a ghost
+//! is an edge of the background, where the picture has none.
+
+use opencv::core::{self, Mat, Size};
+use opencv::imgproc;
+use ptztrack_contract::{Point, Region};
+
+use super::Luma;
+use super::scene_model::SceneView;
+
+/// How far inside and outside of the contour grey levels are compared, pixels: it is not more exact than this.
+const BESIDE: f64 = 2.0;
+/// How much stronger the background's edge must be: whoever stands before an equal wall has hardly any in either.
+const STRONGER: f64 = 1.5;
+/// Mean grey levels of the background's edge, below which nothing can be told.
+const LEAST_EDGE: f64 = 8.0;
+/// Places at which the contour is looked at.
+const LEAST_PLACES: u32 = 16;
+/// Pixels that are looked at together to tell whether picture and background are the same but for their sharpness.
+const COARSE: i32 = 9;
+const UNSHARP: f64 = 0.4;
+
+/// Whether nobody is where `region` is: it is a ghost, or what is known of the background there is not sharp.
+///
+/// # Errors
+/// Where OpenCV fails, which no picture should make it do.
+pub fn is_nobody(scene: &SceneView, region: &Region) -> opencv::Result<bool> {
+    Ok(is_ghost(scene, region) || is_unsharp(scene, region)?)
+}
+
+/// Whether picture and background are the same but for what is finer than [`COARSE`]: the background was learned while the
+/// camera turned, from blurred pictures that lay a little beside each other.
+fn is_unsharp(scene: &SceneView, region: &Region) -> opencv::Result<bool> {
+    let (width, height) = (scene.luma.width(), scene.luma.height());
+    let (x, y, columns, rows) = region.bounds.to_pixels(width as u32, height as u32);
+    let [picture, known] = [scene.luma, scene.background]
+        .map(|plane| plane.crop(x as usize, y as usize, columns as usize, rows as usize));
+    let fine = picture.with_mat(|picture| known.with_mat(|known| difference(picture, known)))?;
+    let coarse = difference(&blurred(&picture)?, &blurred(&known)?)?;
+    Ok(coarse < UNSHARP * fine)
+}
+
+fn blurred(plane: &Luma) -> opencv::Result<Mat> {
+    let mut blurred = Mat::default();
+    plane.with_mat(|plane| imgproc::blur_def(plane, &mut blurred, Size::new(COARSE, COARSE)))?;
+    Ok(blurred)
+}
+
+/// Mean difference of two planes, grey levels.
+fn difference(a: &Mat, b: &Mat) -> opencv::Result<f64> {
+    let mut off = Mat::default();
+    core::absdiff(a, b, &mut off)?;
+    Ok(core::mean_def(&off)?[0])
+}
+
+/// Whether the contour of `region` is an edge of the background, not of the picture.
+fn is_ghost(scene: &SceneView, region: &Region) -> bool {
+    let (mut picture, mut background, mut places) = (0.0, 0.0, 0_u32);
+    across(&region.contour, (scene.luma.width() as f64, scene.luma.height() as f64), |inside, outside| {
+        let step = |plane: &Luma| Some((level(plane, inside)? - level(plane, outside)?).abs());
+        if let (Some(seen), Some(known)) = (step(&scene.luma), step(&scene.background)) {
+            (picture, background, places) = (picture + seen, background + known, places + 1);
+        }
+    });
+    places >= LEAST_PLACES && background >= LEAST_EDGE * f64::from(places) && background > STRONGER * picture
+}
+
+/// Calls `compare` with a place inside and one outside of a closed contour (normalised), at each pixel along it.
+fn across(contour: &[Point], (width, height): (f64, f64), mut compare: impl FnMut(Point, Point)) {
+    let pixels = || contour.iter().map(|point| Point { x: point.x * width - 0.5, y: point.y * height - 0.5 });
+    let sides = || pixels().zip(pixels().cycle().skip(1));
+    let signed_area: f64 = sides().map(|(a, b)| a.x * b.y - b.x * a.y).sum();
+    for (from, to) in sides() {
+        let length = (to.x - from.x).hypot(to.y - from.y);
+        let (along, beside) = (1.0 / length.max(f64::EPSILON), BESIDE * signed_area.signum());
+        let normal = ((to.y - from.y) * along * beside, (from.x - to.x) * along * beside);
+        for step in 0..length.round() as u32 {
+            let share = f64::from(step) * along;
+            let place = (from.x + (to.x - from.x) * share, from.y + (to.y - from.y) * share);
+            compare(
+                Point { x: place.0 - normal.0, y: place.1 - normal.1 },
+                Point { x: place.0 + normal.0, y: place.1 + normal.1 },
+            );
+        }
+    }
+}
+
+/// The grey level of the pixel at a place; `None` outside of the picture.
+fn level(plane: &Luma, place: Point) -> Option<f64> {
+    let (x, y) = (place.x.round(), place.y.round());
+    let inside = x >= 0.0 && y >= 0.0 && x < plane.width() as f64 && y < plane.height() as f64;
+    inside.then(|| f64::from(plane.row(y as usize)[x as usize]))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::synthetic::{Canvas, texture};
+    use ptztrack_contract::{Homography, Rect};
+
+    const SIZE: (usize, usize) = (160, 120);
+    const PERSON: (f64, f64, f64, f64) = (70.0, 30.0, 20.0, 60.0);
+
+    fn room(contrast: f64) -> Canvas {
+        Canvas::seen(SIZE, &Homography::translation(0.0, 0.0), |x, y| 120.0 + contrast * texture(1, x, y))
+    }
+
+    fn with_person(mut picture: Canvas) -> Canvas {
+        picture.paint(PERSON, |u, v| 30.0 + 0.2 * texture(5, u, v));
+        picture
+    }
+
+    fn region() -> Region {
+        let (left, top) = (PERSON.0 / SIZE.0 as f64, PERSON.1 / SIZE.1 as f64);
+        let bounds =
+            Rect { x: left, y: top, width: PERSON.2 / SIZE.0 as f64, height: PERSON.3 / SIZE.1 as f64 };
+        let (right, bottom) = (left + bounds.width, top + bounds.height);
+        let contour = [(left, top), (left, bottom), (right, bottom), (right, top)];
+        Region {
+            bounds,
+            contour: contour.map(|(x, y)| Point { x, y }).to_vec(),
+            perimeter: 0.3,
+            area: 0.06,
+            centroid: bounds.centre(),
+            track: None,
+        }
+    }
+
+    fn judge(picture: &Canvas, background: &Canvas, region: &Region) -> bool {
+        let scene = SceneView {
+            camera_motion: None,
+            luma: picture.luma(),
+            chroma: None,
+            foreground: picture.luma(),
+            background: background.luma(),
+        };
+        is_nobody(&scene, region).unwrap()
+    }
+
+    #[test]
+    fn somebody_is_no_ghost_and_what_they_left_is_one() {
+        let mut turned = region();
+        turned.contour.reverse();
+        for contrast in [0.0, 0.2, 0.5] {
+            let (empty, person) = (room(contrast), with_person(room(contrast)));
+            for region in [region(), turned.clone()] {
+                assert!(!judge(&person, &empty, &region), "{contrast}");
+                assert!(judge(&empty, &person, &region), "{contrast}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_background_that_was_learned_blurred_is_nobody_and_somebody_before_it_is() {
+        let blurred = room(0.5).blurred(5);
+        assert!(judge(&room(0.5), &blurred, &region()));
+        assert!(!judge(&with_person(room(0.5)), &blurred, &region()));
+    }
+
+    #[test]
+    fn nothing_is_told_of_what_has_no_edge_or_lies_outside() {
+        let (empty, lit) = (room(0.0), {
+            let mut picture = room(0.0);
+            picture.paint(PERSON, |_, _| 124.0);
+            picture
+        });
+        assert!(!judge(&empty, &lit, &region()));
+        let mut beyond = region();
+        beyond.contour.iter_mut().for_each(|point| point.x += 2.0);
+        assert!(!judge(&empty, &with_person(room(0.0)), &beyond));
+        assert!(!judge(&empty, &with_person(room(0.0)), &Region { contour: Vec::new(), ..region() }));
+    }
+}
