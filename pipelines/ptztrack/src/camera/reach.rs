@@ -8,10 +8,14 @@
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
+use url::Url;
+
 use crate::config::{CameraSettings, Codec};
 
 /// As long as the pipeline's own source waits.
 const PATIENCE: Duration = Duration::from_secs(1);
+/// Of RTSP, where an address has none (RFC 7826, section 4.2).
+const RTSP_PORT: u16 = 554;
 
 /// Says why the camera does not accept a connection for its pictures.
 ///
@@ -22,9 +26,10 @@ pub fn check(camera: &CameraSettings) -> Result<(), String> {
     if camera.pipeline.is_some() || camera.codec == Codec::Mjpeg && std::env::var_os("http_proxy").is_some() {
         return Ok(());
     }
-    let (host, port) = endpoint(if camera.codec == Codec::Mjpeg { &camera.address } else { &camera.rtsp });
+    let address = if camera.codec == Codec::Mjpeg { &camera.address } else { &camera.rtsp };
+    let (host, port) = endpoint(address).ok_or_else(|| format!("{address} names no host"))?;
     let said = |err: std::io::Error| format!("{host}, port {port}: {err}");
-    let addresses = (host, port).to_socket_addrs().map_err(said)?;
+    let addresses = (host.as_str(), port).to_socket_addrs().map_err(said)?;
     let mut last = std::io::Error::other("the name has no address");
     for address in addresses {
         match TcpStream::connect_timeout(&address, PATIENCE) {
@@ -35,19 +40,11 @@ pub fn check(camera: &CameraSettings) -> Result<(), String> {
     Err(said(last))
 }
 
-/// Host and port of an address, which was checked as it was read.
-fn endpoint(address: &str) -> (&str, u16) {
-    let (scheme, rest) = address.split_once("://").unwrap_or(("", address));
-    let default = match scheme {
-        "https" => 443,
-        "rtsp" => 554,
-        _ => 80,
-    };
-    let (host, port) = match rest.rsplit_once(':') {
-        Some((host, port)) if !port.contains(']') => (host, port.parse().unwrap_or(default)),
-        _ => (rest, default),
-    };
-    (host.trim_matches(['[', ']']), port)
+/// Host and port of an address; `None` where it has no host.
+fn endpoint(address: &str) -> Option<(String, u16)> {
+    let url = Url::parse(address).ok()?;
+    let port = url.port_or_known_default().unwrap_or(RTSP_PORT);
+    Some((url.host_str()?.trim_matches(['[', ']']).to_owned(), port))
 }
 
 #[cfg(test)]
@@ -62,8 +59,9 @@ mod tests {
             ("http://10.0.0.1:8080", "10.0.0.1", 8080),
             ("http://[2001:db8::1]", "2001:db8::1", 80),
             ("rtsp://[2001:db8::1]:5540", "2001:db8::1", 5540),
+            ("rtsp://camera.example/stream", "camera.example", 554),
         ] {
-            assert_eq!(endpoint(address), (host, port), "{address}");
+            assert_eq!(endpoint(address), Some((host.to_owned(), port)), "{address}");
         }
     }
 }
