@@ -10,6 +10,7 @@ mod front;
 mod launch;
 mod pipeline;
 mod program;
+mod recording;
 pub mod scene;
 mod watchdog;
 
@@ -18,6 +19,7 @@ pub use front::{Front, Way};
 pub use launch::{GstLaunch, plugin_folder, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::Program;
+pub use recording::pictures_in;
 pub use watchdog::Watchdog;
 
 use std::time::Duration;
