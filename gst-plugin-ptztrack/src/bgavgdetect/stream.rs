@@ -7,7 +7,7 @@ use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View, is_nobody};
+use crate::vision::{CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -184,10 +184,9 @@ impl Stream {
             foreground: plane(seen.foreground),
             background: plane(seen.background),
         };
-        for region in motion.iter().flat_map(|motion| motion.regions.iter().chain(&motion.outside)) {
-            if is_nobody(&self.scene.view(), region).map_err(StreamError::Scene)? {
-                self.scene.adopt(&region.contour).map_err(StreamError::Scene)?;
-            }
+        if let Some(motion) = &motion {
+            let regions = motion.regions.iter().chain(&motion.outside);
+            self.scene.forget_ghosts(regions).map_err(StreamError::Scene)?;
         }
         Ok((motion, scene))
     }

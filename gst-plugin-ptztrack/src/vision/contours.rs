@@ -17,10 +17,14 @@ impl Grid {
         Point { x: (x + 0.5) / self.width, y: (y + 0.5) / self.height }
     }
 
+    /// Where a normalised point lies, in pixels between the middles of those: the inverse of [`Self::point`].
+    pub(super) fn place(&self, point: &Point) -> Point {
+        Point { x: point.x * self.width - 0.5, y: point.y * self.height - 0.5 }
+    }
+
     /// The pixel whose middle a normalised point is.
     fn pixel(&self, point: &Point) -> Pixel {
-        let coordinate = |normalised: f64, size: f64| (normalised * size - 0.5).round() as i32;
-        Pixel::new(coordinate(point.x, self.width), coordinate(point.y, self.height))
+        nearest(self.place(point))
     }
 
     fn region(&self, contour: &Vector<Pixel>) -> opencv::Result<Region> {
@@ -46,6 +50,11 @@ impl Grid {
             track: None,
         })
     }
+}
+
+/// The pixel whose middle is nearest to a place.
+pub(super) fn nearest(place: Point) -> Pixel {
+    Pixel::new(place.x.round() as i32, place.y.round() as i32)
 }
 
 /// The connected regions of a binary `mask` by the border following of Suzuki and Abe (1985; thesis

@@ -8,6 +8,7 @@ use opencv::imgproc;
 use ptztrack_contract::{Point, Region};
 
 use super::Luma;
+use super::contours::Grid;
 use super::scene_model::SceneView;
 
 /// How far inside and outside of the contour grey levels are compared, pixels: it is not more exact than this.
@@ -20,6 +21,7 @@ const LEAST_EDGE: f64 = 8.0;
 const LEAST_PLACES: u32 = 16;
 /// Pixels that are looked at together to tell whether picture and background are the same but for their sharpness.
 const COARSE: i32 = 9;
+/// Share of their difference that is left then, below which they are the same.
 const UNSHARP: f64 = 0.4;
 
 /// Whether nobody is where `region` is: it is a ghost, or what is known of the background there is not sharp.
@@ -58,7 +60,8 @@ fn difference(a: &Mat, b: &Mat) -> opencv::Result<f64> {
 /// Whether the contour of `region` is an edge of the background, not of the picture.
 fn is_ghost(scene: &SceneView, region: &Region) -> bool {
     let (mut picture, mut background, mut places) = (0.0, 0.0, 0_u32);
-    across(&region.contour, (scene.luma.width() as f64, scene.luma.height() as f64), |inside, outside| {
+    let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
+    across(&region.contour, grid, |inside, outside| {
         let step = |plane: &Luma| Some((level(plane, inside)? - level(plane, outside)?).abs());
         if let (Some(seen), Some(known)) = (step(&scene.luma), step(&scene.background)) {
             (picture, background, places) = (picture + seen, background + known, places + 1);
@@ -68,9 +71,9 @@ fn is_ghost(scene: &SceneView, region: &Region) -> bool {
 }
 
 /// Calls `compare` with a place inside and one outside of a closed contour (normalised), at each pixel along it.
-fn across(contour: &[Point], (width, height): (f64, f64), mut compare: impl FnMut(Point, Point)) {
-    let pixels = || contour.iter().map(|point| Point { x: point.x * width - 0.5, y: point.y * height - 0.5 });
-    let sides = || pixels().zip(pixels().cycle().skip(1));
+fn across(contour: &[Point], grid: Grid, mut compare: impl FnMut(Point, Point)) {
+    let places = || contour.iter().map(|point| grid.place(point));
+    let sides = || places().zip(places().cycle().skip(1));
     let signed_area: f64 = sides().map(|(a, b)| a.x * b.y - b.x * a.y).sum();
     for (from, to) in sides() {
         let length = (to.x - from.x).hypot(to.y - from.y);

@@ -57,7 +57,6 @@ pub use contours::{Grid, fill_regions, regions};
 pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, Patch, Shape, draw, text_width};
 pub use duty::Duty;
-pub use ghosts::is_nobody;
 pub use luma::{Luma, LumaError};
 pub use observation::Observation;
 pub use picture::{Chroma, Picture, Reduced, Samples};

@@ -1,9 +1,10 @@
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
+use ptztrack_contract::{CameraMotion, Homography, Rect, Region};
 
 use super::Luma;
 use super::camera_motion::CameraMotionEstimator;
+use super::ghosts::is_nobody;
 use super::picture::{Picture, Reduced};
 use super::reduce::divisor;
 use super::travelling::TravellingBackground;
@@ -66,10 +67,14 @@ impl SceneModel {
         self.background.protect(bounds);
     }
 
-    /// What has stayed the same within `contour` (normalised, in the last picture) is background at once: see
-    /// [`TravellingBackground::adopt`].
-    pub fn adopt(&mut self, contour: &[Point]) -> opencv::Result<()> {
-        self.background.adopt(contour)
+    /// Where nobody is, of the regions that were found in the last picture, what stays the same is background at once.
+    pub fn forget_ghosts<'a>(&mut self, regions: impl Iterator<Item = &'a Region>) -> opencv::Result<()> {
+        for region in regions {
+            if is_nobody(&self.view(), region)? {
+                self.background.adopt(&region.contour)?;
+            }
+        }
+        Ok(())
     }
 
     /// What the last picture showed.

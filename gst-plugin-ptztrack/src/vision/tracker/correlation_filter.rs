@@ -252,9 +252,9 @@ fn gradients(grey: &Luma) -> [Vec<f32>; 2] {
         for (out, (left, right)) in inner.iter_mut().zip(row.iter().zip(row.iter().skip(2))) {
             *out = f32::from(*right) - f32::from(*left);
         }
-        if let [first, second, .., before, last] = *row {
-            across[0] = f32::from(second) - f32::from(first);
-            across[width - 1] = f32::from(last) - f32::from(before);
+        if let ([first, second, ..], [.., before, last]) = (row, row) {
+            across[0] = f32::from(*second) - f32::from(*first);
+            across[width - 1] = f32::from(*last) - f32::from(*before);
         }
     }
     [across, down]

@@ -11,7 +11,6 @@ mod warp;
 
 use std::time::Duration;
 
-use opencv::core::Point as Pixel;
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
@@ -19,6 +18,7 @@ use self::noise::Noise;
 use self::warp::Warp;
 use super::Luma;
 use super::camera_motion::to_pixels;
+use super::contours::{Grid, nearest};
 use super::picture::Reduced;
 
 /// Pixels of the canvas around the picture: what leaves the picture for a moment is still known on return.
@@ -119,11 +119,8 @@ impl TravellingBackground {
     /// or not: nobody is there.
     pub fn adopt(&mut self, contour: &[Point]) -> opencv::Result<()> {
         let Some(to_canvas) = self.to_picture.inverse() else { return Ok(()) };
-        let (width, height) = (self.size.0 as f64, self.size.1 as f64);
-        let pixels = contour.iter().map(|point| {
-            let place = to_canvas.apply(Point { x: point.x * width - 0.5, y: point.y * height - 0.5 });
-            Pixel::new(place.x.round() as i32, place.y.round() as i32)
-        });
+        let grid = Grid { width: self.size.0 as f64, height: self.size.1 as f64 };
+        let pixels = contour.iter().map(|point| nearest(to_canvas.apply(grid.place(point))));
         self.model.adopt_within(&pixels.collect())
     }
 

@@ -261,6 +261,10 @@ impl Robust {
         looks.max(0.0) + silhouette.fit(evidence, moved).mean().max(0.0)
     }
 
+    fn learn_velocity(&mut self, own: Point2f, dt_s: f32) {
+        self.estimate.own_velocity += (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+    }
+
     /// Takes a place over as the target's own.
     fn settle(&mut self, seen: &Observation, place: &Place, dt_s: f32) -> opencv::Result<()> {
         self.estimate.bounds = place.bounds;
@@ -522,11 +526,9 @@ impl Follow for Robust {
             self.estimate.centroid = centre(self.estimate.bounds);
             return Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Hidden });
         }
-        let by_places = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
         if place.share >= LEARNT {
-            let own = by_places + (by_points - by_places) * lead;
-            self.estimate.own_velocity +=
-                (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
+            let by_places = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
+            self.learn_velocity(by_places + (by_points - by_places) * lead, dt_s);
         }
         self.settle(seen, &place, dt_s)?;
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
