@@ -10,12 +10,12 @@ use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Rect, Region, SceneMeta,
+    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Region, SceneMeta,
     TargetState, Times, TrackerEvent,
 };
 
 use super::settings::{Settings, ZoneSetting};
-use super::stream::{Stream, StreamError};
+use super::stream::{Heard, Stream, StreamError};
 use super::{Output, Profile, Selection, Test, caps};
 use crate::allocation::refuse_crop;
 use crate::lock::lock;
@@ -163,10 +163,7 @@ pub struct BgAvgDetect {
     /// Taken out by the streaming thread while it works on a frame.
     stream: Mutex<Option<Stream>>,
     duty: Mutex<Duty>,
-    /// Where the tracker last said that its target is, and nothing becomes background.
-    target: Mutex<Option<Rect>>,
-    /// Where the camera looks, where it rests and a servo has said so.
-    view: Mutex<Option<View>>,
+    heard: Mutex<Heard>,
 }
 
 impl Default for BgAvgDetect {
@@ -177,8 +174,7 @@ impl Default for BgAvgDetect {
             settings: Mutex::new(settings),
             stream: Mutex::default(),
             duty: Mutex::default(),
-            target: Mutex::default(),
-            view: Mutex::default(),
+            heard: Mutex::default(),
         }
     }
 }
@@ -230,8 +226,7 @@ impl BaseTransformImpl for BgAvgDetect {
 
     fn start(&self) -> Result<(), gst::ErrorMessage> {
         *lock(&self.duty) = Duty::default();
-        *lock(&self.view) = None;
-        *lock(&self.target) = None;
+        *lock(&self.heard) = Heard::default();
         self.apply_output();
         Ok(())
     }
@@ -383,14 +378,16 @@ impl BgAvgDetect {
         let follows = matches!(tracker.state, TargetState::Tracking | TargetState::Occluded);
         gst::debug!(CAT, imp = self, "Tracker is {}", tracker.state.name());
         lock(&self.duty).sleep(follows);
-        *lock(&self.target) = tracker.bounds.filter(|_| follows);
+        lock(&self.heard).target = tracker.bounds.filter(|_| follows);
     }
 
     fn heed_camera(&self, camera: &CameraEvent) {
         let settle_time = lock(&self.settings).settle_time_ns;
         gst::debug!(CAT, imp = self, "Camera {}", if camera.moving { "moves" } else { "is at rest" });
-        lock(&self.duty).camera(camera.moving, Duration::from_nanos(settle_time));
-        *lock(&self.view) = View::of(camera);
+        lock(&self.duty).camera(camera, Duration::from_nanos(settle_time));
+        let mut heard = lock(&self.heard);
+        heard.view = View::of(camera);
+        heard.camera.hear(camera);
     }
 
     /// The regions of a frame, `None` where it was not looked at or while it learns, and the scene.
@@ -405,8 +402,12 @@ impl BgAvgDetect {
         }
         let seen = match settings.profile {
             Profile::Robust => {
-                let (target, view) = (*lock(&self.target), *lock(&self.view));
-                let seen = stream.look_at_scene(buffer, elapsed, &settings, target, view);
+                let heard = {
+                    let mut heard = lock(&self.heard);
+                    heard.camera.pass(elapsed);
+                    *heard
+                };
+                let seen = stream.look_at_scene(buffer, elapsed, &settings, &heard);
                 seen.map(|(motion, scene)| Seen { motion, scene: Some(scene) })
             }
             Profile::Thesis => {

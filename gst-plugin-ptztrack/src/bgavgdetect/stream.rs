@@ -7,7 +7,7 @@ use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View};
+use crate::vision::{CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -37,6 +37,17 @@ fn plane(luma: Luma) -> Plane {
         height: luma.height() as u32,
         pixels: glib::Bytes::from_owned(pixels),
     }
+}
+
+/// What tracker and servo last said.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Heard {
+    /// Where the tracker's target is: nothing becomes background there.
+    pub target: Option<Rect>,
+    /// Where the camera looks, where it rests and that is known.
+    pub view: Option<View>,
+    /// How it moves.
+    pub camera: CameraMoves,
 }
 
 /// One stream of frames of the same caps.
@@ -154,26 +165,27 @@ impl Stream {
     }
 
     /// The moving regions of a frame, the camera at rest or not (`None` while it learns), and what everybody can
-    /// use of it: camera motion, foreground, background. What lies in `target` does not become background. `view` is where
-    /// the camera looks, where it rests and a servo has said so.
+    /// use of it: camera motion, foreground, background.
     pub fn look_at_scene(
         &mut self,
         buffer: &gst::BufferRef,
         elapsed: Duration,
         settings: &Settings,
-        target: Option<Rect>,
-        view: Option<View>,
+        heard: &Heard,
     ) -> Result<(Option<MotionMeta>, SceneMeta), StreamError> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
             .map_err(|_| StreamError::Buffer)?;
         let picture = self.source.picture(&frame)?;
         let from_pts = std::mem::replace(&mut self.scene_pts, buffer.pts());
         let config = settings.detector();
-        self.scene.protect(target);
-        let seen =
-            self.scene.update(&picture, config.analysis_width, elapsed, None).map_err(StreamError::Scene)?;
+        self.scene.protect(heard.target);
+        let expected = heard.camera.expected_motion(elapsed);
+        let seen = self
+            .scene
+            .update(&picture, config.analysis_width, elapsed, expected)
+            .map_err(StreamError::Scene)?;
         self.zones.set(&config.zones, &config.exclude_zones);
-        self.zones.carry(seen.camera_motion.as_ref(), elapsed, view);
+        self.zones.carry(seen.camera_motion.as_ref(), elapsed, heard.view);
         let size = (frame.width() as usize, frame.height() as usize);
         let motion = self.detector.process_likelihood(&seen, size, elapsed, &config, &self.zones)?;
         let scene = SceneMeta {

@@ -315,7 +315,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         if event.type_() == gst::EventType::Navigation {
             self.navigate(&event);
         } else if let Some(Ok(camera)) = CameraEvent::of(&event) {
-            lock(&self.camera).hear(camera.moving);
+            lock(&self.camera).hear(&camera);
         }
         self.parent_src_event(event)
     }
@@ -435,7 +435,8 @@ impl LkFeatureTrack {
             stream.source.picture(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
         let mut seen = Observation::from(picture.luma);
         if settings.profile == Profile::Robust {
-            match stream.scene.look(buffer, &picture, step.into()) {
+            let expected = lock(&self.camera).expected_motion(step.into());
+            match stream.scene.look(buffer, &picture, step.into(), expected) {
                 Ok(Ok(scene)) => seen.scene = Some(scene),
                 Ok(Err(err)) => fault = Some(format!("the detector's scene cannot be read: {err}")),
                 Err(err) => fault = Some(format!("camera motion cannot be measured: {err}")),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ptztrack_contract::{BufferMeta, CameraMotion, ContractError, Plane, SceneMeta};
+use ptztrack_contract::{BufferMeta, CameraMotion, ContractError, Homography, Plane, SceneMeta};
 
 use crate::vision::{CameraMotionEstimator, Luma, Picture, SceneModel, SceneView};
 
@@ -24,7 +24,8 @@ impl SceneSource {
         *self = Self::default();
     }
 
-    /// What `picture`, which came in `buffer` and `elapsed` after the one before, shows.
+    /// What `picture`, which came in `buffer` and `elapsed` after the one before, shows. `expected` (normalised) is a first
+    /// guess of how the picture moved.
     ///
     /// # Errors
     /// Where OpenCV fails; a meta that cannot be read counts as none.
@@ -33,25 +34,31 @@ impl SceneSource {
         buffer: &gst::BufferRef,
         picture: &Picture,
         elapsed: Duration,
+        expected: Option<Homography>,
     ) -> opencv::Result<Result<SceneView<'_>, ContractError>> {
         match SceneMeta::of(buffer) {
-            Some(Ok(meta)) => self.heed(meta, buffer.pts()).map(Ok),
+            Some(Ok(meta)) => self.heed(meta, buffer.pts(), expected).map(Ok),
             Some(Err(error)) => Ok(Err(error)),
             None => {
                 self.last = None;
-                self.model.update(picture, WIDTH, elapsed, None).map(Ok)
+                self.model.update(picture, WIDTH, elapsed, expected).map(Ok)
             }
         }
     }
 
     /// Takes the detector's word. Where pictures were dropped between it and here, its camera motion starts from a
     /// picture that never came: then it is measured again, from the last that did.
-    fn heed(&mut self, mut meta: SceneMeta, pts: Option<gst::ClockTime>) -> opencv::Result<SceneView<'_>> {
+    fn heed(
+        &mut self,
+        mut meta: SceneMeta,
+        pts: Option<gst::ClockTime>,
+        expected: Option<Homography>,
+    ) -> opencv::Result<SceneView<'_>> {
         let before = self.last.take();
         if let Some((last, last_pts)) = &before
             && meta.from_pts != *last_pts
         {
-            meta.camera_motion = between(&last.luma, &meta.luma)?;
+            meta.camera_motion = between(&last.luma, &meta.luma, expected)?;
         }
         if before.is_none() {
             meta.camera_motion = None;
@@ -61,10 +68,10 @@ impl SceneSource {
     }
 }
 
-fn between(from: &Plane, to: &Plane) -> opencv::Result<Option<CameraMotion>> {
+fn between(from: &Plane, to: &Plane, expected: Option<Homography>) -> opencv::Result<Option<CameraMotion>> {
     let mut estimator = CameraMotionEstimator::default();
     estimator.update(&luma(from), None, None)?;
-    estimator.update(&luma(to), None, None)
+    estimator.update(&luma(to), None, expected)
 }
 
 fn luma(plane: &Plane) -> Luma<'_> {

@@ -1,17 +1,23 @@
 use std::time::Duration;
 
-use ptztrack_contract::CameraEvent;
+use ptztrack_contract::{CameraEvent, Homography};
 
-/// Whether the camera moves, by a servo's word, which holds for [`CameraEvent::MOVING_HOLDS`] unless it is said again.
+/// Whether and how fast the camera moves, by a servo's word, which holds for [`CameraEvent::MOVING_HOLDS`] unless it is said
+/// again.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct CameraMoves {
     holds: Duration,
+    /// How fast the picture goes to the right and down, frame widths and heights per second, where that is known.
+    picture_rate: Option<(f64, f64)>,
 }
 
 impl CameraMoves {
     /// The servo says that the camera moves, or that it rests.
-    pub fn hear(&mut self, moving: bool) {
-        self.holds = if moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
+    pub fn hear(&mut self, camera: &CameraEvent) {
+        self.holds = if camera.moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
+        let across = frames_per_s(camera.pan_rate_deg_s, camera.horizontal_fov_deg);
+        let down = frames_per_s(camera.tilt_rate_deg_s, camera.vertical_fov_deg);
+        self.picture_rate = across.zip(down).map(|(pan, tilt)| (-pan, tilt));
     }
 
     /// So much time of the stream has passed.
@@ -23,6 +29,18 @@ impl CameraMoves {
     pub fn is_moving(self) -> bool {
         !self.holds.is_zero()
     }
+
+    /// Where the picture may have gone within `elapsed`, as the camera was told to move: the picture is older than that word,
+    /// so that it is but a guess.
+    pub fn expected_motion(self, elapsed: Duration) -> Option<Homography> {
+        let (right, down) = self.picture_rate.filter(|_| self.is_moving())?;
+        let elapsed_s = elapsed.as_secs_f64();
+        Some(Homography::translation(right * elapsed_s, down * elapsed_s))
+    }
+}
+
+fn frames_per_s(rate_deg_s: f64, fov_deg: Option<f64>) -> Option<f64> {
+    fov_deg.filter(|fov_deg| *fov_deg > 0.0).map(|fov_deg| rate_deg_s / fov_deg)
 }
 
 #[cfg(test)]
@@ -30,14 +48,23 @@ mod tests {
     use super::*;
 
     const TICK: Duration = Duration::from_millis(100);
+    const MOVES: CameraEvent = CameraEvent {
+        moving: true,
+        pan_deg: None,
+        tilt_deg: None,
+        pan_rate_deg_s: 30.0,
+        tilt_rate_deg_s: 10.0,
+        horizontal_fov_deg: Some(60.0),
+        vertical_fov_deg: Some(40.0),
+    };
 
     #[test]
     fn rests_until_it_hears_otherwise() {
         let mut camera = CameraMoves::default();
         assert!(!camera.is_moving());
-        camera.hear(true);
+        camera.hear(&MOVES);
         assert!(camera.is_moving());
-        camera.hear(false);
+        camera.hear(&CameraEvent { moving: false, ..MOVES });
         assert!(!camera.is_moving());
     }
 
@@ -45,13 +72,27 @@ mod tests {
     #[test]
     fn a_word_that_is_not_repeated_is_forgotten() {
         let mut camera = CameraMoves::default();
-        camera.hear(true);
+        camera.hear(&MOVES);
         camera.pass(CameraEvent::MOVING_HOLDS - TICK);
         assert!(camera.is_moving());
-        camera.hear(true);
+        camera.hear(&MOVES);
         camera.pass(TICK);
         assert!(camera.is_moving());
         camera.pass(CameraEvent::MOVING_HOLDS);
         assert!(!camera.is_moving());
+    }
+
+    /// A camera that turns to the right and up sees the world go to the left and down.
+    #[test]
+    fn the_picture_goes_against_the_camera() {
+        let mut camera = CameraMoves::default();
+        assert_eq!(camera.expected_motion(TICK), None);
+        camera.hear(&MOVES);
+        assert_eq!(camera.expected_motion(TICK), Some(Homography::translation(-0.05, 0.025)));
+        camera.hear(&CameraEvent { horizontal_fov_deg: None, ..MOVES });
+        assert_eq!(camera.expected_motion(TICK), None, "how much of the picture a degree is, is not known");
+        camera.hear(&MOVES);
+        camera.pass(CameraEvent::MOVING_HOLDS);
+        assert_eq!(camera.expected_motion(TICK), None, "long ago");
     }
 }

@@ -1,5 +1,7 @@
 use std::time::Duration;
 
+use ptztrack_contract::CameraEvent;
+
 use super::camera_moves::CameraMoves;
 
 /// Whether the picture is worth looking at: not while the tracker follows somebody, nor while the camera
@@ -20,11 +22,11 @@ impl Duty {
 
     /// The camera moves, or no longer does. It rests before its pictures do: they are older than the
     /// news, by `settle_time` at most.
-    pub fn camera(&mut self, moving: bool, settle_time: Duration) {
-        if self.camera.is_moving() && !moving {
+    pub fn camera(&mut self, camera: &CameraEvent, settle_time: Duration) {
+        if self.camera.is_moving() && !camera.moving {
             self.settling = settle_time;
         }
-        self.camera.hear(moving);
+        self.camera.hear(camera);
     }
 
     /// Whether to look at the next picture, which comes `elapsed` after the one before.
@@ -44,6 +46,10 @@ mod tests {
 
     const STEP: Duration = Duration::from_millis(100);
 
+    fn word(moving: bool) -> CameraEvent {
+        CameraEvent { moving, ..CameraEvent::default() }
+    }
+
     #[test]
     fn looks_unless_told_otherwise() {
         assert!(Duty::default().looks(STEP));
@@ -61,9 +67,9 @@ mod tests {
     #[test]
     fn looks_again_when_the_pictures_have_settled() {
         let mut duty = Duty::default();
-        duty.camera(true, 3 * STEP);
+        duty.camera(&word(true), 3 * STEP);
         assert!(!duty.looks(STEP));
-        duty.camera(false, 3 * STEP);
+        duty.camera(&word(false), 3 * STEP);
         let looks: Vec<bool> = (0..5).map(|_| duty.looks(STEP)).collect();
         assert_eq!(looks, [false, false, false, true, true]);
     }
@@ -71,12 +77,12 @@ mod tests {
     #[test]
     fn moving_again_while_settling_settles_again() {
         let mut duty = Duty::default();
-        duty.camera(true, 2 * STEP);
-        duty.camera(false, 2 * STEP);
+        duty.camera(&word(true), 2 * STEP);
+        duty.camera(&word(false), 2 * STEP);
         assert!(!duty.looks(STEP));
-        duty.camera(true, 2 * STEP);
+        duty.camera(&word(true), 2 * STEP);
         assert!(!duty.looks(STEP));
-        duty.camera(false, 2 * STEP);
+        duty.camera(&word(false), 2 * STEP);
         let looks: Vec<bool> = (0..3).map(|_| duty.looks(STEP)).collect();
         assert_eq!(looks, [false, false, true]);
     }
@@ -88,7 +94,7 @@ mod tests {
         let mut looks_within = |said: &[u32]| {
             (0..25).position(|frame| {
                 if said.contains(&frame) {
-                    duty.camera(true, Duration::ZERO);
+                    duty.camera(&word(true), Duration::ZERO);
                 }
                 duty.looks(STEP)
             })
@@ -100,7 +106,7 @@ mod tests {
     #[test]
     fn news_of_a_camera_at_rest_change_nothing() {
         let mut duty = Duty::default();
-        duty.camera(false, 10 * STEP);
+        duty.camera(&word(false), 10 * STEP);
         assert!(duty.looks(STEP));
     }
 }

@@ -41,13 +41,13 @@ impl SceneModel {
     }
 
     /// Looks at the next picture, `elapsed` after the one before, reduced to at most `width` pixels a row (0: not
-    /// reduced). `hint` (normalised) says where the picture may have gone; it is only a first guess.
+    /// reduced). `expected` (normalised) says where the picture may have gone; it is only a guess.
     pub fn update(
         &mut self,
         picture: &Picture,
         width: usize,
         elapsed: Duration,
-        hint: Option<Homography>,
+        expected: Option<Homography>,
     ) -> opencv::Result<SceneView<'_>> {
         let divisor = divisor(picture.luma.width(), width);
         let size = ((picture.luma.width() / divisor).max(1), (picture.luma.height() / divisor).max(1));
@@ -56,7 +56,7 @@ impl SceneModel {
         }
         self.picture.fill(picture, size);
         let foreground = self.background.foreground();
-        self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), hint)?;
+        self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), expected)?;
         self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed);
         Ok(self.view())
     }

@@ -61,13 +61,13 @@ impl CameraMotionEstimator {
     }
 
     /// How the camera moved since the last picture. `foreground` (of the last picture, in its size) says where
-    /// points are not to be believed, `hint` (normalised) where the picture may have gone; it is only a first
-    /// guess. `None`: the first picture, or nothing to hold on to.
+    /// points are not to be believed, `expected` (normalised) where the picture may have gone: a guess
+    /// that is tried where it does not go on as it did. `None`: the first picture, or nothing to hold on to.
     pub fn update(
         &mut self,
         luma: &Luma,
         foreground: Option<&Luma>,
-        hint: Option<Homography>,
+        expected: Option<Homography>,
     ) -> opencv::Result<Option<CameraMotion>> {
         let size = (luma.width() as f64, luma.height() as f64);
         let pyramid = luma.with_mat(Pyramid::of)?;
@@ -80,9 +80,9 @@ impl CameraMotionEstimator {
         if let Some(foreground) = foreground {
             key.doubt(foreground);
         }
-        let hint = hint.map(|hint| to_pixels(&hint, size));
-        let expected: Vec<_> = hint.into_iter().chain([self.last, Homography::IDENTITY]).collect();
-        let Some((fit, ends)) = key.compare(&pyramid, &expected, Centred::of(size.0, size.1))? else {
+        let told = expected.map(|motion| to_pixels(&motion, size));
+        let guesses: Vec<_> = [self.last].into_iter().chain(told).chain([Homography::IDENTITY]).collect();
+        let Some((fit, ends)) = key.compare(&pyramid, &guesses, Centred::of(size.0, size.1))? else {
             self.last = Homography::IDENTITY;
             self.key = Some(Key::first(pyramid, grid)?);
             return Ok(None);
@@ -158,11 +158,11 @@ impl Key {
     fn compare(
         &self,
         pyramid: &Pyramid,
-        expected: &[Homography],
+        guesses: &[Homography],
         centred: Centred,
     ) -> opencv::Result<Option<(Fit, Vec<Option<Point2f>>)>> {
         let places: Vec<Point2f> = self.points.iter().map(|point| point.place).collect();
-        let from_key: Vec<Homography> = expected.iter().map(|motion| self.to_last.then(motion)).collect();
+        let from_key: Vec<Homography> = guesses.iter().map(|motion| self.to_last.then(motion)).collect();
         for guess in &from_key {
             let guesses: Vec<Point2f> = places.iter().map(|place| fit::apply(guess, *place)).collect();
             let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses)?;

@@ -3,6 +3,7 @@
 //! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not
 //! the canvas on the picture, so that what is known is not blurred by being resampled in every picture.
 
+mod burned_in;
 mod gain;
 mod model;
 mod noise;
@@ -13,6 +14,7 @@ use std::time::Duration;
 
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
+use self::burned_in::BurnedIn;
 use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
 use self::noise::Noise;
 use self::warp::Warp;
@@ -48,6 +50,7 @@ const UNSEEN_MOTION: f64 = 0.3;
 pub struct TravellingBackground {
     model: Model,
     noise: Noise,
+    burned_in: BurnedIn,
     /// From the canvas to the last picture, pixels.
     to_picture: Homography,
     rested: Duration,
@@ -113,6 +116,7 @@ impl TravellingBackground {
         let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.show();
+        self.forget_burned_in(&picture.luma(), motion);
     }
 
     /// Makes what has stayed the same for a moment within `contour` (normalised, in the last picture) background, protected
@@ -137,9 +141,7 @@ impl TravellingBackground {
         if let Some(motion) = motion {
             let step = to_pixels(&motion.homography, size);
             self.to_picture = self.to_picture.then(&step);
-            let middle = Point { x: size.0 / 2.0, y: size.1 / 2.0 };
-            let to = step.apply(middle);
-            let rests = (to.x - middle.x).hypot(to.y - middle.y) < RESTS;
+            let rests = displacement(&step, size) < RESTS;
             self.rested = if rests { self.rested.saturating_add(elapsed) } else { Duration::ZERO };
             self.held = self.held.map(|held| moved(held, &motion.homography));
         }
@@ -208,6 +210,15 @@ impl TravellingBackground {
         f64::from(changed) / f64::from(known)
     }
 
+    /// Takes out of the foreground what stays put in the picture while the world moves.
+    fn forget_burned_in(&mut self, luma: &Luma, motion: Option<&CameraMotion>) {
+        let size = (self.size.0 as f64, self.size.1 as f64);
+        let travel = motion.map_or(0.0, |motion| displacement(&to_pixels(&motion.homography, size), size));
+        let held = self.held.map(|held| in_pixels(held, size));
+        self.burned_in.update(luma, &self.foreground, travel, held);
+        self.burned_in.clear(&mut self.foreground);
+    }
+
     /// Leaves likelihood and mean as they lie in the picture.
     fn show(&mut self) {
         let Some(back) = self.to_picture.inverse() else { return };
@@ -215,6 +226,13 @@ impl TravellingBackground {
         self.back.sample(&self.model.likelihood, UNKNOWN, &mut self.foreground);
         self.back.sample(&self.model.shown, 0, &mut self.shown);
     }
+}
+
+/// How far the middle of the picture goes, pixels.
+fn displacement(step: &Homography, (width, height): (f64, f64)) -> f64 {
+    let middle = Point { x: width / 2.0, y: height / 2.0 };
+    let to = step.apply(middle);
+    (to.x - middle.x).hypot(to.y - middle.y)
 }
 
 /// The displacement of the canvas' middle, and how far its corners go beyond that.
@@ -240,15 +258,19 @@ fn moved(bounds: Rect, motion: &Homography) -> Rect {
     Rect { x: first.x, y: first.y, width: last.x - first.x, height: last.y - first.y }
 }
 
-/// Where a box of the picture (normalised) lies on the canvas, pixels.
-fn canvas_box(bounds: Rect, size: (usize, usize), to_picture: &Homography) -> Rect {
-    let (width, height) = (size.0 as f64, size.1 as f64);
-    let pixels = Rect {
+/// A normalised box in pixels.
+fn in_pixels(bounds: Rect, (width, height): (f64, f64)) -> Rect {
+    Rect {
         x: bounds.x * width,
         y: bounds.y * height,
         width: bounds.width * width,
         height: bounds.height * height,
-    };
+    }
+}
+
+/// Where a box of the picture (normalised) lies on the canvas, pixels.
+fn canvas_box(bounds: Rect, size: (usize, usize), to_picture: &Homography) -> Rect {
+    let pixels = in_pixels(bounds, (size.0 as f64, size.1 as f64));
     to_picture.inverse().map_or(pixels, |back| moved(pixels, &back))
 }
 

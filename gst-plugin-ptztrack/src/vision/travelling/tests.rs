@@ -189,3 +189,23 @@ fn who_stands_before_a_new_border_is_not_its_background() {
     assert!(left_behind(false) > 0.3, "{}", left_behind(false));
     assert!(left_behind(true) < 0.1, "{}", left_behind(true));
 }
+
+#[test]
+fn a_burned_in_clock_is_no_mover_and_the_target_stays_one() {
+    const CLOCK: (f64, f64, f64, f64) = (8.0, 8.0, 30.0, 9.0);
+    let mut background = learned();
+    let mut turned = |steps: std::ops::Range<u32>| {
+        for step in steps {
+            let at = -3.3 * f64::from(step);
+            let mut picture = with_person(seen(at, 0.0, step), PERSON);
+            picture.paint(CLOCK, |u, _| if (u as u32).is_multiple_of(4) { 240.0 } else { 20.0 });
+            background.protect(Some(normalised(PERSON)));
+            look(&mut background, &picture, Some((-3.3, 0.0)));
+        }
+        (foreground(&background, CLOCK), foreground(&background, PERSON))
+    };
+    let (clock, person) = turned(1..20);
+    assert!(clock > 0.4 && person > 0.6, "{clock} {person}");
+    let (clock, person) = turned(20..70);
+    assert!(clock < 0.05 && person > 0.6, "{clock} {person}");
+}
