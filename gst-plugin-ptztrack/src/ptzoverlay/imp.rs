@@ -6,11 +6,11 @@ use gst::subclass::prelude::*;
 use gst_video::{VideoFormat, VideoOverlayComposition, VideoOverlayCompositionMeta, VideoOverlayRectangle};
 use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, TargetState};
 
-use super::caps;
+use super::{caps, pixels};
 use crate::allocation::refuse_crop;
 use crate::lock::lock;
 use crate::pad_templates;
-use crate::vision::{self, FrameSize, Parts, Patch, Seen, Shape, Trail};
+use crate::vision::{self, ColourSpace, FrameSize, Parts, Patch, Pen, Seen, Shape, Trail};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("ptzoverlay", gst::DebugColorFlags::empty(), Some("PTZ tracking overlay"))
@@ -58,14 +58,25 @@ struct Format {
     /// Caps of the frames that come in.
     caps: gst::Caps,
     info: gst_video::VideoInfo,
-    /// Whether downstream draws compositions itself.
-    attach: bool,
+    draws: Draws,
+}
+
+/// Who draws.
+#[derive(Debug, Clone, Copy)]
+enum Draws {
+    /// Downstream: it gets a composition.
+    Downstream,
+    /// We, on the pixels as they are.
+    Directly(ColourSpace),
+    /// GStreamer, a composition: we do not know the format.
+    Blending,
 }
 
 /// What is kept from frame to frame.
 #[derive(Debug, Default)]
 struct Memory {
     trail: Trail,
+    pen: Pen,
     /// The last drawing and what it shows: where nothing changed it serves again.
     last: Option<(Vec<Shape>, Option<VideoOverlayComposition>)>,
     /// Whether a fault of this stream was already reported, so that one fault is not a flood.
@@ -254,13 +265,18 @@ impl PtzOverlay {
         })?;
         let composing = caps::composing(&caps);
         let attach = caps::is_composing(&caps) || self.downstream_composes(&composing);
-        gst::debug!(CAT, imp = self, "{} {caps}", if attach { "attaching to" } else { "blending into" });
+        let draws = match pixels::colour_space(&info) {
+            _ if attach => Draws::Downstream,
+            Some(colours) => Draws::Directly(colours),
+            None => Draws::Blending,
+        };
+        gst::debug!(CAT, imp = self, "{caps}: {draws:?}");
         let out = if attach { composing } else { caps.clone() };
         if !self.srcpad.push_event(gst::event::Caps::new(&out)) {
             let flushing = self.srcpad.pad_flags().contains(gst::PadFlags::FLUSHING);
             return Err(if flushing { gst::FlowError::Flushing } else { gst::FlowError::NotNegotiated });
         }
-        *lock(&self.format) = Some(Format { caps, info, attach });
+        *lock(&self.format) = Some(Format { caps, info, draws });
         *lock(&self.memory) = Memory::default();
         Ok(())
     }
@@ -303,13 +319,15 @@ impl PtzOverlay {
     /// The frame with the drawing; where that fails, a warning says why and the frame passes as it is.
     fn draw_on(&self, mut buffer: gst::Buffer, format: &Format) -> gst::Buffer {
         let mut memory = std::mem::take(&mut *lock(&self.memory));
-        let done = self.composition(&buffer, &format.info, &mut memory).and_then(|composition| {
-            let Some(composition) = composition else { return Ok(()) };
+        let done = self.shapes(&buffer, &format.info, &mut memory).and_then(|shapes| {
+            if shapes.is_empty() {
+                return Ok(());
+            }
             let buffer = buffer.make_mut();
-            if format.attach {
-                attach(buffer, &composition)
-            } else {
-                blend(buffer, &format.info, &composition)
+            match format.draws {
+                Draws::Downstream => attach(buffer, &memory.composition(shapes, &format.info)?),
+                Draws::Directly(colours) => draw(buffer, &format.info, colours, &shapes, &mut memory.pen),
+                Draws::Blending => blend(buffer, &format.info, &memory.composition(shapes, &format.info)?),
             }
         });
         if let Err(reason) = done
@@ -325,35 +343,52 @@ impl PtzOverlay {
         buffer
     }
 
-    fn composition(
+    /// What there is to draw.
+    fn shapes(
         &self,
         buffer: &gst::BufferRef,
         info: &gst_video::VideoInfo,
         memory: &mut Memory,
-    ) -> Result<Option<VideoOverlayComposition>, String> {
+    ) -> Result<Vec<Shape>, String> {
         let unreadable = |err: ContractError| format!("unreadable meta: {err}");
         let motion = MotionMeta::of(buffer).transpose().map_err(unreadable)?;
         let target = TargetMeta::of(buffer).transpose().map_err(unreadable)?;
         if motion.is_none() && target.is_none() {
-            return Ok(None);
+            return Ok(Vec::new());
         }
         let settings = *lock(&self.settings);
         remember(&mut memory.trail, buffer.pts(), target.as_ref(), settings.trail_duration_ns);
         let trail: Vec<_> = memory.trail.points().collect();
         let seen = Seen { motion: motion.as_ref(), target: target.as_ref(), trail: &trail };
-        let frame = FrameSize { width: info.width(), height: info.height() };
-        let failed = |err: opencv::Error| format!("drawing failed: {err}");
-        let shapes = vision::scene(frame, settings.parts(), seen).map_err(failed)?;
-        if let Some((last, composition)) = &memory.last
+        vision::scene(frame_size(info), settings.parts(), seen).map_err(failed)
+    }
+}
+
+impl Memory {
+    /// The shapes as a composition; none where they all lie outside.
+    fn composition(
+        &mut self,
+        shapes: Vec<Shape>,
+        info: &gst_video::VideoInfo,
+    ) -> Result<Option<VideoOverlayComposition>, String> {
+        if let Some((last, composition)) = &self.last
             && *last == shapes
         {
             return Ok(composition.clone());
         }
-        let patches = vision::draw(&shapes, frame).map_err(failed)?;
+        let patches = self.pen.patches(&shapes, frame_size(info)).map_err(failed)?;
         let composition = compose(patches)?;
-        memory.last = Some((shapes, composition.clone()));
+        self.last = Some((shapes, composition.clone()));
         Ok(composition)
     }
+}
+
+fn frame_size(info: &gst_video::VideoInfo) -> FrameSize {
+    FrameSize { width: info.width(), height: info.height() }
+}
+
+fn failed(err: opencv::Error) -> String {
+    format!("drawing failed: {err}")
 }
 
 /// Adds to the trail. A dropped frame (DISCONT) does not break it, only a new target or a jump back does:
@@ -398,7 +433,8 @@ fn rectangle(patch: Patch) -> Result<VideoOverlayRectangle, String> {
 }
 
 /// Adds the drawing to one that is there already, as only one is shown.
-fn attach(buffer: &mut gst::BufferRef, composition: &VideoOverlayComposition) -> Result<(), String> {
+fn attach(buffer: &mut gst::BufferRef, composition: &Option<VideoOverlayComposition>) -> Result<(), String> {
+    let Some(composition) = composition else { return Ok(()) };
     let Some(mut meta) = buffer.meta_mut::<VideoOverlayCompositionMeta>() else {
         VideoOverlayCompositionMeta::add(buffer, composition);
         return Ok(());
@@ -409,12 +445,33 @@ fn attach(buffer: &mut gst::BufferRef, composition: &VideoOverlayComposition) ->
     Ok(())
 }
 
+type WritableFrame<'a> = gst_video::VideoFrameRef<&'a mut gst::BufferRef>;
+
+fn frame<'a>(
+    buffer: &'a mut gst::BufferRef,
+    info: &gst_video::VideoInfo,
+) -> Result<WritableFrame<'a>, String> {
+    gst_video::VideoFrameRef::from_buffer_ref_writable(buffer, info)
+        .map_err(|_| format!("the frame is no {}x{} {:?}", info.width(), info.height(), info.format()))
+}
+
 fn blend(
     buffer: &mut gst::BufferRef,
     info: &gst_video::VideoInfo,
-    composition: &VideoOverlayComposition,
+    composition: &Option<VideoOverlayComposition>,
 ) -> Result<(), String> {
-    let mut frame = gst_video::VideoFrameRef::from_buffer_ref_writable(buffer, info)
-        .map_err(|_| format!("the frame is no {}x{} {:?}", info.width(), info.height(), info.format()))?;
-    composition.blend(&mut frame).map_err(|err| err.to_string())
+    let Some(composition) = composition else { return Ok(()) };
+    composition.blend(&mut frame(buffer, info)?).map_err(|err| err.to_string())
+}
+
+fn draw(
+    buffer: &mut gst::BufferRef,
+    info: &gst_video::VideoInfo,
+    colours: ColourSpace,
+    shapes: &[Shape],
+    pen: &mut Pen,
+) -> Result<(), String> {
+    let mut frame = frame(buffer, info)?;
+    pixels::with_surface(&mut frame, colours, |surface| pen.draw(shapes, frame_size(info), surface))
+        .map_err(failed)
 }

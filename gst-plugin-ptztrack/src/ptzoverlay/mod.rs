@@ -5,7 +5,7 @@
 //! its recent trail, its state, and its offset from the middle of the frame. Each part is a property.
 //!
 //! Where downstream says that it draws a `GstVideoOverlayComposition` itself, the drawing is attached and
-//! the pixels stay as they are; elsewhere it is blended into them. A frame without metas passes untouched.
+//! the pixels stay as they are; elsewhere they are drawn on. A frame without metas passes untouched.
 //!
 //! ## Pipelines
 //!
@@ -27,6 +27,7 @@ use glib::prelude::*;
 mod caps;
 #[allow(missing_docs, reason = "the derived property accessors are described by their blurbs")]
 mod imp;
+mod pixels;
 
 glib::wrapper! {
     /// Element `ptzoverlay`: draws what detector and tracker saw.

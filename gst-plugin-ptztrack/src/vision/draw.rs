@@ -1,13 +1,10 @@
-use opencv::core::{Mat, Point, Rect, Scalar, ToInputOutputArray, Vec4b, Vector};
-use opencv::imgproc;
+use opencv::core::{Point, Rect};
 
+use super::coverage::Coverage;
+use super::font::{Font, text_width};
+use super::surface::{ColourSpace, Component, Surface};
 use super::{FrameSize, Spot};
 
-/// Fixed-point digits OpenCV takes for positions between pixels.
-const SHIFT: i32 = 4;
-/// Height of a capital letter of the font at scale 1, in pixels.
-const CAPITAL_HEIGHT: f64 = 21.0;
-const FONT: i32 = imgproc::FONT_HERSHEY_SIMPLEX;
 /// Where there are more patches than this, those in the same rows are drawn as one: each costs a blender a pass over the
 /// whole width of the rows that it covers.
 const MAX_PATCHES: usize = 8;
@@ -36,13 +33,6 @@ impl Colour {
     /// The same with another opacity.
     pub const fn with_alpha(self, alpha: f64) -> Self {
         Self { alpha, ..self }
-    }
-
-    /// BGRA with premultiplied alpha. OpenCV's anti-aliasing mixes all four channels alike, which is
-    /// right for premultiplied colours and only for those.
-    fn scalar(self) -> Scalar {
-        let channel = |value: u8| f64::from(value) * self.alpha;
-        Scalar::new(channel(self.blue), channel(self.green), channel(self.red), 255.0 * self.alpha)
     }
 }
 
@@ -103,76 +93,78 @@ pub enum Shape {
 }
 
 impl Shape {
-    /// The pixels that it can touch, cut to the frame; empty where it lies outside.
+    /// The pixels that it can touch, cut to the frame, from a column and a row on that suit any [`Surface`]; empty where it
+    /// lies outside.
     fn bounds(&self, frame: FrameSize) -> opencv::Result<Rect> {
-        let (corners, margin) = match self {
+        match self {
             Self::Plate { origin, width, height, .. } => {
-                (vec![*origin, Spot { x: origin.x + width, y: origin.y + height }], 1.0)
+                let end = Spot { x: origin.x + width, y: origin.y + height };
+                Ok(around(&[*origin, end], 1.0, frame))
             }
             Self::Line { points, width, .. } | Self::Fading { points, width, .. } => {
-                (points.clone(), f64::from(outlined(*width)) / 2.0 + 2.0)
+                Ok(around(points, f64::from(outlined(*width)) / 2.0 + 2.0, frame))
             }
-            Self::Dot { centre, radius, .. } => (vec![*centre], radius + outline(*radius) + 2.0),
+            Self::Dot { centre, radius, .. } => {
+                Ok(around(&[*centre], radius + outline(*radius) + 2.0, frame))
+            }
             Self::Text { origin, text, height, .. } => {
                 let end = Spot { x: origin.x + text_width(text, *height)?, y: origin.y - height };
                 // Letters like `g` and `,` reach below the base line.
-                (vec![*origin, end], height * 0.5 + 2.0)
-            }
-        };
-        let limit = |value: f64, size: u32| value.clamp(0.0, f64::from(size)) as i32;
-        let low = |pick: fn(&Spot) -> f64| corners.iter().map(pick).fold(f64::INFINITY, f64::min) - margin;
-        let high = |pick: fn(&Spot) -> f64| corners.iter().map(pick).fold(-f64::INFINITY, f64::max) + margin;
-        let (left, top) =
-            (limit(low(|p| p.x).floor(), frame.width), limit(low(|p| p.y).floor(), frame.height));
-        let (right, bottom) =
-            (limit(high(|p| p.x).ceil(), frame.width), limit(high(|p| p.y).ceil(), frame.height));
-        Ok(Rect::new(left, top, (right - left).max(0), (bottom - top).max(0)))
-    }
-
-    /// Draws it into `picture`, whose top left pixel is that of `patch` in the frame.
-    fn draw(&self, picture: &mut impl ToInputOutputArray, patch: Rect) -> opencv::Result<()> {
-        let place = |spot: &Spot| Spot { x: spot.x - f64::from(patch.x), y: spot.y - f64::from(patch.y) };
-        match self {
-            Self::Plate { origin, width, height, colour } => {
-                let corner = place(origin);
-                let end = Spot { x: corner.x + width, y: corner.y + height };
-                let (start, end) = (corner.rounded(), end.rounded());
-                let area = Rect::new(start.x, start.y, end.x - start.x, end.y - start.y);
-                imgproc::rectangle(picture, area, colour.scalar(), imgproc::FILLED, imgproc::LINE_8, 0)
-            }
-            Self::Line { points, closed, width, colour } => {
-                let corners: Vector<Point> = points.iter().map(|point| place(point).fixed()).collect();
-                stroke(
-                    picture,
-                    &corners,
-                    *closed,
-                    outlined(*width),
-                    OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha),
-                )?;
-                stroke(picture, &corners, *closed, *width, *colour)
-            }
-            Self::Fading { points, width, colour } => {
-                let corners: Vec<Point> = points.iter().map(|point| place(point).fixed()).collect();
-                let strength = |index: usize| (index + 1) as f64 / corners.len() as f64;
-                // All of the outline first, or that of each piece would cut off the piece before.
-                for (width, colour) in [(outlined(*width), OUTLINE), (*width, *colour)] {
-                    for (index, piece) in corners.windows(2).enumerate() {
-                        let colour = colour.with_alpha(colour.alpha * strength(index));
-                        stroke(picture, &piece.iter().copied().collect(), false, width, colour)?;
-                    }
-                }
-                Ok(())
-            }
-            Self::Dot { centre, radius, colour } => {
-                disc(picture, place(centre), radius + outline(*radius), OUTLINE)?;
-                disc(picture, place(centre), *radius, *colour)
-            }
-            Self::Text { origin, text, height, colour } => {
-                let (origin, colour) = (place(origin).rounded(), colour.scalar());
-                let (scale, width) = font(*height);
-                imgproc::put_text(picture, text, origin, FONT, scale, colour, width, imgproc::LINE_AA, false)
+                Ok(around(&[*origin, end], height * 0.5 + 2.0, frame))
             }
         }
+    }
+
+    /// Draws it on `surface`, within `bounds`.
+    fn draw(&self, pen: &mut Pen, bounds: Rect, surface: &mut Surface) -> opencv::Result<()> {
+        match self {
+            Self::Plate { origin, width, height, colour } => {
+                let (start, end) =
+                    (origin.rounded(), Spot { x: origin.x + width, y: origin.y + height }.rounded());
+                let area = Rect::new(start.x, start.y, end.x - start.x, end.y - start.y);
+                pen.layer(bounds, *colour, surface, |coverage| coverage.fill(area));
+            }
+            Self::Line { points, closed, width, colour } => {
+                let sides = || {
+                    let back = points.last().zip(points.first()).filter(|_| *closed && points.len() > 1);
+                    points
+                        .windows(2)
+                        .map(|side| (side[0], side[1]))
+                        .chain(back.map(|(from, to)| (*from, *to)))
+                };
+                let rim = OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha);
+                for (width, colour) in [(outlined(*width), rim), (*width, *colour)] {
+                    let radius = f64::from(width) / 2.0;
+                    pen.layer(bounds, colour, surface, |coverage| {
+                        sides().for_each(|(from, to)| coverage.add_stroke(from, to, radius, 1.0));
+                    });
+                }
+            }
+            Self::Fading { points, width, colour } => {
+                let strength = |index: usize| (index + 1) as f64 / points.len() as f64;
+                for (width, colour) in [(outlined(*width), OUTLINE), (*width, *colour)] {
+                    let radius = f64::from(width) / 2.0;
+                    pen.layer(bounds, colour, surface, |coverage| {
+                        for (index, side) in points.windows(2).enumerate() {
+                            coverage.add_stroke(side[0], side[1], radius, strength(index));
+                        }
+                    });
+                }
+            }
+            Self::Dot { centre, radius, colour } => {
+                for (radius, colour) in [(radius + outline(*radius), OUTLINE), (*radius, *colour)] {
+                    pen.layer(bounds, colour, surface, |coverage| {
+                        coverage.add_stroke(*centre, *centre, radius, 1.0);
+                    });
+                }
+            }
+            Self::Text { origin, text, height, colour } => {
+                pen.coverage.clear(bounds);
+                pen.font.write(text, *origin, *height, &mut pen.coverage)?;
+                surface.blend(&pen.coverage, *colour, &mut pen.reduced);
+            }
+        }
+        Ok(())
     }
 }
 
@@ -180,49 +172,6 @@ impl Spot {
     fn rounded(self) -> Point {
         Point::new(self.x.round() as i32, self.y.round() as i32)
     }
-
-    fn fixed(self) -> Point {
-        // OpenCV's positions are pixel centres.
-        Point::new(fixed(self.x - 0.5), fixed(self.y - 0.5))
-    }
-}
-
-fn stroke(
-    picture: &mut impl ToInputOutputArray,
-    corners: &Vector<Point>,
-    closed: bool,
-    width: i32,
-    colour: Colour,
-) -> opencv::Result<()> {
-    if corners.len() < 2 {
-        return Ok(());
-    }
-    // OpenCV spreads strokes of one pixel so far that they come out faint.
-    let passes = if width == 1 { 3 } else { 1 };
-    (0..passes).try_for_each(|_| {
-        imgproc::polylines(picture, corners, closed, colour.scalar(), width, imgproc::LINE_AA, SHIFT)
-    })
-}
-
-/// A disc as polygon: OpenCV's own small circles are diamonds.
-fn disc(
-    picture: &mut impl ToInputOutputArray,
-    centre: Spot,
-    radius: f64,
-    colour: Colour,
-) -> opencv::Result<()> {
-    const CORNERS: u32 = 24;
-    let corners: Vector<Point> = (0..CORNERS)
-        .map(|corner| {
-            let angle = std::f64::consts::TAU * f64::from(corner) / f64::from(CORNERS);
-            Spot { x: centre.x + radius * angle.cos(), y: centre.y + radius * angle.sin() }.fixed()
-        })
-        .collect();
-    imgproc::fill_convex_poly(picture, &corners, colour.scalar(), imgproc::LINE_AA, SHIFT)
-}
-
-fn fixed(value: f64) -> i32 {
-    (value * f64::from(1 << SHIFT)).round() as i32
 }
 
 /// Width of the dark rim beside a stroke or disc of that size.
@@ -232,17 +181,6 @@ fn outline(size: f64) -> f64 {
 
 fn outlined(width: i32) -> i32 {
     width + 2 * outline(f64::from(width)) as i32
-}
-
-/// Scale and stroke width for capitals of `height` pixels.
-fn font(height: f64) -> (f64, i32) {
-    (height / CAPITAL_HEIGHT, ((height / 9.0).round() as i32).max(1))
-}
-
-/// How many pixels wide `text` is with capitals of `height` pixels.
-pub fn text_width(text: &str, height: f64) -> opencv::Result<f64> {
-    let (scale, width) = font(height);
-    Ok(f64::from(imgproc::get_text_size(text, FONT, scale, width, &mut 0)?.width))
 }
 
 /// A drawn part of the frame.
@@ -260,16 +198,81 @@ pub struct Patch {
     pub pixels: Vec<u8>,
 }
 
-/// Draws `shapes`, later ones over earlier ones, into as few and small patches as hold them; patches
-/// never overlap and lie inside the frame.
-pub fn draw(shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
-    let bounded = shapes.iter().map(|shape| Ok((shape, shape.bounds(frame)?)));
-    let bounded = bounded.collect::<opencv::Result<Vec<_>>>()?;
-    let mut areas = joined(bounded.iter().map(|(_, bounds)| *bounds), |a, b| !(*a & *b).empty());
-    if areas.len() > MAX_PATCHES {
-        areas = joined(areas, |a, b| a.y < b.y + b.height && b.y < a.y + a.height);
+/// Draws shapes, and keeps letters and memory for the next picture.
+#[derive(Debug, Default)]
+pub struct Pen {
+    coverage: Coverage,
+    reduced: Vec<u8>,
+    font: Font,
+}
+
+impl Pen {
+    /// Draws `shapes`, later ones over earlier ones, on a frame of that size.
+    pub fn draw(&mut self, shapes: &[Shape], frame: FrameSize, surface: &mut Surface) -> opencv::Result<()> {
+        for shape in shapes {
+            let bounds = shape.bounds(frame)?;
+            if !bounds.empty() {
+                shape.draw(self, bounds, surface)?;
+            }
+        }
+        Ok(())
     }
-    areas.into_iter().map(|area| draw_patch(&bounded, area)).collect()
+
+    /// Draws `shapes`, later ones over earlier ones, into as few and small patches as hold them; patches
+    /// never overlap and lie inside the frame.
+    pub fn patches(&mut self, shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
+        let bounded = shapes.iter().map(|shape| Ok((shape, shape.bounds(frame)?)));
+        let bounded = bounded.collect::<opencv::Result<Vec<_>>>()?;
+        let mut areas = joined(bounded.iter().map(|(_, bounds)| *bounds), |a, b| !(*a & *b).empty());
+        if areas.len() > MAX_PATCHES {
+            areas = joined(areas, |a, b| a.y < b.y + b.height && b.y < a.y + a.height);
+        }
+        areas.into_iter().map(|area| self.patch(&bounded, area)).collect()
+    }
+
+    fn patch(&mut self, shapes: &[(&Shape, Rect)], area: Rect) -> opencv::Result<Patch> {
+        let (width, height) = (area.width as usize, area.height as usize);
+        let mut pixels = vec![0; width * height * 4];
+        let at = |offset| Component { offset, step: 4, stride: 4 * width, ..Component::default() };
+        let mut surface = Surface {
+            planes: [&mut pixels, &mut [], &mut [], &mut []],
+            components: &[at(2), at(1), at(0), at(3)],
+            colours: ColourSpace::Rgb,
+            origin: (area.x, area.y),
+        };
+        for (shape, bounds) in shapes.iter().filter(|(_, bounds)| !(*bounds & area).empty()) {
+            shape.draw(self, *bounds, &mut surface)?;
+        }
+        Ok(Patch { x: area.x, y: area.y, width: area.width as u32, height: area.height as u32, pixels })
+    }
+
+    /// Lays a colour over what `cover` covers within `bounds`.
+    fn layer(
+        &mut self,
+        bounds: Rect,
+        colour: Colour,
+        surface: &mut Surface,
+        cover: impl FnOnce(&mut Coverage),
+    ) {
+        self.coverage.clear(bounds);
+        cover(&mut self.coverage);
+        surface.blend(&self.coverage, colour, &mut self.reduced);
+    }
+}
+
+/// The pixels of the frame that are at most `margin` beside these places.
+fn around(places: &[Spot], margin: f64, frame: FrameSize) -> Rect {
+    let extent = |pick: fn(&Spot) -> f64, size: u32| {
+        let values = places.iter().map(pick);
+        let low = values.clone().fold(f64::INFINITY, f64::min) - margin;
+        let high = values.fold(-f64::INFINITY, f64::max) + margin;
+        let limit = |value: f64| value.clamp(0.0, f64::from(size)) as i32;
+        let start = limit(low.floor()) / Surface::GRID * Surface::GRID;
+        (start, (limit(high.ceil()) - start).max(0))
+    };
+    let ((x, width), (y, height)) =
+        (extent(|place| place.x, frame.width), extent(|place| place.y, frame.height));
+    Rect::new(x, y, width, height)
 }
 
 /// Areas, each in one with all that it is near to.
@@ -284,15 +287,6 @@ fn joined(areas: impl IntoIterator<Item = Rect>, near: impl Fn(&Rect, &Rect) -> 
     joined
 }
 
-fn draw_patch(shapes: &[(&Shape, Rect)], area: Rect) -> opencv::Result<Patch> {
-    let mut pixels = vec![0; area.width as usize * area.height as usize * size_of::<Vec4b>()];
-    let mut picture = Mat::new_rows_cols_with_bytes_mut::<Vec4b>(area.height, area.width, &mut pixels)?;
-    for (shape, _) in shapes.iter().filter(|(_, bounds)| !(*bounds & area).empty()) {
-        shape.draw(&mut picture, area)?;
-    }
-    Ok(Patch { x: area.x, y: area.y, width: area.width as u32, height: area.height as u32, pixels })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -300,6 +294,10 @@ mod tests {
 
     const FRAME: FrameSize = FrameSize { width: 64, height: 48 };
     const RED: Colour = Colour::new(255, 0, 0);
+
+    fn draw(shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
+        Pen::default().patches(shapes, frame)
+    }
 
     fn pixel(patch: &Patch, x: i32, y: i32) -> [u8; 4] {
         let start = (((y - patch.y) * patch.width as i32 + x - patch.x) * 4) as usize;
@@ -358,12 +356,6 @@ mod tests {
         let row = |y: f64| (0..20).map(move |index| dot(f64::from(index) * 50.0, y));
         assert_eq!(draw(&row(50.0).collect::<Vec<_>>(), frame).unwrap().len(), 1);
         assert_eq!(draw(&row(20.0).chain(row(80.0)).collect::<Vec<_>>(), frame).unwrap().len(), 2);
-    }
-
-    #[test]
-    fn text_grows_with_its_height() {
-        assert!(text_width("abc", 20.0).unwrap() > 1.8 * text_width("abc", 10.0).unwrap());
-        assert!(text_width("", 20.0).unwrap() < 20.0);
     }
 
     proptest! {

@@ -1,6 +1,7 @@
 use ptztrack_contract::{MotionMeta, Point, Rect, Region, TargetMeta, TargetState};
 
-use super::draw::{Colour, Shape, text_width};
+use super::draw::{Colour, Shape};
+use super::font::text_width;
 
 /// Size of a frame in pixels.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
