@@ -219,6 +219,7 @@ impl Servo {
     /// What holds whatever is measured and answered; asked after every step where debug assertions are on.
     pub fn check_invariants(&self) {
         self.controller.check_invariants();
+        self.limits.check_invariants();
         self.home.check_invariants();
         self.moves.check_invariants();
         let sum = self.calibration.delays().sum();

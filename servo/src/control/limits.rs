@@ -60,6 +60,14 @@ impl LimitEnforcer {
     pub fn at_limit(&self) -> bool {
         self.at_limit
     }
+
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        if let Some((_, PanTilt { pan, tilt })) = self.told {
+            assert!(pan.is_finite() && tilt.is_finite(), "a position of {pan}, {tilt} degrees");
+        }
+        assert!(!self.at_limit || self.told.is_some(), "at a limit, and nobody knows where");
+    }
 }
 
 /// The rate that is left of one that drives outwards near an end, and whether the end is reached, by `near_deg`.
@@ -170,6 +178,28 @@ mod tests {
     }
 
     proptest! {
+        /// Between the ends that the camera told and those that are set, whatever it is told meanwhile.
+        #[test]
+        fn what_is_held_back_leads_to_no_end(
+            steps in prop::collection::vec((-200.0..200.0f64, -185.0..185.0f64, any::<bool>(), 1u64..30_000), 1..60),
+        ) {
+            let (mut limits_enforcer, mut history) = (LimitEnforcer::default(), CommandHistory::default());
+            let (hard, soft) = (limits(Some((-170.0, 170.0))), SoftLimits::default());
+            let (delay, mut now) = (Duration::from_millis(100), Duration::ZERO);
+            for (rate, pan, tells, wait) in steps {
+                now += Duration::from_millis(wait);
+                if tells {
+                    limits_enforcer.told(now, PanTilt::new(pan, 0.0));
+                }
+                let position = limits_enforcer.position(&history, delay, now);
+                let held = limits_enforcer.apply(PanTilt::new(rate, 0.0), position, (&hard, &soft), 0.5);
+                limits_enforcer.check_invariants();
+                prop_assert!(held.pan * rate >= 0.0 && held.pan.abs() <= rate.abs());
+                prop_assert!(position.is_some() || !limits_enforcer.at_limit());
+                history.push(now, held);
+            }
+        }
+
         #[test]
         fn no_rate_leads_out(rate in -200.0..200.0f64, pan in -170.0..170.0f64) {
             let (held, _) = apply(rate, pan, &limits(Some((-170.0, 170.0))), &SoftLimits::default());

@@ -155,7 +155,24 @@ impl Mailbox {
     }
 
     pub(super) fn take(&self) -> Mail {
-        mem::take(&mut *self.mail())
+        let mut mail = self.mail();
+        if cfg!(debug_assertions) {
+            self.check(&mail);
+        }
+        mem::take(&mut *mail)
+    }
+
+    /// What holds at any time.
+    #[cfg(test)]
+    pub fn check_invariants(&self) {
+        self.check(&self.mail());
+    }
+
+    fn check(&self, mail: &Mail) {
+        assert!(mail.waiting.is_empty() || mail.rest, "somebody waits for a rest that nobody asked for");
+        let closed = self.closed.load(Ordering::Relaxed);
+        let answered = mail.waiting.is_empty() && mail.settling.is_empty();
+        assert!(!closed || answered, "somebody waits where nobody answers");
     }
 
     /// Resolves when something arrives, or has arrived since the last time.

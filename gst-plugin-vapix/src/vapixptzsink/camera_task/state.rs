@@ -193,6 +193,16 @@ impl<O: Fn(Event)> TaskState<O> {
             (self.observer)(Event::Status(status));
         }
         self.tell_rest();
+        if cfg!(debug_assertions) {
+            self.check_invariants();
+        }
+    }
+
+    /// What holds whenever everything was told; asked then where debug assertions are on.
+    pub fn check_invariants(&self) {
+        let rests = self.control.session().is_at_rest();
+        assert!(self.waiting.is_empty() || !rests, "somebody waits for a rest that has come");
+        assert!(!self.gave_up || self.deadline.is_some(), "given up before the end was asked for");
     }
 
     /// Nothing is to be done at this time that has not been done.
@@ -217,8 +227,9 @@ mod tests {
     use super::*;
     use crate::vapixptzsink::camera_task::FINISH_BUDGET;
     use crate::vapixptzsink::clock::Clock;
+    use proptest::prelude::*;
     use servo::{Measurement, Position, ServoSettings, Visibility};
-    use std::sync::mpsc::Receiver;
+    use std::sync::mpsc::{Receiver, TryRecvError};
     use vapix::session::{Next, Query};
     use vapix::wire::Command;
 
@@ -317,6 +328,47 @@ mod tests {
         }
         state.serve_at(now + ms(5000), |_| timeout());
         assert!(state.is_over() && !gave_up(&told));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Whatever is left in the mailbox, in whatever order, and however the camera answers.
+        #[test]
+        fn nobody_waits_for_ever(
+            events in prop::collection::vec((0u8..10, any::<bool>(), 1u64..3000), 1..40),
+        ) {
+            let (mut state, _told) = state();
+            let (mut now, mut waiting) = (ms(1000), Vec::new());
+            for (event, answers, wait) in events {
+                match event {
+                    0 | 1 => state.see(Visibility::Seen),
+                    2 => state.see(Visibility::Gone),
+                    3 => waiting.push(state.mailbox.rest()),
+                    4 => state.mailbox.accept_measurements(false),
+                    5 => state.mailbox.accept_measurements(true),
+                    6 => state.mailbox.inherit(Command::Stop),
+                    7 => state.mailbox.configure(ServoSettings { max_rate_hz: 5.0, ..ServoSettings::default() }),
+                    8 => state.mailbox.set_credentials(None),
+                    _ => waiting.push(state.mailbox.finish(FINISH_BUDGET)),
+                }
+                state.mailbox.check_invariants();
+                now += ms(wait);
+                state.serve_at(now, |_| if answers { Ok(Response::Accepted) } else { timeout() });
+                if state.is_over() {
+                    break;
+                }
+            }
+            waiting.push(state.mailbox.finish(FINISH_BUDGET));
+            for _ in 0..70 {
+                now += ms(1000);
+                state.serve_at(now, |_| timeout());
+            }
+            prop_assert!(state.is_over());
+            state.give_up();
+            state.check_invariants();
+            prop_assert!(waiting.iter().all(|heard| heard.try_recv() != Err(TryRecvError::Empty)));
+        }
     }
 
     #[test]
