@@ -22,6 +22,16 @@ impl Picture {
         self.data = pixels;
     }
 
+    /// Makes what is in a rectangle a third as light.
+    pub fn darken(&mut self, bounds: Rect2f) {
+        for (index, pixel) in self.data.iter_mut().enumerate() {
+            let (x, y) = ((index % self.width) as f32, (index / self.width) as f32);
+            if bounds.contains(opencv::core::Point2f::new(x, y)) {
+                *pixel /= 3;
+            }
+        }
+    }
+
     /// Paints a rectangle with a texture of its own, which moves with it.
     pub fn paint(&mut self, bounds: Rect2f, seed: u32) {
         for y in 0..self.height {

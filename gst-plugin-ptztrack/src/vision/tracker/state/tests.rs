@@ -222,3 +222,40 @@ fn who_comes_out_changed_beside_a_hidden_target_is_followed_on() {
     let last = walk(&mut tracker, 7);
     assert_eq!((last.state, last.id), (TargetState::Tracking, 1), "{:?}", last.bounds);
 }
+
+/// In a crowd somebody else always walks near whoever is not seen for a moment.
+#[test]
+fn a_neighbour_in_other_clothes_is_not_taken_for_the_target() {
+    const BESIDE: f32 = 60.0;
+    let detected = |x: f32| Detection {
+        bounds: Rect {
+            x: f64::from(x) / SIZE.0 as f64,
+            y: 100.0 / SIZE.1 as f64,
+            width: f64::from(PERSON.0) / SIZE.0 as f64,
+            height: f64::from(PERSON.1) / SIZE.1 as f64,
+        },
+        ..Detection::default()
+    };
+    let walk = |picture: &mut Picture, x: f32| {
+        picture.paint(Rect2f::new(x, 100.0, PERSON.0, PERSON.1), 99);
+        picture.darken(Rect2f::new(x, 100.0, PERSON.0, PERSON.1));
+    };
+    let mut tracker = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    for _ in 0..10 {
+        step(&mut tracker, &street((0.0, 0.0), &[]));
+    }
+    let mut first = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
+    walk(&mut first, 80.0 + BESIDE);
+    let report = tracker.process(&first, DT, &[detected(80.0)]);
+    assert_eq!(report.changes, [TargetChange::Acquired]);
+    for n in 1..24 {
+        let x = 80.0 + 8.5 * n as f32;
+        let hidden = (13..15).contains(&n);
+        let people = [(x, 100.0, 7)];
+        let mut picture = street((0.0, 0.0), if hidden { &[] } else { &people });
+        walk(&mut picture, x + BESIDE);
+        let report = tracker.process(&picture, DT, &[detected(x + BESIDE)]);
+        let off = (report.bounds.x * SIZE.0 as f64) as f32 - x;
+        assert!(off < 0.5 * BESIDE, "{n}: {off} pixels beside");
+    }
+}

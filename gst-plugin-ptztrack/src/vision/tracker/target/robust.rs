@@ -69,9 +69,11 @@ const MAX_GROWTH: f32 = 4.0;
 const ADOPTED: f32 = 0.3;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.15;
-/// How much farther, in heights of it a second, a target that is not seen may be than its last motion took it: whoever
-/// runs.
-const UNSEEN_SPREAD_PER_S: f32 = 2.3;
+/// How far, in heights of it, a target that is not seen may be from where its last motion took it: at once, and farther with
+/// every second, as somebody may turn or run.
+const UNSEEN_REACH: (f32, f32) = (0.5, 2.3);
+/// Deviation within that of whoever need not look like it.
+const UNSEEN_SPREAD: (f32, f32) = (0.15, 1.5);
 /// Time constant of what its last motion says of a hidden target, seconds: somebody may turn or stop behind a wall.
 const HIDDEN_TIME_S: f32 = 2.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
@@ -434,14 +436,18 @@ impl Robust {
     fn recognise(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
         for sighting in sightings {
-            let Some(place) = self.box_in(sighting.bounds) else { continue };
+            if !self.may_be_in(sighting.bounds) {
+                continue;
+            }
             // Half hidden or turned it may look unlike what the filter knows; colours, motion and place must do.
-            let place = self.locate(seen, place, WIDE_SPREAD)?;
+            let place = self.locate(seen, self.box_in(sighting.bounds), WIDE_SPREAD)?;
             let shares = self
                 .usual
                 .silhouette(place.fit)
                 .with(self.usual.stands_out(place.level), |fit, stands_out| fit * stands_out);
-            let place = Place { share: of_whole(shares), ..place };
+            // In a crowd there is always somebody who fits: who is farther away must have the target's colours.
+            let likely = if self.resembles(seen, sighting)? { 1.0 } else { self.likely_at(place.bounds) };
+            let place = Place { share: of_whole(shares) * likely, ..place };
             if place.share >= FOUND && best.is_none_or(|best| place.share > best.share) {
                 best = Some(place);
             }
@@ -450,8 +456,8 @@ impl Robust {
     }
 
     /// The target's box in a region, which may show a part of it only or somebody else too: as near to where it is
-    /// expected as the region allows, heads level. `None` where it cannot have come so far since it was seen.
-    fn box_in(&self, region: Rect2f) -> Option<Rect2f> {
+    /// expected as the region allows, heads level.
+    fn box_in(&self, region: Rect2f) -> Rect2f {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let x = middle.x.clamp(region.x, region.x + region.width);
@@ -460,9 +466,19 @@ impl Robust {
         } else {
             middle.y.clamp(region.y, region.y + region.height)
         };
-        let place = Point2f::new(x, y);
-        let reach = bounds.height * (0.5 + UNSEEN_SPREAD_PER_S * self.unseen_s);
-        (length(place - middle) <= reach).then(|| around(place, bounds.width, bounds.height))
+        around(Point2f::new(x, y), bounds.width, bounds.height)
+    }
+
+    /// How far a place is from where it is expected, in such parts of its height as a second unseen adds to.
+    fn farness(&self, place: Rect2f, (at_once, per_s): (f32, f32)) -> f32 {
+        let bounds = self.estimate.bounds;
+        length(centre(place) - centre(bounds)) / (bounds.height * (at_once + per_s * self.unseen_s))
+    }
+
+    /// How likely it has come to a place since it was seen, beside where it is expected: 0 to 1.
+    fn likely_at(&self, place: Rect2f) -> f32 {
+        let off = self.farness(place, UNSEEN_SPREAD);
+        (-0.5 * off * off).exp()
     }
 
     /// The best place where a hidden target may be by now.
@@ -568,7 +584,7 @@ impl Follow for Robust {
     }
 
     fn may_be_in(&self, region: Rect2f) -> bool {
-        self.box_in(region).is_some()
+        self.farness(self.box_in(region), UNSEEN_REACH) <= 1.0
     }
 
     fn estimate(&self) -> &Estimate {
