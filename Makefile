@@ -36,6 +36,7 @@ INPUTS ?= 10000000
 BENCH_SIZE ?= 1280x720
 BENCH_SECONDS ?= 16
 ROUNDS ?= 5
+LIVE_SECONDS ?= 20
 # A package of its own, which shares what is compiled.
 BENCHMARKS := --manifest-path benchmarks/Cargo.toml --target-dir target
 
@@ -72,16 +73,21 @@ demo: packages-demo
 	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
-## bench: measure what following costs beside decoding and other elements, on recordings of the room by a still and by a turning
-##       camera, and leave a table and a plot in target/bench (ROUNDS=5  BENCH_SIZE=1280x720)
+## bench: measure what following costs, on recordings of the room, and leave tables and plots in target/bench: whole pipelines beside
+##       decoding and other elements, live pictures as in the thesis' table 5.4, how late commands are, 1 to 16 cameras, and each
+##       algorithm by itself from 640x480 to 3840x2160 (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20)
 bench: packages-evaluate
 	$(CARGO) build --release $(PRODUCT)
 	$(CARGO) build --release $(BENCHMARKS)
 	mkdir -p target/bench
-	target/release/record target/bench/still.avi $(BENCH_SIZE) $(BENCH_SECONDS) 0
-	target/release/record target/bench/turning.avi $(BENCH_SIZE) $(BENCH_SECONDS) 5
-	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/still.avi target/bench/turning.avi \
+	for codec in avi mpeg4; do \
+		target/release/record target/bench/still.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 0; \
+		target/release/record target/bench/turning.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 5; \
+	done
+	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
 		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
+	scripts/with-plugins release python3 benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench
+	$(CARGO) bench $(BENCHMARKS) | tee target/bench/algorithms.txt
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
 ##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;

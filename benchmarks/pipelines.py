@@ -17,7 +17,8 @@ import subprocess
 import sys
 import threading
 
-DECODERS = {".avi": "avidemux ! jpegdec", ".mp4": "qtdemux ! mpeg4videoparse ! avdec_mpeg4"}
+CODECS = {".avi": "MJPEG", ".mpeg4": "MPEG-4"}
+DECODERS = {".avi": "avidemux ! jpegdec", ".mpeg4": "avidemux ! avdec_mpeg4"}
 DETECT = "bgavgdetect"
 TRACK = f"{DETECT} ! lkfeaturetrack"
 OURS = {
@@ -30,6 +31,7 @@ OURS = {
 BOX = "object-initial-x={x} object-initial-y={y} object-initial-width={w} object-initial-height={h} draw-rect=false"
 PEERS = {
     "motioncells": "videoconvert ! motioncells display=false",
+    "segmentation MOG2": "videoconvert ! segmentation method=mog2",
     "cvtracker MOSSE": f"videoconvert ! cvtracker algorithm=5 {BOX}",
     "cvtracker KCF": f"videoconvert ! cvtracker algorithm=2 {BOX}",
 }
@@ -87,10 +89,15 @@ def measure(recording, pipelines, pictures, rounds):
     return runs
 
 
+def label(recording):
+    """What it is called in tables and plots."""
+    return f"{CODECS[recording.suffix]}, camera {recording.stem}"
+
+
 def table(recording, runs):
     """Markdown: median, the range of the runs, and the ratio to decoding."""
     decode = statistics.median(runs["decode"])
-    lines = [f"| {recording.stem} | ms a picture | lowest to highest | to decoding |", "|---|---|---|---|"]
+    lines = [f"| {label(recording)} | ms a picture | lowest to highest | to decoding |", "|---|---|---|---|"]
     for name, values in runs.items():
         median = statistics.median(values)
         extent = f"{min(values):.2f} to {max(values):.2f}"
@@ -110,17 +117,21 @@ def machine():
 
 
 def plot(out, results):
-    """Bars of the medians, where gnuplot is installed."""
-    data = out / "pipelines.dat"
+    """Bars of the medians, a group for each pipeline, where gnuplot is installed."""
+    data, recordings = out / "pipelines.dat", list(results)
     with data.open("w") as file:
-        for recording, runs in results.items():
-            for name, values in runs.items():
-                file.write(f'"{recording.stem}: {name}" {statistics.median(values):.3f}\n')
+        file.write(" ".join(f'"{text}"' for text in ["pipeline", *map(label, recordings)]) + "\n")
+        for name in results[recordings[0]]:
+            medians = (f"{statistics.median(results[recording][name]):.3f}" for recording in recordings)
+            file.write(f'"{name}" {" ".join(medians)}\n')
     commands = f"""
-        set terminal pngcairo size 1000,600 noenhanced; set output "{out / 'pipelines.png'}"
-        set style fill solid 0.7; set boxwidth 0.7; unset key; set yrange [0:*]; set ylabel "processor ms a picture"
-        set xtics rotate by -35; set bmargin 12; set rmargin 14; set grid y
-        plot "{data}" using 0:2:xtic(1) with boxes linecolor rgb "#3b6ea5"
+        set terminal pngcairo size 1000,560 noenhanced font "DejaVu Sans,11"; set output "{out / 'pipelines.png'}"
+        set style data histograms; set style histogram clustered gap 1; set style fill solid 0.85 noborder; set boxwidth 0.9
+        set linetype 1 linecolor rgb "#3b6ea5"; set linetype 2 linecolor rgb "#8fb3d9"
+        set linetype 3 linecolor rgb "#c9622e"; set linetype 4 linecolor rgb "#eab38f"
+        set key top left; set yrange [0:*]; set ylabel "processor ms a picture"; set grid y
+        set xtics nomirror rotate by -25 scale 0; set ytics nomirror; set border 3; set rmargin 12
+        plot for [column=2:{len(recordings) + 1}] "{data}" using column:xtic(1) title columnheader
     """
     try:
         subprocess.run(["gnuplot"], input=commands, text=True, check=True)
@@ -131,7 +142,7 @@ def plot(out, results):
 def main():
     """Measures all recordings and writes the results."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("recordings", nargs="+", type=pathlib.Path, help="files of which the name ends in .avi or .mp4")
+    parser.add_argument("recordings", nargs="+", type=pathlib.Path, help="AVI files of which the name ends in .avi (MJPEG) or .mpeg4")
     parser.add_argument("--pictures", type=int, required=True, help="how many there are in each recording")
     parser.add_argument("--size", default="1280x720", help="of the pictures, WIDTHxHEIGHT")
     parser.add_argument("--rounds", type=int, default=5, help="runs of each pipeline (default: %(default)s)")
@@ -147,7 +158,7 @@ def main():
         writer.writerow(["recording", "pipeline", "round", "ms_a_picture"])
         for recording, runs in results.items():
             for name, values in runs.items():
-                writer.writerows([recording.stem, name, index, f"{ms:.4f}"] for index, ms in enumerate(values))
+                writer.writerows([label(recording), name, index, f"{ms:.4f}"] for index, ms in enumerate(values))
     tables = "\n".join(table(recording, runs) for recording, runs in results.items())
     text = f"{machine()}; {arguments.size}, {arguments.pictures} pictures, medians of {arguments.rounds} runs.\n\n{tables}"
     (arguments.out / "pipelines.md").write_text(text)

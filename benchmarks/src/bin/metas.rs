@@ -12,7 +12,7 @@ use ptztrack_contract::{BufferMeta, MotionMeta, Plane, SceneMeta, TargetMeta};
 fn main() -> Result<(), Box<dyn Error>> {
     gst::init()?;
     let [file] = std::env::args().skip(1).collect::<Vec<_>>().try_into().map_err(|_| "metas RECORDING")?;
-    let decoder = if file.ends_with(".mp4") { "qtdemux ! avdec_mpeg4" } else { "avidemux ! jpegdec" };
+    let decoder = if file.ends_with(".mpeg4") { "avidemux ! avdec_mpeg4" } else { "avidemux ! jpegdec" };
     let launch = format!(
         "filesrc name=source ! {decoder} ! bgavgdetect ! lkfeaturetrack name=track ! ptzoverlay ! fakesink name=sink sync=false"
     );
