@@ -20,16 +20,16 @@ use virtual_camera::Fault;
 
 const HEADER: &str = "# What can go wrong with the camera
 
-Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the properties'
-defaults, on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s; the worst
-of three runs that end it at different moments between two attempts; of the last three rows one run.
-Where the user sees something, that is one warning as the fault begins and one `connected` as it is
-over. A request that hangs is waited for as long as `timeout` says, 1.5 s by default: with a longer one
-it takes that long to be back.
+Measured by `cargo run -p gst-plugin-vapix --example faults`, over HTTP and with the default properties,
+on a camera that is being steered. Each fault lasts 4 s or more, the reboot 60 s. The figures are the worst
+of three runs, in which the fault ends at different moments between two attempts; the last three rows are
+one run each. The user sees one warning when the fault begins, and one `connected` when it is over. A
+request that hangs is given up after `timeout`, 1.5 s by default; with a longer timeout, control is back
+that much later.
 
-Where PTZ alone is lost, the element took pictures at once all the time. Where video is lost too, it got
-none, and the first as the fault was over. How soon a pipeline whose source fails with the camera has
-video and control back, see [How soon video and control are back](coming-back.md).
+Where only PTZ is lost, the element accepted every picture at once throughout. Where video is lost too, no
+picture arrived until the fault was over. For pipelines whose source fails together with the camera, see
+[How soon video and control are back](coming-back.md).
 
 | Fault | Lost | What the user sees | Requests per second meanwhile | Back in control after |
 |---|---|---|---|---|";

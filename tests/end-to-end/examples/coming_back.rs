@@ -17,9 +17,9 @@ use virtual_camera::Fault;
 
 const HEADER: &str = "# How soon video and control are back
 
-Video and PTZ come from one camera and are lost together. Measured by `cargo run -p end-to-end --example coming_back`; the worst
-of three runs, from the moment when the camera can be reached again until a picture has come, and until the camera has taken the
-first command. Whoever follows a camera that went on turning meanwhile has to find somebody after that.
+Video and PTZ come from one camera and are lost together. Measured by `cargo run -p end-to-end --example coming_back`; the worst of
+three runs, from the moment when the camera can be reached again until a picture arrives, and until the camera accepts the first
+command. If the camera went on turning meanwhile, the target has to be found again after that.
 
 | What follows | What is lost | Video is back after | Control is back after |
 |---|---|---|---|";

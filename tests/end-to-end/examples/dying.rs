@@ -19,20 +19,20 @@ use virtual_camera::{Fault, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
 
-What becomes of a camera whose application dies while it turns it. Measured by `cargo run -p end-to-end --example dying`, over
-HTTP with the properties' defaults; the worst of three runs, from the death (in an outage: from its end) until the camera rests.
-The last column is the same with a watchdog that cannot be started.
+What happens to a camera whose application dies while the camera turns. Measured by `cargo run -p end-to-end --example dying`, over
+HTTP with the default properties; the worst of three runs, from the death (in an outage: from the end of the outage) until the camera is
+at rest. In the last column the watchdog could not be started.
 
 | Way to die | What stops the camera | It rests after | Without `vapix-watchdog` |
 |---|---|---|---|";
 
 const FOOTER: &str = "
-`vapix-watchdog` hears at once that a process is gone, and of one that is stopped or hangs by its lease, which lasts 2 s. In an
-outage it tries twice a second, for a minute.
+`vapix-watchdog` notices at once that a process has ended; that a process is stopped or hangs, it notices when the lease runs out,
+after 2 s. In an outage it retries twice a second, for a minute.
 
-What remains: power, and a cut cable, for longer than that minute; and everything that ends the watchdog together with the
-application, as the end of PID 1 of a container does: run it in another one, or beside it, with `vapix-watchdog --listen` and
-`dead-man-socket`. `mode=absolute` gives the camera a place to go to, not a speed: it comes to rest by itself.";
+What is not covered: loss of power or of the network for longer than that minute, and everything that ends the watchdog together with
+the application, such as the end of PID 1 of a container. Run the watchdog outside that container, with `vapix-watchdog --listen` and
+`dead-man-socket`. `mode=absolute` gives the camera a position to go to, not a speed: it comes to rest by itself.";
 
 /// It must turn as fast as this to be left turning, °/s.
 const TURNS: f64 = 3.0;
