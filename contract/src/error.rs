@@ -10,7 +10,7 @@ pub enum ContractError {
         found: String,
     },
     /// A field is missing, or holds another type.
-    #[error("`{structure}`: field `{field}` is missing or of another type: {reason}")]
+    #[error("`{structure}`: field `{field}` is missing or has another type: {reason}")]
     Field {
         /// The structure's name.
         structure: String,
@@ -20,7 +20,7 @@ pub enum ContractError {
         reason: String,
     },
     /// A field holds a value outside what it may hold.
-    #[error("`{structure}`: field `{field}` has no meaning: `{value}`")]
+    #[error("`{structure}`: field `{field}` has an invalid value: `{value}`")]
     Value {
         /// The structure's name.
         structure: String,

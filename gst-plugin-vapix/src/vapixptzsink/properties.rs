@@ -175,7 +175,7 @@ fn one_of(
             if values.contains(&value) {
                 Ok(value)
             } else {
-                Err(format!("`{name}`={value} is none of {values:?}"))
+                Err(format!("`{name}`={value} is not one of {values:?}"))
             }
         },
     )
@@ -248,7 +248,7 @@ fn duration(
                 "`{name}`={value} is {value} ns: durations are in nanoseconds, and {value} ms would be {value}000000"
             )),
             _ if range.contains(&Duration::from_nanos(value)) => Ok(Duration::from_nanos(value)),
-            _ => Err(format!("`{name}`={value} ns is not within {least:?} and {most:?}")),
+            _ => Err(format!("`{name}`={value} ns is not between {least:?} and {most:?}")),
         }
     })
 }

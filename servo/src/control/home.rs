@@ -30,7 +30,7 @@ impl FromStr for Home {
             None | Some([_]) => Ok(Self::Preset(text.to_owned())),
             Some([pan, tilt]) => Self::position(*pan, *tilt, None),
             Some([pan, tilt, zoom]) => Self::position(*pan, *tilt, Some(*zoom)),
-            Some(_) => Err(format!("`{text}` has more than pan,tilt,zoom")),
+            Some(_) => Err(format!("`{text}` has more parts than pan,tilt,zoom")),
         }
     }
 }
@@ -53,7 +53,7 @@ impl Home {
         let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
         let zooms = zoom.is_none_or(|zoom| (1.0..=9999.0).contains(&zoom));
         if !turns || !zooms {
-            return Err("pan and tilt are from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
+            return Err("pan and tilt must be from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
         }
         Ok(Self::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }))
     }

@@ -7,10 +7,13 @@ use crate::model::{CommandHistory, Delays, PanTilt, SpeedMap};
 /// Learns how fast the speed steps really are, as a factor on the map that was assumed: on its bare curve, as the kink
 /// of a floor that another curve has not is no straight line between any two steps.
 ///
-/// Found by [`RecursiveLeastSquares`] with forgetting on 12 regressors. Its logarithm is the sum of an offset (the camera is faster as a whole), a slope over the logarithm of
-/// the step (another exponent: a linear camera taken for a cubic one), a slope over the logarithm of the
-/// field of view (proportional speed that shrinks all speeds as the view narrows), and a small
-/// correction at each of a few steps, straight in between (any other curve).
+/// Found by [`RecursiveLeastSquares`] with forgetting on 12 regressors. Its logarithm is the sum of an offset (the camera is
+/// faster as a whole), a slope over the logarithm of the step (another exponent: a linear camera taken for a cubic one), a
+/// slope over the logarithm of the field of view (proportional speed that shrinks all speeds as the view narrows), and a
+/// small correction at each of a few steps, straight in between (any other curve).
+///
+/// Gain and exponent alone (the corrections held at zero) do not suffice: where field of view, latency and curve are wrong at
+/// once, the target is lost (test `everything_wrong_at_once_is_put_right_within_20_s`).
 #[derive(Debug)]
 pub(super) struct SpeedMapEstimator {
     regression: RecursiveLeastSquares<FEATURES>,
