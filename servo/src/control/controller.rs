@@ -1,4 +1,5 @@
 use super::OscillationGuard;
+use crate::estimation::Offset;
 use crate::model::{PanTilt, SpeedMap};
 
 /// How the controller is to behave.
@@ -12,17 +13,6 @@ pub struct ControlLaw {
     pub max_deg_s: f64,
     /// Degrees per second by which an axis' rate changes at most, from one command to the next.
     pub max_change_deg_s: f64,
-}
-
-/// How far off the middle the target is, degrees.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Offset {
-    /// In the last picture.
-    pub seen: PanTilt,
-    /// When a command sent now acts.
-    pub expected: PanTilt,
-    /// The target's own motion then, degrees per second.
-    pub target: PanTilt,
 }
 
 /// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.

@@ -10,7 +10,7 @@ mod zoom;
 mod zoom_drive;
 
 pub use actuation::{Access, Actuation, ActuatorStatus};
-pub use controller::{ControlLaw, Controller, Offset};
+pub use controller::{ControlLaw, Controller};
 pub use home::{Home, HomeReturn};
 pub use limits::LimitEnforcer;
 pub use oscillation::OscillationGuard;

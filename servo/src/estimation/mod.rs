@@ -32,5 +32,5 @@ pub use mounting::Mounting;
 pub use rate::{RateAverage, Samples};
 use recursive_least_squares::RecursiveLeastSquares;
 use speed_map::{Maps, SpeedMapEstimator};
-pub use target::{Prediction, TargetEstimator};
+pub use target::{Offset, Prediction, TargetEstimator};
 pub use zoom::ZoomEstimator;

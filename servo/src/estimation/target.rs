@@ -3,7 +3,6 @@ use std::time::Duration;
 use ptztrack_contract::Vector;
 
 use super::{Measurement, RateAverage, Visibility};
-use crate::control::Offset;
 use crate::model::{CommandHistory, Delays, PanTilt, View, rise_deg};
 
 /// How the target's motion is carried forward over the latency.
@@ -24,6 +23,17 @@ impl Prediction {
             Self::Lead => Duration::from_millis(400),
         }
     }
+}
+
+/// How far off the middle the target is, degrees.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Offset {
+    /// In the last picture.
+    pub seen: PanTilt,
+    /// When a command sent now acts.
+    pub expected: PanTilt,
+    /// The target's own motion then, degrees per second.
+    pub target: PanTilt,
 }
 
 /// Where the target is and will be, as angles from the camera's axis.
