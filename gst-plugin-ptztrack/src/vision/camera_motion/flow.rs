@@ -3,8 +3,8 @@
 use opencv::core::{self, Mat, Point2f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vector};
 use opencv::video;
 
-/// Width and height of the window of a point: eight columns are looked at together, one left over costs as much.
-const WINDOW: (i32, i32) = (16, 13);
+/// Side of the window of a point.
+const WINDOW: i32 = 13;
 /// Halvings of the picture: the coarsest level sees motions of half its window, 8 times as large here ...
 const LEVELS: i32 = 3;
 /// ... and twice as large with this one, which is enough where it is known how the camera turns.
@@ -39,7 +39,7 @@ impl Pyramid {
         let highest = video::build_optical_flow_pyramid(
             picture,
             &mut levels,
-            Size::new(WINDOW.0, WINDOW.1),
+            Size::new(WINDOW, WINDOW),
             LEVELS,
             false,
             core::BORDER_REFLECT_101,
@@ -76,7 +76,7 @@ pub(super) fn follow(
         &mut ends,
         &mut status,
         &mut residuals,
-        Size::new(WINDOW.0, WINDOW.1),
+        Size::new(WINDOW, WINDOW),
         if reach == Reach::Near { highest.min(NEAR_LEVELS) } else { highest },
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,

@@ -172,13 +172,8 @@ impl CorrelationFilter {
 /// Columns and rows of cells for a target of that shape; even, and never too few to correlate.
 fn grid(bounds: Rect2f) -> (usize, usize) {
     let aspect = (bounds.width * CONTEXT.0 / (bounds.height * CONTEXT.1).max(1.0)).clamp(0.2, 5.0);
-    // Transforms of numbers with larger prime factors are slow.
-    const SIZES: [usize; 11] = [10, 12, 16, 18, 20, 24, 30, 32, 36, 40, 50];
-    let nearest = |cells: f32| {
-        let off = |size: &usize| (*size as f32 - cells).abs();
-        SIZES.into_iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap_or(SIZES[0])
-    };
-    (nearest((CELLS * aspect).sqrt()), nearest((CELLS / aspect).sqrt()))
+    let even = |cells: f32| 2 * (cells / 2.0).round() as usize;
+    (even((CELLS * aspect).sqrt()), even((CELLS / aspect).sqrt()))
 }
 
 /// Where the parabola through three neighbouring values peaks, -0.5 to 0.5 from the middle one.

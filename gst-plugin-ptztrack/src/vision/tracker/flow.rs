@@ -20,9 +20,9 @@ const RETURN_LEVELS: i32 = 0;
 /// How points are followed and when they count as lost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flow {
-    /// Height of the window in patch pixels, odd; its width is about the same.
+    /// Side of the window in patch pixels, odd.
     pub window: i32,
-    /// Height of the larger window that lost points are tried with again.
+    /// Side of the larger window that lost points are tried with again.
     pub grown_window: i32,
     /// Mean absolute difference of the two windows, grey levels, above which a point is lost.
     pub max_residual: f32,
@@ -108,8 +108,7 @@ fn lucas_kanade(
         &mut ends,
         &mut status,
         &mut residuals,
-        // Eight columns are looked at together, one left over costs as much.
-        Size::new((window + 3) / 8 * 8, window),
+        Size::new(window, window),
         levels.min(from.levels()).min(to.levels()),
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,

@@ -90,7 +90,7 @@ impl Patch {
             video::build_optical_flow_pyramid(
                 &grey,
                 &mut pyramid,
-                Size::new(window + 7, window),
+                Size::new(window, window),
                 LEVELS,
                 true,
                 BORDER_REFLECT_101,
