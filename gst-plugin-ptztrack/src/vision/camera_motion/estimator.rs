@@ -3,14 +3,14 @@ use ptztrack_contract::{CameraMotion, Homography};
 
 use super::corners::{self, Corner, Grid};
 use super::fit::{self, Centred, Fit, Pair};
-use super::flow::{self, Pyramid, Reach};
+use super::flow::{self, Pyramid};
 use crate::vision::Luma;
 
 /// Farther than this many pixels from the key picture, anywhere in the picture, the next picture becomes the
 /// key picture: blur and perspective change what points look like.
 const MAX_TRAVEL: f64 = 4.0;
 /// New corners looked for in one picture, after the first: a search everywhere costs more than all the rest.
-const TOP_UP: usize = 6;
+const TOP_UP: usize = 12;
 /// When a smaller share of the key picture's points agrees, the next picture becomes the key picture.
 const MIN_AGREEING: f64 = 0.6;
 /// Background that was seen as such counts fully; points of unknown standing, and points on what was
@@ -163,10 +163,9 @@ impl Key {
     ) -> opencv::Result<Option<(Fit, Vec<Option<Point2f>>)>> {
         let places: Vec<Point2f> = self.points.iter().map(|point| point.place).collect();
         let from_key: Vec<Homography> = guesses.iter().map(|motion| self.to_last.then(motion)).collect();
-        // A picture that moved about as expected costs half; where few points say so, they are looked for farther off.
-        for (guess, reach) in from_key.iter().flat_map(|guess| [(guess, Reach::Near), (guess, Reach::Far)]) {
+        for guess in &from_key {
             let guesses: Vec<Point2f> = places.iter().map(|place| fit::apply(guess, *place)).collect();
-            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses, reach)?;
+            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses)?;
             let pairs: Vec<Pair> = self
                 .points
                 .iter()
@@ -175,18 +174,11 @@ impl Key {
                     Some(Pair { from: point.place, to: (*end)?, weight: point.weight })
                 })
                 .collect();
-            let fit = fit::fit(&pairs, &from_key, centred);
-            if let Some(fit) = fit.filter(|fit| reach == Reach::Far || self.is_shared(fit)) {
+            if let Some(fit) = fit::fit(&pairs, &from_key, centred) {
                 return Ok(Some((fit, ends)));
             }
         }
         Ok(None)
-    }
-
-    /// Whether most of the points agree.
-    fn is_shared(&self, fit: &Fit) -> bool {
-        let agreeing = fit.agrees.iter().filter(|agrees| **agrees).count();
-        agreeing as f64 >= MIN_AGREEING * self.points.len() as f64
     }
 
     /// What the picture after `pyramid` is compared with.
@@ -202,7 +194,9 @@ impl Key {
             let weight = &mut self.points[index].weight;
             *weight += 0.3 * (f64::from(u8::from(agrees)) - *weight);
         }
-        if travel(&fit.homography, grid) <= MAX_TRAVEL && self.is_shared(fit) {
+        let agreeing = fit.agrees.iter().filter(|agrees| **agrees).count();
+        let near = travel(&fit.homography, grid) <= MAX_TRAVEL;
+        if near && agreeing as f64 >= MIN_AGREEING * self.points.len() as f64 {
             self.to_last = fit.homography;
             return Ok(self);
         }

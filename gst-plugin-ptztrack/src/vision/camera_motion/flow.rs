@@ -5,10 +5,8 @@ use opencv::video;
 
 /// Side of the window of a point.
 const WINDOW: i32 = 13;
-/// Halvings of the picture: the coarsest level sees motions of half its window, 8 times as large here ...
+/// Halvings of the picture: the coarsest level sees motions of half its window, 8 times as large here.
 const LEVELS: i32 = 3;
-/// ... and twice as large with this one, which is enough where it is known how the camera turns.
-const NEAR_LEVELS: i32 = 1;
 const ITERATIONS: i32 = 15;
 const PRECISION: f64 = 0.02;
 /// Smaller eigenvalue of the gradient matrix, per pixel, below which (3.11) is not worth solving.
@@ -16,15 +14,6 @@ const MIN_EIGENVALUE: f64 = 1e-4;
 /// Mean absolute difference of the two windows, grey levels, above which a point is lost. Generous: what does
 /// not fit the others is sorted out by the fit, and blur changes looks.
 const MAX_RESIDUAL: f32 = 24.0;
-
-/// How far from where they are expected points are looked for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Reach {
-    /// Within half a window in the halved picture.
-    Near,
-    /// Within half a window in the smallest picture, for twice the time.
-    Far,
-}
 
 /// A picture and its halvings.
 #[derive(Debug)]
@@ -60,7 +49,6 @@ pub(super) fn follow(
     to: &Pyramid,
     points: &[Point2f],
     guesses: &[Point2f],
-    reach: Reach,
 ) -> opencv::Result<Vec<Option<Point2f>>> {
     if points.is_empty() {
         return Ok(Vec::new());
@@ -68,7 +56,6 @@ pub(super) fn follow(
     let starts = Vector::<Point2f>::from_slice(points);
     let mut ends = Vector::<Point2f>::from_slice(guesses);
     let (mut status, mut residuals) = (Vector::<u8>::new(), Vector::<f32>::new());
-    let highest = from.highest.min(to.highest);
     video::calc_optical_flow_pyr_lk(
         &from.levels,
         &to.levels,
@@ -77,7 +64,7 @@ pub(super) fn follow(
         &mut status,
         &mut residuals,
         Size::new(WINDOW, WINDOW),
-        if reach == Reach::Near { highest.min(NEAR_LEVELS) } else { highest },
+        from.highest.min(to.highest),
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,
             max_count: ITERATIONS,

@@ -12,11 +12,6 @@ const PRECISION: f64 = 0.03;
 /// Smaller eigenvalue of the gradient matrix, per pixel, below which equation 3.11 is not worth solving.
 const MIN_EIGENVALUE: f64 = 1e-4;
 
-/// Halvings of the patch down to which points are looked for around where they are expected, ...
-const NEAR_LEVELS: i32 = 2;
-/// ... and on their way back, which must lead to where they came from.
-const RETURN_LEVELS: i32 = 0;
-
 /// How points are followed and when they count as lost.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Flow {
@@ -40,15 +35,13 @@ impl Flow {
         points: &[Point2f],
         guesses: &[Point2f],
     ) -> opencv::Result<Vec<Option<Point2f>>> {
-        let mut found = self.attempt(previous, next, points, guesses, (self.window, NEAR_LEVELS))?;
+        let mut found = self.attempt(previous, next, points, guesses, self.window)?;
         let lost: Vec<usize> = (0..points.len()).filter(|&index| found[index].is_none()).collect();
         // Thesis 3.5.2: "if the feature is not found in the small window, the algorithm increases the
         // window size". Worth it only where the motion was too large, and then most points are lost.
         if self.grown_window > self.window && 2 * lost.len() > points.len() {
             let pick = |from: &[Point2f]| lost.iter().map(|&index| from[index]).collect::<Vec<_>>();
-            let all = previous.levels();
-            let again =
-                self.attempt(previous, next, &pick(points), &pick(guesses), (self.grown_window, all))?;
+            let again = self.attempt(previous, next, &pick(points), &pick(guesses), self.grown_window)?;
             for (index, place) in lost.into_iter().zip(again) {
                 found[index] = place;
             }
@@ -62,9 +55,9 @@ impl Flow {
         next: &Patch,
         points: &[Point2f],
         guesses: &[Point2f],
-        (window, levels): (i32, i32),
+        window: i32,
     ) -> opencv::Result<Vec<Option<Point2f>>> {
-        let forth = lucas_kanade(previous, next, points, guesses, (window, levels))?;
+        let forth = lucas_kanade(previous, next, points, guesses, window)?;
         let mut found: Vec<Option<Point2f>> = forth
             .into_iter()
             .map(|end| end.filter(|end| end.residual <= self.max_residual).map(|end| end.position))
@@ -73,7 +66,7 @@ impl Flow {
         let limit = max_error * previous.step() as f32;
         let ends: Vec<Point2f> =
             found.iter().zip(guesses).map(|(end, guess)| end.unwrap_or(*guess)).collect();
-        let back = lucas_kanade(next, previous, &ends, points, (window, RETURN_LEVELS))?;
+        let back = lucas_kanade(next, previous, &ends, points, window)?;
         for ((place, returned), start) in found.iter_mut().zip(back).zip(points) {
             if returned.is_none_or(|returned| length(returned.position - *start) > limit) {
                 *place = None;
@@ -93,7 +86,7 @@ fn lucas_kanade(
     to: &Patch,
     points: &[Point2f],
     guesses: &[Point2f],
-    (window, levels): (i32, i32),
+    window: i32,
 ) -> opencv::Result<Vec<Option<End>>> {
     if points.is_empty() || from.is_empty() || !from.fits(to) {
         return Ok(points.iter().map(|_| None).collect());
@@ -109,7 +102,7 @@ fn lucas_kanade(
         &mut status,
         &mut residuals,
         Size::new(window, window),
-        levels.min(from.levels()).min(to.levels()),
+        from.levels().min(to.levels()),
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,
             max_count: ITERATIONS,
