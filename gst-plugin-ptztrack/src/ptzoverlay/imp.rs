@@ -323,11 +323,16 @@ impl PtzOverlay {
             if shapes.is_empty() {
                 return Ok(());
             }
-            let buffer = buffer.make_mut();
+            let info = &format.info;
+            // Only what is drawn on is made writable: a frame that is shared would be copied.
             match format.draws {
-                Draws::Downstream => attach(buffer, &memory.composition(shapes, &format.info)?),
-                Draws::Directly(colours) => draw(buffer, &format.info, colours, &shapes, &mut memory.pen),
-                Draws::Blending => blend(buffer, &format.info, &memory.composition(shapes, &format.info)?),
+                Draws::Downstream => memory
+                    .composition(shapes, info)?
+                    .map_or(Ok(()), |composition| attach(buffer.make_mut(), &composition)),
+                Draws::Directly(colours) => draw(buffer.make_mut(), info, colours, &shapes, &mut memory.pen),
+                Draws::Blending => memory
+                    .composition(shapes, info)?
+                    .map_or(Ok(()), |composition| blend(buffer.make_mut(), info, &composition)),
             }
         });
         if let Err(reason) = done
@@ -433,8 +438,7 @@ fn rectangle(patch: Patch) -> Result<VideoOverlayRectangle, String> {
 }
 
 /// Adds the drawing to one that is there already, as only one is shown.
-fn attach(buffer: &mut gst::BufferRef, composition: &Option<VideoOverlayComposition>) -> Result<(), String> {
-    let Some(composition) = composition else { return Ok(()) };
+fn attach(buffer: &mut gst::BufferRef, composition: &VideoOverlayComposition) -> Result<(), String> {
     let Some(mut meta) = buffer.meta_mut::<VideoOverlayCompositionMeta>() else {
         VideoOverlayCompositionMeta::add(buffer, composition);
         return Ok(());
@@ -458,9 +462,8 @@ fn frame<'a>(
 fn blend(
     buffer: &mut gst::BufferRef,
     info: &gst_video::VideoInfo,
-    composition: &Option<VideoOverlayComposition>,
+    composition: &VideoOverlayComposition,
 ) -> Result<(), String> {
-    let Some(composition) = composition else { return Ok(()) };
     composition.blend(&mut frame(buffer, info)?).map_err(|err| err.to_string())
 }
 

@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use ptztrack_contract::{CameraEvent, CameraMotion, Homography, Point};
 
+use super::camera_motion::displacement;
 use super::zones::Zones;
 
 /// The picture must have rested for so long before the servo's word is taken for it: words come before pictures do.
@@ -12,6 +13,8 @@ const REST: Duration = Duration::from_millis(600);
 const RESTS: f64 = 0.002;
 /// A picture that has moved by more than this since the zones were set is another view.
 const SAME_VIEW: f64 = 0.02;
+/// Of the picture, whose motion is taken.
+const MIDDLE: Point = Point { x: 0.5, y: 0.5 };
 
 /// Where a camera looks.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -86,10 +89,11 @@ impl CarriedZones {
     pub fn carry(&mut self, motion: Option<&CameraMotion>, elapsed: Duration, view: Option<View>) {
         let step = motion.map_or(Homography::IDENTITY, |motion| motion.homography);
         self.since = self.since.then(&step);
-        let rests = motion.is_some() && displacement(&step) < RESTS;
+        let rests = motion.is_some() && displacement(&step, MIDDLE) < RESTS;
         self.rest = if rests { self.rest.saturating_add(elapsed) } else { Duration::ZERO };
         let Some(view) = view.filter(|_| self.rest >= REST) else { return };
-        if self.set_in.is_none() && self.rested_in.is_none() && displacement(&self.since) < SAME_VIEW {
+        if self.set_in.is_none() && self.rested_in.is_none() && displacement(&self.since, MIDDLE) < SAME_VIEW
+        {
             self.set_in = Some(view);
         }
         if self.set_in.is_some() {
@@ -116,12 +120,6 @@ impl CarriedZones {
             _ => Some(point),
         }
     }
-}
-
-/// How far the middle of the picture goes.
-fn displacement(motion: &Homography) -> f64 {
-    let to = motion.apply(Point { x: 0.5, y: 0.5 });
-    (to.x - 0.5).hypot(to.y - 0.5)
 }
 
 #[cfg(test)]

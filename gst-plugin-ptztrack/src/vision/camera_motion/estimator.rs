@@ -1,5 +1,5 @@
 use opencv::core::Point2f;
-use ptztrack_contract::{CameraMotion, Homography};
+use ptztrack_contract::{CameraMotion, Homography, Point};
 
 use super::corners::{self, Corner, Grid};
 use super::fit::{self, Centred, Fit, Pair};
@@ -220,7 +220,7 @@ fn travel(homography: &Homography, grid: Grid) -> f64 {
     let (width, height) = grid.size();
     let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
     let length = |(x, y): (f64, f64)| {
-        let to = homography.apply(ptztrack_contract::Point { x, y });
+        let to = homography.apply(Point { x, y });
         (to.x - x).hypot(to.y - y)
     };
     corners.map(length).into_iter().fold(0.0, f64::max)
@@ -230,6 +230,12 @@ fn travel(homography: &Homography, grid: Grid) -> f64 {
 pub(in crate::vision) fn to_pixels(motion: &Homography, (width, height): (f64, f64)) -> Homography {
     let scaled = motion.scaled(width, height);
     Homography::translation(0.5, 0.5).then(&scaled).then(&Homography::translation(-0.5, -0.5))
+}
+
+/// How far `motion` takes what is at `from`.
+pub(in crate::vision) fn displacement(motion: &Homography, from: Point) -> f64 {
+    let to = motion.apply(from);
+    (to.x - from.x).hypot(to.y - from.y)
 }
 
 /// The way back.

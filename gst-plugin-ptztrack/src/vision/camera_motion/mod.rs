@@ -12,7 +12,7 @@ mod fit;
 mod flow;
 
 pub use estimator::CameraMotionEstimator;
-pub(super) use estimator::to_pixels;
+pub(super) use estimator::{displacement, to_pixels};
 
 #[cfg(test)]
 mod tests;

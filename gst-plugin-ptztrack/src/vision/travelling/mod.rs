@@ -19,7 +19,7 @@ use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
 use self::noise::Noise;
 use self::warp::Warp;
 use super::Luma;
-use super::camera_motion::to_pixels;
+use super::camera_motion::{displacement, to_pixels};
 use super::contours::{Grid, nearest};
 use super::picture::Reduced;
 
@@ -94,7 +94,8 @@ impl TravellingBackground {
         if self.model.size == (0, 0) {
             self.start();
         }
-        self.move_on(motion, elapsed);
+        let travel = motion.map_or(0.0, |motion| self.move_by(&motion.homography, elapsed));
+        self.stay_on_canvas();
         let how = self.comparison(motion, elapsed);
         self.lay(picture);
         self.model.relight(gain::light_gain(
@@ -116,7 +117,7 @@ impl TravellingBackground {
         let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.show();
-        self.forget_burned_in(&picture.luma(), motion);
+        self.forget_burned_in(&picture.luma(), travel);
     }
 
     /// Makes what has stayed the same for a moment within `contour` (normalised, in the last picture) background, protected
@@ -135,16 +136,19 @@ impl TravellingBackground {
         self.rested = Duration::ZERO;
     }
 
-    /// Finds where the next picture lies on the canvas, and lays the canvas anew where it has to be.
-    fn move_on(&mut self, motion: Option<&CameraMotion>, elapsed: Duration) {
+    /// Finds where the next picture lies on the canvas; by how many pixels its middle moved.
+    fn move_by(&mut self, motion: &Homography, elapsed: Duration) -> f64 {
         let size = (self.size.0 as f64, self.size.1 as f64);
-        if let Some(motion) = motion {
-            let step = to_pixels(&motion.homography, size);
-            self.to_picture = self.to_picture.then(&step);
-            let rests = displacement(&step, size) < RESTS;
-            self.rested = if rests { self.rested.saturating_add(elapsed) } else { Duration::ZERO };
-            self.held = self.held.map(|held| moved(held, &motion.homography));
-        }
+        let step = to_pixels(motion, size);
+        let travel = displacement(&step, Point { x: size.0 / 2.0, y: size.1 / 2.0 });
+        self.to_picture = self.to_picture.then(&step);
+        self.rested = if travel < RESTS { self.rested.saturating_add(elapsed) } else { Duration::ZERO };
+        self.held = self.held.map(|held| moved(held, motion));
+        travel
+    }
+
+    /// Lays the canvas anew where the picture no longer fits it.
+    fn stay_on_canvas(&mut self) {
         let margin = MARGIN as f64;
         let (shift, bend) = shift_and_bend(&self.to_picture, self.model.size);
         let off = (shift.0 + margin, shift.1 + margin);
@@ -211,10 +215,8 @@ impl TravellingBackground {
     }
 
     /// Takes out of the foreground what stays put in the picture while the world moves.
-    fn forget_burned_in(&mut self, luma: &Luma, motion: Option<&CameraMotion>) {
-        let size = (self.size.0 as f64, self.size.1 as f64);
-        let travel = motion.map_or(0.0, |motion| displacement(&to_pixels(&motion.homography, size), size));
-        let held = self.held.map(|held| in_pixels(held, size));
+    fn forget_burned_in(&mut self, luma: &Luma, travel: f64) {
+        let held = self.held.map(|held| in_pixels(held, (self.size.0 as f64, self.size.1 as f64)));
         self.burned_in.update(luma, &self.foreground, travel, held);
         self.burned_in.clear(&mut self.foreground);
     }
@@ -226,13 +228,6 @@ impl TravellingBackground {
         self.back.sample(&self.model.likelihood, UNKNOWN, &mut self.foreground);
         self.back.sample(&self.model.shown, 0, &mut self.shown);
     }
-}
-
-/// How far the middle of the picture goes, pixels.
-fn displacement(step: &Homography, (width, height): (f64, f64)) -> f64 {
-    let middle = Point { x: width / 2.0, y: height / 2.0 };
-    let to = step.apply(middle);
-    (to.x - middle.x).hypot(to.y - middle.y)
 }
 
 /// The displacement of the canvas' middle, and how far its corners go beyond that.
