@@ -9,6 +9,8 @@ const GREYS: usize = 16;
 const TINTS: usize = 13;
 /// Width of a colour difference's bin: clothes and walls rarely lie further than 40 from grey.
 const TINT_WIDTH: i32 = 6;
+/// People's clothes are of any brightness and near grey: what the next bin of tint has of the share of this one.
+const TINT_DECAY: f32 = 0.37;
 /// Share that a bin has where nothing was counted.
 const FLOOR: f32 = 0.005;
 /// What brightness, and what tint, may say at most, as a natural logarithm of odds.
@@ -46,6 +48,14 @@ impl Histogram {
             total += weight;
         }
         (total > f32::EPSILON).then(|| counted.scaled(1.0 / total))
+    }
+
+    /// Of somebody of whom nothing is known.
+    fn of_anyone() -> Self {
+        let off = |bin: usize| (bin % TINTS).abs_diff(TINTS / 2) + (bin / TINTS).abs_diff(TINTS / 2);
+        let tints: [f32; TINTS * TINTS] = std::array::from_fn(|bin| TINT_DECAY.powi(off(bin) as i32));
+        let total: f32 = tints.iter().sum();
+        Self { greys: [1.0 / GREYS as f32; GREYS], tints: tints.map(|share| share / total) }
     }
 
     fn scaled(mut self, factor: f32) -> Self {
@@ -91,39 +101,33 @@ fn tint_bin([u, v]: [u8; 2]) -> usize {
     bin(u) * TINTS + bin(v)
 }
 
-/// Upper and lower body against what is beside them.
+/// Upper and lower body against what is beside them, and against other people.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct ColourModel {
     /// Upper body, lower body.
     figure: [Histogram; 2],
-    ground: Histogram,
-    /// Logarithms of odds of either half, worked out once.
-    odds: [Odds; 2],
-}
-
-/// Logarithms of the odds of each brightness and each tint.
-#[derive(Debug, Clone, PartialEq)]
-struct Odds {
-    greys: [f32; 256],
-    tints: [f32; TINTS * TINTS],
+    ground: Alternative,
+    anyone: Alternative,
 }
 
 impl ColourModel {
     pub fn new(figure: [Histogram; 2], ground: Histogram) -> Self {
-        let odds = odds(&figure, &ground);
-        Self { figure, ground, odds }
+        Self {
+            ground: Alternative::to(&figure, ground),
+            anyone: Alternative::to(&figure, Histogram::of_anyone()),
+            figure,
+        }
     }
 
-    /// Logarithm of the odds that a cell of that colour belongs to the target; `lower` 0 (upper body) to 1 (lower).
-    pub fn log_odds(&self, (grey, tint): Colour, lower: f32) -> f32 {
-        let tint = tint.map(tint_bin);
-        // Near the middle of the body both halves count; everywhere else there is a table.
-        if lower == 0.0 || lower == 1.0 {
-            let odds = &self.odds[usize::from(lower == 1.0)];
-            return odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]);
-        }
-        let tinted = tint.map_or(0.0, |bin| tint_odds(&self.figure, &self.ground, bin, lower));
-        grey_odds(&self.figure, &self.ground, grey, lower) + tinted
+    /// Logarithm of the odds that a cell of that colour belongs to the target and not to the ground; `lower` 0 (upper body)
+    /// to 1 (lower).
+    pub fn log_odds(&self, colour: Colour, lower: f32) -> f32 {
+        self.ground.log_odds(&self.figure, colour, lower)
+    }
+
+    /// The same against somebody of whom nothing is known.
+    pub fn log_odds_against_anyone(&self, colour: Colour, lower: f32) -> f32 {
+        self.anyone.log_odds(&self.figure, colour, lower)
     }
 
     /// How alike somebody else's figure is by brightness and tint, 0 to 1: the Bhattacharyya coefficient, the mean of upper
@@ -148,27 +152,60 @@ impl ColourModel {
             }
         }
         if let Some(new) = ground {
-            self.ground.blend(&new, ground_rate);
+            self.ground.colours.blend(&new, ground_rate);
         }
-        self.odds = odds(&self.figure, &self.ground);
+        self.ground.odds = odds(&self.figure, &self.ground.colours);
+        self.anyone.odds = odds(&self.figure, &self.anyone.colours);
     }
 }
 
-fn odds(figure: &[Histogram; 2], ground: &Histogram) -> [Odds; 2] {
+/// What else a cell may belong to.
+#[derive(Debug, Clone, PartialEq)]
+struct Alternative {
+    colours: Histogram,
+    /// Logarithms of odds of either half of the figure against it, worked out once.
+    odds: [Odds; 2],
+}
+
+/// Logarithms of the odds of each brightness and each tint.
+#[derive(Debug, Clone, PartialEq)]
+struct Odds {
+    greys: [f32; 256],
+    tints: [f32; TINTS * TINTS],
+}
+
+impl Alternative {
+    fn to(figure: &[Histogram; 2], colours: Histogram) -> Self {
+        Self { odds: odds(figure, &colours), colours }
+    }
+
+    fn log_odds(&self, figure: &[Histogram; 2], (grey, tint): Colour, lower: f32) -> f32 {
+        let tint = tint.map(tint_bin);
+        // Near the middle of the body both halves count; everywhere else there is a table.
+        if lower == 0.0 || lower == 1.0 {
+            let odds = &self.odds[usize::from(lower == 1.0)];
+            return odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]);
+        }
+        let tinted = tint.map_or(0.0, |bin| tint_odds(figure, &self.colours, bin, lower));
+        grey_odds(figure, &self.colours, grey, lower) + tinted
+    }
+}
+
+fn odds(figure: &[Histogram; 2], other: &Histogram) -> [Odds; 2] {
     [0.0, 1.0].map(|lower| Odds {
-        greys: std::array::from_fn(|grey| grey_odds(figure, ground, grey as u8, lower)),
-        tints: std::array::from_fn(|bin| tint_odds(figure, ground, bin, lower)),
+        greys: std::array::from_fn(|grey| grey_odds(figure, other, grey as u8, lower)),
+        tints: std::array::from_fn(|bin| tint_odds(figure, other, bin, lower)),
     })
 }
 
-fn grey_odds(figure: &[Histogram; 2], ground: &Histogram, grey: u8, lower: f32) -> f32 {
+fn grey_odds(figure: &[Histogram; 2], other: &Histogram, grey: u8, lower: f32) -> f32 {
     let (low, high, share) = grey_bins(grey);
     let brightness = |h: &Histogram| h.greys[low] * (1.0 - share) + h.greys[high] * share;
-    log_odds(either(figure, lower, brightness), brightness(ground))
+    log_odds(either(figure, lower, brightness), brightness(other))
 }
 
-fn tint_odds(figure: &[Histogram; 2], ground: &Histogram, bin: usize, lower: f32) -> f32 {
-    log_odds(either(figure, lower, |h| h.tints[bin]), ground.tints[bin])
+fn tint_odds(figure: &[Histogram; 2], other: &Histogram, bin: usize, lower: f32) -> f32 {
+    log_odds(either(figure, lower, |h| h.tints[bin]), other.tints[bin])
 }
 
 /// Of the upper and the lower body as `lower` says.
@@ -176,8 +213,8 @@ fn either(figure: &[Histogram; 2], lower: f32, of: impl Fn(&Histogram) -> f32) -
     of(&figure[0]) * (1.0 - lower) + of(&figure[1]) * lower
 }
 
-fn log_odds(figure: f32, ground: f32) -> f32 {
-    ((figure + FLOOR) / (ground + FLOOR)).ln().clamp(-LARGEST, LARGEST)
+fn log_odds(figure: f32, other: f32) -> f32 {
+    ((figure + FLOOR) / (other + FLOOR)).ln().clamp(-LARGEST, LARGEST)
 }
 
 #[cfg(test)]
@@ -202,6 +239,16 @@ mod tests {
         assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(DARK, 1.0) > 1.0);
         assert!(model.log_odds(WALL, 0.0) < -1.0 && model.log_odds(WALL, 1.0) < -1.0);
         assert!(model.log_odds(RED, 1.0) < model.log_odds(RED, 0.0));
+    }
+
+    #[test]
+    fn colours_that_it_does_not_wear_are_somebody_elses() {
+        let odds = |colour, lower| model().log_odds_against_anyone(colour, lower);
+        assert!(odds(RED, 0.0) > 2.0 && odds(DARK, 1.0) > 1.0);
+        assert!(odds(RED, 1.0) < -0.5 && odds(DARK, 0.0) < -2.0 && odds(WALL, 0.0) < -2.0);
+        let anyone = Histogram::of_anyone();
+        let sum = |shares: &[f32]| shares.iter().sum::<f32>();
+        assert!((sum(&anyone.greys) - 1.0).abs() < 1e-4 && (sum(&anyone.tints) - 1.0).abs() < 1e-4);
     }
 
     #[test]

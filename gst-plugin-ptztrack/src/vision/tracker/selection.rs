@@ -54,6 +54,8 @@ pub(super) struct Sighting {
     pub outside: bool,
     /// Pixels per second; nothing where it was seen only once.
     pub velocity: Point2f,
+    /// Whether it was seen beside the target, and so is somebody else.
+    pub another: bool,
 }
 
 struct Candidate {
@@ -62,6 +64,8 @@ struct Candidate {
     missed: u32,
     missed_s: f64,
     age_s: f64,
+    /// Frames in which it was seen beside the target.
+    frames_beside: u32,
     /// Its boxes of the last second, carried along with the background, and how old they are in seconds.
     way: VecDeque<(Rect2f, f64)>,
 }
@@ -69,7 +73,7 @@ struct Candidate {
 impl Candidate {
     fn new(sighting: Sighting) -> Self {
         let way = VecDeque::from([(sighting.bounds, 0.0)]);
-        Self { sighting, frames: 1, missed: 0, missed_s: 0.0, age_s: 0.0, way }
+        Self { sighting, frames: 1, missed: 0, missed_s: 0.0, age_s: 0.0, frames_beside: 0, way }
     }
 
     /// Goes with the background into the next frame; where nobody knows how that moved, the way so far says nothing.
@@ -96,7 +100,8 @@ impl Candidate {
         let time_s = (f64::from(self.missed) * dt_s) as f32;
         let velocity = motion(self.sighting.bounds, sighting.bounds) / time_s.max(f32::EPSILON);
         let old = self.sighting.velocity;
-        self.sighting = Sighting { velocity: old + (velocity - old) * SMOOTHING, ..sighting };
+        let velocity = old + (velocity - old) * SMOOTHING;
+        self.sighting = Sighting { velocity, another: self.sighting.another, ..sighting };
         self.frames += 1;
         (self.missed, self.missed_s) = (0, 0.0);
         self.way.push_back((self.sighting.bounds, 0.0));
@@ -141,6 +146,17 @@ impl Selection {
         let seen = self.candidates.iter().filter(|candidate| candidate.missed == 0);
         self.suppressed.free(bounds, seen.map(|candidate| candidate.sighting.bounds));
         self.candidates.clear();
+    }
+
+    /// The target is seen at `bounds`: who is seen beside it, in `confirm_frames` frames or more, is somebody else, wherever they
+    /// go from then on.
+    pub fn tell_apart(&mut self, bounds: Rect2f, confirm_frames: u32) {
+        for candidate in self.candidates.iter_mut().filter(|candidate| candidate.missed == 0) {
+            if (bounds & candidate.sighting.bounds).area() <= 0.0 {
+                candidate.frames_beside += 1;
+                candidate.sighting.another = candidate.frames_beside >= confirm_frames;
+            }
+        }
     }
 
     /// What is at `bounds` was let go on purpose: it is not chosen again for a while.
@@ -215,11 +231,13 @@ impl Selection {
         chosen.map(|candidate| &candidate.sighting)
     }
 
-    /// The detections of this frame that go somewhere, wholly in view, the largest first.
+    /// The detections of this frame that go somewhere, wholly in view, and may be the target: the largest first.
     pub fn travelling(&self, confirm_frames: u32, frame: Frame) -> Vec<&Sighting> {
-        let ready = self
-            .confirmed(confirm_frames)
-            .filter(|candidate| !touches_edge(candidate.sighting.bounds, frame) && candidate.travels());
+        let ready = self.confirmed(confirm_frames).filter(|candidate| {
+            !candidate.sighting.another
+                && !touches_edge(candidate.sighting.bounds, frame)
+                && candidate.travels()
+        });
         let mut ready: Vec<_> = ready.map(|candidate| &candidate.sighting).collect();
         ready.sort_by(|a, b| b.bounds.area().total_cmp(&a.bounds.area()));
         ready
@@ -441,5 +459,38 @@ mod tests {
         assert_eq!(x(300.0, 220.0), Some(290.0));
         assert_eq!(x(220.0, 120.0), Some(200.0));
         assert_eq!(x(600.0, 20.0), None);
+    }
+
+    #[test]
+    fn who_was_seen_beside_the_target_stays_somebody_else() {
+        let target = at(300.0, 100.0, 40.0, 90.0);
+        let mut selection = Selection::default();
+        let mut walk = |frames: std::ops::Range<usize>| {
+            for n in frames {
+                let other = at(100.0 + 10.0 * n as f32, 100.0, 40.0, 90.0);
+                selection.update(vec![target.clone(), other], STILL, FRAME, DT);
+                selection.tell_apart(target.bounds, 3);
+            }
+            selection.current().map(|sighting| sighting.another).collect::<Vec<_>>()
+        };
+        assert_eq!(walk(0..2), [false, false], "not yet confirmed");
+        assert_eq!(walk(2..4), [false, true]);
+        assert_eq!(walk(4..18), [false, true], "nor when they pass in front of it");
+    }
+
+    #[test]
+    fn somebody_else_does_not_travel_as_the_target_might() {
+        let path = |n: usize| at(100.0 + 20.0 * n as f32, 100.0, 40.0, 90.0);
+        let travelling = |beside: bool| {
+            let mut selection = Selection::default();
+            for n in 0..6 {
+                selection.update(vec![path(n)], Some(EgoMotion::default()), FRAME, DT);
+                if beside {
+                    selection.tell_apart(at(500.0, 100.0, 40.0, 90.0).bounds, 3);
+                }
+            }
+            selection.travelling(3, FRAME).len()
+        };
+        assert_eq!((travelling(false), travelling(true)), (1, 0));
     }
 }

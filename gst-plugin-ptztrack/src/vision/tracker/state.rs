@@ -218,6 +218,7 @@ impl Tracker {
             restless: detection.restless,
             outside: detection.outside,
             velocity: Point2f::default(),
+            another: false,
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
         self.selection.detector_pause_s = self.config.detector_pause_s;
@@ -262,6 +263,9 @@ impl Tracker {
             _ => {}
         }
         target.dwell.pass(dt_s);
+        if sight == Sight::Seen && target.follow.estimate().is_sure() {
+            self.selection.tell_apart(target.follow.estimate().bounds, self.config.confirm_frames);
+        }
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
         if let (Sight::Seen, Some(ego)) = (sight, ego) {
             target.dwell.watch(before, target.follow.estimate().bounds, ego, dt_s);
@@ -378,7 +382,7 @@ impl Tracker {
     fn acquire(&mut self, seen: &Observation, sighting: &Sighting) -> opencv::Result<Option<Target>> {
         let Some(follow) = self.follow_anew(seen, sighting)? else { return Ok(None) };
         let known = match self.lost.take() {
-            Some((lost, _)) if lost.follow.resembles(seen, sighting)? => Some(lost.id),
+            Some((lost, _)) if !sighting.another && lost.follow.resembles(seen, sighting)? => Some(lost.id),
             _ => None,
         };
         let id = known.unwrap_or(self.last_id + 1);

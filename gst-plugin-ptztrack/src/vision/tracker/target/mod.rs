@@ -23,6 +23,9 @@ const GROWN_WINDOW: i32 = 25;
 /// Points followed at most: more cost time and add nothing to their median.
 const MAX_POINTS: usize = 64;
 
+/// Confidence from which what is seen elsewhere is somebody else.
+const SURE: f32 = 0.7;
+
 /// What one step saw of the target.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Sight {
@@ -45,6 +48,13 @@ pub(super) struct Estimate {
     pub own_velocity: Point2f,
     /// Motion of the background at the target, pixels per second; `None` where it could not be seen.
     pub ego_velocity: Option<Point2f>,
+}
+
+impl Estimate {
+    /// Whether it is seen so well that it is nowhere else.
+    pub fn is_sure(&self) -> bool {
+        self.confidence >= SURE
+    }
 }
 
 /// A way to follow one target from picture to picture.

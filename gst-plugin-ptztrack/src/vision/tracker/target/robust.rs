@@ -9,7 +9,7 @@ use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, Shape, Template};
+use crate::vision::tracker::figure::{CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Shape, Template};
 use crate::vision::tracker::flow::Flow;
 use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
 use crate::vision::tracker::grey_histogram::near_the_middle;
@@ -76,6 +76,9 @@ const UNSEEN_REACH: (f32, f32) = (0.5, 2.3);
 const UNSEEN_SPREAD: (f32, f32) = (0.15, 1.5);
 /// Time constant of what its last motion says of a hidden target, seconds: somebody may turn or stop behind a wall.
 const HIDDEN_TIME_S: f32 = 2.0;
+/// Logarithm of the odds that what moves beside other people is the target, and the seconds in which their going adds 1 to it.
+const ALONE_BESIDE_OTHERS: f32 = 0.5;
+const OTHERS_TIME_S: f32 = 2.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
 /// Of a silhouette of which nothing is known yet.
@@ -120,6 +123,8 @@ pub(in super::super) struct Robust {
     first_size: (f32, f32),
     age_s: f32,
     unseen_s: f32,
+    /// Since somebody else was near.
+    alone_s: f32,
     seen_in_a_row: u32,
     pictures: u32,
     pictures_since_replenished: u32,
@@ -137,7 +142,7 @@ impl Robust {
         let grid = Grid { columns: filter.grid().columns * FINER, rows: filter.grid().rows * FINER };
         let shape = Shape::upright(grid);
         let cells = Cells::observe(seen, bounds, grid);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &shape);
+        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &shape);
         let mut target = Self {
             estimate: Estimate {
                 bounds,
@@ -159,6 +164,7 @@ impl Robust {
             first_size: (bounds.width, bounds.height),
             age_s: 0.0,
             unseen_s: 0.0,
+            alone_s: f32::INFINITY,
             seen_in_a_row: 0,
             pictures: 0,
             pictures_since_replenished: 0,
@@ -181,7 +187,7 @@ impl Robust {
     /// The map of figure and ground around the box as it is now.
     fn look_closely(&mut self, seen: &Observation) -> opencv::Result<(Cells, Evidence)> {
         let cells = Cells::observe(seen, self.estimate.bounds, self.grid);
-        let evidence = cells.evidence(self.colours.as_ref());
+        let evidence = cells.evidence(self.colours.as_ref(), self.alone());
         self.map = FigureMap::new(&cells, &evidence, &self.shape);
         Ok((cells, evidence))
     }
@@ -192,6 +198,19 @@ impl Robust {
         self.estimate.ego_velocity = ego.map(|ego| ego.at(centre(self.estimate.bounds)) / dt_s);
         self.age_s += dt_s;
         self.pictures += 1;
+    }
+
+    /// Notices who else is near: one who was seen beside the target may be behind it, or it behind them, a moment later.
+    fn watch_others(&mut self, sightings: &[Sighting], dt_s: f32) {
+        let reach = scaled(self.estimate.bounds, CONTEXT.0, CONTEXT.1);
+        let near =
+            sightings.iter().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
+        self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
+    }
+
+    /// Logarithm of the odds that what moves around the target belongs to nobody else, before its colours are seen.
+    fn alone(&self) -> f32 {
+        ALONE_BESIDE_OTHERS + self.alone_s / OTHERS_TIME_S
     }
 
     fn follow_points(
@@ -219,7 +238,7 @@ impl Robust {
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
     fn locate(&self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
         let cells = Cells::observe(seen, bounds, self.grid);
-        let evidence = cells.evidence(self.colours.as_ref());
+        let evidence = cells.evidence(self.colours.as_ref(), self.alone());
         let response = self.filter.respond(&seen.luma, bounds)?;
         let cell = cells.cell() * FINER as f32;
         let silhouette = self.shape.template(1.0);
@@ -435,21 +454,25 @@ impl Robust {
     /// The best of what the detector saw within reach that looks like the target.
     fn recognise(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
-        for sighting in sightings {
-            if !self.may_be_in(sighting.bounds) {
+        for sighting in sightings.iter().filter(|sighting| !sighting.another) {
+            let bounds = self.box_in(sighting.bounds);
+            if self.distance_in(bounds, UNSEEN_REACH) > 1.0 {
                 continue;
             }
             // Half hidden or turned it may look unlike what the filter knows; colours, motion and place must do.
-            let place = self.locate(seen, self.box_in(sighting.bounds), WIDE_SPREAD)?;
+            let place = self.locate(seen, bounds, WIDE_SPREAD)?;
             let shares = self
                 .usual
                 .silhouette(place.fit)
                 .with(self.usual.stands_out(place.level), |fit, stands_out| fit * stands_out);
+            let share = of_whole(shares);
+            if share < best.map_or(FOUND, |best| best.share) {
+                continue;
+            }
             // In a crowd there is always somebody who fits: who is farther away must have the target's colours.
             let likely = if self.resembles(seen, sighting)? { 1.0 } else { self.likely_at(place.bounds) };
-            let place = Place { share: of_whole(shares) * likely, ..place };
-            if place.share >= FOUND && best.is_none_or(|best| place.share > best.share) {
-                best = Some(place);
+            if share * likely >= FOUND && best.is_none_or(|best| share * likely > best.share) {
+                best = Some(Place { share: share * likely, ..place });
             }
         }
         Ok(best)
@@ -469,15 +492,16 @@ impl Robust {
         around(Point2f::new(x, y), bounds.width, bounds.height)
     }
 
-    /// How far a place is from where it is expected, in such parts of its height as a second unseen adds to.
-    fn farness(&self, place: Rect2f, (at_once, per_s): (f32, f32)) -> f32 {
+    /// How far a place is from where an unseen target is expected, beside a distance (`UNSEEN_REACH`, `UNSEEN_SPREAD`) that
+    /// grows while it is not seen.
+    fn distance_in(&self, place: Rect2f, (at_once, per_s): (f32, f32)) -> f32 {
         let bounds = self.estimate.bounds;
         length(centre(place) - centre(bounds)) / (bounds.height * (at_once + per_s * self.unseen_s))
     }
 
     /// How likely it has come to a place since it was seen, beside where it is expected: 0 to 1.
     fn likely_at(&self, place: Rect2f) -> f32 {
-        let off = self.farness(place, UNSEEN_SPREAD);
+        let off = self.distance_in(place, UNSEEN_SPREAD);
         (-0.5 * off * off).exp()
     }
 
@@ -499,6 +523,7 @@ impl Robust {
 impl Follow for Robust {
     fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
+        self.watch_others(sightings, dt_s);
         let expected = self.estimate.own_velocity * dt_s;
         let (next, consensus) = self.follow_points(&seen.luma, expected)?;
         let start = centre(self.estimate.bounds);
@@ -552,6 +577,7 @@ impl Follow for Robust {
 
     fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
+        self.watch_others(sightings, dt_s);
         self.unseen_s += dt_s;
         self.estimate.own_velocity *= (-dt_s / HIDDEN_TIME_S).exp();
         self.carry(self.estimate.own_velocity * dt_s);
@@ -578,13 +604,13 @@ impl Follow for Robust {
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
         let Some(colours) = &self.colours else { return Ok(false) };
         let cells = Cells::observe(seen, sighting.bounds, self.grid);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
+        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(self.grid));
         let (figure, _) = cells.histograms(&map);
         Ok(colours.likeness(&figure) >= ALIKE)
     }
 
     fn may_be_in(&self, region: Rect2f) -> bool {
-        self.farness(self.box_in(region), UNSEEN_REACH) <= 1.0
+        self.distance_in(self.box_in(region), UNSEEN_REACH) <= 1.0
     }
 
     fn estimate(&self) -> &Estimate {
