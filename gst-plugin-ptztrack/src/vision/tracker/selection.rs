@@ -56,6 +56,15 @@ pub(super) struct Sighting {
     pub velocity: Point2f,
     /// Whether it was seen beside the target, and so is somebody else.
     pub another: bool,
+    /// How many others have merged with it and not split off again.
+    pub merged: u32,
+}
+
+impl Sighting {
+    /// Whether it shows several people.
+    pub fn is_group(&self) -> bool {
+        self.merged > 0
+    }
 }
 
 struct Candidate {
@@ -101,7 +110,8 @@ impl Candidate {
         let velocity = motion(self.sighting.bounds, sighting.bounds) / time_s.max(f32::EPSILON);
         let old = self.sighting.velocity;
         let velocity = old + (velocity - old) * SMOOTHING;
-        self.sighting = Sighting { velocity, another: self.sighting.another, ..sighting };
+        let Sighting { another, merged, .. } = self.sighting;
+        self.sighting = Sighting { velocity, another, merged, ..sighting };
         self.frames += 1;
         (self.missed, self.missed_s) = (0, 0.0);
         self.way.push_back((self.sighting.bounds, 0.0));
@@ -169,6 +179,7 @@ impl Selection {
     pub fn update(&mut self, sightings: Vec<Sighting>, ego: Option<EgoMotion>, frame: Frame, dt_s: f64) {
         self.suppressed.carry(ego);
         self.candidates.iter_mut().for_each(|candidate| candidate.carry(ego, dt_s));
+        let before: Vec<_> = self.candidates.iter().map(|candidate| candidate.sighting.bounds).collect();
         for sighting in sightings.into_iter().filter(|sighting| is_sound(sighting, frame)) {
             let same = self
                 .candidates
@@ -182,9 +193,24 @@ impl Selection {
                 None => self.candidates.push(Candidate::new(sighting)),
             }
         }
+        self.merge_and_split(&before);
         self.candidates
             .retain(|candidate| candidate.missed <= PATIENCE || candidate.missed_s <= self.detector_pause_s);
         self.follow_released(dt_s);
+    }
+
+    /// Who is no longer seen where another is has merged with them; who is new where another was, `before`, has split off.
+    fn merge_and_split(&mut self, before: &[Rect2f]) {
+        let (old, new) = self.candidates.split_at_mut(before.len());
+        let gone = old.iter().filter(|candidate| candidate.missed == 1 && candidate.frames > 1);
+        let gone: Vec<_> = gone.map(|candidate| candidate.sighting.bounds).collect();
+        for (candidate, before) in old.iter_mut().zip(before).filter(|(candidate, _)| candidate.missed == 0) {
+            let now = candidate.sighting.bounds;
+            let merged = gone.iter().filter(|gone| lies_in(**gone, now)).count();
+            let split = new.iter().filter(|new| lies_in(new.sighting.bounds, *before)).count();
+            candidate.sighting.merged =
+                (candidate.sighting.merged + merged as u32).saturating_sub(split as u32);
+        }
     }
 
     /// The released target moves on, and so does the place that is held back.
@@ -260,6 +286,11 @@ impl Selection {
             .filter(|sighting| grown(sighting.bounds, REACH).contains(point))
             .min_by(|a, b| a.bounds.area().total_cmp(&b.bounds.area()))
     }
+}
+
+/// Whether most of `part` lies in `whole`.
+fn lies_in(part: Rect2f, whole: Rect2f) -> bool {
+    share_inside(part, whole) > 0.5
 }
 
 /// How far both sides of a box have moved: one that moves alone shows or hides a part of what is in it.
@@ -476,6 +507,24 @@ mod tests {
         assert_eq!(walk(0..2), [false, false], "not yet confirmed");
         assert_eq!(walk(2..4), [false, true]);
         assert_eq!(walk(4..18), [false, true], "nor when they pass in front of it");
+    }
+
+    #[test]
+    fn people_merge_and_split() {
+        let (left, right) = (at(100.0, 100.0, 40.0, 90.0), at(150.0, 100.0, 40.0, 90.0));
+        let both = at(100.0, 100.0, 90.0, 90.0);
+        let mut selection = seen(3, &[left.clone(), right.clone()]);
+        let mut groups = |sightings: &[Sighting]| {
+            selection.update(sightings.to_vec(), STILL, FRAME, DT);
+            selection.current().map(Sighting::is_group).collect::<Vec<_>>()
+        };
+        assert_eq!(groups(&[left.clone(), right.clone()]), [false, false]);
+        assert_eq!(groups(std::slice::from_ref(&both)), [true]);
+        for _ in 0..5 {
+            assert_eq!(groups(std::slice::from_ref(&both)), [true], "for as long as they are together");
+        }
+        assert_eq!(groups(&[left.clone(), right]), [false, false]);
+        assert_eq!(groups(std::slice::from_ref(&left)), [false], "who goes away merges with nobody");
     }
 
     #[test]

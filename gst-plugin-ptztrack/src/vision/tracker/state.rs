@@ -219,6 +219,7 @@ impl Tracker {
             outside: detection.outside,
             velocity: Point2f::default(),
             another: false,
+            merged: 0,
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
         self.selection.detector_pause_s = self.config.detector_pause_s;
@@ -301,7 +302,7 @@ impl Tracker {
             return Ok(None);
         }
         for sighting in self.selection.travelling(self.config.confirm_frames, frame) {
-            if target.follow.may_be_in(sighting.bounds) && target.follow.resembles(seen, sighting)? {
+            if target.follow.may_be_in(sighting) && target.follow.resembles(seen, sighting)? {
                 return self.follow_anew(seen, sighting);
             }
         }

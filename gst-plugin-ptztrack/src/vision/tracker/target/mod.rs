@@ -68,8 +68,8 @@ pub(super) trait Follow: Send {
     /// Whether `sighting` is the same person, wherever it is.
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool>;
 
-    /// Whether a target that is not seen may have come as far as `region` since it was.
-    fn may_be_in(&self, region: Rect2f) -> bool;
+    /// Whether a target that is not seen may have come as far as `sighting` since it was.
+    fn may_be_in(&self, sighting: &Sighting) -> bool;
 
     /// What is known of the target now.
     fn estimate(&self) -> &Estimate;

@@ -430,7 +430,8 @@ impl Robust {
         let middle = centre(bounds);
         let own = sightings.iter().find(|sighting| {
             let region = sighting.bounds;
-            region.contains(middle)
+            !sighting.is_group()
+                && region.contains(middle)
                 && region.width <= 2.0 * bounds.width
                 && region.height <= 2.0 * bounds.height
         });
@@ -455,7 +456,7 @@ impl Robust {
     fn recognise(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
         for sighting in sightings.iter().filter(|sighting| !sighting.another) {
-            let bounds = self.box_in(sighting.bounds);
+            let bounds = self.box_in(sighting);
             if self.distance_in(bounds, UNSEEN_REACH) > 1.0 {
                 continue;
             }
@@ -479,12 +480,13 @@ impl Robust {
     }
 
     /// The target's box in a region, which may show a part of it only or somebody else too: as near to where it is
-    /// expected as the region allows, heads level.
-    fn box_in(&self, region: Rect2f) -> Rect2f {
+    /// expected as the region allows, heads level unless there are several.
+    fn box_in(&self, sighting: &Sighting) -> Rect2f {
+        let region = sighting.bounds;
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let x = middle.x.clamp(region.x, region.x + region.width);
-        let y = if region.height > 0.7 * bounds.height {
+        let y = if region.height > 0.7 * bounds.height && !sighting.is_group() {
             region.y + bounds.height / 2.0
         } else {
             middle.y.clamp(region.y, region.y + region.height)
@@ -609,8 +611,8 @@ impl Follow for Robust {
         Ok(colours.likeness(&figure) >= ALIKE)
     }
 
-    fn may_be_in(&self, region: Rect2f) -> bool {
-        self.distance_in(self.box_in(region), UNSEEN_REACH) <= 1.0
+    fn may_be_in(&self, sighting: &Sighting) -> bool {
+        self.distance_in(self.box_in(sighting), UNSEEN_REACH) <= 1.0
     }
 
     fn estimate(&self) -> &Estimate {

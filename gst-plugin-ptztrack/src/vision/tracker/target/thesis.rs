@@ -117,7 +117,7 @@ impl Follow for Thesis {
         Ok(false)
     }
 
-    fn may_be_in(&self, _: Rect2f) -> bool {
+    fn may_be_in(&self, _: &Sighting) -> bool {
         false
     }
 
