@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Puts version, commit and date into the plugin description.
 
 fn main() {

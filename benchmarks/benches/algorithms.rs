@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What looks at whole pictures, each by itself, from 640x480 to 3840x2160: time a picture. The tracker, which needs all that
 //! comes before it, is measured as an element.
 

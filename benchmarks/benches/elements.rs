@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Each element by itself, from 640x480 to 3840x2160: time a picture.
 
 use std::cell::RefCell;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 /// Pixels of the world around the picture on either side, in picture widths.
 const MARGIN: f64 = 0.25;
 /// Pictures from one end of a walk, or a turn, to the other.

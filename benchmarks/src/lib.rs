@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Made-up pictures and the elements they go through, for what is measured here: see `docs/benchmarks.md`.
 
 mod footage;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Reading and writing `GstStructure` fields with errors that name the field.
 
 use gst::prelude::*;

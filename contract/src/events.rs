@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `GST_EVENT_CUSTOM_UPSTREAM` events: they pass tees and queues against the stream.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Normalised image geometry: `x` in frame widths from the left, `y` in frame heights from the top.
 
 /// A point of the frame; inside the frame both coordinates are 0 to 1.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use crate::Point;
 
 /// How a static world moves in the picture of a camera that turns or zooms: a projective map of normalised

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What travels between ptztrack's elements: metas on buffers, upstream events and bus messages.
 //!
 //! Every kind is a typed struct with its [`gst::Structure`] form, so that an application in any

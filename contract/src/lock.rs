@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The one way both plugins take locks.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Element messages on the bus. Loss is never silent.
 
 use crate::codec::{self, Reader};

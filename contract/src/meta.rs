@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Typed access to tag-less [`gst::meta::CustomMeta`]s.
 //!
 //! A meta without tags survives `videoconvert`, `videoscale` and `videocrop` (measured on 1.22).

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Enumerations whose values travel as words.
 
 /// An enumeration whose values travel as words.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use crate::codec::{self, Reader};
 use crate::{BufferMeta, ContractError, Homography};
 

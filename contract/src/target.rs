@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use crate::named::named_enum;
 
 /// `roi-type` of the standard region-of-interest meta that marks the target.

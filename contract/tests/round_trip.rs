@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whatever the contract writes it reads back, and what it cannot read it refuses by name.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! ptztrack inside a Rust program: prints what happens to the target until Ctrl-C, SIGTERM or SIGHUP. Where the picture is
 //! gone, as when the camera reboots, it starts anew until it is back.
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What upstream is told of downstream's wishes.
 
 /// Leaves out that cropping may be left to downstream (`GstVideoCropMeta`): pictures are looked at and drawn on whole, so

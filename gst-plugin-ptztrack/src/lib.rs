@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! GStreamer elements that find a moving person and follow their features on a plain CPU.
 //!
 //! * [`bgavgdetect`]: finds what moves (thesis 3.2 to 3.4),

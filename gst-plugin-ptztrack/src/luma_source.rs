@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Reads the luma of any supported video frame.
 
 use gst_video::VideoFormat;

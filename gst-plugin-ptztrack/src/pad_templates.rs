@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The pads that all elements of this plugin have.
 
 /// One pad in and one out, always there, both of these caps.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `bgavgdetect` in a harness and in pipelines: what it reports, when it does not, and what it leaves alone.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `ptzoverlay` in a harness: what it changes in pixels, and what it leaves alone.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

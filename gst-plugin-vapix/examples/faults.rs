@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Runs everything that can come between `vapixptzsink` and its camera, and prints a table in Markdown of
 //! what the user sees and how long it takes:
 //!

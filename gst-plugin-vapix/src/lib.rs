@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! GStreamer sink that steers an Axis pan-tilt-zoom camera after the tracked target.
 //!
 //! [`vapixptzsink`] is the element (thesis 3.6). What it computes is in the crate [`servo`], how it speaks with the camera

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera of another make-up than the one the defaults are made for, with nothing set but where it is and who we are.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Who the sink is to the camera.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

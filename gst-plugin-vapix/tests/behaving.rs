@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! It goes home, gives way to others, and stops what nobody else does. By the stream's time, over real HTTP.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How well a camera is moved, over real HTTP, in stepped time and with properties as they are by default.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! HTTPS, and the redirect to it: what the virtual camera does not speak, a scripted one answers.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

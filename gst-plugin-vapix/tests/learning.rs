@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the sink learns, over HTTP, of a camera that is otherwise than it was told.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

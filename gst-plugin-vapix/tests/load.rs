@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! More pictures than a slow camera can follow: what is sent is of the newest, and nothing waits in between.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Time that goes by the stream's.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Many cameras in one application: none waits for another.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Text of any length is read in a bounded space. A test of its own process: others need memory, too.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Cameras that hang, and pictures that are turned on their way, over real HTTP and in stepped time.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What can be set, what cannot, and that no password comes out.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Proportional speed, on as cameras leave the factory: zoomed in, a person is followed as well as without it. Over real
 //! HTTP, in stepped time.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]

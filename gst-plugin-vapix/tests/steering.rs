@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera is told, and that it is never left moving.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

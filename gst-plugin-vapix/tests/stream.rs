@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Streams that are not what they seem: late, cropped, without a target, stalled.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

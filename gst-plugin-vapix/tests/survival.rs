@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whatever goes wrong with the camera: video goes on, one warning, and control is back when the camera is.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Cameras that can be moved in some ways only, with `mode` as it is by default.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Model, estimation and control of a camera that follows a target: from where the target is in the picture to what
 //! the camera is to do. No HTTP, no GStreamer: what any camera protocol would need.
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Names what is measured and what measures: a hash of the sources of the tracker, of the servo and of the laboratory, so
 //! that a kept result is known by what it was made with.
 

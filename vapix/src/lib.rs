@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! VAPIX, the HTTP interface of Axis cameras.
 //!
 //! * [`session`]: who may move the camera, what to ask and say next, what its answers mean. Sees no picture.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How often a request is sent.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

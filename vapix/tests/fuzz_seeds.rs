@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The fuzz targets are kept compiling, and read what real cameras say; also cut short and damaged.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 

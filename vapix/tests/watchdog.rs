@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The watchdog process, over real HTTP: what it does when whoever moves a camera is not there any more.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! From a decoded picture at `bgavgdetect` to the command that it led to, at the camera: `latency SECONDS WxH`.
 //!
 //! A virtual camera shows somebody in the room by MJPEG over HTTP and is moved after them, all in this process and by the

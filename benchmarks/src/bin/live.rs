@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Lets cameras that are recordings play by the clock, and counts what becomes of their pictures:
 //! `live RECORDING CAMERAS SECONDS ELEMENTS`, for example `live room.avi 4 20 "bgavgdetect ! lkfeaturetrack"`.
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Writes what the elements say of every picture of a recording: `metas RECORDING > file`.
 //!
 //! Two builds of the plugins that compute the same write the same, to the last digit. Planes and pixels are written as a

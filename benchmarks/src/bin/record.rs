@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Writes what the camera sees of somebody in the room, as a recording to measure with:
 //! `record FILE WxH SECONDS DEGREES_PER_SECOND [PICTURES_PER_SECOND]`, the last 25 unless given.
 //!

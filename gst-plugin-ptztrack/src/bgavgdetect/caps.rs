@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use gst_video::VideoFormat;
 
 use super::Output;

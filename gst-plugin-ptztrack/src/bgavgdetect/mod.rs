@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! SECTION:element-bgavgdetect
 //!
 //! Finds what moves, whether the camera rests or turns, by background subtraction (thesis 3.2 to 3.4): running mean

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is read from buffers and attached to them.
 
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};

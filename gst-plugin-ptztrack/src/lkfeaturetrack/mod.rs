@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! SECTION:element-lkfeaturetrack
 //!
 //! Follows one target by its feature points (thesis 3.5), also while the camera turns. Takes what

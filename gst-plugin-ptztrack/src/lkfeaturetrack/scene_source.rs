@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the whole picture shows: as the detector in front saw it, or else looked at here.
 
 use std::time::Duration;

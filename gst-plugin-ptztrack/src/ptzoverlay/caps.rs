@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Caps with and without the feature that says "I draw compositions".
 
 use std::sync::LazyLock;

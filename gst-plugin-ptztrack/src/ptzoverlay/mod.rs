@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! SECTION:element-ptzoverlay
 //!
 //! Draws what `bgavgdetect` and `lkfeaturetrack` attached to a frame: contours and boxes of what moves,

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pixels of a frame as a [`Surface`].
 
 use gst_video::prelude::*;

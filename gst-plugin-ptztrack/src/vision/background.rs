@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::Luma;
 
 /// How a pixel is told from the background.

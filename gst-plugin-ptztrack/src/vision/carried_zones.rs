@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where zones lie in the picture of a camera that has turned since they were set.
 
 use std::time::Duration;

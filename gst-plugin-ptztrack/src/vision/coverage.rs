@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How much of each pixel a shape covers: strokes, discs and letters before they have a colour.
 
 use multiversion::multiversion;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use opencv::core::{Point, Rect};
 
 use super::coverage::Coverage;

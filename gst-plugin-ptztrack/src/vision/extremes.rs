@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The least or the most of all bytes within a rectangle: erosion and dilation (thesis 3.3.1), a row at a time, so that
 //! the compiler makes vector code of it.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! OpenCV's letters, each drawn once.
 
 use std::collections::HashMap;

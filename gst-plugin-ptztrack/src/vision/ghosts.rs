@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Ghosts: what was taken for background while somebody stood before it, and is foreground now that they have gone.
 //!
 //! Somebody's outline is an edge of the picture, and runs across a background that has none there. The outline of a ghost

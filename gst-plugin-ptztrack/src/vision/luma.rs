@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use opencv::core::{CV_8UC1, Mat};
 
 /// A picture that cannot be looked at.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Everything that computes on pictures: plain types, tested by themselves.
 //!
 //! A picture's way: `camera_motion` and the background that travels with it (`scene_model`) → moving regions

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::extremes::Extremes;
 
 /// Opening with a square of that many pixels a side, then closing with a rectangle of that width and height

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What one picture brings to the tracker.
 
 use super::{Luma, SceneView};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use ptztrack_contract::{Rect, Region};
 
 /// Lets through what is there for several pictures in a row: sensor and coding noise comes and goes,

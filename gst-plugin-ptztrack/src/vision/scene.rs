@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use ptztrack_contract::{MotionMeta, Point, Rect, Region, TargetMeta, TargetState};
 
 use super::draw::{Colour, Shape};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Colours on pixels, wherever a format keeps these.
 
 use multiversion::multiversion;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A world on paper whose every motion is known: smooth noise, sampled anywhere between the pixels.
 
 use ptztrack_contract::{Homography, Point};

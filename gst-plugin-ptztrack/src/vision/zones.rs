@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use opencv::core::{CV_8UC1, Mat, Point as Pixel, Scalar, Vector};
 use opencv::imgproc;
 use ptztrack_contract::Point;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The element in a harness, and pictures of a person in a street.
 
 use gst::prelude::*;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `stationary-timeout` and `max-tracking-time`.
 
 use gst::prelude::*;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `lkfeaturetrack` in a harness and in pipelines.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The whole loop but the network: measurement, estimation, control, session.
 
 #[cfg(test)]

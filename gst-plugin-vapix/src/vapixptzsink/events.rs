@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What upstream is told of the camera.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::sync::mpsc::SyncSender;
 use std::sync::{LazyLock, Mutex, Weak};
 use std::time::Duration;

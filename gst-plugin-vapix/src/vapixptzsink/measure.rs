@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! From a buffer to a measurement, or to a warning why there is none.
 
 use std::time::Duration;

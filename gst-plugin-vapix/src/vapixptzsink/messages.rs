@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera task tells, told to the user.
 
 use gst::prelude::*;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the caps say of the picture.
 
 use ptztrack_contract::{TargetMeta, aspect};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The table of properties: one entry gives specification, default, documentation, getter and setter.
 
 use std::ops::RangeInclusive;

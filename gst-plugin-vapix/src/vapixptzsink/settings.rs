@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The values of the properties, and what they mean to servo and client.
 
 use std::path::PathBuf;

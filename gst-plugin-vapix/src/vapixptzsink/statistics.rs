@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Numbers for the `stats` property.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is kept of the stream from buffer to buffer.
 
 use std::mem;

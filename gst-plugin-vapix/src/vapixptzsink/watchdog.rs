@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where the application's watchdog is: one process for all its cameras.
 
 use std::env::{current_exe, var_os};

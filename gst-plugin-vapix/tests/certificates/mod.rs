@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Certificates for tests, and servers that show them.
 
 use std::path::{Path, PathBuf};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A sink under test before a virtual camera.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera and a sink whose time goes on together, picture by picture.
 
 use std::time::Duration;

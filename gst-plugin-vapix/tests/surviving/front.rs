@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stands in front of a virtual camera: TLS, which it does not speak, and other addresses.
 
 use std::io::{BufRead, BufReader, Read, Write};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A sink steers a camera, something goes wrong, and is over again.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Names that tests give and take away: the C library's name service, but for those that end in `.test`, which no
 //! other has (RFC 6761). It stands in front of the library's own, so that what is tested is what users run.
 

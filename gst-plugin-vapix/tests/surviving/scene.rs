@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What comes between a sink and its camera, or into its stream, while the camera is steered.
 
 use std::time::{Duration, Instant};

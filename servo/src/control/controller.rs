@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::OscillationGuard;
 use crate::estimation::Offset;
 use crate::model::{PanTilt, SpeedMap};

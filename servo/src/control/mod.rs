@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera is to do, by what was estimated.
 
 mod actuation;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is measured: where the target is, how it moves, and what the camera does not say of itself.
 //!
 //! The camera is learned while a target is followed, from how the background moves in the picture (the tracker's

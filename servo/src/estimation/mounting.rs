@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use ptztrack_contract::{Point, Rect, Vector};
 
 use super::Measurement;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 /// Recursive least squares with forgetting (Åström and Wittenmark, *Adaptive Control*, 2nd ed., section 2.2): the weights
 /// of `N` regressors with their covariance, which is that of the prior at first. Forgetting adds a part of the prior's
 /// variance to the diagonal, up to the prior's itself (Kulhavý's stabilised forgetting): a regressor that is not excited

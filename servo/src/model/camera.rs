@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::{CommandHistory, HardLimits, Lens, PanTilt, Position, Range, SpeedMap, TableRow};
 
 /// Field of view of a camera that does not tell: a common dome's, zoomed out.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera is: what it can do, what it was told, what a place in its picture means.
 
 mod camera;

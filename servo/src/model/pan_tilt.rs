@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::ops::{Add, Div, Mul, Sub};
 
 /// A pair of angles (degrees) or of angular rates (degrees per second), positive to the right and up.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where the camera is and how far it goes.
 
 use super::{PanTilt, around_deg};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::TableRow;
 
 /// How a camera's speed grows with the speed step.

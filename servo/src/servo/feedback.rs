@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What became of an actuation, and what the camera told.
 
 use std::mem;

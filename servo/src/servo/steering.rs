@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! From the target's place to what the camera is to do.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures of a run's telling moments, chosen while it goes on.
 
 use std::collections::BTreeMap;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Many runs, some at once, in an order that does not depend on which is faster.
 
 use std::{

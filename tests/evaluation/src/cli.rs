@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The command line: which experiments are run, how many at once, and where the report goes.
 
 use std::{collections::BTreeSet, ops::RangeInclusive, path::PathBuf, str::FromStr, time::Duration};

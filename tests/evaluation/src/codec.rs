@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What pictures go through before a tracker sees them: a real encoder and its decoder.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is run: who is followed where, by whom, and seen through what.
 
 use std::{path::PathBuf, time::Duration};

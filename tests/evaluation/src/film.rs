@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A video of a run to look at: what the tracker saw, what it said, and in white where the person really is.
 
 use std::{

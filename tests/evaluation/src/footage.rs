@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Scenes of real people: in front of a camera that turns within a recording, or in the recording as it is.
 
 use std::{collections::BTreeMap, path::Path, str::FromStr, sync::Arc, time::Duration};

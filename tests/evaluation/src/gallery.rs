@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures of scenes to look at, from far and from near.
 
 use std::{path::Path, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The thesis' 72 closed-loop experiments (chapter 5), rerun by anyone: real elements in a real pipeline against the
 //! virtual camera, in virtual time, so that the same seed gives the same table on any x86-64 machine.
 //!

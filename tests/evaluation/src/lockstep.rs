@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One experiment in virtual time: camera and pipeline take turns, and nobody looks at a clock.
 //!
 //! Picture n is exposed n and a half frame periods after the camera's start and reaches the pipeline when it is as old

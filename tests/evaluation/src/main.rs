@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `evaluate`: runs tests and writes down what came out.
 
 use std::{

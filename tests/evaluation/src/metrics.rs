@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The metrics of thesis section 5.2, each computed in one place that quotes its equation.
 //!
 //! Counting begins with the first box: the first picture, with the camera still at home, in which the whole person is

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Who is where in a recording, as those wrote it down who published it.
 
 use std::path::{Path, PathBuf};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One picture in, the same picture finished: a pipeline that works in step with whoever feeds it.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What a result was made with: results of another servo or another laboratory do not belong into the same table.
 
 use serde::{Deserialize, Serialize};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One experiment in real time, as a user runs it: the camera streams over HTTP or RTSP, a leaky queue drops the pictures
 //! that the tracker is too late for, and the servo looks at the clock.
 //!

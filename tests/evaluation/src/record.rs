@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What one run leaves: per picture what was true, what the tracker said and where the camera looked. Pure data.
 
 use std::{fmt, time::Duration};

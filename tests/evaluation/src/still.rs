@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A recording as it is, without any camera: only the tracked box is judged.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Results that are kept, so that only what is missing is run: one file for each tracker, test, seed and setup. It begins
 //! with the key of all that the result depends on; another key, and it is not taken.
 

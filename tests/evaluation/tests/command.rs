@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The command as it is called: what it refuses before anything is written, and that it gives the same everywhere.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whole runs: the same twice, the bounds as good and as bad as they must be.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Runs by the clock: streams as a user has them, and pictures known again behind the leaky queue.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

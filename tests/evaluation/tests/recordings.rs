@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! People in recordings that the test makes itself: followed within one, and in one as it is.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

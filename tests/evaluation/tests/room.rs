@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A few of the 72 tests, small and from seeds of their own: what must hold whatever the tracker is worth.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How fast the room is painted and encoded, on one core: `cargo run --release -p virtual-camera --example speed -- [WxH]`.
 //!
 //! The camera turns all the while, so that every picture is another one, and blurred. Counted is processor time, of

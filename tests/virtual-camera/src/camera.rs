@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The camera as a whole: what its servers share, and the handle that tests and programs hold.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The pinhole: which pixel of the recording a pixel of the view sees.
 //!
 //! Axes of a camera: x to the right, y down, z forwards. A view at pan p and tilt t sees along its ray v what the

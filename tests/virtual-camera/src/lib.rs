@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A virtual Axis pan-tilt-zoom camera on loopback: VAPIX over HTTP, MJPEG, RTSP, kinematics and a live page.
 //!
 //! Its world is a wide still recording, a photograph of all around it or a made-up room; the picture is what a turning pinhole camera would see in it,

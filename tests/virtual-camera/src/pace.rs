@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! When pictures are taken.
 
 use std::time::Duration;

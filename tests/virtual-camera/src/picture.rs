@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A picture in memory: planar YUV 4:2:0, as decoders give it and encoders take it.
 
 /// One 8-bit plane without padding.

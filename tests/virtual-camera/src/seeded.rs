@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Chance that always falls the same way: everything made up comes from a seed.
 
 /// A stream of numbers (splitmix64, Steele et al. 2014), the same on every machine.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What a virtual camera is made like: every quality that differs between real cameras is a setting.
 
 use std::{fmt, path::PathBuf, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What tests ask a camera, and how they trouble it.
 
 use std::time::Duration;

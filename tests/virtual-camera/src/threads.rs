@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The threads that draw, one for each client.
 
 use std::{sync::Mutex, thread::JoinHandle};

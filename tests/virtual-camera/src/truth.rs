@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is really to be seen in a picture, for those who judge what was found in it.
 
 use std::ops::Range;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What clients may ask of any picture.
 
 use crate::{camera::Camera, encode::EncodeError, vapix::Args, world::FootageError};

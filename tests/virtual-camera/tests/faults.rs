@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How the camera misbehaves when told to, seen from the wire.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The footage world, with recordings made on the spot.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! VAPIX over real HTTP.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The live page, in a headless Chromium.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

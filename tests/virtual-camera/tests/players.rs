@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Independent clients: FFmpeg plays the streams, two VAPIX libraries from PyPI steer the camera.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The program as a user starts it.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

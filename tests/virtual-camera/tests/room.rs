@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera in the made-up room.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

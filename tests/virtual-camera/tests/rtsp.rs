@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! RTSP with the stock `rtspsrc`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera whose time goes on only when it is told.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whether the camera knows what is in its pictures.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What passes between the [`Session`](super::Session) and those who speak with the camera for it.
 
 use std::fmt;

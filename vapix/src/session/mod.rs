@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The session with one camera: who may move it, what to ask and say next, what its answers mean. Sees no picture: what
 //! the camera is to do it is told by the [`Servo`].
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What to say to the camera next, and why.
 
 use std::time::Duration;

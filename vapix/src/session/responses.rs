@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera's answers mean.
 
 use std::time::Duration;

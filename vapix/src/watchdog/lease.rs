@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::path::absolute;
 use std::sync::Arc;
 use std::time::{Duration, Instant};

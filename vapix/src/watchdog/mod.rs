@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A camera moves until it is told otherwise, so whoever moves it must not die in between. What is to be done then is the
 //! job of another process, the watchdog: it holds a [`Lease`] for each camera that may move, and stops a camera when its
 //! lease runs out or when the socket to the application closes.

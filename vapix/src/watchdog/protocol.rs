@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What an application tells its watchdog. It says all there is to say each time: a watchdog that was started anew, or took
 //! over, needs to know nothing of before.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The answer to `query=attributes`: what a camera's steps mean.
 
 use servo::TableRow;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Basic and Digest authentication (RFC 7617; RFC 2069, 2617, 7616).
 
 use base64::prelude::{BASE64_STANDARD, Engine};

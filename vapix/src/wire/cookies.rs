@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use reqwest::header::{COOKIE, HeaderMap, HeaderValue, SET_COOKIE};
 use serde::{Deserialize, Serialize};
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::time::Duration;
 
 /// Why the camera did not do what it was asked.

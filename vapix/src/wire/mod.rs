@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! VAPIX, the HTTP interface of Axis cameras, as far as following a target needs it.
 //!
 //! [`Client`] asks and commands one camera; [`Command`] is what it can be told; [`Parameters`] and [`Attributes`],

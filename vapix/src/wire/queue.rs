@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The control queue: who may move the camera where several want to (`ptzqueue.cgi`).
 
 use std::fmt;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use std::fmt;
 
 /// A password: its `Debug` form is `***`, and it has no `Display`, so that no log can carry it.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The texts that `ptz.cgi` and `param.cgi` answer with.
 //!
 //! Read by key and never by place, as the set of keys varies with camera and firmware; lines end in

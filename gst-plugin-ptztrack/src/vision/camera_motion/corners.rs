@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where there is something to hold on to.
 
 use opencv::core::{self, Mat, Point2f, Rect};

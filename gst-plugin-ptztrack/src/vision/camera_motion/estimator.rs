@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use opencv::core::Point2f;
 use ptztrack_contract::{CameraMotion, Homography, Point};
 

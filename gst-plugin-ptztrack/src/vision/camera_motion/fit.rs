@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The motion that most points of the picture share.
 
 use opencv::core::Point2f;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How the picture moves because the camera does, once a picture.
 //!
 //! | step | file |

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Colours of figure and ground: how much likelier a colour is on the target than beside it.
 //!
 //! Histograms of both as in Staple (Bertinetto et al., "Staple: Complementary Learners for Real-Time Tracking", CVPR

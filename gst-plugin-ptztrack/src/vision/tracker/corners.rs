@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Corners worth following (thesis 3.5.1, equations 3.6 and 3.7): Shi and Tomasi's smaller eigenvalue, ranked, outliers
 //! rejected.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the target looks like: a correlation filter that says where it is near a place, and how surely.
 //!
 //! Lucas-Kanade follows points from one frame to the next and forgets; small errors add up, and points

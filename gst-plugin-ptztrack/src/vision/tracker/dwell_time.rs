@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How long a target is followed, and stands.
 
 use opencv::core::{Point2f, Rect2f};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How the background moves in the picture while the camera turns or zooms, in pixels.
 
 use opencv::core::{Point2f, Rect2f};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Figure and ground: which cells around the target are person, and which are wall.
 //!
 //! Motion against the background and colour each give the odds of every cell; the silhouette that the target had until

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Sparse pyramidal Lucas-Kanade (thesis 3.5.2, equations 3.8 to 3.11) between two patches, with its tests.
 
 use opencv::core::{Point2f, Size, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS, Vector};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pixel geometry on OpenCV's own types, and the way between pixels and the normalised contract.
 
 use opencv::core::{Point2f, Rect2f};

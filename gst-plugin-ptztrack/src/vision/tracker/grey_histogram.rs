@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Centre of mass by mean-shift over the back-projected grey histogram (thesis 3.5.3, equations 3.12 to 3.15; Comaniciu).
 
 use opencv::core::{Mat, Point2f, Rect, Rect2f, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS};

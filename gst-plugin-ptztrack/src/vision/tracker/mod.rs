@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Follows one target through a moving camera's picture (thesis 3.5).
 //!
 //! | step | thesis | file |

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A smoothed window of the picture with its pyramid: the only pixels that optical flow works on.
 
 use opencv::core::{BORDER_CONSTANT, BORDER_REFLECT_101, Mat, Point2f, Rect2f, Size, Vector};

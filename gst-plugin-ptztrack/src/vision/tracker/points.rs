@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The feature points of a target: who belongs to it, who left it, who may join.
 
 use opencv::core::Point2f;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whether the target is still there: doubt that grows with time, not one bad picture.
 
 /// Seconds in which nothing of the target to be seen turns certainty into doubt.

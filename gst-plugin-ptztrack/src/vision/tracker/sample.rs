@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A part of a picture at another size.
 
 use multiversion::multiversion;

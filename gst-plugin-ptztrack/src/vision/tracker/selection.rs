@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Which detection becomes the target.
 
 use std::collections::VecDeque;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, Vector};
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where targets were given up, so that they are not taken again until they move.
 
 use opencv::core::Rect2f;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures whose every motion is known: smooth noise, sampled anywhere between the pixels.
 
 use opencv::core::Rect2f;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stays put in the picture while the world moves: a burned-in clock, a logo, dirt on the dome. It is not the known
 //! background wherever the camera looks, and yet no mover.
 

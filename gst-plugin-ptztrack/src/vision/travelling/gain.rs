@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How much lighter or darker the pictures have become as a whole: lamps, clouds, and cameras that expose anew as they turn.
 
 use super::model::KNOWN;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The background travels with the camera (Yi et al., Detection of Moving Objects with Non-stationary Cameras
 //! in 5.8 ms, CVPR Workshops 2013): mean and spread (thesis 3.1, 3.2) of every pixel on a canvas somewhat larger
 //! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is known of each pixel of the background, and how a picture is held against it.
 
 use opencv::core::{CV_8UC1, Mat, Point as Pixel, Scalar, Vector};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How noisy the pictures are: of the sensor, and of coding.
 
 /// Brightness is told apart in so many steps.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is done to every pixel of the model in every picture, a row at a time, so that the compiler makes vector code of
 //! it: with AVX2 where the processor has it, which gives the same numbers.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures sampled through a projective map.
 
 use std::ops::Range;

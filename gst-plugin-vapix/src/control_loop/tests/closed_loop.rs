@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The virtual camera's head, everything late, before somebody who walks: closed loops for tests, without a picture and
 //! without a network.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What a control asks of a camera just met, and what becomes of questions without an answer.
 
 use std::time::Duration;

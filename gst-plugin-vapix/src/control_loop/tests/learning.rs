@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is learned of a camera that is otherwise than it was taken for, in closed loop.
 
 use std::ops::Range;

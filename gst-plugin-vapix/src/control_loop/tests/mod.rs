@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The whole loop, with a camera that answers at once, or late, or not at all.
 
 mod closed_loop;

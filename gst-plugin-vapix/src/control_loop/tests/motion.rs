@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How well the whole servo moves, in closed loop.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The camera in others' hands, or perhaps in others' hands.
 
 use super::*;

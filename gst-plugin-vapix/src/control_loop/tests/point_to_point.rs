@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where the camera looks, told or not, and what follows from that for limits and home.
 
 use super::*;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! By which words the camera is brought to rest, and what is said of a swing.
 
 use super::*;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How well the whole servo zooms, and moves where it may not or knows one way only, in closed loop.
 
 use std::time::Duration;

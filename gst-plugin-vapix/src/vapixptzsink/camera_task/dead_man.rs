@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The lease that has the watchdog stop the camera where this process cannot any more.
 
 use std::sync::Arc;

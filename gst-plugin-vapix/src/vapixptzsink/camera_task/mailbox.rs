@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the streaming thread leaves for the camera task. Nothing here ever waits for the network.
 
 use std::mem;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
 
 mod dead_man;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the camera's task does between two exchanges: takes what came in, keeps count, reports changes.
 
 use std::mem;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What trackers are judged by on a recording as it is, where no camera follows: the two measures of Y. Wu, J. Lim and
 //! M.-H. Yang, "Online object tracking: a benchmark", CVPR 2013, section 3. Where a camera follows, the same is computed
 //! in its pictures.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How soon the camera has the person in the middle, and how well it keeps them there.
 
 use super::{counted_dgc, d_gc, is_out, mean};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Whether it is still the same person.
 
 use super::{SPECK, distance, is_hit, is_true_positive, tracked};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! When the person was lost, and why, judged by the truth.
 //!
 //! The tracker *holds* the person in a picture when it says that it tracks, or that the target is hidden, and its centroid

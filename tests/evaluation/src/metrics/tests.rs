@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Cases computed by hand, in a picture of 80x60: its radius a is 50, so that distances are easy.
 
 use proptest::prelude::*;

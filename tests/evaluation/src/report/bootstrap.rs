@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How sure a mean is: 95 % intervals by the bootstrap (B. Efron, "Bootstrap methods: another look at the jackknife", 1979).
 //!
 //! Runs of the same seed and path are not independent: same room, same person, same way. So what is drawn, with

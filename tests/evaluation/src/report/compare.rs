@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What changed from one report to another, test by test, with the interval of the difference.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Tables for machines: RFC 4180, fixed formatting, missing values empty.
 
 use super::{

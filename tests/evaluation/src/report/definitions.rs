@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is counted, in words, for those who read the figures.
 
 /// One definition: what, and how it is counted.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Runs with their metrics, in an order that does not depend on which ended first.
 
 use std::{collections::BTreeSet, fmt};

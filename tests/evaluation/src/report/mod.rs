@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What runs are written down as: CSV for machines, Markdown and one page for people, plots and pictures.
 //!
 //! | file | what is in it |

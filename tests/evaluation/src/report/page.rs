@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One page with everything, that needs no other file.
 
 use std::{fs, path::Path};

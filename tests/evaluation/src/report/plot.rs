@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Plots, drawn by gnuplot where it is installed.
 
 use std::{

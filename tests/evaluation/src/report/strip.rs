@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures of the telling moments, the boxes drawn over them.
 
 use std::fmt::Write;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A table, for the terminal, for Markdown and for a page.
 
 /// Rows of text under headings.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is put beside what.
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Reports of runs that nobody ran.
 
 use std::{collections::BTreeMap, fs, path::PathBuf, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The figures of the thesis, tables 5.2 and 5.3, to stand beside ours.
 
 use std::sync::LazyLock;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `--suite hard`: what makes following hard in reality, one thing a test. Every test is settings of camera and room that
 //! `virtual-camera` takes on its command line too.
 

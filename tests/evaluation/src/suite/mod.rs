@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Sets of tests besides the thesis' 72.
 
 pub mod hard;

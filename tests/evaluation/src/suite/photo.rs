@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Photographs of rooms with somebody walking in them: twelve ways through each.
 
 use std::{

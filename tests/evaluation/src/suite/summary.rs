@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What came of the hard tests, in one table: counts over seeds, with intervals.
 
 use std::{collections::BTreeMap, fmt::Write};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The bounds: they know the truth of the picture at hand, more of it or less, and one of them never moves the camera.
 
 use std::sync::Mutex;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What follows the person: each a few elements between decoder and servo, and the same first box for all.
 
 use std::sync::{Arc, Mutex};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Detector and feature point tracker, with their defaults or as the thesis has them.
 //!
 //! Until the first box the tracker is told to wait for an operator, while the detector learns the background. The first

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What a GStreamer user has without us: the trackers of OpenCV in the stock `cvtracker` element.
 //!
 //! The element takes its box from properties when it sees its first picture, and cannot be told of another one later.

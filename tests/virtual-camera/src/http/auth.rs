@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Who may: Basic and Digest, as Axis cameras ask for them.
 
 use std::{

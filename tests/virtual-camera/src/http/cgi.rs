@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `ptz.cgi`, `ptzqueue.cgi` and `param.cgi`, with the faults they can have.
 
 use std::{future::pending, io, sync::Arc, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Connections that can be made to fail, and the door they come through.
 
 use std::{

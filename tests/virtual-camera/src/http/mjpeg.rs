@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! MJPEG: one JPEG after the other in a response that never ends.
 
 use std::{io::Write, sync::Arc, time::Duration};

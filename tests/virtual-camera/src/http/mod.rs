@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The HTTP server: VAPIX, snapshots, MJPEG and the live page.
 
 mod auth;

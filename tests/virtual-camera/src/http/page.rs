@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The live page and what it asks for. It is for people at this computer: no password.
 
 use std::sync::Arc;

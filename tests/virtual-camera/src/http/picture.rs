@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Single pictures, and what clients may ask of any picture.
 
 use std::sync::Arc;

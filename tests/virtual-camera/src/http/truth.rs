@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is really in a picture, for the live page to draw over it.
 
 use std::{sync::Arc, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Exposure, white balance and focus that overshoot and come back after the camera has turned.
 
 use std::{f64::consts::TAU, time::Duration};

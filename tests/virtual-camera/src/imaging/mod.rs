@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What a camera does to its pictures between the sensor and the encoder, and what shakes it.
 
 mod hunting;

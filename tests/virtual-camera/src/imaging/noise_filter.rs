@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The noise filter over time: what changes little is taken for noise, so that what moves leaves a smear.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A clock and a logo, burned into the picture as cameras do.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The whole pan-tilt-zoom head: commands in, poses out, over time.
 
 use std::{collections::VecDeque, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How the camera moves: motors, speed maps, delays. Time is always an argument, so that virtual time works too.
 
 mod head;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One axis: a position that changes no faster than its motor can.
 
 /// What a motor is told to do.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! From VAPIX speed steps to degrees per second.
 
 /// How a speed step (1 to 100) becomes a speed: every product has its own curve.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Makes a pipeline for each client, and feeds it.
 
 use std::sync::{Arc, Once};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! RTSP, through gst-rtsp-server: `/axis-media/media.amp?videocodec=...` and `/mpeg4/media.amp`.
 
 mod codec;

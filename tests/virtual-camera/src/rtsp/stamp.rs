@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Right times for MPEG-4 pictures, and each of them sent at once.
 //!
 //! `avenc_mpeg4` of GStreamer 1.22 stamps every picture with 2⁶³ ns, and `rtpmp4vpay` waits for the next picture, or for

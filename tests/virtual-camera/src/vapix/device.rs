@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The device behind the CGIs: head, lens, parameters, presets.
 
 use std::{collections::BTreeMap, fmt::Write, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The text of `ptz.cgi?info=1`.
 
 use crate::settings::Moves;

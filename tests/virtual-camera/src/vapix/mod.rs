@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The words of VAPIX: requests understood, answers spelt. No network here.
 
 pub(crate) mod device;

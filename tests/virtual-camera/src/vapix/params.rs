@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `param.cgi`: the camera's parameters.
 
 use super::{Answer, Args, device::field_angles};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `ptz.cgi`: what a request asks for.
 
 use std::str::FromStr;

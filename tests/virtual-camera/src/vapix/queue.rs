@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! `ptzqueue.cgi`: who may move the camera where several want to.
 
 use std::time::Duration;

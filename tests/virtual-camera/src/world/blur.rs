@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Motion blur: what the shutter sees while the camera turns.
 
 use crate::picture::{Picture, Plane};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A recording from a file, decoded as it is looked at.
 
 use std::{

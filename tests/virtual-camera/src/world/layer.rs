@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Somebody without what is behind them: the mean of some moments of an exposure, laid over a picture.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What there is to see: something around the camera, and the view of it.
 
 mod blur;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Who is where in a recording, as the MOTChallenge writes it: `frame,id,left,top,width,height[,consider[,...]]` a line.
 //!
 //! Frames count from 1, boxes in pixels. A `consider` of 0 marks what is not to be counted (arXiv:1603.00831, table 4).

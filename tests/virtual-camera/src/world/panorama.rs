@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The view of a turning camera inside a still recording.
 
 use std::{

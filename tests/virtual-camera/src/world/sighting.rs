@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The truth about somebody: measured on a picture of their shape alone.
 
 use super::room::view::{Vector, View};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A small made-up world for tests: a textured wall and one textured person who walks where told.
 
 use std::{sync::Arc, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Which picture of a recording shows the world when.
 
 use std::{

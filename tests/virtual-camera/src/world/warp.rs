@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Pictures seen through another lens: through a homography, or out of a panorama.
 //!
 //! By hand, in whole numbers: less work than OpenCV's, and the same picture however many cores there are.

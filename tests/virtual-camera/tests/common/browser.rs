@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A headless Chromium, for the tests of pages. Whoever includes it has a `PATIENCE`.
 // Not every page is clicked by the mouse.
 #![allow(dead_code)]

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the tests share: small quick cameras and an HTTP client.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 #![allow(dead_code)]

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Stops cameras whose application has died or hangs. Started by `vapixptzsink`, with the socket as its standard input;
 //! or by an administrator, to run elsewhere than the application:
 //!

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 use super::super::synthetic::{Picture, Scene};
 use super::*;
 use crate::vision::{self, SceneModel};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! One target and how it is followed: with all cues, or as the thesis does it.
 
 mod robust;

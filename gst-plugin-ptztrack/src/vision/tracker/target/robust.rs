@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A target followed by all that tells it from the wall: motion against the background, colour, silhouette, the
 //! correlation filter, and the points that lie on its figure.
 

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Thesis 3.5 as written: corners in the contour, Lucas-Kanade in a patch, the mean of the points, mean-shift.
 
 use opencv::core::{Point2f, Rect2f};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What is usually seen of a target: only beside that does what is seen now say whether it is there.
 
 use crate::vision::tracker::figure::Halves;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The panorama itself: decoded once for the whole process, and looked at through a view.
 
 use std::{

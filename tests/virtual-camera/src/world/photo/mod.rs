@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A photograph of everything around the camera, with somebody cut out of film walking in it.
 
 mod equirectangular;

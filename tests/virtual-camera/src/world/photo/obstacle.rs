@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Something that stands before the person: a board or a pillar, whose surface is a piece of the panorama itself.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where one can walk in a panorama, and how it was taken.
 
 use std::{collections::BTreeMap, path::Path};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Which photograph, who walks in it, and how.
 
 use std::{path::PathBuf, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Somebody cut out of film: pictures with an alpha channel, and a list of which way they walk in each.
 
 use std::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! With a panorama and a person of their own.
 
 use std::{fs, path::PathBuf, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where the person is when: along a lane of the floor, at what speed, facing where.
 //!
 //! Metres, x to the right, z ahead at pan 0, from below the lens.

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Panorama, person and sensor together: a world for the camera.
 
 use std::{sync::Arc, time::Duration};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What people do in the room, besides what the thesis' tests ask of one.
 
 /// Who walks where. All but [`Self::Test`] and [`Self::Nobody`] begin as a test does: after two seconds the person to be

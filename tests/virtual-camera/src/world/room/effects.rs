@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Light that changes or is thrown about: sun patches, cast shadows, a reflecting floor, lamps switched off.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What goes on in the room besides people: lights and things that change by themselves.
 
 use std::f64::consts::TAU;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How bright it is where: lamps, daylight and what walls throw back.
 
 use super::view::{Vector, dot, scale, subtract};

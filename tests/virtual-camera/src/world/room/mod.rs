@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A made-up room around the camera, with people walking in it.
 
 mod action;

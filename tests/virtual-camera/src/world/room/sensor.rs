@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! From light to numbers: the lens' softness, exposure, flickering lamps, noise.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Which test the room plays: the thesis' 72 and the seeds they are rerun with.
 
 use std::time::Duration;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where a point of the room is in the picture.
 //!
 //! World: metres, x to the right, y up, z ahead at pan 0; the floor is y = 0. Axes of the camera as in

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Fills the pixels that a surface covers.
 
 use std::ops::Range;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Which pixels a convex polygon covers, and how much of those at its edge.
 
 use std::ops::Range;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Flat surfaces in true perspective: which pixels they cover, and with what.
 
 mod brush;

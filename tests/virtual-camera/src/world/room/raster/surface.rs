@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A flat piece of the room: where it is, what it is made of, how it is lit, and how it is drawn.
 
 use std::sync::Arc;

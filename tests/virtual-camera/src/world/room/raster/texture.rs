@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What surfaces are made of: tiles of pixels at every resolution.
 
 use std::sync::Arc;

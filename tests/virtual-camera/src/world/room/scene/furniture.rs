@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stands in the room, made of boxes and leaves.
 
 use std::sync::Arc;

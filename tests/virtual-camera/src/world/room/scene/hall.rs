@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The hall: how large it is, its walls, floor and ceiling, and its light.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Light baked into the room: lamps and windows, and the darkness of corners and beneath things.
 
 use super::{furniture::Piece, hall::Hall, solid::Solid};

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What the walls, the floor and the doors of one hall are finished with.
 
 use std::sync::Arc;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The room itself: a hall with what stands and hangs in it, lit once and for all.
 
 mod furniture;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Tools to paint tiles with: colours, noise, shapes.
 
 use std::sync::Arc;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Boxes: where they stand, what hides what, and their sides.
 
 use std::sync::Arc;

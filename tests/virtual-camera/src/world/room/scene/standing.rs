@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stands free on the floor, behind the person's way and before it.
 
 use super::{furniture::Piece, solid::Solid, stuff::Painter};

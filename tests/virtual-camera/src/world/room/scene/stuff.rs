@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What walls, floors and furniture are made of: tiles that repeat.
 
 use std::sync::Arc;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What kind of room a seed is.
 
 use super::paint::{Colour, hue};

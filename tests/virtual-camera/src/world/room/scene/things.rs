@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What hangs on walls and the fronts of furniture: pictures of which there is one each.
 
 use std::sync::Arc;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What stands along the walls and hangs on them.
 
 use std::sync::Arc;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The skin of a posed body: which rings lie round which bones.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Who is in the room, and the ways they take where the room does not play a test of the thesis.
 
 use std::f64::consts::PI;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What covers the person: skin, hair and clothes, with their patterns, folds and weave, as tiles of cloth.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The build of a person: lengths of bones, thickness of limbs, habits of walking.
 
 use super::super::{

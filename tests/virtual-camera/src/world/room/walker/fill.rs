@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Filling triangles: which samples lie inside, and what runs over them linearly.
 
 /// What a corner of a triangle carries.

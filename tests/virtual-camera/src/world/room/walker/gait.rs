@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! How the person walks: where the feet come down, and how the joints stand at every moment.
 //!
 //! The feet lead. Each comes down where the body will be over it in the middle of its stance and stays there, so no

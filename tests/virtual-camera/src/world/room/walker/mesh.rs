@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Skins over the bones: tubes of elliptical rings, smoothed along their length.
 
 use std::f64::consts::TAU;

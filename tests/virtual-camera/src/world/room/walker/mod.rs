@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! The people who walk through the room: their ways, their gait, their bodies and clothes, and how they are drawn.
 
 mod body;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where something must stand to hide the person, or the lower half of them, for as long as wanted.
 
 use super::{

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Painting skins into a picture, nearest first.
 
 use super::{

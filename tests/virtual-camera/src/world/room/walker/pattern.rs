@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Chance spread over a tile so that its edges meet.
 
 use crate::seeded::Seeded;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A way by waypoints: where somebody goes who turns, stops and sits down as people do.
 
 use std::f64::consts::{PI, TAU};

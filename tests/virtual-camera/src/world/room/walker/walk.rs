@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Where the person is when: the way across the room, its speed and its turn.
 
 use std::f64::consts::PI;

@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! What people put on: cuts, patterns and colours. Half of them wear plain clothes, many of these dark.
 
 use super::{

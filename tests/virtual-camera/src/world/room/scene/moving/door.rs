@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A door in a partition, that opens and falls shut.
 
 use super::{

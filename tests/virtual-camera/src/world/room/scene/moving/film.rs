@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A screen on a stand that shows films: shots with something moving in each, and cuts between them.
 
 use std::sync::Arc;

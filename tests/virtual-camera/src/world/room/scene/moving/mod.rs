@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! Things in the room that move by themselves.
 
 mod door;

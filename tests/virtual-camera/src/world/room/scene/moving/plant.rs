@@ -1,3 +1,5 @@
+// SPDX-License-Identifier: MPL-2.0
+
 //! A plant whose leaves move in the draught.
 
 use super::{
