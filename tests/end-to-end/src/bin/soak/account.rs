@@ -7,6 +7,7 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use crate::known::Known;
 use crate::sample::{Sample, Samples};
 
 /// What was counted of one camera.
@@ -14,13 +15,16 @@ pub struct Account {
     camera: usize,
     /// How often each thing happened, and the longest that it took to be back.
     happened: BTreeMap<&'static str, (u32, Duration)>,
+    /// What stock GStreamer may complain of here, and how often it did.
+    known: Vec<(&'static Known, u32)>,
     /// What must not be.
     faults: Vec<String>,
 }
 
 impl Account {
-    pub fn of(camera: usize) -> Self {
-        Self { camera, happened: BTreeMap::new(), faults: Vec::new() }
+    pub fn of(camera: usize, known: &'static [Known]) -> Self {
+        let known = known.iter().map(|known| (known, 0)).collect();
+        Self { camera, happened: BTreeMap::new(), known, faults: Vec::new() }
     }
 
     /// How long it took to be followed again, where it was.
@@ -39,8 +43,24 @@ impl Account {
         }
     }
 
+    /// All that who followed has said: a complaint is a fault, but for those that are known, which are counted.
+    pub fn said(&mut self, output: &str) {
+        let complains = |line: &&str| line.contains("panicked") || line.contains("CRITICAL");
+        let mut faulty = false;
+        for line in output.lines().filter(complains) {
+            match self.known.iter_mut().find(|(known, _)| known.is(line)) {
+                Some((_, times)) => *times += 1,
+                None => faulty = true,
+            }
+        }
+        if faulty {
+            self.fault(&format!("who followed complained: {output}"));
+        }
+    }
+
     pub fn ended(&mut self, well: bool, output: &str) {
-        if !well || output.contains("panicked") || output.contains("CRITICAL") {
+        self.said(output);
+        if !well {
             self.fault(&format!("who followed ended badly: {output}"));
         }
     }
@@ -85,6 +105,7 @@ pub fn tell(accounts: &[Account], samples: &Samples, out: &Path) -> bool {
             }
         }
     }
+    text.push_str(&known_complaints(accounts));
     match &faults[..] {
         [] => text.push_str("\nEvery camera is at rest, nothing has grown, nothing was lost.\n"),
         faults => writeln!(text, "\nNot well:\n\n- {}", faults.join("\n- ")).unwrap(),
@@ -94,8 +115,72 @@ pub fn tell(accounts: &[Account], samples: &Samples, out: &Path) -> bool {
     faults.is_empty()
 }
 
+/// A line for each that came: they are no faults, but nobody shall have to guess that they were there.
+fn known_complaints(accounts: &[Account]) -> String {
+    let mut text = String::new();
+    for account in accounts {
+        for (known, times) in account.known.iter().filter(|(_, times)| *times > 0) {
+            let (camera, Known { text: line, why, .. }) = (account.camera, known);
+            writeln!(text, "\nCamera {camera}: {times} times GStreamer's own `{line}`: {why}.").unwrap();
+        }
+    }
+    text
+}
+
 fn median(samples: &[Sample], value: fn(&Sample) -> f64) -> f64 {
     let mut values: Vec<_> = samples.iter().map(value).collect();
     values.sort_by(f64::total_cmp);
     values[values.len() / 2]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::known::OF_RTSPSRC;
+
+    fn complaint(of: &str) -> String {
+        format!("\n(unattended:4711): {of}\n")
+    }
+
+    fn known() -> String {
+        complaint(&format!("GStreamer-CRITICAL **: 12:34:56.789: {}", OF_RTSPSRC[0].text))
+    }
+
+    #[test]
+    fn a_known_complaint_is_counted_and_told_and_no_fault() {
+        let mut account = Account::of(2, OF_RTSPSRC);
+        account.said(&known());
+        account.ended(true, &known().repeat(3));
+        assert!(account.faults.is_empty(), "{:?}", account.faults);
+        let told = known_complaints(&[Account::of(3, OF_RTSPSRC), account]);
+        assert!(told.contains("Camera 2: 4 times") && told.contains(OF_RTSPSRC[0].text), "{told}");
+        assert!(!told.contains("Camera 3"), "{told}");
+    }
+
+    #[test]
+    fn nothing_else_hides_behind_a_known_complaint() {
+        let others = [
+            complaint(
+                "GStreamer-CRITICAL **: 12:34:56.789: gst_event_unref: assertion 'event != NULL' failed",
+            ),
+            "thread 'main' panicked at src/main.rs:1:1:\n".to_owned(),
+        ];
+        for other in others {
+            let mut account = Account::of(2, OF_RTSPSRC);
+            account.said(&format!("{}{other}{}", known(), known()));
+            assert_eq!(account.faults.len(), 1, "{other}");
+            assert!(known_complaints(&[account]).contains("2 times"));
+        }
+        let mut ended_badly = Account::of(2, OF_RTSPSRC);
+        ended_badly.ended(false, &known());
+        assert_eq!(ended_badly.faults.len(), 1);
+    }
+
+    /// Who has no `rtspsrc` has no excuse.
+    #[test]
+    fn where_none_is_known_each_is_a_fault() {
+        let mut account = Account::of(0, &[]);
+        account.said(&known());
+        assert_eq!(account.faults.len(), 1);
+    }
 }

@@ -15,6 +15,7 @@ use virtual_camera::{Fault, VirtualCamera};
 
 use crate::account::Account;
 use crate::fault::Happening;
+use crate::known::{Known, OF_RTSPSRC};
 
 /// From the end of one thing to the next, s.
 const PEACE_S: (u64, u64) = (4, 16);
@@ -34,6 +35,11 @@ pub struct Camera {
     process: Arc<AtomicU32>,
 }
 
+/// How the picture of this camera comes.
+fn by_rtsp(number: usize) -> bool {
+    number >= 2
+}
+
 /// What samples are taken of.
 pub struct Probe {
     /// From 0.
@@ -51,7 +57,7 @@ impl Camera {
         let network = Network::before(&camera);
         let seed = seed * 10 + number as u64;
         let mut command = watchdog.of(tool(plugin_folder().join("unattended").to_str().unwrap()));
-        command.args([if number < 2 { "mjpeg" } else { "h264" }, &seed.to_string()]);
+        command.args([if by_rtsp(number) { "h264" } else { "mjpeg" }, &seed.to_string()]);
         network.surround(&mut command);
         let follower = GstLaunch::spawn(&mut command);
         let process = Arc::new(AtomicU32::new(follower.id()));
@@ -65,7 +71,8 @@ impl Camera {
 
     /// One thing after the other, until it is over.
     pub fn run(mut self, over: &AtomicBool) -> Account {
-        let mut account = Account::of(self.number);
+        let known: &[Known] = if by_rtsp(self.number) { OF_RTSPSRC } else { &[] };
+        let mut account = Account::of(self.number, known);
         account.came_back("start", self.is_followed(Instant::now()));
         while !over.load(Ordering::Relaxed) {
             sleep(Duration::from_secs(self.chance.within(PEACE_S)));
@@ -115,7 +122,8 @@ impl Camera {
     fn kill(&mut self, account: &mut Account) {
         if let Some(follower) = self.follower.take() {
             follower.signal("KILL");
-            follower.finish();
+            let (_, output) = follower.finish();
+            account.said(&output);
         }
         account.rests(left_at_rest(&self.camera, RESTS));
         let follower = GstLaunch::spawn(&mut self.command);

@@ -11,6 +11,7 @@
 mod account;
 mod camera;
 mod fault;
+mod known;
 mod sample;
 
 use std::path::PathBuf;
