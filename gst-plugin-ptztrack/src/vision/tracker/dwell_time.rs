@@ -92,6 +92,11 @@ impl DwellTime {
         Self { trial: Some(Way::default()), ..Self::default() }
     }
 
+    /// Whether it has yet to go somewhere: a screen may have been chosen as well as a person.
+    pub fn is_on_trial(&self) -> bool {
+        self.trial.is_some()
+    }
+
     /// Takes a frame, `dt_s` seconds after the last one, in which the target was seen or not.
     pub fn pass(&mut self, dt_s: f64) {
         self.tracked_s += dt_s;
@@ -129,7 +134,7 @@ impl DwellTime {
     /// Why the target is to be given up now, if it is.
     pub fn exhausted(&self, limits: Limits) -> Option<ReleaseReason> {
         let patience_s =
-            if self.trial.is_some() { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
+            if self.is_on_trial() { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
         if self.still_s > patience_s {
             Some(ReleaseReason::Stationary)
         } else {
@@ -288,5 +293,18 @@ mod tests {
             };
             prop_assert!(!given_up(30.0, EgoMotion::default(), walk));
         }
+    }
+
+    #[test]
+    fn the_trial_ends_when_it_has_gone_its_breadth() {
+        let mut dwell = DwellTime::on_trial();
+        let at = |x: f32| around(Point2f::new(x, 0.0), WIDTH, 2.25 * WIDTH);
+        let mut go = |from: f32, to: f32| {
+            dwell.watch(at(from), at(to), EgoMotion::default(), DT);
+            dwell.is_on_trial()
+        };
+        assert!(go(0.0, 0.9 * WIDTH) && go(0.9 * WIDTH, 0.1 * WIDTH), "to and fro");
+        assert!(!go(0.1 * WIDTH, 1.1 * WIDTH));
+        assert!(!DwellTime::default().is_on_trial());
     }
 }

@@ -266,7 +266,7 @@ impl Tracker {
             _ => {}
         }
         target.dwell.pass(dt_s);
-        if sight == Sight::Seen && target.follow.estimate().is_sure() {
+        if sight == Sight::Seen && target.follow.estimate().is_sure() && !target.dwell.is_on_trial() {
             self.selection.tell_apart(target.follow.estimate().bounds, self.config.confirm_frames);
         }
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
