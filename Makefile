@@ -125,18 +125,28 @@ install:
 	scripts/install-plugins target/release "$(PREFIX)" "$(DESTDIR)"
 
 ## deb: make a Debian package of plugins, watchdog and program for the release that this runs on, in target/deb
+##      (RELEASE=bookworm|trixie: for that one, built in a bare root of its own, target/bookworm; as root)
+ifdef RELEASE
+deb:
+	@scripts/install-packages mmdebstrap
+	@# Not with this make's arguments, or it makes a root in the root.
+	env -u MAKEFLAGS -u RELEASE scripts/in-debian "$(RELEASE)" "target/$(RELEASE)" make deb
+	install -D --mode=644 --target-directory=target/deb target/$(RELEASE)/ptztrack/target/deb/*~$(RELEASE)1_*.deb
+else
 deb: packages-build
 	@scripts/install-packages dpkg-dev
 	$(CARGO) build --release $(PRODUCT)
 	scripts/make-deb target/release target/deb
+endif
 
-## test-packages: make it, check it, and install, use and purge it in a bare Debian; as root
-test-packages: deb
+## test-packages: make it, check it, and install, use and purge it in a bare Debian; as root (RELEASE=bookworm|trixie)
+test-packages: deb packages-build
 	@scripts/install-packages $(RUN_PACKAGES) lintian mmdebstrap systemd
 	@# Not built from what is packed: the registry has none of them yet.
 	$(CARGO) package --workspace --exclude virtual-camera --exclude end-to-end --exclude evaluation --no-verify --allow-dirty
 	$(CARGO) build --release --package virtual-camera
-	scripts/test-packages "$$(ls target/deb/*.deb | tail -1)" target/release/virtual-camera
+	release="$(RELEASE)"; scripts/test-packages \
+		"$$(ls -t target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb | sed -n 1p)" target/release/virtual-camera
 
 packages-build:
 	@scripts/install-packages $(BUILD_PACKAGES)
