@@ -221,11 +221,7 @@ impl Key {
 fn travel(homography: &Homography, grid: Grid) -> f64 {
     let (width, height) = grid.size();
     let corners = [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)];
-    let length = |(x, y): (f64, f64)| {
-        let to = homography.apply(Point { x, y });
-        (to.x - x).hypot(to.y - y)
-    };
-    corners.map(length).into_iter().fold(0.0, f64::max)
+    corners.map(|(x, y)| displacement(homography, Point { x, y })).into_iter().fold(0.0, f64::max)
 }
 
 /// A normalised motion as one of pixels, whose middles lie half a pixel inside.

@@ -6,6 +6,8 @@
 //! 2016), of the upper and the lower body each. Brightness and colour are counted apart, so that the few hundred cells of
 //! one picture fill them; grey video has brightness alone.
 
+use std::cell::OnceCell;
+
 /// Bins of brightness, and of each of the two colour differences.
 const GREYS: usize = 16;
 const TINTS: usize = 13;
@@ -114,11 +116,7 @@ pub(super) struct ColourModel {
 
 impl ColourModel {
     pub fn new(figure: [Histogram; 2], ground: Histogram) -> Self {
-        Self {
-            ground: Alternative::to(&figure, ground),
-            anyone: Alternative::to(&figure, Histogram::of_anyone()),
-            figure,
-        }
+        Self { figure, ground: ground.into(), anyone: Histogram::of_anyone().into() }
     }
 
     /// Logarithm of the odds that a cell of that colour belongs to the target and not to the ground; `lower` 0 (upper body)
@@ -156,8 +154,8 @@ impl ColourModel {
         if let Some(new) = ground {
             self.ground.colours.blend(&new, ground_rate);
         }
-        self.ground.odds = odds(&self.figure, &self.ground.colours);
-        self.anyone.odds = odds(&self.figure, &self.anyone.colours);
+        self.ground.odds.take();
+        self.anyone.odds.take();
     }
 }
 
@@ -165,8 +163,8 @@ impl ColourModel {
 #[derive(Debug, Clone, PartialEq)]
 struct Alternative {
     colours: Histogram,
-    /// Logarithms of odds of either half of the figure against it, worked out once.
-    odds: [Odds; 2],
+    /// Logarithms of odds of either half of the figure against it, worked out once, and only where they are asked for.
+    odds: OnceCell<[Odds; 2]>,
 }
 
 /// Logarithms of the odds of each brightness and each tint.
@@ -176,16 +174,18 @@ struct Odds {
     tints: [f32; TINTS * TINTS],
 }
 
-impl Alternative {
-    fn to(figure: &[Histogram; 2], colours: Histogram) -> Self {
-        Self { odds: odds(figure, &colours), colours }
+impl From<Histogram> for Alternative {
+    fn from(colours: Histogram) -> Self {
+        Self { colours, odds: OnceCell::new() }
     }
+}
 
+impl Alternative {
     fn log_odds(&self, figure: &[Histogram; 2], (grey, tint): Colour, lower: f32) -> f32 {
         let tint = tint.map(tint_bin);
         // Near the middle of the body both halves count; everywhere else there is a table.
         if lower == 0.0 || lower == 1.0 {
-            let odds = &self.odds[usize::from(lower == 1.0)];
+            let odds = &self.odds.get_or_init(|| odds(figure, &self.colours))[usize::from(lower == 1.0)];
             return odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]);
         }
         let tinted = tint.map_or(0.0, |bin| tint_odds(figure, &self.colours, bin, lower));

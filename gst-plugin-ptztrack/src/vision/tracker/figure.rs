@@ -38,6 +38,15 @@ pub(super) struct Cells {
     inside: Vec<bool>,
 }
 
+/// What tells the target by its looks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Looks<'a> {
+    pub colours: &'a ColourModel,
+    /// Logarithm of the odds that what moves here is the target and nobody else, before its colours are seen: infinite where
+    /// nobody else is near.
+    pub alone: f32,
+}
+
 /// A number of cells across and down.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Grid {
@@ -106,17 +115,16 @@ impl Cells {
         self.lattice.cell()
     }
 
-    /// Logarithm of the odds of each cell, by motion and colour. `alone` is that of the odds that what moves here is the target
-    /// and nobody else, before its colours are seen: infinite where nobody else is near.
-    pub fn evidence(&self, colours: Option<&ColourModel>, alone: f32) -> Evidence {
+    /// Logarithm of the odds of each cell, by motion and, where they are known, by colours.
+    pub fn evidence(&self, looks: Option<Looks>) -> Evidence {
         let odds = (0..self.colours.len()).map(|index| {
-            let both = colours.map_or(self.motion[index], |model| {
+            let both = looks.map_or(self.motion[index], |Looks { colours, alone }| {
                 let (colour, lower) = (self.colours[index], self.lattice.lower(index));
-                let not_ground = self.motion[index] + model.log_odds(colour, lower);
+                let not_ground = self.motion[index] + colours.log_odds(colour, lower);
                 // Somebody else moves against the background as well: only colours tell who it is. The larger of both
                 // doubts counts.
                 if alone.is_finite() {
-                    not_ground.min(alone + model.log_odds_against_anyone(colour, lower))
+                    not_ground.min(alone + colours.log_odds_against_anyone(colour, lower))
                 } else {
                     not_ground
                 }
@@ -456,7 +464,7 @@ mod tests {
     #[test]
     fn what_moves_is_figure_and_the_wall_is_ground() {
         let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(GRID));
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
         assert!(map.at(centre(BOX)) > 0.95);
         assert!(map.at(Point2f::new(BOX.x - 15.0, 110.0)) < 0.1);
         assert_eq!(map.at(Point2f::new(0.0, 0.0)), 0.0, "beyond the map");
@@ -466,7 +474,7 @@ mod tests {
     fn the_silhouette_fits_best_where_the_person_is() {
         let moved = BOX + Point2f::new(8.0, 0.0);
         let cells = Scene::new(moved, 60, 255).cells(BOX);
-        let evidence = cells.evidence(None, f32::INFINITY);
+        let evidence = cells.evidence(None);
         let template = Shape::upright(GRID).template(1.0);
         let best = (-6..=6)
             .flat_map(|x| (-6..=6).map(move |y| (x, y)))
@@ -482,7 +490,7 @@ mod tests {
     #[test]
     fn a_known_wall_fits_nobody() {
         let cells = Scene::new(Rect2f::default(), 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None, f32::INFINITY), (0, 0));
+        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
         assert!(fit.mean().abs() < 0.05, "{fit:?}");
     }
 
@@ -490,36 +498,38 @@ mod tests {
     fn behind_a_table_the_upper_half_still_fits() {
         let upper = Rect2f { height: 50.0, ..BOX };
         let cells = Scene::new(upper, 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None, f32::INFINITY), (0, 0));
+        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
         assert!(fit.upper > 0.4 && fit.lower < 0.1, "{fit:?}");
+    }
+
+    /// Of somebody of that grey who moves.
+    fn colours_of(grey: u8) -> ColourModel {
+        let cells = Scene::new(BOX, grey, 255).cells(BOX);
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
+        let ([upper, lower], ground) = cells.histograms(&map);
+        ColourModel::new([upper.expect("seen"), lower.expect("seen")], ground.expect("seen"))
+    }
+
+    /// How well an upright silhouette of these colours fits the scene.
+    fn fit(scene: &Scene, colours: &ColourModel, alone: f32) -> f32 {
+        let evidence = scene.cells(BOX).evidence(Some(Looks { colours, alone }));
+        Shape::upright(GRID).template(1.0).fit(&evidence, (0, 0)).mean()
     }
 
     #[test]
     fn colours_find_who_stands_still_again() {
         // Seen to move first, then nothing moves any more.
-        let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(GRID));
-        let ([upper, lower], ground) = cells.histograms(&map);
-        let model = ColourModel::new([upper.expect("seen"), lower.expect("seen")], ground.expect("seen"));
-        let still = Scene::new(BOX, 60, 128).cells(BOX);
-        let fit =
-            Shape::upright(GRID).template(1.0).fit(&still.evidence(Some(&model), f32::INFINITY), (0, 0));
-        assert!(fit.mean() > 0.4, "{fit:?}");
-        let gone = Scene::new(Rect2f::default(), 60, 128).cells(BOX);
-        let fit = Shape::upright(GRID).template(1.0).fit(&gone.evidence(Some(&model), f32::INFINITY), (0, 0));
-        assert!(fit.mean().abs() < 0.05, "{fit:?}");
+        let colours = colours_of(60);
+        let still = fit(&Scene::new(BOX, 60, 128), &colours, f32::INFINITY);
+        assert!(still > 0.4, "{still}");
+        let gone = fit(&Scene::new(Rect2f::default(), 60, 128), &colours, f32::INFINITY);
+        assert!(gone.abs() < 0.05, "{gone}");
     }
 
     #[test]
     fn beside_others_who_moves_in_other_colours_is_not_the_target() {
-        let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(GRID));
-        let ([upper, lower], ground) = cells.histograms(&map);
-        let model = ColourModel::new([upper.expect("seen"), lower.expect("seen")], ground.expect("seen"));
-        let fit = |grey, alone| {
-            let evidence = Scene::new(BOX, grey, 255).cells(BOX).evidence(Some(&model), alone);
-            Shape::upright(GRID).template(1.0).fit(&evidence, (0, 0)).mean()
-        };
+        let colours = colours_of(60);
+        let fit = |grey, alone| fit(&Scene::new(BOX, grey, 255), &colours, alone);
         let (own, other) = (fit(60, 0.5), fit(220, 0.5));
         assert!(own > 0.4 && other < 0.5 * own, "{own} {other}");
         assert!(fit(220, f32::INFINITY) > 0.4, "alone, whoever moves is the target");
@@ -530,7 +540,7 @@ mod tests {
         let usual = Halves { upper: 0.8, lower: 0.7 };
         let level = |seen_to_move| {
             let cells = Scene::new(BOX, 60, seen_to_move).cells(BOX);
-            Shape::upright(GRID).level(&cells.evidence(None, f32::INFINITY), (0, 0), usual)
+            Shape::upright(GRID).level(&cells.evidence(None), (0, 0), usual)
         };
         let off = |level: Halves| (level.upper - usual.upper).abs().max((level.lower - usual.lower).abs());
         assert!(off(level(128)) < 0.01, "{:?}", level(128));
@@ -540,7 +550,7 @@ mod tests {
     #[test]
     fn the_centre_of_mass_is_that_of_the_figure() {
         let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(GRID));
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
         let mass = map.centre_of_mass(BOX).expect("seen");
         assert!((mass - centre(BOX)).norm() < 2.0, "{mass:?}");
         assert_eq!(map.centre_of_mass(BOX + Point2f::new(900.0, 0.0)), None);

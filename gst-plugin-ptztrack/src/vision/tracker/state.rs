@@ -219,9 +219,7 @@ impl Tracker {
             contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
             restless: detection.restless,
             outside: detection.outside,
-            velocity: Point2f::default(),
-            another: false,
-            merged: 0,
+            ..Sighting::default()
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
         self.selection.detector_pause_s = self.config.detector_pause_s;

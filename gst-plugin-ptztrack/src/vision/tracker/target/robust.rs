@@ -11,7 +11,9 @@ use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::figure::{CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Shape, Template};
+use crate::vision::tracker::figure::{
+    CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Looks, Shape, Template,
+};
 use crate::vision::tracker::flow::Flow;
 use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
 use crate::vision::tracker::grey_histogram::near_the_middle;
@@ -144,7 +146,7 @@ impl Robust {
         let grid = Grid { columns: filter.grid().columns * FINER, rows: filter.grid().rows * FINER };
         let shape = Shape::upright(grid);
         let cells = Cells::observe(seen, bounds, grid);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &shape);
+        let map = FigureMap::new(&cells, &cells.evidence(None), &shape);
         let mut target = Self {
             estimate: Estimate {
                 bounds,
@@ -189,7 +191,7 @@ impl Robust {
     /// The map of figure and ground around the box as it is now.
     fn look_closely(&mut self, seen: &Observation) -> opencv::Result<(Cells, Evidence)> {
         let cells = Cells::observe(seen, self.estimate.bounds, self.grid);
-        let evidence = cells.evidence(self.colours.as_ref(), self.alone());
+        let evidence = cells.evidence(self.looks());
         self.map = FigureMap::new(&cells, &evidence, &self.shape);
         Ok((cells, evidence))
     }
@@ -210,9 +212,10 @@ impl Robust {
         self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
     }
 
-    /// Logarithm of the odds that what moves around the target belongs to nobody else, before its colours are seen.
-    fn alone(&self) -> f32 {
-        ALONE_BESIDE_OTHERS + self.alone_s / OTHERS_TIME_S
+    /// What its looks are, and how likely it is that what moves around it is nobody else.
+    fn looks(&self) -> Option<Looks<'_>> {
+        let alone = ALONE_BESIDE_OTHERS + self.alone_s / OTHERS_TIME_S;
+        self.colours.as_ref().map(|colours| Looks { colours, alone })
     }
 
     fn follow_points(
@@ -240,7 +243,7 @@ impl Robust {
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
     fn locate(&self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
         let cells = Cells::observe(seen, bounds, self.grid);
-        let evidence = cells.evidence(self.colours.as_ref(), self.alone());
+        let evidence = cells.evidence(self.looks());
         let response = self.filter.respond(&seen.luma, bounds)?;
         let cell = cells.cell() * FINER as f32;
         let silhouette = self.shape.template(1.0);
@@ -608,7 +611,7 @@ impl Follow for Robust {
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
         let Some(colours) = &self.colours else { return Ok(false) };
         let cells = Cells::observe(seen, sighting.bounds, self.grid);
-        let map = FigureMap::new(&cells, &cells.evidence(None, f32::INFINITY), &Shape::upright(self.grid));
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
         let (figure, _) = cells.histograms(&map);
         Ok(colours.likeness(&figure) >= ALIKE)
     }
