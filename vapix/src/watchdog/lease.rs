@@ -60,15 +60,11 @@ impl Lease {
             return Ok(());
         }
         let watchdog = self.watchdog.clone();
-        let connecting = spawn_blocking(move || watchdog.connect());
+        let connecting = spawn_blocking(move || watchdog.connect(&message));
         match timeout(Self::LONGEST_START, connecting).await {
-            Ok(Ok(connected)) => connected?,
-            Ok(Err(err)) => return Err(Unavailable::Broken(err.to_string())),
-            Err(_) => return Err(Unavailable::Broken("it does not start".to_owned())),
-        }
-        match self.watchdog.say(&message)? {
-            true => Ok(()),
-            false => Err(Unavailable::Broken("it ended as soon as it was started".to_owned())),
+            Ok(Ok(connected)) => connected,
+            Ok(Err(err)) => Err(Unavailable::Broken(err.to_string())),
+            Err(_) => Err(Unavailable::Broken("it does not start".to_owned())),
         }
     }
 

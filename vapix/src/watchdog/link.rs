@@ -84,25 +84,17 @@ impl Watchdog {
     /// # Errors
     /// [`Unavailable::Broken`] where there was one and it failed.
     pub(super) fn say(&self, message: &Message) -> Result<bool, Unavailable> {
-        let line = message.to_line().map_err(|err| Unavailable::Broken(err.to_string()))?;
-        let mut link = self.link();
-        let Some(stream) = &mut link.stream else { return Ok(false) };
-        // Neither waits, as the socket does not block, nor raises SIGPIPE, as the standard library asks for none. A watchdog
-        // that has not read for so long that the socket is full will not read this either.
-        let said = stream.write_all(&line);
-        if said.is_err() {
-            link.stream = None;
-        }
-        said.map(|()| true).map_err(|err| Unavailable::Broken(err.to_string()))
+        self.link().say(&line(message)?)
     }
 
-    /// Connects if there is no connection. May take as long as it takes to start a process.
+    /// Says something, and connects for it if there is no connection. May take as long as it takes to start a process.
     ///
     /// # Errors
-    /// Why there is none; the same for a while.
-    pub(super) fn connect(&self) -> Result<(), Unavailable> {
+    /// Why there is no connection, the same for a while; or that it failed.
+    pub(super) fn connect(&self, message: &Message) -> Result<(), Unavailable> {
+        let line = line(message)?;
         let mut link = self.link();
-        if link.stream.is_some() {
+        if link.say(&line)? {
             return Ok(());
         }
         if link.tried.is_some_and(|tried| tried.elapsed() < Self::PAUSE) {
@@ -110,7 +102,7 @@ impl Watchdog {
             return Err(link.failure.clone().unwrap_or_else(again));
         }
         link.tried = Some(Instant::now());
-        let stream = self.address.connect();
+        let stream = self.address.connect(&line);
         link.failure = stream.as_ref().err().cloned();
         link.stream = Some(stream?);
         Ok(())
@@ -119,6 +111,23 @@ impl Watchdog {
     fn link(&self) -> MutexGuard<'_, Link> {
         self.link.lock().unwrap_or_else(PoisonError::into_inner)
     }
+}
+
+impl Link {
+    fn say(&mut self, line: &[u8]) -> Result<bool, Unavailable> {
+        let Some(stream) = &mut self.stream else { return Ok(false) };
+        // Neither waits, as the socket does not block, nor raises SIGPIPE, as the standard library asks for none. A watchdog
+        // that has not read for so long that the socket is full will not read this either.
+        let said = stream.write_all(line);
+        if said.is_err() {
+            self.stream = None;
+        }
+        said.map(|()| true).map_err(|err| Unavailable::Broken(err.to_string()))
+    }
+}
+
+fn line(message: &Message) -> Result<Vec<u8>, Unavailable> {
+    message.to_line().map_err(|err| Unavailable::Broken(err.to_string()))
 }
 
 impl WatchdogAddress {
@@ -136,26 +145,30 @@ impl WatchdogAddress {
         }
     }
 
-    fn connect(&self) -> Result<UnixStream, Unavailable> {
+    /// With this as the first that is said.
+    fn connect(&self, line: &[u8]) -> Result<UnixStream, Unavailable> {
         match self {
-            Self::Program(program) => start(program)
+            Self::Program(program) => start(program, line)
                 .map_err(|err| Unavailable::Program { program: program.clone(), reason: err.to_string() }),
-            Self::Socket(socket) => connect(socket)
+            Self::Socket(socket) => connect(socket, line)
                 .map_err(|err| Unavailable::Socket { socket: socket.clone(), reason: err.to_string() }),
         }
     }
 }
 
-fn connect(socket: &Path) -> io::Result<UnixStream> {
-    let stream = UnixStream::connect(socket)?;
+fn connect(socket: &Path, line: &[u8]) -> io::Result<UnixStream> {
+    let mut stream = UnixStream::connect(socket)?;
     stream.set_nonblocking(true)?;
+    stream.write_all(line)?;
     Ok(stream)
 }
 
 /// Nothing of ours runs between fork and exec, so this is safe in any host; what must be done then the program does itself.
-fn start(program: &Path) -> io::Result<UnixStream> {
-    let (ours, its) = UnixStream::pair()?;
+fn start(program: &Path, line: &[u8]) -> io::Result<UnixStream> {
+    let (mut ours, its) = UnixStream::pair()?;
     ours.set_nonblocking(true)?;
+    // From its first instruction on it knows what to do, even if this process dies while it starts.
+    ours.write_all(line)?;
     let mut child = Command::new(program)
         .stdin(OwnedFd::from(its))
         .stdout(Stdio::null())
@@ -220,16 +233,27 @@ mod tests {
     fn a_program_that_is_not_there_is_named_and_not_looked_for_again_at_once() {
         let watchdog = nowhere();
         for _ in 0..3 {
-            let err = watchdog.connect().unwrap_err().to_string();
+            let err = watchdog.connect(&release()).unwrap_err().to_string();
             assert!(err.contains("/nonexistent/watchdog") && err.contains("No such file"), "{err}");
         }
         let socket = Watchdog::new(WatchdogAddress::Socket("/nonexistent/socket".into()));
-        assert!(socket.connect().unwrap_err().to_string().contains("/nonexistent/socket"));
+        assert!(socket.connect(&release()).unwrap_err().to_string().contains("/nonexistent/socket"));
+    }
+
+    /// Were it told once it runs, it would know nothing where the application dies in the meantime. `start` waits for the end
+    /// of the program, so nothing can be said to it afterwards.
+    #[test]
+    fn a_program_knows_from_its_start_what_to_do() {
+        let (ended, end) = std::sync::mpsc::channel();
+        std::thread::spawn(move || ended.send(start(Path::new("/bin/sh"), b"exit 7\n")));
+        let err =
+            end.recv_timeout(Duration::from_secs(60)).expect("it was told nothing").unwrap_err().to_string();
+        assert!(err.contains("exit status: 7"), "{err}");
     }
 
     #[test]
     fn a_program_that_fails_is_no_watchdog() {
-        let err = start(Path::new("/bin/false")).unwrap_err().to_string();
+        let err = start(Path::new("/bin/false"), b"").unwrap_err().to_string();
         assert!(err.contains("exit status: 1"), "{err}");
     }
 }
