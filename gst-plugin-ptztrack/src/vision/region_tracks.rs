@@ -9,11 +9,11 @@ const MAX_MISSED: Duration = Duration::from_millis(500);
 /// Time constant of a region's place and velocity: regions grow and fall apart from picture to picture.
 const SMOOTHING: Duration = Duration::from_millis(200);
 /// What has been seen for so long ...
-const TRIAL: Duration = Duration::from_secs(1);
+const TRIAL: Duration = Duration::from_millis(500);
 /// ... and has come less far than this part of its own size, goes nowhere.
 const MIN_TRAVEL: f64 = 0.4;
 /// Time constants of how restless a place is believed to be: while something changes there, and after.
-const RISE: Duration = Duration::from_secs(1);
+const RISE: Duration = Duration::from_millis(400);
 const DECAY: Duration = Duration::from_secs(120);
 /// Most places that are remembered.
 const MAX_PLACES: usize = 64;
