@@ -10,6 +10,8 @@ const FLOOR: f32 = 0.6;
 const CHROMA_FLOOR: f32 = 2.0;
 /// What is believed before anything was seen, grey levels.
 const START: f32 = 2.5;
+/// How much of it is believed of a brightness of which nothing was seen, beside one that was.
+const START_WEIGHT: f32 = 0.01;
 /// Weight of a picture in what is believed.
 const RATE: f32 = 0.1;
 /// Fewer samples of a picture than this say nothing.
@@ -37,6 +39,8 @@ impl Line {
 #[derive(Debug)]
 pub(super) struct Noise {
     luma: [f32; BINS],
+    /// How well the luma's is known.
+    weights: [f32; BINS],
     /// Standard deviation of the chroma.
     chroma: f32,
     sums: [(f32, f32); BINS],
@@ -46,7 +50,8 @@ pub(super) struct Noise {
 impl Default for Noise {
     fn default() -> Self {
         let nothing = [(0.0, 0.0); BINS];
-        Self { luma: [START; BINS], chroma: START, sums: nothing, chroma_sum: (0.0, 0.0) }
+        let weights = [START_WEIGHT; BINS];
+        Self { luma: [START; BINS], weights, chroma: START, sums: nothing, chroma_sum: (0.0, 0.0) }
     }
 }
 
@@ -62,26 +67,36 @@ impl Noise {
     /// Learns from what was noted of one picture.
     pub fn learn(&mut self) {
         let learned = |believed: &mut f32, (sum, count): (f32, f32)| {
-            if count >= MIN_SAMPLES {
+            let is_seen = count >= MIN_SAMPLES;
+            if is_seen {
                 *believed += RATE * ((PER_MEAN_DEVIATION * sum / count).max(FLOOR) - *believed);
             }
+            is_seen
         };
-        self.luma.iter_mut().zip(self.sums).for_each(|(believed, sums)| learned(believed, sums));
+        for ((believed, weight), sums) in self.luma.iter_mut().zip(&mut self.weights).zip(self.sums) {
+            if learned(believed, sums) {
+                *weight += RATE * (1.0 - *weight);
+            }
+        }
         learned(&mut self.chroma, self.chroma_sum);
         self.sums = [(0.0, 0.0); BINS];
         self.chroma_sum = (0.0, 0.0);
     }
 
-    /// Variance of the luma over brightness, by least squares.
+    /// Variance of the luma over brightness, by weighted least squares: in the dark only what is dark is known.
     pub fn luma(&self) -> Line {
         let middle = |bin: usize| (bin as f32 + 0.5) * 256.0 / BINS as f32;
-        let count = BINS as f32;
-        let mean = self.luma.iter().map(|deviation| deviation * deviation).sum::<f32>() / count;
-        let centre = 128.0;
+        let known = self.luma.iter().zip(self.weights).enumerate();
+        let known = known.map(|(bin, (deviation, weight))| (middle(bin), deviation * deviation, weight));
+        let weights: f32 = self.weights.iter().sum();
+        let average = |value: fn((f32, f32, f32)) -> f32| {
+            known.clone().map(|bin| value(bin) * bin.2).sum::<f32>() / weights
+        };
+        let (centre, mean) = (average(|bin| bin.0), average(|bin| bin.1));
         let (mut product, mut square) = (0.0, 0.0);
-        for (bin, deviation) in self.luma.iter().enumerate() {
-            product += (middle(bin) - centre) * (deviation * deviation - mean);
-            square += (middle(bin) - centre).powi(2);
+        for (middle, variance, weight) in known.clone() {
+            product += weight * (middle - centre) * (variance - mean);
+            square += weight * (middle - centre).powi(2);
         }
         let slope = product / square;
         Line { at_black: mean - slope * centre, slope }
@@ -90,5 +105,51 @@ impl Noise {
     /// Variance of the chroma.
     pub fn chroma(&self) -> f32 {
         (self.chroma * self.chroma).max(CHROMA_FLOOR * CHROMA_FLOOR)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a picture with these brightnesses, and the mean deviation of each.
+    fn learned(bins: &[(u8, f32)]) -> Noise {
+        let mut noise = Noise::default();
+        for _ in 0..100 {
+            for &(brightness, deviation) in bins {
+                (0..60).for_each(|_| noise.note(brightness, deviation / PER_MEAN_DEVIATION, 0.0));
+            }
+            noise.learn();
+        }
+        noise
+    }
+
+    #[test]
+    fn before_anything_was_seen_all_is_as_noisy() {
+        let line = Noise::default().luma();
+        [0.0, 128.0, 255.0]
+            .map(|brightness| assert!((line.variance(brightness) - START * START).abs() < 1e-3));
+    }
+
+    #[test]
+    fn noise_that_grows_with_light_is_a_line() {
+        let variance = |brightness: f32| 1.0 + 0.05 * brightness;
+        let seen =
+            [16_u8, 80, 144, 240].map(|brightness| (brightness, variance(f32::from(brightness)).sqrt()));
+        let line = learned(&seen).luma();
+        for brightness in [16.0, 112.0, 240.0] {
+            assert!(
+                (line.variance(brightness) / variance(brightness) - 1.0).abs() < 0.15,
+                "{brightness} {line:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_is_not_known_of_bright_places_makes_dark_ones_no_noisier() {
+        let line = learned(&[(10, 1.0), (40, 1.1)]).luma();
+        for brightness in [5.0, 25.0, 50.0] {
+            assert!((0.4..2.0).contains(&line.variance(brightness)), "{brightness} {line:?}");
+        }
     }
 }
