@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench evaluate evaluate-all soak deny fuzz install deb test-packages packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -11,6 +11,7 @@ BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git
 RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good \
 	gstreamer1.0-plugins-bad gstreamer1.0-plugins-ugly gstreamer1.0-libav
 EVALUATE_PACKAGES := $(RUN_PACKAGES) gstreamer1.0-opencv gnuplot-nox fonts-dejavu-core
+BENCH_PACKAGES := $(EVALUATE_PACKAGES) valgrind python3
 DEMO_PACKAGES := $(RUN_PACKAGES) python3 gnuplot-nox opencv-doc
 TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium mosquitto mosquitto-clients python3 python3-gi python3-venv \
 	gir1.2-gst-plugins-base-1.0
@@ -39,6 +40,8 @@ ROUNDS ?= 5
 LIVE_SECONDS ?= 20
 # A package of its own, which shares what is compiled.
 BENCHMARKS := --manifest-path benchmarks/Cargo.toml --target-dir target
+# The runner must be of the version that the benchmarks are built with.
+GUNGRAUN := $(shell sed -n 's/^gungraun = "=\(.*\)"/\1/p' benchmarks/Cargo.toml)
 
 ## help: list the targets
 help:
@@ -76,7 +79,7 @@ demo: packages-demo
 ## bench: measure what following costs, on recordings of the room, and leave tables and plots in target/bench: whole pipelines beside
 ##       decoding and other elements, live pictures as in the thesis' table 5.4, how late commands are, 1 to 16 cameras, and each
 ##       algorithm by itself from 640x480 to 3840x2160 (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20)
-bench: packages-evaluate
+bench: packages-bench
 	$(CARGO) build --release $(PRODUCT)
 	$(CARGO) build --release $(BENCHMARKS)
 	mkdir -p target/bench
@@ -87,7 +90,15 @@ bench: packages-evaluate
 	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
 		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
 	scripts/with-plugins release python3 benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench
-	$(CARGO) bench $(BENCHMARKS) | tee target/bench/algorithms.txt
+	$(CARGO) bench $(BENCHMARKS) --bench algorithms --bench elements | tee target/bench/algorithms.txt
+
+## bench-check: count the instructions that each element takes for fixed pictures, and fail where one is more than a tenth off the
+##       counts in benchmarks/instructions.csv (ARGS=--accept writes these)
+bench-check: packages-bench
+	$(CARGO) install --quiet --locked gungraun-runner --version $(GUNGRAUN) --root target/tools
+	rm -rf target/gungraun
+	GUNGRAUN_RUNNER="$(CURDIR)/target/tools/bin/gungraun-runner" $(CARGO) bench $(BENCHMARKS) --bench instructions -- --save-summary=json
+	python3 benchmarks/check_instructions.py target/gungraun benchmarks/instructions.csv $(ARGS)
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
 ##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;
@@ -157,6 +168,9 @@ packages-demo: packages-build
 
 packages-evaluate: packages-build
 	@scripts/install-packages $(EVALUATE_PACKAGES)
+
+packages-bench: packages-build
+	@scripts/install-packages $(BENCH_PACKAGES)
 
 packages-test: packages-build
 	@scripts/install-packages $(TEST_PACKAGES)

@@ -127,8 +127,9 @@ mod tests {
     #[test]
     fn before_anything_was_seen_all_is_as_noisy() {
         let line = Noise::default().luma();
-        [0.0, 128.0, 255.0]
-            .map(|brightness| assert!((line.variance(brightness) - START * START).abs() < 1e-3));
+        for brightness in [0.0, 128.0, 255.0] {
+            assert!((line.variance(brightness) - START * START).abs() < 1e-3, "{brightness} {line:?}");
+        }
     }
 
     #[test]
