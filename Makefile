@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench evaluate evaluate-all soak deny fuzz install deb test-packages packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench evaluate evaluate-all soak deny fuzz install deb test-packages test-container packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -135,7 +135,8 @@ deb:
 else
 deb: packages-build
 	@scripts/install-packages dpkg-dev
-	$(CARGO) build --release $(PRODUCT)
+	@# The date is the package's: crates in C would be compiled anew with each commit.
+	env -u SOURCE_DATE_EPOCH $(CARGO) build --release $(PRODUCT)
 	scripts/make-deb target/release target/deb
 endif
 
@@ -147,6 +148,13 @@ test-packages: deb packages-build
 	$(CARGO) build --release --package virtual-camera
 	release="$(RELEASE)"; scripts/test-packages \
 		"$$(ls -t target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb | sed -n 1p)" target/release/virtual-camera
+
+## test-container: build the container of deploy/Containerfile with podman, and follow in it, not as root and on a read-only root;
+##       as root (RELEASE=bookworm where this is another)
+test-container: deb packages-build
+	@scripts/install-packages $(RUN_PACKAGES) curl mmdebstrap podman runc
+	$(CARGO) build --release --package virtual-camera
+	scripts/test-container target/release/virtual-camera
 
 packages-build:
 	@scripts/install-packages $(BUILD_PACKAGES)
