@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
+use pipeline_supervisor::reach;
 use ptztrack_contract::lock::lock;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
@@ -99,6 +100,21 @@ fn location(camera: &CameraSettings) -> String {
     };
     let query: Vec<String> = [first, size, rate].into_iter().flatten().collect();
     format!("{path}?{}", query.join("&"))
+}
+
+/// Whether who has the pictures accepts a connection.
+///
+/// # Errors
+/// Why not.
+pub fn check_address(camera: &CameraSettings) -> Result<(), String> {
+    // A pipeline of one's own may have its pictures from elsewhere.
+    if camera.pipeline.is_some() {
+        return Ok(());
+    }
+    match camera.codec {
+        Codec::Mjpeg => reach::check_http(&camera.address, std::env::var("http_proxy").ok()),
+        Codec::Mpeg4 | Codec::H264 => reach::check(&camera.rtsp),
+    }
 }
 
 /// Builds it, with everything that watches it.
