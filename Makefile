@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -22,8 +22,8 @@ CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 25m
 
-# Both plugins; the watchdog, which is a program of crate `vapix`; what `pipelines/` are run with; and the program `ptztrack`.
-PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package vapix --package pipeline-supervisor \
+# Both plugins; the watchdog, a program of crate `ptztrack-vapix`; what `pipelines/` are run with; and the program `ptztrack`.
+PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package ptztrack-vapix --package pipeline-supervisor \
 	--package ptztrack
 
 CODEC ?= mjpeg
@@ -146,7 +146,8 @@ deb:
 else
 deb: packages-build
 	@scripts/install-packages dpkg-dev
-	$(CARGO) build --release $(PRODUCT)
+	@# The date is the package's: crates in C would be compiled anew with each commit.
+	env -u SOURCE_DATE_EPOCH $(CARGO) build --release $(PRODUCT)
 	scripts/make-deb target/release target/deb
 endif
 
@@ -158,6 +159,13 @@ test-packages: deb packages-build
 	$(CARGO) build --release --package virtual-camera
 	release="$(RELEASE)"; scripts/test-packages \
 		"$$(ls -t target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb | sed -n 1p)" target/release/virtual-camera
+
+## test-container: build the container of deploy/Containerfile with podman, and follow in it, not as root and on a read-only root;
+##       as root (RELEASE=bookworm where this is another)
+test-container: deb packages-build
+	@scripts/install-packages $(RUN_PACKAGES) curl mmdebstrap podman runc
+	$(CARGO) build --release --package virtual-camera
+	scripts/test-container target/release/virtual-camera
 
 packages-build:
 	@scripts/install-packages $(BUILD_PACKAGES)

@@ -11,8 +11,10 @@ The password comes from the environment variable CAMERA_PASSWORD, so that no lis
 
 import os
 import signal
+import socket
 import sys
 import time
+from urllib.parse import urlsplit
 
 import gi
 
@@ -60,7 +62,8 @@ class Follower:
         pause = PAUSES[0]
         while not self.ending and not self.hopeless:
             begin = time.monotonic()
-            self.play()
+            if self.answers():
+                self.play()
             if time.monotonic() - begin > WELL:
                 pause = PAUSES[0]
             if not self.ending and not self.hopeless:
@@ -68,6 +71,17 @@ class Follower:
                 self.loop.run()
             pause = min(2 * pause, PAUSES[1])
         return 1 if self.hopeless else 0
+
+    def answers(self):
+        """Whether the camera, or its proxy, accepts a connection: where not, each try of souphttpsrc would cost a descriptor."""
+        address = os.environ.get("http_proxy") or self.camera
+        url = urlsplit(address if "://" in address else f"http://{address}")
+        try:
+            socket.create_connection((url.hostname, url.port or {"https": 443}.get(url.scheme, 80)), timeout=1).close()
+        except OSError as error:
+            print(f"{url.hostname}: {error}", file=sys.stderr)
+            return False
+        return True
 
     def play(self):
         """Plays a pipeline to its end, whatever that is; the camera has stopped then."""

@@ -103,7 +103,7 @@ impl Follow {
         let rtsp = self.rtsp.as_deref().map_or(camera.rtsp, |rtsp| rtsp.trim_end_matches('/').to_owned());
         let credentials =
             self.user.as_ref().map(|user| self.password().map(|password| (user, password))).transpose()?;
-        Ok(CameraSettings {
+        let camera = CameraSettings {
             rtsp,
             codec: self.codec,
             size: self.size,
@@ -111,7 +111,8 @@ impl Follow {
             show: self.show,
             credentials: credentials.map(|(user, password)| Credentials { user: user.clone(), password }),
             ..camera
-        })
+        };
+        camera.lacks().map_or(Ok(camera), Err)
     }
 
     fn password(&self) -> Result<Secret, String> {

@@ -6,6 +6,7 @@
 //! That nothing comes any more is for the pipeline to tell: by `souphttpsrc timeout=1`, or the element `watchdog`.
 
 mod backoff;
+pub mod reach;
 mod supervisor;
 
 use std::error::Error;
@@ -16,7 +17,8 @@ pub use supervisor::Supervisor;
 const ENDS: [i32; 3] = [1, 2, 15];
 
 /// Runs what `build` makes, again and again, until the process is told to end; `on_message` hears every message. To be
-/// called in the main thread: it runs the default main context.
+/// called in the main thread: it runs the default main context. Nothing is started while nobody accepts the connection of a
+/// `souphttpsrc`; standard error says why.
 ///
 /// # Errors
 /// Those of [`Supervisor::run`].
@@ -32,7 +34,12 @@ pub fn run(
             glib::ControlFlow::Continue
         })
     });
-    let result = supervisor.run(|| build().map(Some), on_message);
+    let reached = || {
+        let pipeline = build()?;
+        let reached = reach::check_sources(&pipeline).inspect_err(|reason| eprintln!("{reason}"));
+        Ok(reached.is_ok().then_some(pipeline))
+    };
+    let result = supervisor.run(reached, on_message);
     signals.into_iter().for_each(glib::SourceId::remove);
     result
 }

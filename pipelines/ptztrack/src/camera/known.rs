@@ -15,6 +15,9 @@ use super::stopwatch::Stopwatch;
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
+/// What a tracker does that has found nobody yet.
+pub const SEARCHING: &str = "searching";
+
 /// What is known of one camera, for everybody who asks.
 #[derive(Debug)]
 pub struct Known {
@@ -73,7 +76,7 @@ impl Known {
         Self {
             name: name.to_owned(),
             begin: Instant::now(),
-            state: Mutex::new(State { target: "searching".to_owned(), ..State::default() }),
+            state: Mutex::new(State { target: SEARCHING.to_owned(), ..State::default() }),
             elements: Mutex::default(),
             pictures: AtomicU64::default(),
             processed: AtomicU64::default(),
@@ -95,9 +98,14 @@ impl Known {
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 
+    /// Pictures of before count no more: the pipeline is over.
+    pub fn ends(&self) {
+        self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+    }
+
     /// The last picture counts from now: another pipeline begins.
     pub fn begins_anew(&self) {
-        self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.ends();
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 

@@ -8,7 +8,7 @@ use gst::MessageView;
 use ptztrack_contract::lock::lock;
 use ptztrack_contract::{CameraChange, CameraMessage, TargetChange, TargetMessage};
 
-use super::known::Known;
+use super::known::{Known, SEARCHING};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
@@ -36,9 +36,7 @@ impl Listener {
                 }
                 self.picture_gone(error.message().to_owned());
             }
-            MessageView::Eos(_) => {
-                lock(&self.known.state).picture = false;
-            }
+            MessageView::Eos(_) => self.ends(),
             MessageView::Warning(warning) => {
                 self.trouble(Level::Warning, "warning", warning.error().message().to_owned(), "");
             }
@@ -59,7 +57,16 @@ impl Listener {
 
     fn fails(&self) {
         self.known.failures.fetch_add(1, Ordering::Relaxed);
-        lock(&self.known.state).picture = false;
+        self.ends();
+    }
+
+    fn ends(&self) {
+        self.known.ends();
+        let mut state = lock(&self.known.state);
+        state.picture = false;
+        // The next pipeline begins with nobody.
+        state.target = SEARCHING.to_owned();
+        state.target_id = None;
     }
 
     fn picture_gone(&mut self, reason: String) {

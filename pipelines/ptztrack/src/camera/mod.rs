@@ -5,7 +5,6 @@
 mod known;
 mod messages;
 mod pipeline;
-mod reach;
 mod recording;
 mod stopwatch;
 
@@ -100,7 +99,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     });
     let waits = listener.clone();
     let build = || {
-        if let Err(reason) = reach::check(settings) {
+        if let Err(reason) = pipeline::check_address(settings) {
             lock(&known.elements).take();
             waits.borrow_mut().out_of_reach(reason);
             return Ok(None);

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
+use pipeline_supervisor::reach;
 use ptztrack_contract::lock::lock;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
@@ -23,6 +24,9 @@ const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0
 /// A few pictures a second for who looks, and none while nobody does.
 const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! ptzoverlay ! videoconvert \
     ! jpegenc quality=75 ! appsink name=picture sync=false async=false max-buffers=1 drop=true";
+
+/// Without a packet for so long, RTSP has to begin anew; HTTP's source has a limit of its own.
+const LONGEST_SILENCE: Duration = Duration::from_millis(1200);
 
 /// Between two pictures for who looks.
 const VIEW_EVERY: Duration = Duration::from_millis(200);
@@ -65,12 +69,7 @@ fn source(codec: Codec, encoded: Option<&str>) -> String {
         encoded.map(|branch| format!(" ! tee name=encoded encoded. ! queue ! {branch} encoded. ! queue"));
     let tap = tap.unwrap_or_default();
     let rtsp = |depay: &str, decoder: &str| {
-        // Events of the servo, too, would reset a watchdog in the way of the pictures.
-        format!(
-            "rtspsrc name=source latency=0 protocols=tcp ! tee name=received \
-             received. ! watchdog timeout=1200 ! fakesink sync=false async=false \
-             received. ! {depay}{tap} ! {decoder}"
-        )
+        format!("rtspsrc name=source latency=0 protocols=tcp ! {depay} name=received{tap} ! {decoder}")
     };
     match codec {
         Codec::Mjpeg => format!(
@@ -103,6 +102,21 @@ fn location(camera: &CameraSettings) -> String {
     format!("{path}?{}", query.join("&"))
 }
 
+/// Whether who has the pictures accepts a connection.
+///
+/// # Errors
+/// Why not.
+pub fn check_address(camera: &CameraSettings) -> Result<(), String> {
+    // A pipeline of one's own may have its pictures from elsewhere.
+    if camera.pipeline.is_some() {
+        return Ok(());
+    }
+    match camera.codec {
+        Codec::Mjpeg => reach::check_http(&camera.address, std::env::var("http_proxy").ok()),
+        Codec::Mpeg4 | Codec::H264 => reach::check(&camera.rtsp),
+    }
+}
+
 /// Builds it, with everything that watches it.
 ///
 /// # Errors
@@ -118,6 +132,7 @@ pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipelin
     if let Some(recording) = &camera.recording {
         recording::configure(&pipeline, recording, &camera.name);
     }
+    end_in_silence(&pipeline);
     count(&pipeline, known);
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
@@ -150,6 +165,42 @@ fn log_in(element: &gst::Element, credentials: Option<&Credentials>, [user, pass
         element.set_property(user, &credentials.user);
         element.set_property(password, credentials.password.reveal());
     }
+}
+
+/// An error where packets stop. Not by GStreamer's `watchdog`: that would be all that is needed of the plugins called bad, which
+/// bring more packages along than everything else.
+fn end_in_silence(pipeline: &gst::Pipeline) {
+    let packets = pipeline.by_name("received").and_then(|depay| depay.static_pad("sink"));
+    let (Some(packets), Some(source)) = (packets, pipeline.by_name("source")) else { return };
+    // Nothing comes after the stream's end.
+    let last = Arc::new(Mutex::new(Some(Instant::now())));
+    let kinds =
+        gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST | gst::PadProbeType::EVENT_DOWNSTREAM;
+    packets.add_probe(kinds, {
+        let last = last.clone();
+        move |_, info| {
+            match info.event().map(|event| event.type_()) {
+                None => *lock(&last) = Some(Instant::now()),
+                Some(gst::EventType::Eos) => *lock(&last) = None,
+                Some(_) => {}
+            }
+            gst::PadProbeReturn::Ok
+        }
+    });
+    let source = source.downgrade();
+    glib::MainContext::ref_thread_default().spawn_local(async move {
+        loop {
+            let last = *lock(&last);
+            let (Some(source), Some(last)) = (source.upgrade(), last) else { break };
+            if last.elapsed() > LONGEST_SILENCE {
+                let silence = LONGEST_SILENCE.as_secs_f64();
+                gst::element_error!(source, gst::ResourceError::Read, ("no packet for {silence} s"));
+                break;
+            }
+            drop(source);
+            glib::timeout_future(LONGEST_SILENCE / 4).await;
+        }
+    });
 }
 
 /// Counts pictures that come, and those that go all the way.

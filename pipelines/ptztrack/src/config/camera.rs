@@ -8,6 +8,11 @@ use super::properties::{self, ELEMENTS, Property};
 use super::table::{Read, Table, whole};
 use super::units;
 
+/// Packages of Debian that ours does not depend on.
+const BAD: &str = "gstreamer1.0-plugins-bad";
+const LIBAV: &str = "gstreamer1.0-libav";
+const UGLY: &str = "gstreamer1.0-plugins-ugly";
+
 /// One camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraSettings {
@@ -91,6 +96,26 @@ impl CameraSettings {
         }
     }
 
+    /// What GStreamer has not got on this machine, and needs for this camera.
+    pub fn lacks(&self) -> Option<String> {
+        if self.pipeline.is_some() {
+            return None;
+        }
+        let (mut needed, parser) = match self.codec {
+            Codec::Mjpeg => (Vec::new(), "jpegparse"),
+            Codec::Mpeg4 => (vec![("avdec_mpeg4", LIBAV)], "mpeg4videoparse"),
+            Codec::H264 => (vec![("avdec_h264", LIBAV)], "h264parse"),
+        };
+        match &self.recording {
+            Some(recording) if recording.overlay => needed.extend([("x264enc", UGLY), ("h264parse", BAD)]),
+            Some(_) => needed.push((parser, BAD)),
+            None => {}
+        }
+        let missing = |needed: &(&str, _)| gst::ElementFactory::find(needed.0).is_none();
+        let (element, package) = needed.into_iter().find(missing)?;
+        Some(format!("GStreamer has no element {element}; on Debian it is in the package {package}"))
+    }
+
     pub(super) fn read(name: String, mut table: Table) -> Option<Self> {
         if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
             table.wrong(format!("camera `{name}`: a name has letters, digits, `-` and `_` only"));
@@ -124,6 +149,9 @@ impl CameraSettings {
         camera.pipeline = pipeline(&mut table);
         if camera.pipeline.is_some() && camera.recording.is_some() {
             table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
+        }
+        if let Some(reason) = camera.lacks() {
+            table.wrong(reason);
         }
         table.no_more();
         Some(camera)
