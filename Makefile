@@ -97,7 +97,7 @@ bench: packages-bench
 bench-check: packages-bench
 	$(CARGO) install --quiet --locked gungraun-runner --version $(GUNGRAUN) --root target/tools
 	rm -rf target/gungraun
-	GUNGRAUN_RUNNER="$(CURDIR)/target/tools/bin/gungraun-runner" $(CARGO) bench $(BENCHMARKS) --bench instructions -- --save-summary=json
+	CARGO_TARGET_DIR="$(CURDIR)/target" GUNGRAUN_RUNNER="$(CURDIR)/target/tools/bin/gungraun-runner" $(CARGO) bench $(BENCHMARKS) --bench instructions -- --save-summary=json
 	python3 benchmarks/check_instructions.py target/gungraun benchmarks/instructions.csv $(ARGS)
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
