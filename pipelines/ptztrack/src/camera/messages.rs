@@ -60,7 +60,8 @@ impl Listener {
         self.ends();
     }
 
-    fn ends(&self) {
+    /// The pipeline is over, and what was seen in it with it.
+    pub(super) fn ends(&self) {
         self.known.ends();
         let mut state = lock(&self.known.state);
         state.picture = false;

@@ -99,6 +99,8 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     });
     let waits = listener.clone();
     let build = || {
+        // The one before may have gone without a word.
+        waits.borrow().ends();
         if let Err(reason) = pipeline::check_address(settings) {
             lock(&known.elements).take();
             waits.borrow_mut().out_of_reach(reason);

@@ -27,6 +27,8 @@ const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! 
 
 /// Without a packet for so long, RTSP has to begin anew; HTTP's source has a limit of its own.
 const LONGEST_SILENCE: Duration = Duration::from_millis(1200);
+/// On top of that before the first packet: to log in over a long way, and for the camera to start an encoder.
+const LONGEST_START: Duration = Duration::from_secs(4);
 
 /// Between two pictures for who looks.
 const VIEW_EVERY: Duration = Duration::from_millis(200);
@@ -132,7 +134,9 @@ pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipelin
     if let Some(recording) = &camera.recording {
         recording::configure(&pipeline, recording, &camera.name);
     }
-    end_in_silence(&pipeline);
+    if camera.pipeline.is_none() {
+        end_in_silence(&pipeline);
+    }
     count(&pipeline, known);
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
@@ -173,7 +177,7 @@ fn end_in_silence(pipeline: &gst::Pipeline) {
     let packets = pipeline.by_name("received").and_then(|depay| depay.static_pad("sink"));
     let (Some(packets), Some(source)) = (packets, pipeline.by_name("source")) else { return };
     // Nothing comes after the stream's end.
-    let last = Arc::new(Mutex::new(Some(Instant::now())));
+    let last = Arc::new(Mutex::new(Some(Instant::now() + LONGEST_START)));
     let kinds =
         gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST | gst::PadProbeType::EVENT_DOWNSTREAM;
     packets.add_probe(kinds, {
