@@ -59,13 +59,17 @@ impl Lease {
         if matches!(self.watchdog.say(&message), Ok(true)) {
             return Ok(());
         }
-        let watchdog = self.watchdog.clone();
-        let connecting = spawn_blocking(move || watchdog.connect(&message));
-        match timeout(Self::LONGEST_START, connecting).await {
-            Ok(Ok(connected)) => connected,
-            Ok(Err(err)) => Err(Unavailable::Broken(err.to_string())),
-            Err(_) => Err(Unavailable::Broken("it does not start".to_owned())),
+        let (watchdog, first) = (self.watchdog.clone(), message.clone());
+        let connecting = spawn_blocking(move || watchdog.connect(&first));
+        let said = match timeout(Self::LONGEST_START, connecting).await {
+            Ok(Ok(connected)) => connected?,
+            Ok(Err(err)) => return Err(Unavailable::Broken(err.to_string())),
+            Err(_) => return Err(Unavailable::Broken("it does not start".to_owned())),
+        };
+        if said || self.watchdog.say(&message)? {
+            return Ok(());
         }
+        Err(Unavailable::Broken("it ended as soon as it was started".to_owned()))
     }
 
     /// Gives it back, where it is held: the camera rests, or is somebody else's.

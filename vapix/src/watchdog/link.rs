@@ -84,18 +84,29 @@ impl Watchdog {
     /// # Errors
     /// [`Unavailable::Broken`] where there was one and it failed.
     pub(super) fn say(&self, message: &Message) -> Result<bool, Unavailable> {
-        self.link().say(&line(message)?)
-    }
-
-    /// Says something, and connects for it if there is no connection. May take as long as it takes to start a process.
-    ///
-    /// # Errors
-    /// Why there is no connection, the same for a while; or that it failed.
-    pub(super) fn connect(&self, message: &Message) -> Result<(), Unavailable> {
         let line = line(message)?;
         let mut link = self.link();
-        if link.say(&line)? {
-            return Ok(());
+        let Some(stream) = &mut link.stream else { return Ok(false) };
+        // Neither waits, as the socket does not block, nor raises SIGPIPE, as the standard library asks for none. A watchdog
+        // that has not read for so long that the socket is full will not read this either.
+        let said = stream.write_all(&line);
+        if said.is_err() {
+            link.stream = None;
+        }
+        said.map(|()| true).map_err(|err| Unavailable::Broken(err.to_string()))
+    }
+
+    /// Connects if there is no connection, with `first` as the first that is said. May take as long as it takes to start a
+    /// process. Whether that was said: over a connection that another lease has made in the meantime it is not, as whoever
+    /// asked may have given up waiting.
+    ///
+    /// # Errors
+    /// Why there is no connection; the same for a while.
+    pub(super) fn connect(&self, first: &Message) -> Result<bool, Unavailable> {
+        let line = line(first)?;
+        let mut link = self.link();
+        if link.stream.is_some() {
+            return Ok(false);
         }
         if link.tried.is_some_and(|tried| tried.elapsed() < Self::PAUSE) {
             let again = || Unavailable::Broken("it ended as soon as it was started".to_owned());
@@ -105,24 +116,11 @@ impl Watchdog {
         let stream = self.address.connect(&line);
         link.failure = stream.as_ref().err().cloned();
         link.stream = Some(stream?);
-        Ok(())
+        Ok(true)
     }
 
     fn link(&self) -> MutexGuard<'_, Link> {
         self.link.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Link {
-    fn say(&mut self, line: &[u8]) -> Result<bool, Unavailable> {
-        let Some(stream) = &mut self.stream else { return Ok(false) };
-        // Neither waits, as the socket does not block, nor raises SIGPIPE, as the standard library asks for none. A watchdog
-        // that has not read for so long that the socket is full will not read this either.
-        let said = stream.write_all(line);
-        if said.is_err() {
-            self.stream = None;
-        }
-        said.map(|()| true).map_err(|err| Unavailable::Broken(err.to_string()))
     }
 }
 
@@ -238,6 +236,18 @@ mod tests {
         }
         let socket = Watchdog::new(WatchdogAddress::Socket("/nonexistent/socket".into()));
         assert!(socket.connect(&release()).unwrap_err().to_string().contains("/nonexistent/socket"));
+    }
+
+    /// Whoever asked may have given its lease back while another was starting the program.
+    #[test]
+    fn over_a_connection_that_is_there_connecting_says_nothing() {
+        let watchdog = nowhere();
+        let mut its = between(&watchdog);
+        assert!(!watchdog.connect(&release()).unwrap());
+        drop(watchdog);
+        let mut heard = Vec::new();
+        its.read_to_end(&mut heard).unwrap();
+        assert!(heard.is_empty());
     }
 
     /// Were it told once it runs, it would know nothing where the application dies in the meantime. `start` waits for the end
