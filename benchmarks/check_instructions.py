@@ -4,8 +4,9 @@
 
 usage: check_instructions.py COUNTED EXPECTED [--accept]
 
-COUNTED is gungraun's folder of that bench. Fails where one is more than a tenth off, to either side: what became cheaper is
-to stay so. With --accept the counts are written to EXPECTED instead.
+COUNTED is gungraun's folder of that bench, emptied before: with an earlier run to compare with, what it leaves has another form.
+Fails where one is more than a tenth off, to either side: what became cheaper is to stay so. With --accept the counts are written
+to EXPECTED instead.
 """
 
 import csv
@@ -22,9 +23,7 @@ def counted(folder: Path) -> dict[str, int]:
         summary = json.loads(path.read_text())
         (profile,) = (one for one in summary["profiles"] if one["tool"] == "Callgrind")
         metrics = profile["summaries"]["total"]["summary"]["Callgrind"]["Ir"]["metrics"]
-        # With an earlier run to compare with there are both, the new one first.
-        (new, *_) = metrics["Both"] if "Both" in metrics else (metrics["Left"],)
-        counts[summary["id"]] = new["Int"]
+        counts[summary["id"]] = metrics["Left"]["Int"]
     return counts
 
 

@@ -94,7 +94,7 @@ impl Noise {
         };
         let (centre, mean) = (average(|bin| bin.0), average(|bin| bin.1));
         let (mut product, mut square) = (0.0, 0.0);
-        for (middle, variance, weight) in known.clone() {
+        for (middle, variance, weight) in known {
             product += weight * (middle - centre) * (variance - mean);
             square += weight * (middle - centre).powi(2);
         }

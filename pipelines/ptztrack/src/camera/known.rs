@@ -105,7 +105,6 @@ impl Known {
 
     /// The last picture counts from now: another pipeline begins.
     pub fn begins_anew(&self) {
-        self.ends();
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 
