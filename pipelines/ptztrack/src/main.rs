@@ -46,6 +46,7 @@ fn run(options: Options) -> Result<(), String> {
         }
         Command::Check { file } => {
             let config = Config::load(&file)?;
+            config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }

@@ -101,6 +101,9 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     let build = || {
         // The one before may have gone without a word.
         waits.borrow().ends();
+        if let Some(reason) = settings.lacks() {
+            return Err(reason.into());
+        }
         if let Err(reason) = pipeline::check_address(settings) {
             lock(&known.elements).take();
             waits.borrow_mut().out_of_reach(reason);
