@@ -109,7 +109,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             waits.borrow_mut().out_of_reach(reason);
             return Ok(None);
         }
-        known.begins_anew();
+        known.begins();
         known.rebuilt.fetch_add(1, Ordering::Relaxed);
         pipeline::build(settings, known).map(Some)
     };
@@ -152,7 +152,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
         log.tell(&Event::new(Level::Warning, Some(&known.name), "no-picture", detail));
-        known.begins_anew();
+        known.forgive_silence();
         supervisor.restart();
     }
 }
