@@ -142,6 +142,7 @@ deb:
 	@scripts/install-packages mmdebstrap
 	@# Not with this make's arguments, or it makes a root in the root.
 	env -u MAKEFLAGS -u RELEASE scripts/in-debian "$(RELEASE)" "target/$(RELEASE)" make deb
+	rm -f target/deb/*~$(RELEASE)1_*.deb
 	install -D --mode=644 --target-directory=target/deb target/$(RELEASE)/ptztrack/target/deb/*~$(RELEASE)1_*.deb
 else
 deb: packages-build
@@ -151,8 +152,8 @@ deb: packages-build
 	scripts/make-deb target/release target/deb
 endif
 
-## test-packages: make it, check it, and install, use and purge it in a bare Debian; as root (RELEASE=bookworm|trixie)
-test-packages: deb packages-build
+## test-packages: make it, check it, and install, use and purge it in a bare Debian, and do test-fleet; as root (RELEASE=bookworm|trixie)
+test-packages: deb packages-build test-fleet
 	@scripts/install-packages $(RUN_PACKAGES) lintian mmdebstrap systemd
 	@# Not built from what is packed: the registry has none of them yet.
 	$(CARGO) package --workspace --exclude virtual-camera --exclude end-to-end --exclude evaluation --no-verify --allow-dirty
