@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -159,7 +159,16 @@ test-packages: deb packages-build test-fleet
 	$(CARGO) package --workspace --exclude virtual-camera --exclude end-to-end --exclude evaluation --no-verify --allow-dirty
 	$(CARGO) build --release --package virtual-camera
 	release="$(RELEASE)"; scripts/test-packages \
-		"$$(ls -t target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb | sed -n 1p)" target/release/virtual-camera
+		target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb target/release/virtual-camera
+
+## test-fleet: check deploy/kubernetes against Kubernetes' schemas, where there is a kubectl, and have ten processes share twenty
+##       virtual cameras
+test-fleet: packages-build
+	@scripts/install-packages $(RUN_PACKAGES) python3 python3-venv
+	@# Not installed: that of Debian 12 does not know what deploy/kubernetes asks of it.
+	if command -v kubectl >/dev/null; then scripts/test-kubernetes; else echo "Without kubectl, deploy/kubernetes is not checked."; fi
+	$(CARGO) build --release $(PRODUCT) --package virtual-camera
+	scripts/test-fleet target/release
 
 ## test-container: build the container of deploy/Containerfile with podman, and follow in it, not as root and on a read-only root;
 ##       as root (RELEASE=bookworm where this is another)
