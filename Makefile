@@ -157,7 +157,6 @@ test-packages: deb packages-build test-fleet
 	@scripts/install-packages $(RUN_PACKAGES) lintian mmdebstrap systemd
 	@# Not built from what is packed: the registry has none of them yet.
 	$(CARGO) package --workspace --exclude virtual-camera --exclude end-to-end --exclude evaluation --no-verify --allow-dirty
-	$(CARGO) build --release --package virtual-camera
 	release="$(RELEASE)"; scripts/test-packages \
 		target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb target/release/virtual-camera
 
