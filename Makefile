@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -142,6 +142,7 @@ deb:
 	@scripts/install-packages mmdebstrap
 	@# Not with this make's arguments, or it makes a root in the root.
 	env -u MAKEFLAGS -u RELEASE scripts/in-debian "$(RELEASE)" "target/$(RELEASE)" make deb
+	rm -f target/deb/*~$(RELEASE)1_*.deb
 	install -D --mode=644 --target-directory=target/deb target/$(RELEASE)/ptztrack/target/deb/*~$(RELEASE)1_*.deb
 else
 deb: packages-build
@@ -151,14 +152,22 @@ deb: packages-build
 	scripts/make-deb target/release target/deb
 endif
 
-## test-packages: make it, check it, and install, use and purge it in a bare Debian; as root (RELEASE=bookworm|trixie)
-test-packages: deb packages-build
+## test-packages: make it, check it, and install, use and purge it in a bare Debian, and do test-fleet; as root (RELEASE=bookworm|trixie)
+test-packages: deb packages-build test-fleet
 	@scripts/install-packages $(RUN_PACKAGES) lintian mmdebstrap systemd
 	@# Not built from what is packed: the registry has none of them yet.
 	$(CARGO) package --workspace --exclude virtual-camera --exclude end-to-end --exclude evaluation --no-verify --allow-dirty
-	$(CARGO) build --release --package virtual-camera
 	release="$(RELEASE)"; scripts/test-packages \
-		"$$(ls -t target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb | sed -n 1p)" target/release/virtual-camera
+		target/deb/*~$${release:-$$(. /etc/os-release; echo $$VERSION_CODENAME)}1_*.deb target/release/virtual-camera
+
+## test-fleet: check deploy/kubernetes against Kubernetes' schemas, where there is a kubectl, and have ten processes share twenty
+##       virtual cameras
+test-fleet: packages-build
+	@scripts/install-packages $(RUN_PACKAGES) python3 python3-venv
+	@# Not installed: that of Debian 12 does not know what deploy/kubernetes asks of it.
+	if command -v kubectl >/dev/null; then scripts/test-kubernetes; else echo "Without kubectl, deploy/kubernetes is not checked."; fi
+	$(CARGO) build --release $(PRODUCT) --package virtual-camera
+	scripts/test-fleet target/release
 
 ## test-container: build the container of deploy/Containerfile with podman, and follow in it, not as root and on a read-only root;
 ##       as root (RELEASE=bookworm where this is another)

@@ -42,7 +42,7 @@ pub enum Command {
     },
     /// Follow with one camera, without a file
     Follow(Box<Follow>),
-    /// Read a file and name every mistake in it, with its line
+    /// Read a file and name every mistake in it, with its line, and what this machine has not got for a camera
     Check {
         /// The file
         file: PathBuf,

@@ -23,6 +23,8 @@ use log::Log;
 use service::Origin;
 
 fn main() -> ExitCode {
+    #[cfg(target_env = "gnu")]
+    share_memory();
     let options = Options::parse();
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
@@ -31,6 +33,14 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// Has all threads take memory from the same two places. By default glibc makes eight for each core and spreads the threads of
+/// the cameras over them: each grows for half an hour, until it has room for the most that its threads ever needed at once.
+#[cfg(target_env = "gnu")]
+fn share_memory() {
+    // SAFETY: takes numbers only, and there is one thread yet.
+    unsafe { libc::mallopt(libc::M_ARENA_MAX, 2) };
 }
 
 fn run(options: Options) -> Result<(), String> {
@@ -46,6 +56,7 @@ fn run(options: Options) -> Result<(), String> {
         }
         Command::Check { file } => {
             let config = Config::load(&file)?;
+            config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }

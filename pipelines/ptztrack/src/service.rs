@@ -114,8 +114,10 @@ async fn apply(fleet: &Arc<Fleet>, config: Config) {
     let _ = tokio::task::spawn_blocking(move || fleet.apply(config.cameras)).await;
 }
 
-/// A file with mistakes changes nothing.
+/// A file with mistakes changes nothing. What GStreamer lacked may be there now.
 async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &Log) -> Config {
+    // Its reason to fail would be that no plugin can be read, and the cameras say what they lack.
+    let _ = gst::Registry::update();
     match origin.read() {
         Ok(config) => {
             log.info("read-again", "the configuration was read again");

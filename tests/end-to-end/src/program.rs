@@ -23,6 +23,17 @@ impl Program {
     /// With what `file` makes for it in its folder, named after the test.
     #[track_caller]
     pub fn start(test: &str, file: impl FnOnce(&Path) -> String, more: &[&str]) -> Self {
+        Self::start_in(test, file, more, &[])
+    }
+
+    /// The same in an environment of its own.
+    #[track_caller]
+    pub fn start_in(
+        test: &str,
+        file: impl FnOnce(&Path) -> String,
+        more: &[&str],
+        environment: &[(&str, &Path)],
+    ) -> Self {
         let folder = plugin_folder().join(format!("program-{test}-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("password"), scene::PASSWORD).unwrap();
@@ -30,6 +41,7 @@ impl Program {
         fs::write(&cameras, file(&folder)).unwrap();
         let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
         command.arg("run").arg(&cameras).args(["--http", "127.0.0.1:0"]).args(more);
+        command.envs(environment.iter().copied());
         let mut launch = GstLaunch::spawn(command);
         let line = launch.wait_for_line("/healthz at http://");
         let page = line.split("http://").nth(1).and_then(|page| page.split('/').next()).unwrap().to_owned();

@@ -8,11 +8,13 @@ mod browser;
 
 use std::collections::HashSet;
 use std::fs;
+use std::path::Path;
 use std::process::Command;
 
 use browser::Browser;
 use end_to_end::following::Network;
 use end_to_end::{GstLaunch, PATIENCE, Program, Way, pictures_in, plugin_folder, scene, tool};
+use gst::prelude::*;
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
 
@@ -60,7 +62,7 @@ fn a_camera_with_a_wrong_password_is_given_up_and_no_matter_to_the_others() {
     let (good, other) = (camera(), camera());
     let network = Network::before(&good);
     let other_url = other.url();
-    let file = |folder: &std::path::Path| {
+    let file = |folder: &Path| {
         fs::write(folder.join("other"), "wrong").unwrap();
         let good = Program::entry("good", &network.url(), &folder.join("password"));
         good + &Program::entry("other", &other_url, &folder.join("other"))
@@ -94,10 +96,59 @@ fn a_camera_with_a_wrong_password_is_given_up_and_no_matter_to_the_others() {
 }
 
 #[test]
+fn a_camera_that_lacks_an_element_is_given_up_and_no_matter_to_the_others() {
+    // All plugins of this machine, but for the one that a recording needs.
+    end_to_end::init();
+    let missing = gst::ElementFactory::find("jpegparse").unwrap().plugin().unwrap().filename().unwrap();
+    let plugins = plugin_folder().join(format!("lacking-{}", std::process::id()));
+    fs::create_dir_all(&plugins).unwrap();
+    let place = |plugin: &Path| plugins.join(plugin.file_name().unwrap());
+    for plugin in fs::read_dir(missing.parent().unwrap()).unwrap() {
+        let plugin = plugin.unwrap().path();
+        if plugin != missing && plugin.extension().is_some_and(|extension| extension == "so") {
+            std::os::unix::fs::symlink(&plugin, place(&plugin)).unwrap();
+        }
+    }
+    let registry = plugins.join("registry.bin");
+    let environment = [("GST_PLUGIN_SYSTEM_PATH", plugins.as_path()), ("GST_REGISTRY", registry.as_path())];
+
+    let (good, records) = (camera(), camera());
+    let file = |folder: &Path| {
+        let recording = folder.join("recordings");
+        let recording = format!("[camera.records.recording]\nfolder = {recording:?}\nkeep = \"1h\"\n");
+        let password = folder.join("password");
+        Program::entry("good", &good.url(), &password)
+            + &Program::entry("records", &records.url(), &password)
+            + &recording
+    };
+    let mut program = Program::start_in("lacking", file, &[], &environment);
+    let line = program.launch.wait_for_line("records: error: given up: ");
+    let lack = "GStreamer has no element jpegparse; on Debian it is in the package gstreamer1.0-plugins-bad";
+    assert!(line.contains(lack), "{line}");
+    follows(&good);
+    let cameras = program.folder().join("cameras.toml");
+    let check = || ptztrack().arg("check").arg(&cameras).envs(environment).output().unwrap();
+    let said = check();
+    assert_eq!(said.status.code(), Some(1), "{said:?}");
+    assert_eq!(String::from_utf8_lossy(&said.stderr), format!("camera `records`: {lack}\n"));
+
+    // Once it is installed, the file is read again.
+    std::os::unix::fs::symlink(&missing, place(&missing)).unwrap();
+    assert!(check().status.success());
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("records: the picture is there");
+    program.end("TERM");
+    fs::remove_dir_all(&plugins).unwrap();
+    for camera in [&good, &records] {
+        scene::assert_left_at_rest(camera);
+    }
+}
+
+#[test]
 fn a_camera_that_reboots_is_told_of_once_and_comes_back() {
     let camera = camera();
     let network = Network::before(&camera);
-    let file = |folder: &std::path::Path| Program::entry("door", &network.url(), &folder.join("password"));
+    let file = |folder: &Path| Program::entry("door", &network.url(), &folder.join("password"));
     let mut program = Program::start("reboot", file, &[]);
     program.launch.wait_for_line("door: the picture is there");
     program.launch.wait_for_line("acquired");
@@ -131,9 +182,7 @@ fn a_camera_that_hangs_costs_nothing_but_time() {
     let waiting: Vec<_> =
         (0..4).map_while(|_| std::net::TcpStream::connect_timeout(&address, moment).ok()).collect();
     assert!(!waiting.is_empty());
-    let file = |folder: &std::path::Path| {
-        Program::entry("door", &format!("http://{address}"), &folder.join("password"))
-    };
+    let file = |folder: &Path| Program::entry("door", &format!("http://{address}"), &folder.join("password"));
     let mut program = Program::start("hangs", file, &[]);
     let line = program.launch.wait_for_line("tried again until it is back");
     assert!(line.contains(&format!("port {}: ", address.port())), "{line}");
@@ -155,7 +204,7 @@ fn count(metrics: &str, name: &str) -> f64 {
 
 #[test]
 fn a_pipeline_that_gives_no_picture_is_built_anew() {
-    let file = |_: &std::path::Path| {
+    let file = |_: &Path| {
         "[camera.door]\naddress = \"http://127.0.0.1:1\"\npipeline = \"appsrc is-live=true ! bgavgdetect ! fakesink\"\n"
             .to_owned()
     };
@@ -170,7 +219,7 @@ fn a_pipeline_that_gives_no_picture_is_built_anew() {
 #[test]
 fn metrics_and_page_are_for_who_asks_by_the_right_name() {
     let camera = camera();
-    let file = |folder: &std::path::Path| Program::entry("door", &camera.url(), &folder.join("password"));
+    let file = |folder: &Path| Program::entry("door", &camera.url(), &folder.join("password"));
     let program = Program::start("metrics", file, &[]);
     follows(&camera);
     let metrics = program.wait_for("/metrics", |metrics| {
@@ -198,7 +247,7 @@ fn the_page_shows_every_camera_and_steers_it() {
     let Some(mut browser) = Browser::start("chromium-program") else { return };
     let door = camera();
     let hall = VirtualCamera::start(scene::standing_person()).unwrap();
-    let file = |folder: &std::path::Path| {
+    let file = |folder: &Path| {
         let password = folder.join("password");
         let home = "[camera.door.vapixptzsink]\nhome = \"10,8\"\nhome-timeout = \"1h\"\n";
         Program::entry("door", &door.url(), &password)
@@ -253,7 +302,7 @@ fn the_page_shows_every_camera_and_steers_it() {
 #[test]
 fn the_cameras_own_stream_is_recorded_as_it_comes() {
     let camera = camera();
-    let file = |folder: &std::path::Path| {
+    let file = |folder: &Path| {
         let recording = folder.join("recordings");
         let more = format!("codec = \"h264\"\nrtsp = \"{}\"\n", camera.rtsp_url());
         let recording =

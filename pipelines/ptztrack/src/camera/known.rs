@@ -29,7 +29,7 @@ pub struct Known {
     pub elements: Mutex<Option<Elements>>,
     pub pictures: AtomicU64,
     pub processed: AtomicU64,
-    /// By the pipelines before this one.
+    /// By the pipelines before this one; between two, more than there can be.
     processed_before: AtomicU64,
     pub rebuilt: AtomicU64,
     pub failures: AtomicU64,
@@ -98,13 +98,19 @@ impl Known {
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 
-    /// Pictures of before count no more: the pipeline is over.
+    /// Pictures count no more, those that are still under way neither: the pipeline is over.
     pub fn ends(&self) {
-        self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.processed_before.store(u64::MAX, Ordering::Relaxed);
     }
 
-    /// The last picture counts from now: another pipeline begins.
-    pub fn begins_anew(&self) {
+    /// Another pipeline begins, the one before having stopped.
+    pub fn begins(&self) {
+        self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+        self.forgive_silence();
+    }
+
+    /// The last picture counts from now.
+    pub fn forgive_silence(&self) {
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 
@@ -166,5 +172,27 @@ impl Known {
             _ => "the camera is not moved",
         };
         format!("{target}, {camera}")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The connection breaks while a picture is on its way through the tracker.
+    #[test]
+    fn a_picture_that_is_under_way_at_the_end_is_none_of_the_next_pipeline() {
+        let known = Known::new("door");
+        known.begins();
+        assert!(!known.has_picture());
+        known.saw_picture();
+        assert!(known.has_picture());
+        known.ends();
+        known.saw_picture();
+        assert!(!known.has_picture(), "between two pipelines");
+        known.begins();
+        assert!(!known.has_picture(), "in the next one");
+        known.saw_picture();
+        assert!(known.has_picture());
     }
 }

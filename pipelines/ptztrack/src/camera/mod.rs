@@ -101,12 +101,15 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     let build = || {
         // The one before may have gone without a word.
         waits.borrow().ends();
+        if let Some(reason) = settings.lacks() {
+            return Err(reason.into());
+        }
         if let Err(reason) = pipeline::check_address(settings) {
             lock(&known.elements).take();
             waits.borrow_mut().out_of_reach(reason);
             return Ok(None);
         }
-        known.begins_anew();
+        known.begins();
         known.rebuilt.fetch_add(1, Ordering::Relaxed);
         pipeline::build(settings, known).map(Some)
     };
@@ -149,7 +152,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
         log.tell(&Event::new(Level::Warning, Some(&known.name), "no-picture", detail));
-        known.begins_anew();
+        known.forgive_silence();
         supervisor.restart();
     }
 }

@@ -150,9 +150,6 @@ impl CameraSettings {
         if camera.pipeline.is_some() && camera.recording.is_some() {
             table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
         }
-        if let Some(reason) = camera.lacks() {
-            table.wrong(reason);
-        }
         table.no_more();
         Some(camera)
     }

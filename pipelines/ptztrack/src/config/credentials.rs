@@ -90,7 +90,8 @@ fn password(table: &mut Table) -> Result<Option<Secret>, String> {
 /// `LoadCredential=NAME:...` in a unit of systemd; or a file in the folder that the package's unit loads as `passwords`.
 fn from_systemd(name: &str) -> Result<Secret, String> {
     let folder = std::env::var_os("CREDENTIALS_DIRECTORY").ok_or(
-        "CREDENTIALS_DIRECTORY is not set: `LoadCredential=` in systemd's unit gives a service its passwords",
+        "CREDENTIALS_DIRECTORY is not set: a service has it by `LoadCredential=` in systemd's unit; \
+         to check by hand, let it be the folder of the passwords",
     )?;
     if name.contains('/') {
         return Err(format!("`{name}` is a name, not a path"));

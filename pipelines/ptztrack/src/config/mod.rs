@@ -67,6 +67,16 @@ impl Config {
         config.filter(|_| problems.is_empty()).ok_or(problems)
     }
 
+    /// What this machine has not got, a line for each camera that cannot start without.
+    ///
+    /// # Errors
+    /// Those lines.
+    pub fn check_machine(&self) -> Result<(), String> {
+        let lack = |camera: &CameraSettings| Some(format!("camera `{}`: {}", camera.name, camera.lacks()?));
+        let lacks: Vec<String> = self.cameras.iter().filter_map(lack).collect();
+        if lacks.is_empty() { Ok(()) } else { Err(lacks.join("\n")) }
+    }
+
     fn read(mut root: Table) -> Self {
         let http = root.table("http").and_then(Http::read);
         let mqtt = root.table("mqtt").and_then(Mqtt::read);
