@@ -28,10 +28,31 @@ fn main() -> ExitCode {
     let options = Options::parse();
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
-        Err(reason) => {
+        Err(Failure { reason, status }) => {
             eprintln!("{reason}");
-            ExitCode::FAILURE
+            status
         }
+    }
+}
+
+/// `EX_CONFIG` of sysexits.h: starting again mends nothing, so the systemd unit does not.
+const MISTAKEN_CONFIGURATION: u8 = 78;
+
+/// Why the program ends, and its exit status.
+struct Failure {
+    reason: String,
+    status: ExitCode,
+}
+
+impl From<String> for Failure {
+    fn from(reason: String) -> Self {
+        Self { reason, status: ExitCode::FAILURE }
+    }
+}
+
+impl Failure {
+    fn mistaken(reason: String) -> Self {
+        Self { reason, status: MISTAKEN_CONFIGURATION.into() }
     }
 }
 
@@ -43,7 +64,7 @@ fn share_memory() {
     unsafe { libc::mallopt(libc::M_ARENA_MAX, 2) };
 }
 
-fn run(options: Options) -> Result<(), String> {
+fn run(options: Options) -> Result<(), Failure> {
     gst::init().map_err(|err| err.to_string())?;
     let log = Arc::new(Log::new(options.log_format));
     match options.command {
@@ -55,13 +76,13 @@ fn run(options: Options) -> Result<(), String> {
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Command::Check { file } => {
-            let config = Config::load(&file)?;
+            let config = Config::load(&file).map_err(Failure::mistaken)?;
             config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }
         Command::Man { folder } => {
-            clap_mangen::generate_to(Options::command(), folder).map_err(|err| err.to_string())
+            Ok(clap_mangen::generate_to(Options::command(), folder).map_err(|err| err.to_string())?)
         }
         Command::ExampleConfig => {
             print!("{}", config::EXAMPLE);
@@ -70,8 +91,8 @@ fn run(options: Options) -> Result<(), String> {
     }
 }
 
-fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), String> {
-    let mut config = origin.read()?;
+fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failure> {
+    let mut config = origin.read().map_err(Failure::mistaken)?;
     if let Some(listen) = serving.http {
         let (hosts, credentials) =
             config.http.map_or((Vec::new(), None), |http| (http.hosts, http.credentials));
@@ -89,5 +110,5 @@ fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), String
         .enable_all()
         .build()
         .map_err(|err| err.to_string())?;
-    runtime.block_on(service::run(origin, config, log))
+    Ok(runtime.block_on(service::run(origin, config, log))?)
 }

@@ -341,9 +341,11 @@ fn mistakes_are_named_and_the_example_is_right() {
     )
     .unwrap();
     let wrong = ptztrack().arg("check").arg(&file).output().unwrap();
+    let run = ptztrack().arg("run").arg(&file).output().unwrap();
     fs::remove_file(&file).unwrap();
     let said = String::from_utf8_lossy(&wrong.stderr);
-    assert_eq!(wrong.status.code(), Some(1), "{said}");
+    assert_eq!(wrong.status.code(), Some(78), "{said}");
+    assert_eq!((run.status.code(), run.stderr.as_slice()), (Some(78), wrong.stderr.as_slice()));
     for expected in [
         "line 3: `zones` cannot be 0,0 1,1: ",
         "line 5: `gain` must be a number from 0 to 20",
