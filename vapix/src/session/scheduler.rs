@@ -15,7 +15,7 @@ pub struct Scheduler {
     stop_tried: bool,
     /// Somebody else moved the camera since, and whose move it is in now is being found out.
     contested: bool,
-    /// A move went unanswered: it may still act until then, even after a stop.
+    /// A move went unanswered, and maybe stops after it: the camera may still act on it until then, even after a stop.
     doubt_until: Option<Duration>,
     /// The words that end the last move, whatever the mode is by now.
     stop: Command,
@@ -124,8 +124,9 @@ impl Scheduler {
         if may_have_acted {
             // What the camera does is unknown: the same command is worth sending again.
             self.accepted = None;
-            if !command.is_stop() {
-                self.may_move = true;
+            self.may_move |= !command.is_stop();
+            // A camera that hangs acts on all that it was sent once it wakes, in whatever order: its time to do so begins then.
+            if !command.is_stop() || self.in_doubt() {
                 self.doubt_until = Some(now + Self::DOUBT);
             }
         }
@@ -278,5 +279,21 @@ mod tests {
         assert_eq!(scheduler.stop_due(ms(2100), INTERVAL, ms(0)), Some(ms(8000)));
         accept(&mut scheduler, Command::Halt, ms(8000));
         assert_eq!(scheduler.stop_due(ms(8000), INTERVAL, ms(0)), None);
+    }
+
+    #[test]
+    fn a_camera_that_hangs_for_long_is_stopped_again_after_it_wakes() {
+        let mut scheduler = Scheduler::default();
+        scheduler.attempted(&RIGHT, ms(0));
+        scheduler.failed(&RIGHT, true, ms(2000));
+        for second in (4..56).step_by(2) {
+            scheduler.attempted(&Command::Halt, ms(1000 * second));
+            scheduler.failed(&Command::Halt, true, ms(1000 * second + 2000));
+        }
+        accept(&mut scheduler, Command::Halt, ms(57_000));
+        assert!(scheduler.in_doubt(), "the old move may come after the stop");
+        assert_eq!(scheduler.stop_due(ms(57_000), INTERVAL, ms(0)), Some(ms(62_000)));
+        accept(&mut scheduler, Command::Halt, ms(62_000));
+        assert!(!scheduler.in_doubt() && scheduler.stop_due(ms(62_000), INTERVAL, ms(0)).is_none());
     }
 }
