@@ -21,6 +21,9 @@ use crate::config::{CameraSettings, Codec, Credentials};
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
 const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0";
 
+/// Nobody is there to notice that it follows somebody asleep, or has taken the wall for somebody.
+const TRACKER: &str = "lkfeaturetrack stationary-timeout=120000000000";
+
 /// A few pictures a second for who looks, and none while nobody does.
 const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! ptzoverlay ! videoconvert \
     ! jpegenc quality=75 ! appsink name=picture sync=false async=false max-buffers=1 drop=true";
@@ -44,10 +47,7 @@ pub fn description(camera: &CameraSettings) -> String {
     let recording = camera.recording.as_ref();
     let encoded = recording.filter(|recording| !recording.overlay).map(|_| recording::branch(camera.codec));
     let mut text = source(camera.codec, encoded.as_deref());
-    write_all(
-        &mut text,
-        &format!(" ! {NEWEST} name=newest ! bgavgdetect ! lkfeaturetrack ! tee name=followed "),
-    );
+    write_all(&mut text, &format!(" ! {NEWEST} name=newest ! bgavgdetect ! {TRACKER} ! tee name=followed "));
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {STEER} ! vapixptzsink "));
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
     if recording.is_some_and(|recording| recording.overlay) {
@@ -361,5 +361,28 @@ impl Elements {
     /// What `vapixptzsink` says of itself.
     pub fn servo_stats(&self) -> Option<gst::Structure> {
         self.servo.as_ref().map(|servo| servo.property("stats"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    fn described(more: &str) -> String {
+        gst::init().expect("GStreamer");
+        let text = format!("[camera.door]\naddress = \"http://192.168.0.90\"\n{more}");
+        description(&Config::parse(&text).expect("right").cameras[0])
+    }
+
+    #[test]
+    fn who_stands_for_long_is_let_go_of_but_a_pipeline_of_ones_own_is_as_it_is_written() {
+        assert!(
+            described("").contains("! lkfeaturetrack stationary-timeout=120000000000 !"),
+            "{}",
+            described("")
+        );
+        let own = "fakesrc name=source ! fakesink";
+        assert_eq!(described(&format!("pipeline = \"{own}\"")), own);
     }
 }
