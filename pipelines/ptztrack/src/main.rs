@@ -24,7 +24,7 @@ use service::Origin;
 
 fn main() -> ExitCode {
     #[cfg(target_env = "gnu")]
-    share_memory();
+    limit_arenas();
     let options = Options::parse();
     match run(options) {
         Ok(()) => ExitCode::SUCCESS,
@@ -56,10 +56,10 @@ impl Failure {
     }
 }
 
-/// Has all threads take memory from the same two places. By default glibc makes eight for each core and spreads the threads of
-/// the cameras over them: each grows for half an hour, until it has room for the most that its threads ever needed at once.
+/// Has all threads take memory from two arenas. By default glibc makes up to eight for each core and spreads the threads of the
+/// cameras over them: each grows for half an hour, until it has room for the most that its threads ever needed at once.
 #[cfg(target_env = "gnu")]
-fn share_memory() {
+fn limit_arenas() {
     // SAFETY: takes numbers only, and there is one thread yet.
     unsafe { libc::mallopt(libc::M_ARENA_MAX, 2) };
 }

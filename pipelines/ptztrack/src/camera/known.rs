@@ -106,11 +106,11 @@ impl Known {
     /// Another pipeline begins, the one before having stopped.
     pub fn begins(&self) {
         self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
-        self.forgive_silence();
+        self.reset_silence();
     }
 
     /// The last picture counts from now.
-    pub fn forgive_silence(&self) {
+    pub fn reset_silence(&self) {
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 

@@ -152,7 +152,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
         log.tell(&Event::new(Level::Warning, Some(&known.name), "no-picture", detail));
-        known.forgive_silence();
+        known.reset_silence();
         supervisor.restart();
     }
 }

@@ -377,11 +377,8 @@ mod tests {
 
     #[test]
     fn who_stands_for_long_is_let_go_of_but_a_pipeline_of_ones_own_is_as_it_is_written() {
-        assert!(
-            described("").contains("! lkfeaturetrack stationary-timeout=120000000000 !"),
-            "{}",
-            described("")
-        );
+        let ours = described("");
+        assert!(ours.contains("! lkfeaturetrack stationary-timeout=120000000000 !"), "{ours}");
         let own = "fakesrc name=source ! fakesink";
         assert_eq!(described(&format!("pipeline = \"{own}\"")), own);
     }
