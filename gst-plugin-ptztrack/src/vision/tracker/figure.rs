@@ -132,7 +132,13 @@ impl Cells {
             if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
         });
         let unknown = self.motion.iter().map(|motion| *motion == 0.0);
-        Evidence { grid: self.lattice.grid, odds: odds.collect(), unknown: unknown.collect() }
+        let moving = self.motion.iter().map(|motion| (motion / MOVES).clamp(0.0, 1.0));
+        Evidence {
+            grid: self.lattice.grid,
+            odds: odds.collect(),
+            moving: moving.collect(),
+            unknown: unknown.collect(),
+        }
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -170,19 +176,19 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 pub(super) struct Evidence {
     grid: Grid,
     odds: Vec<f32>,
+    /// How surely it is not the known background, 0 to 1.
+    moving: Vec<f32>,
     /// Whether nothing is known of the background there.
     unknown: Vec<bool>,
 }
 
 impl Evidence {
-    /// Of the cell in a column and row, and whether it is unknown; `None` beyond those there are.
+    /// Index of the cell in a column and row; `None` beyond those there are.
     #[inline]
-    fn at(&self, column: i32, row: i32) -> Option<(f32, bool)> {
+    fn index(&self, column: i32, row: i32) -> Option<usize> {
         let inside = |place: i32, count: usize| (0..count as i32).contains(&place);
-        (inside(column, self.grid.columns) && inside(row, self.grid.rows)).then(|| {
-            let index = row as usize * self.grid.columns + column as usize;
-            (self.odds[index], self.unknown[index])
-        })
+        (inside(column, self.grid.columns) && inside(row, self.grid.rows))
+            .then(|| row as usize * self.grid.columns + column as usize)
     }
 
     /// The cells of a row from a column on, and how many columns before the first cell there are.
@@ -235,10 +241,29 @@ impl Halves {
         0.5 * self.sum()
     }
 
+    /// One of them.
+    pub fn half(&self, lower: bool) -> &f32 {
+        if lower { &self.lower } else { &self.upper }
+    }
+
+    /// One of them, to be changed.
+    pub fn half_mut(&mut self, lower: bool) -> &mut f32 {
+        if lower { &mut self.lower } else { &mut self.upper }
+    }
+
     /// Each by itself with that of `other`.
     pub fn with(self, other: Self, combine: impl Fn(f32, f32) -> f32) -> Self {
         Self { upper: combine(self.upper, other.upper), lower: combine(self.lower, other.lower) }
     }
+}
+
+/// How much of a silhouette stands out from the background, 0 to 1.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Level {
+    /// By motion and colour.
+    pub figure: Halves,
+    /// By motion alone.
+    pub moving: Halves,
 }
 
 /// The silhouette that the target had until now: how likely each cell around the box belongs to it.
@@ -298,23 +323,27 @@ impl Shape {
         Template { first, columns: window_x.len(), upper_rows, weights, norm }
     }
 
-    /// How likely the silhouette, moved by so many cells, is figure by motion and colour alone: 0 to 1. Where nothing is
-    /// known of the background it is as likely as `usual`.
-    pub fn level(&self, evidence: &Evidence, moved: (i32, i32), usual: Halves) -> Halves {
+    /// How much of the silhouette, moved by so many cells, stands out. Where nothing is known of the background that is as much
+    /// as is `usual`.
+    pub fn level(&self, evidence: &Evidence, moved: (i32, i32), usual: Level) -> Level {
         let Grid { columns, rows } = self.grid;
-        let mut sums = [(0.0_f32, 0.0_f32); 2];
-        let usual = [usual.upper, usual.lower];
+        let mut level = Level::default();
+        let mut weights = Halves::default();
         for (index, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.5) {
             let (x, y) = ((index % columns) as i32 + moved.0, (index / columns) as i32 + moved.1);
-            if let Some((odds, unknown)) = evidence.at(x, y) {
-                let half = usize::from(2 * (index / columns) >= rows);
-                let (sum, weight) = &mut sums[half];
-                *sum += share * if unknown { usual[half] } else { 1.0 / (1.0 + (-odds).exp()) };
-                *weight += share;
-            }
+            let Some(cell) = evidence.index(x, y) else { continue };
+            let lower = 2 * (index / columns) >= rows;
+            let (figure, moving) = if evidence.unknown[cell] {
+                (*usual.figure.half(lower), *usual.moving.half(lower))
+            } else {
+                (1.0 / (1.0 + (-evidence.odds[cell]).exp()), evidence.moving[cell])
+            };
+            *level.figure.half_mut(lower) += share * figure;
+            *level.moving.half_mut(lower) += share * moving;
+            *weights.half_mut(lower) += share;
         }
-        let mean = |(sum, weight): (f32, f32)| sum / weight.max(f32::EPSILON);
-        Halves { upper: mean(sums[0]), lower: mean(sums[1]) }
+        let mean = |sum: f32, weight: f32| sum / weight.max(f32::EPSILON);
+        Level { figure: level.figure.with(weights, mean), moving: level.moving.with(weights, mean) }
     }
 
     /// Logarithm of the odds that a cell belongs to the target by its place alone.
@@ -537,14 +566,23 @@ mod tests {
 
     #[test]
     fn where_no_background_is_known_the_silhouette_is_as_likely_as_usual() {
-        let usual = Halves { upper: 0.8, lower: 0.7 };
+        let figure = Halves { upper: 0.8, lower: 0.7 };
+        let usual = Level { figure, moving: Halves { upper: 0.6, lower: 0.5 } };
         let level = |seen_to_move| {
             let cells = Scene::new(BOX, 60, seen_to_move).cells(BOX);
             Shape::upright(GRID).level(&cells.evidence(None), (0, 0), usual)
         };
-        let off = |level: Halves| (level.upper - usual.upper).abs().max((level.lower - usual.lower).abs());
-        assert!(off(level(128)) < 0.01, "{:?}", level(128));
-        assert!(level(0).upper < 0.3 && level(255).upper > 0.8, "{:?} {:?}", level(0), level(255));
+        let off = |level: Halves, usual: Halves| {
+            (level.upper - usual.upper).abs().max((level.lower - usual.lower).abs())
+        };
+        let unknown = level(128);
+        assert!(
+            off(unknown.figure, figure) < 0.01 && off(unknown.moving, usual.moving) < 0.01,
+            "{unknown:?}"
+        );
+        let (wall, mover) = (level(0), level(255));
+        assert!(wall.figure.upper < 0.3 && mover.figure.upper > 0.8, "{wall:?} {mover:?}");
+        assert!(wall.moving.upper < 0.01 && mover.moving.upper > 0.9, "{wall:?} {mover:?}");
     }
 
     #[test]

@@ -66,6 +66,17 @@ fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Chain {
     chain
 }
 
+/// Somebody of that width.
+fn detected(x: f32, width: f32) -> Detection {
+    let bounds = Rect {
+        x: f64::from(x) / SIZE.0 as f64,
+        y: 100.0 / SIZE.1 as f64,
+        width: f64::from(width) / SIZE.0 as f64,
+        height: f64::from(PERSON.1) / SIZE.1 as f64,
+    };
+    Detection { bounds, ..Detection::default() }
+}
+
 fn step(chain: &mut Chain, picture: &Picture) -> Report {
     chain.process(picture, DT, &[])
 }
@@ -168,6 +179,54 @@ fn hidden_for_a_second_and_found_again() {
     assert_at(&last, 40.0 + 8.0 * 39.0, 100.0);
 }
 
+/// What is left of somebody at the edge of a wall does not hold back the box: it goes on behind the wall as fast as they went.
+#[test]
+fn a_hidden_target_goes_on_as_fast_as_before() {
+    const WALL: Rect2f = Rect2f { x: 180.0, y: 0.0, width: 110.0, height: 320.0 };
+    let picture = |people: &[(f32, f32, u32)]| {
+        let mut picture = street((0.0, 0.0), people);
+        picture.paint(WALL, 4321);
+        picture
+    };
+    let mut tracker = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    for _ in 0..10 {
+        step(&mut tracker, &picture(&[]));
+    }
+    let x = |n: usize| 40.0 + 8.0 * n as f32;
+    tracker.process(&picture(&[(x(0), 100.0, 7)]), DT, &[detected(x(0), PERSON.0)]);
+    let mut changes = Vec::new();
+    let mut off = 0.0_f32;
+    for n in 1..50 {
+        let report = step(&mut tracker, &picture(&[(x(n), 100.0, 7)]));
+        if report.state == TargetState::Occluded {
+            off = off.max(((report.bounds.x * SIZE.0 as f64) as f32 - x(n)).abs());
+        }
+        changes.extend(report.changes);
+    }
+    assert_eq!(changes, [TargetChange::Occluded, TargetChange::Reacquired]);
+    assert!(off < PERSON.0 / 2.0, "{off} pixels off");
+}
+
+/// Whoever turns looks unlike what was learned of them and is now broad, now narrow; in their colours and where they are expected
+/// it is they.
+#[test]
+fn who_turns_round_is_followed_on() {
+    let mut tracker = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    for _ in 0..10 {
+        step(&mut tracker, &street((0.0, 0.0), &[]));
+    }
+    for n in 0..40 {
+        let x = 60.0 + 6.0 * n as f32;
+        let (width, texture) = if n < 15 { (PERSON.0, 7) } else { (30.0 + 3.0 * (n % 5) as f32, 20 + n) };
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(Rect2f::new(x, 100.0, width, PERSON.1), texture);
+        let report = tracker.process(&picture, DT, &[detected(x, width)]);
+        assert_eq!((report.state, report.id), (TargetState::Tracking, 1), "picture {n}");
+        let middle = (report.centroid.x * SIZE.0 as f64) as f32;
+        assert!((middle - x - width / 2.0).abs() < 15.0, "picture {n}: {middle} for {}", x + width / 2.0);
+    }
+}
+
 #[test]
 fn the_same_pictures_give_the_same_answers() {
     let run = || {
@@ -232,15 +291,6 @@ fn beside_another(
     paint: impl Fn(&mut Picture, Rect2f),
 ) -> (f32, TargetState, u64) {
     const BESIDE: f32 = 60.0;
-    let detected = |x: f32| Detection {
-        bounds: Rect {
-            x: f64::from(x) / SIZE.0 as f64,
-            y: 100.0 / SIZE.1 as f64,
-            width: f64::from(PERSON.0) / SIZE.0 as f64,
-            height: f64::from(PERSON.1) / SIZE.1 as f64,
-        },
-        ..Detection::default()
-    };
     let other = |picture: &mut Picture, x: f32| paint(picture, Rect2f::new(x, 100.0, PERSON.0, PERSON.1));
     let mut tracker = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
     for _ in 0..10 {
@@ -248,7 +298,7 @@ fn beside_another(
     }
     let mut first = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
     other(&mut first, 80.0 + BESIDE);
-    let report = tracker.process(&first, DT, &[detected(80.0)]);
+    let report = tracker.process(&first, DT, &[detected(80.0, PERSON.0)]);
     assert_eq!(report.changes, [TargetChange::Acquired]);
     let (mut farthest, mut last) = (0.0_f32, report);
     for n in 1..30 {
@@ -256,7 +306,7 @@ fn beside_another(
         let people = [(x, 100.0, 7)];
         let mut picture = street((0.0, 0.0), if hidden.contains(&n) { &[] } else { &people });
         other(&mut picture, x + BESIDE);
-        last = tracker.process(&picture, DT, &[detected(x + BESIDE)]);
+        last = tracker.process(&picture, DT, &[detected(x + BESIDE, PERSON.0)]);
         farthest = farthest.max(((last.bounds.x * SIZE.0 as f64) as f32 - x) / BESIDE);
     }
     (farthest, last.state, last.id)

@@ -2,6 +2,7 @@
 
 //! One target and how it is followed: with all cues, or as the thesis does it.
 
+mod course;
 mod robust;
 mod thesis;
 mod usual;
@@ -70,7 +71,7 @@ pub(super) trait Follow: Send {
     /// Whether `sighting` is the same person, wherever it is.
     fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool>;
 
-    /// Whether a target that is not seen may have come as far as `sighting` since it was.
+    /// Whether a target that is not seen may have come as far as `sighting` since it was, which shows as much as half of it.
     fn may_be_in(&self, sighting: &Sighting) -> bool;
 
     /// What is known of the target now.

@@ -5,6 +5,7 @@
 
 use opencv::core::{Point2f, Rect2f};
 
+use super::course::Course;
 use super::usual::{Usual, of_whole};
 use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, YOUNG_S, is_gone, spacing, window_for};
 use crate::vision::tracker::colour::ColourModel;
@@ -12,7 +13,7 @@ use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
 use crate::vision::tracker::ego_motion::EgoMotion;
 use crate::vision::tracker::figure::{
-    CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Looks, Shape, Template,
+    CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Level, Looks, Shape, Template,
 };
 use crate::vision::tracker::flow::Flow;
 use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
@@ -78,15 +79,20 @@ const CENTROID_REACH: f32 = 0.15;
 const UNSEEN_REACH: (f32, f32) = (0.5, 2.3);
 /// Deviation within that of whoever need not look like it.
 const UNSEEN_SPREAD: (f32, f32) = (0.15, 1.5);
-/// Time constant of what its last motion says of a hidden target, seconds: somebody may turn or stop behind a wall.
-const HIDDEN_TIME_S: f32 = 2.0;
 /// Logarithm of the odds that what moves beside other people is the target, and the seconds in which their going adds 1 to it.
 const ALONE_BESIDE_OTHERS: f32 = 0.5;
 const OTHERS_TIME_S: f32 = 2.0;
+/// Time after somebody else was near from which the target is rather alone, seconds.
+const ALONE_TIME_S: f32 = 4.0;
+/// How much of the width and height of the target a region has that shows all of it, and of its height one that may show part of
+/// it.
+const WHOLE: f32 = 0.7;
+const PART: f32 = 0.5;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
 /// Of a silhouette of which nothing is known yet.
-const EVEN: Halves = Halves { upper: 0.5, lower: 0.5 };
+const EVEN: Level =
+    Level { figure: Halves { upper: 0.5, lower: 0.5 }, moving: Halves { upper: 0.0, lower: 0.0 } };
 /// Pictures in a row in which a hidden target must be seen.
 const SEEN_AGAIN: u32 = 2;
 
@@ -95,7 +101,7 @@ const SEEN_AGAIN: u32 = 2;
 struct Place {
     bounds: Rect2f,
     fit: Halves,
-    level: Halves,
+    level: Level,
     response: Halves,
     /// Share of what is usually seen of either half of the target.
     shares: Halves,
@@ -123,6 +129,7 @@ pub(in super::super) struct Robust {
     map: FigureMap,
     usual: Usual,
     presence: Presence,
+    course: Course,
     ego: EgoMotion,
     first_size: (f32, f32),
     age_s: f32,
@@ -162,8 +169,9 @@ impl Robust {
             shape,
             colours: None,
             map,
-            usual: Usual::at_first(Halves::default(), Halves::default()),
+            usual: Usual::at_first(Halves::default(), Level::default()),
             presence: Presence::default(),
+            course: Course { middle: centre(bounds), velocity: sighting.velocity },
             ego: EgoMotion::default(),
             first_size: (bounds.width, bounds.height),
             age_s: 0.0,
@@ -210,6 +218,11 @@ impl Robust {
         let near =
             sightings.iter().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
         self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
+    }
+
+    /// How likely it is that nobody else is near, 0 to 1.
+    fn alone(&self) -> f32 {
+        1.0 - (-self.alone_s / ALONE_TIME_S).exp()
     }
 
     /// What its looks are, and how likely it is that what moves around it is nobody else.
@@ -270,7 +283,7 @@ impl Robust {
         let fit = silhouette.fit(&evidence, moved);
         let answer = response.at(best);
         let level = self.shape.level(&evidence, moved, self.usual.level());
-        let shares = self.usual.shares(fit, level, answer);
+        let shares = self.usual.shares(fit, level, answer, self.alone());
         Ok(Place { bounds: bounds + offset, fit, level, response: answer, shares, share: of_whole(shares) })
     }
 
@@ -285,6 +298,11 @@ impl Robust {
         let moved = (x * FINER as i32, y * FINER as i32);
         let looks = 0.5 * response.at((x, y)).sum() / self.usual.response();
         looks.max(0.0) + silhouette.fit(evidence, moved).mean().max(0.0)
+    }
+
+    /// Its course by what is seen of it now.
+    fn measured(&self) -> Course {
+        Course { middle: centre(self.estimate.bounds), velocity: self.estimate.own_velocity }
     }
 
     fn learn_velocity(&mut self, own: Point2f, dt_s: f32) {
@@ -470,18 +488,36 @@ impl Robust {
             let shares = self
                 .usual
                 .silhouette(place.fit)
-                .with(self.usual.stands_out(place.level), |fit, stands_out| fit * stands_out);
-            let share = of_whole(shares);
-            if share < best.map_or(FOUND, |best| best.share) {
-                continue;
-            }
+                .with(self.usual.stands_out(place.level, self.alone()), |fit, stands_out| fit * stands_out);
+            let alike = self.resembles(seen, sighting)?;
             // In a crowd there is always somebody who fits: who is farther away must have the target's colours.
-            let likely = if self.resembles(seen, sighting)? { 1.0 } else { self.likely_at(place.bounds) };
-            if share * likely >= FOUND && best.is_none_or(|best| share * likely > best.share) {
-                best = Some(Place { share: share * likely, ..place });
+            let likely = if alike { 1.0 } else { self.likely_at(place.bounds) };
+            let by_looks = Place { share: of_whole(shares) * likely, ..place };
+            let found = match self.by_colours(sighting, place).filter(|_| alike) {
+                Some(by_colours) if by_colours.share > by_looks.share => by_colours,
+                _ => by_looks,
+            };
+            if found.share >= FOUND && best.is_none_or(|best| found.share > best.share) {
+                best = Some(found);
             }
         }
         Ok(best)
+    }
+
+    /// Somebody in the target's colours, where it is expected and nobody else is near, is the target, however it turned: all of
+    /// it, or, while it is hidden, the part that comes out again.
+    fn by_colours(&self, sighting: &Sighting, place: Place) -> Option<Place> {
+        let (region, mut bounds) = (sighting.bounds, self.box_in(sighting));
+        let whole = region.width > WHOLE * bounds.width && region.height > WHOLE * bounds.height;
+        if !whole && self.presence.is_here() {
+            return None;
+        }
+        if whole && !sighting.is_group() {
+            let mix = |old: f32, new: f32| old + (new - old) * ADOPTED;
+            let (width, height) = (mix(bounds.width, region.width), mix(bounds.height, region.height));
+            bounds = around(centre(region), width, height);
+        }
+        Some(Place { bounds, share: self.likely_at(bounds) * self.alone(), ..place })
     }
 
     /// The target's box in a region, which may show a part of it only or somebody else too: as near to where it is
@@ -491,7 +527,7 @@ impl Robust {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let x = middle.x.clamp(region.x, region.x + region.width);
-        let y = if region.height > 0.7 * bounds.height && !sighting.is_group() {
+        let y = if region.height > WHOLE * bounds.height && !sighting.is_group() {
             region.y + bounds.height / 2.0
         } else {
             middle.y.clamp(region.y, region.y + region.height)
@@ -561,15 +597,19 @@ impl Follow for Robust {
         // The less is seen of it, the more counts where it was going.
         let gain = ((place.share - FOUND / 2.0) / (LEARNT - FOUND / 2.0)).clamp(0.0, 1.0);
         // A silhouette that is hidden on one side seems to stay behind; the points on what is left of it do not.
-        let hidden = ((1.0 - place.share) / CLEARLY_HIDDEN).clamp(POINTS_LEAD, 1.0);
-        let lead = trust * hidden;
+        let hidden = ((1.0 - place.share) / CLEARLY_HIDDEN).clamp(0.0, 1.0);
+        let lead = trust * hidden.max(POINTS_LEAD);
         let correction = 1.0 + (dt_s / (dt_s + CORRECTION_TIME_S) - 1.0) * lead;
         let predicted = self.estimate.bounds;
         place.bounds = predicted + (centre(place.bounds) - centre(predicted)) * (gain * correction);
         self.presence.update(place.share, dt_s);
         self.estimate.confidence = self.presence.confidence() * place.share.min(1.0);
+        self.course.go_on(self.ego, dt_s);
         if !self.presence.is_here() {
             self.seen_in_a_row = 0;
+            let bounds = self.estimate.bounds;
+            self.estimate.bounds = around(self.course.middle, bounds.width, bounds.height);
+            self.estimate.own_velocity = self.course.velocity;
             self.remember(&seen.luma)?;
             self.estimate.centroid = centre(self.estimate.bounds);
             return Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Hidden });
@@ -579,6 +619,7 @@ impl Follow for Robust {
             self.learn_velocity(by_places + (by_points - by_places) * lead, dt_s);
         }
         self.settle(seen, &place, dt_s)?;
+        self.course.correct(self.measured(), (1.0 - hidden).max(trust));
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
     }
 
@@ -586,7 +627,6 @@ impl Follow for Robust {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         self.unseen_s += dt_s;
-        self.estimate.own_velocity *= (-dt_s / HIDDEN_TIME_S).exp();
         self.carry(self.estimate.own_velocity * dt_s);
         let found = self.search(seen, sightings)?;
         self.seen_in_a_row = if found.is_some() { self.seen_in_a_row + 1 } else { 0 };
@@ -603,6 +643,7 @@ impl Follow for Robust {
         }
         self.presence = Presence::default();
         self.unseen_s = 0.0;
+        self.course = self.measured();
         self.look_closely(seen)?;
         self.seed()?;
         Ok(Sight::Seen)
@@ -617,7 +658,9 @@ impl Follow for Robust {
     }
 
     fn may_be_in(&self, sighting: &Sighting) -> bool {
-        self.distance_in(self.box_in(sighting), UNSEEN_REACH) <= 1.0
+        // A hand that comes out is no smaller person.
+        sighting.bounds.height >= PART * self.estimate.bounds.height
+            && self.distance_in(self.box_in(sighting), UNSEEN_REACH) <= 1.0
     }
 
     fn estimate(&self) -> &Estimate {
