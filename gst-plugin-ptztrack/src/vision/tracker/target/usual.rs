@@ -16,6 +16,9 @@ const LEAST_LEVEL: f32 = 0.05;
 /// Share of what usually moves against the background from which nobody misses the rest: a dark coat before a dark wall does not
 /// stand out for a while.
 const ENOUGH: f32 = 0.5;
+/// How much slower than it is learned it is forgotten that the target stood out: a box that grows into the wall, or slides onto
+/// it, shows less and less of it.
+const FORGETTING: f32 = 0.1;
 /// What the better half of the body is worth without the other.
 const HALF: f32 = 0.9;
 
@@ -79,7 +82,10 @@ impl Usual {
         let mix = |least: f32| move |old: f32, new: f32| (old + (new - old) * rate).max(least);
         self.fit = self.fit.with(fit, mix(LEAST_FIT));
         self.level.figure = self.level.figure.with(level.figure, mix(LEAST_LEVEL));
-        self.level.moving = self.level.moving.with(level.moving, mix(0.0));
+        self.level.moving = self.level.moving.with(level.moving, |old, new| {
+            let rate = if new > old { rate } else { FORGETTING * rate };
+            old + (new - old) * rate
+        });
         self.response = self.response.with(response, mix(LEAST_RESPONSE));
     }
 }
@@ -111,6 +117,16 @@ mod tests {
     fn known_wall_is_wall_in_whatever_colours() {
         assert!(share(level(0.8, 0.6), 1.0) > 0.95);
         assert!(share(level(0.7, 0.01), 1.0) < 0.2, "{}", share(level(0.7, 0.01), 1.0));
+    }
+
+    #[test]
+    fn a_box_that_slides_onto_the_wall_is_noticed() {
+        let mut usual = Usual::at_first(both(0.6), level(0.8, 0.6));
+        for n in 0..50 {
+            usual.learn(both(0.6), level(0.8, 0.6 * (1.0 - n as f32 / 50.0)), FIRST_RESPONSE, 0.03);
+        }
+        let share = of_whole(usual.shares(both(0.6), level(0.8, 0.0), FIRST_RESPONSE, 1.0));
+        assert!(share < 0.3, "{share}");
     }
 
     #[test]
