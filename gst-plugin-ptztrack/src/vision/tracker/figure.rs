@@ -131,14 +131,7 @@ impl Cells {
             });
             if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
         });
-        let unknown = self.motion.iter().map(|motion| *motion == 0.0);
-        let moving = self.motion.iter().map(|motion| (motion / MOVES).clamp(0.0, 1.0));
-        Evidence {
-            grid: self.lattice.grid,
-            odds: odds.collect(),
-            moving: moving.collect(),
-            unknown: unknown.collect(),
-        }
+        Evidence { grid: self.lattice.grid, odds: odds.collect(), motion: self.motion.clone() }
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -176,10 +169,8 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 pub(super) struct Evidence {
     grid: Grid,
     odds: Vec<f32>,
-    /// How surely it is not the known background, 0 to 1.
-    moving: Vec<f32>,
-    /// Whether nothing is known of the background there.
-    unknown: Vec<bool>,
+    /// The same by motion alone; 0 where nothing is known of the background.
+    motion: Vec<f32>,
 }
 
 impl Evidence {
@@ -242,8 +233,8 @@ impl Halves {
     }
 
     /// One of them.
-    pub fn half(&self, lower: bool) -> &f32 {
-        if lower { &self.lower } else { &self.upper }
+    pub fn half(self, lower: bool) -> f32 {
+        if lower { self.lower } else { self.upper }
     }
 
     /// One of them, to be changed.
@@ -333,10 +324,11 @@ impl Shape {
             let (x, y) = ((index % columns) as i32 + moved.0, (index / columns) as i32 + moved.1);
             let Some(cell) = evidence.index(x, y) else { continue };
             let lower = 2 * (index / columns) >= rows;
-            let (figure, moving) = if evidence.unknown[cell] {
-                (*usual.figure.half(lower), *usual.moving.half(lower))
+            let motion = evidence.motion[cell];
+            let (figure, moving) = if motion == 0.0 {
+                (usual.figure.half(lower), usual.moving.half(lower))
             } else {
-                (1.0 / (1.0 + (-evidence.odds[cell]).exp()), evidence.moving[cell])
+                (1.0 / (1.0 + (-evidence.odds[cell]).exp()), (motion / MOVES).clamp(0.0, 1.0))
             };
             *level.figure.half_mut(lower) += share * figure;
             *level.moving.half_mut(lower) += share * moving;

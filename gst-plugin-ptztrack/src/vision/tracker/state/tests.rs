@@ -54,27 +54,19 @@ fn following(profile: Profile, picture: &Picture, x: f32, y: f32) -> Chain {
 
 fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Chain {
     let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config) };
-    let (width, height) = (SIZE.0 as f64, SIZE.1 as f64);
-    let bounds = Rect {
-        x: f64::from(x) / width,
-        y: f64::from(y) / height,
-        width: f64::from(PERSON.0) / width,
-        height: f64::from(PERSON.1) / height,
-    };
-    let report = chain.process(picture, DT, &[Detection { bounds, ..Detection::default() }]);
+    let report = chain.process(picture, DT, &[detection(Rect2f::new(x, y, PERSON.0, PERSON.1))]);
     assert_eq!(report.changes, [TargetChange::Acquired]);
     chain
 }
 
+fn detection(bounds: Rect2f) -> Detection {
+    let frame = Frame { width: SIZE.0 as f32, height: SIZE.1 as f32 };
+    Detection { bounds: frame.rect(bounds), ..Detection::default() }
+}
+
 /// Somebody of that width.
 fn detected(x: f32, width: f32) -> Detection {
-    let bounds = Rect {
-        x: f64::from(x) / SIZE.0 as f64,
-        y: 100.0 / SIZE.1 as f64,
-        width: f64::from(width) / SIZE.0 as f64,
-        height: f64::from(PERSON.1) / SIZE.1 as f64,
-    };
-    Detection { bounds, ..Detection::default() }
+    detection(Rect2f::new(x, 100.0, width, PERSON.1))
 }
 
 fn step(chain: &mut Chain, picture: &Picture) -> Report {
@@ -251,15 +243,6 @@ fn a_long_gap_is_a_loss() {
 #[test]
 fn who_comes_out_changed_beside_a_hidden_target_is_followed_on() {
     let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
-    let detected = |x: f32, height: f32| Detection {
-        bounds: Rect {
-            x: f64::from(x) / SIZE.0 as f64,
-            y: f64::from(190.0 - height) / SIZE.1 as f64,
-            width: f64::from(PERSON.0) / SIZE.0 as f64,
-            height: f64::from(height) / SIZE.1 as f64,
-        },
-        ..Detection::default()
-    };
     let walk = |tracker: &mut Chain, texture: u32| {
         let mut last = Report::default();
         for n in 1..24 {
@@ -273,7 +256,7 @@ fn who_comes_out_changed_beside_a_hidden_target_is_followed_on() {
             let x = 96.0 - 8.0 * (n - 12) as f32;
             if n >= 12 {
                 picture.paint(Rect2f::new(x, 130.0, PERSON.0, 60.0), texture);
-                last = tracker.process(&picture, DT, &[detected(x, 60.0)]);
+                last = tracker.process(&picture, DT, &[detection(Rect2f::new(x, 130.0, PERSON.0, 60.0))]);
             } else {
                 last = step(tracker, &picture);
             }

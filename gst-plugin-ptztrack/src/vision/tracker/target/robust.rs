@@ -489,13 +489,17 @@ impl Robust {
                 .usual
                 .silhouette(place.fit)
                 .with(self.usual.stands_out(place.level, self.alone()), |fit, stands_out| fit * stands_out);
-            let alike = self.resembles(seen, sighting)?;
+            let by_looks = Place { share: of_whole(shares), ..place };
+            let by_colours = self.by_colours(sighting, bounds, place);
+            let most = by_colours.map_or(by_looks.share, |by_colours| by_colours.share.max(by_looks.share));
+            if most < best.map_or(FOUND, |best| best.share) {
+                continue;
+            }
             // In a crowd there is always somebody who fits: who is farther away must have the target's colours.
-            let likely = if alike { 1.0 } else { self.likely_at(place.bounds) };
-            let by_looks = Place { share: of_whole(shares) * likely, ..place };
-            let found = match self.by_colours(sighting, place).filter(|_| alike) {
-                Some(by_colours) if by_colours.share > by_looks.share => by_colours,
-                _ => by_looks,
+            let found = if !self.resembles(seen, sighting)? {
+                Place { share: by_looks.share * self.likely_at(place.bounds), ..place }
+            } else {
+                by_colours.filter(|by_colours| by_colours.share > by_looks.share).unwrap_or(by_looks)
             };
             if found.share >= FOUND && best.is_none_or(|best| found.share > best.share) {
                 best = Some(found);
@@ -506,8 +510,9 @@ impl Robust {
 
     /// Somebody in the target's colours, where it is expected and nobody else is near, is the target, however it turned: all of
     /// it, or, while it is hidden, the part that comes out again.
-    fn by_colours(&self, sighting: &Sighting, place: Place) -> Option<Place> {
-        let (region, mut bounds) = (sighting.bounds, self.box_in(sighting));
+    /// Takes the target's box in the region, and the best `place` there.
+    fn by_colours(&self, sighting: &Sighting, mut bounds: Rect2f, place: Place) -> Option<Place> {
+        let region = sighting.bounds;
         let whole = region.width > WHOLE * bounds.width && region.height > WHOLE * bounds.height;
         if !whole && self.presence.is_here() {
             return None;
