@@ -137,6 +137,7 @@ fn a_camera_that_lacks_an_element_is_given_up_and_no_matter_to_the_others() {
     assert!(check().status.success());
     program.launch.signal("HUP");
     program.launch.wait_for_line("records: the picture is there");
+    follows(&records);
     program.end("TERM");
     fs::remove_dir_all(&plugins).unwrap();
     for camera in [&good, &records] {
