@@ -2,6 +2,7 @@
 
 //! Reading and writing `GstStructure` fields with errors that name the field.
 
+use glib::value::FromValue;
 use gst::prelude::*;
 
 use crate::named::Named;
@@ -35,19 +36,14 @@ impl<'a> Reader<'a> {
         }
     }
 
-    pub fn get<T>(&self, field: &str) -> Result<T, ContractError>
-    where
-        T: for<'v> glib::value::FromValue<'v>,
-    {
+    /// What lies in the structure is lent, where `T` is a reference: a copy of a list copies each of its values.
+    pub fn get<T: FromValue<'a>>(&self, field: &str) -> Result<T, ContractError> {
         let value = self.0.value(field).map_err(|err| self.field_error(field, err))?;
         value.get::<T>().map_err(|_| self.field_error(field, format!("found a {}", value.type_())))
     }
 
     /// `None` where the field is absent: optional fields are simply left out.
-    pub fn get_optional<T>(&self, field: &str) -> Result<Option<T>, ContractError>
-    where
-        T: for<'v> glib::value::FromValue<'v>,
-    {
+    pub fn get_optional<T: FromValue<'a>>(&self, field: &str) -> Result<Option<T>, ContractError> {
         if self.0.has_field(field) { self.get(field).map(Some) } else { Ok(None) }
     }
 
@@ -86,39 +82,61 @@ impl<'a> Reader<'a> {
 
     /// Exactly `N` finite numbers.
     pub fn numbers<const N: usize>(&self, field: &str) -> Result<[f64; N], ContractError> {
-        let tuples = self.tuples::<N>(field)?;
-        match tuples.as_slice() {
-            [tuple] => Ok(*tuple),
-            other => Err(self.value_error(field, format!("{} numbers", other.len() * N))),
+        let values = self.list(field)?;
+        if values.len() != N {
+            return Err(self.value_error(field, format!("{} numbers", values.len())));
         }
+        self.tuple(field, values)
     }
 
     /// A flat list of finite numbers, `N` to an item.
     pub fn tuples<const N: usize>(&self, field: &str) -> Result<Vec<[f64; N]>, ContractError> {
-        let array = self.get::<gst::Array>(field)?;
-        let values = array.as_slice();
+        let mut tuples = Vec::with_capacity(self.list(field)?.len() / N);
+        self.each_tuple(field, |tuple| tuples.push(tuple))?;
+        Ok(tuples)
+    }
+
+    /// The same, one item after the other.
+    pub fn each_tuple<const N: usize>(
+        &self,
+        field: &str,
+        mut take: impl FnMut([f64; N]),
+    ) -> Result<(), ContractError> {
+        let values = self.list(field)?;
         if !values.len().is_multiple_of(N) {
             return Err(self.value_error(field, format!("{} numbers", values.len())));
         }
-        values
-            .chunks_exact(N)
-            .map(|chunk| {
-                let mut tuple = [0.0; N];
-                for (slot, value) in tuple.iter_mut().zip(chunk) {
-                    *slot = value
-                        .get::<f64>()
-                        .ok()
-                        .filter(|number| number.is_finite())
-                        .ok_or_else(|| self.value_error(field, format!("{value:?}")))?;
-                }
-                Ok(tuple)
-            })
-            .collect()
+        for values in values.chunks_exact(N) {
+            take(self.tuple(field, values)?);
+        }
+        Ok(())
+    }
+
+    /// The values of a list.
+    pub fn list(&self, field: &str) -> Result<&'a [glib::SendValue], ContractError> {
+        self.get::<gst::ArrayRef>(field).map(|list| list.as_slice())
+    }
+
+    /// As many finite numbers as there are in `values`, which are `N`.
+    fn tuple<const N: usize>(
+        &self,
+        field: &str,
+        values: &[glib::SendValue],
+    ) -> Result<[f64; N], ContractError> {
+        let mut tuple = [0.0; N];
+        for (slot, value) in tuple.iter_mut().zip(values) {
+            *slot = value
+                .get::<f64>()
+                .ok()
+                .filter(|number| number.is_finite())
+                .ok_or_else(|| self.value_error(field, format!("{value:?}")))?;
+        }
+        Ok(tuple)
     }
 
     pub fn named<T: Named>(&self, field: &str) -> Result<T, ContractError> {
-        let name = self.get::<String>(field)?;
-        T::from_name(&name).ok_or_else(|| self.value_error(field, name))
+        let name = self.get::<&str>(field)?;
+        T::from_name(name).ok_or_else(|| self.value_error(field, name))
     }
 
     pub fn named_optional<T: Named>(&self, field: &str) -> Result<Option<T>, ContractError> {

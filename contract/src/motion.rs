@@ -80,19 +80,23 @@ impl Region {
             .build()
     }
 
-    fn from_structure(structure: &gst::StructureRef) -> Result<Self, ContractError> {
+    fn refill(&mut self, structure: &gst::StructureRef) -> Result<(), ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        Ok(Self {
+        let mut contour = std::mem::take(&mut self.contour);
+        contour.clear();
+        reader.each_tuple("contour", |[x, y]| contour.push(Point { x, y }))?;
+        *self = Self {
             bounds: reader.rect("box")?,
-            contour: reader.tuples::<2>("contour")?.into_iter().map(|[x, y]| Point { x, y }).collect(),
+            contour,
             perimeter: reader.number("perimeter")?,
             area: reader.number("area")?,
             centroid: reader.point("centroid")?,
             track: reader
-                .get_optional::<gst::Structure>("track")?
-                .map(|track| RegionTrack::from_structure(&track))
+                .get_optional::<&gst::StructureRef>("track")?
+                .map(RegionTrack::from_structure)
                 .transpose()?,
-        })
+        };
+        Ok(())
     }
 }
 
@@ -119,19 +123,33 @@ impl BufferMeta for MotionMeta {
     }
 
     fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
+        let mut meta = Self::default();
+        meta.read_in_place(structure)?;
+        Ok(meta)
+    }
+}
+
+impl MotionMeta {
+    /// As [`BufferMeta::of`], in the memory of this one; after an error it holds anything.
+    pub fn refill(&mut self, buffer: &gst::BufferRef) -> Option<Result<(), ContractError>> {
+        let meta = gst::meta::CustomMeta::from_buffer(buffer, Self::NAME).ok()?;
+        Some(self.read_in_place(meta.structure()))
+    }
+
+    fn read_in_place(&mut self, structure: &gst::StructureRef) -> Result<(), ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let read = |field: &str| {
-            let regions = reader.get::<gst::Array>(field)?;
-            let read = regions.as_slice().iter().map(|value| match value.get::<gst::Structure>() {
-                Ok(region) => Region::from_structure(&region),
-                Err(err) => Err(ContractError::Field {
+        for (field, regions) in [(REGIONS, &mut self.regions), (OUTSIDE, &mut self.outside)] {
+            let values = reader.list(field)?;
+            regions.resize_with(values.len(), Region::default);
+            for (region, value) in regions.iter_mut().zip(values) {
+                let structure = value.get::<&gst::StructureRef>().map_err(|err| ContractError::Field {
                     structure: Self::NAME.to_owned(),
                     field: field.to_owned(),
                     reason: err.to_string(),
-                }),
-            });
-            read.collect::<Result<_, _>>()
-        };
-        Ok(Self { regions: read(REGIONS)?, outside: read(OUTSIDE)? })
+                })?;
+                region.refill(structure)?;
+            }
+        }
+        Ok(())
     }
 }

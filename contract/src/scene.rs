@@ -27,10 +27,8 @@ impl CameraMotion {
 
     fn from_structure(structure: &gst::StructureRef) -> Result<Self, ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let rows = reader.tuples::<3>("homography")?;
-        let rows = <[[f64; 3]; 3]>::try_from(rows)
-            .map_err(|rows| reader.value_error("homography", format!("{} rows", rows.len())))?;
-        let homography = Homography(rows);
+        let [a, b, c, d, e, f, g, h, i] = reader.numbers("homography")?;
+        let homography = Homography([[a, b, c], [d, e, f], [g, h, i]]);
         Ok(Self { homography, covariance: reader.numbers("covariance")?, inliers: reader.get("inliers")? })
     }
 }
@@ -89,13 +87,11 @@ pub struct SceneMeta {
 
 impl SceneMeta {
     fn plane(reader: &Reader, field: &str) -> Result<Plane, ContractError> {
-        let structure = reader.get::<gst::Structure>(field)?;
-        Plane::from_structure(&structure)
+        Plane::from_structure(reader.get(field)?)
     }
 
     fn plane_optional(reader: &Reader, field: &str) -> Result<Option<Plane>, ContractError> {
-        let structure = reader.get_optional::<gst::Structure>(field)?;
-        structure.map(|structure| Plane::from_structure(&structure)).transpose()
+        reader.get_optional(field)?.map(Plane::from_structure).transpose()
     }
 }
 
@@ -120,10 +116,12 @@ impl BufferMeta for SceneMeta {
 
     fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let motion = reader.get_optional::<gst::Structure>("camera-motion")?;
         let scene = Self {
             from_pts: reader.get_optional("from-pts")?,
-            camera_motion: motion.map(|motion| CameraMotion::from_structure(&motion)).transpose()?,
+            camera_motion: reader
+                .get_optional("camera-motion")?
+                .map(CameraMotion::from_structure)
+                .transpose()?,
             luma: Self::plane(&reader, "luma")?,
             chroma: Self::plane_optional(&reader, "u")?
                 .zip(Self::plane_optional(&reader, "v")?)
