@@ -111,12 +111,12 @@ pub struct BgAvgDetect {
     )]
     #[property(
         name = "zones", type = String, mutable_playing, blurb = "Where people are chosen (empty = everywhere), in the picture in which it is set: polygons separated by `;`, each of three or more points `x,y` (0 to 1) separated by spaces",
-        get = |imp: &Self| lock(&imp.settings).zones.text.clone(),
+        get = |imp: &Self| lock(&imp.settings).zones.text.to_string(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("zones", text, |settings| &mut settings.zones)
     )]
     #[property(
         name = "exclude-zones", type = String, mutable_playing, blurb = "Where nobody is chosen: polygons as in zones",
-        get = |imp: &Self| lock(&imp.settings).exclude_zones.text.clone(),
+        get = |imp: &Self| lock(&imp.settings).exclude_zones.text.to_string(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("exclude-zones", text, |settings| &mut settings.exclude_zones)
     )]
     #[property(
@@ -304,6 +304,7 @@ impl BaseTransformImpl for BgAvgDetect {
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         let seen = self.look(&mut stream, buffer);
         let attached = attach(buffer, &seen, &stream.in_info);
+        stream.recycle(seen.motion);
         *lock(&self.stream) = Some(stream);
         self.posted(attached)
     }
@@ -322,6 +323,7 @@ impl BaseTransformImpl for BgAvgDetect {
         if let Err(error) = &drawn {
             self.warn_once(&mut stream, error);
         }
+        stream.recycle(seen.motion);
         *lock(&self.stream) = Some(stream);
         self.posted(attached)?;
         // What could not be drawn is not shown: its memory holds anything.

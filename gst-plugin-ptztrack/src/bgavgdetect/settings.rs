@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Output, Profile, Selection, Test};
@@ -8,7 +9,7 @@ use crate::vision::{Criterion, DetectorConfig, ForegroundTest, RegionChoice, Zon
 /// Polygons as written and as read.
 #[derive(Debug, Clone, Default)]
 pub(super) struct ZoneSetting {
-    pub text: String,
+    pub text: Arc<str>,
     zones: Zones,
 }
 
@@ -16,7 +17,7 @@ impl std::str::FromStr for ZoneSetting {
     type Err = ZoneError;
 
     fn from_str(text: &str) -> Result<Self, ZoneError> {
-        Ok(Self { text: text.to_owned(), zones: text.parse()? })
+        Ok(Self { text: text.into(), zones: text.parse()? })
     }
 }
 

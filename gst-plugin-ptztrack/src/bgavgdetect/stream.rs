@@ -31,14 +31,11 @@ pub(super) enum StreamError {
     Conversion(#[from] glib::BoolError),
 }
 
+/// A copy of a plane whose rows are packed, as all of a [`crate::vision::SceneView`] are.
 fn plane(luma: Luma) -> Plane {
-    let mut pixels = Vec::with_capacity(luma.width() * luma.height());
-    (0..luma.height()).for_each(|y| pixels.extend_from_slice(luma.row(y)));
-    Plane {
-        width: luma.width() as u32,
-        height: luma.height() as u32,
-        pixels: glib::Bytes::from_owned(pixels),
-    }
+    let (width, height) = (luma.width(), luma.height());
+    let pixels = glib::Bytes::from(&luma.bytes()[..width * height]);
+    Plane { width: width as u32, height: height as u32, pixels }
 }
 
 /// What tracker and servo last said.
@@ -203,6 +200,11 @@ impl Stream {
             self.scene.forget_ghosts(regions).map_err(StreamError::Scene)?;
         }
         Ok((motion, scene))
+    }
+
+    /// Takes back what was told of a picture, as memory for the next.
+    pub fn recycle(&mut self, motion: Option<MotionMeta>) {
+        motion.into_iter().for_each(|motion| self.detector.recycle(motion));
     }
 
     /// Whether motion starts or ends with these regions.

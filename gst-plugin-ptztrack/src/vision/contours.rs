@@ -29,7 +29,8 @@ impl Grid {
         nearest(self.place(point))
     }
 
-    fn region(&self, contour: &Vector<Pixel>) -> opencv::Result<Region> {
+    /// The region within `contour`, in the memory of another.
+    fn region(&self, contour: &Vector<Pixel>, memory: Region) -> opencv::Result<Region> {
         let bounds = imgproc::bounding_rect(contour)?;
         let moments = imgproc::moments_def(contour)?;
         let bounds = Rect {
@@ -43,9 +44,12 @@ impl Grid {
         } else {
             bounds.centre()
         };
+        let mut points = memory.contour;
+        points.clear();
+        points.extend(contour.iter().map(|p| self.point(f64::from(p.x), f64::from(p.y))));
         Ok(Region {
             bounds,
-            contour: contour.iter().map(|p| self.point(f64::from(p.x), f64::from(p.y))).collect(),
+            contour: points,
             perimeter: imgproc::arc_length(contour, true)? / (2.0 * (self.width + self.height)),
             area: imgproc::contour_area_def(contour)? / (self.width * self.height),
             centroid,
@@ -63,12 +67,26 @@ pub(super) fn nearest(place: Point) -> Pixel {
 /// 3.4.1), outer borders only, the longest perimeter first. Contours run through the middles of the
 /// outermost pixels, so a region one pixel wide has no area.
 pub fn regions(mask: &Mat, grid: Grid) -> opencv::Result<Vec<Region>> {
+    let mut found = Vec::new();
+    find_regions(mask, grid, &mut found, &mut Vec::new())?;
+    Ok(found)
+}
+
+/// Leaves them in `found`, in the memory of what is `spare`.
+pub(super) fn find_regions(
+    mask: &Mat,
+    grid: Grid,
+    found: &mut Vec<Region>,
+    spare: &mut Vec<Region>,
+) -> opencv::Result<()> {
+    spare.append(found);
     let mut contours = Vector::<Vector<Pixel>>::new();
     imgproc::find_contours_def(mask, &mut contours, imgproc::RETR_EXTERNAL, imgproc::CHAIN_APPROX_SIMPLE)?;
-    let mut regions =
-        contours.iter().map(|contour| grid.region(&contour)).collect::<opencv::Result<Vec<_>>>()?;
-    regions.sort_by(|a, b| b.perimeter.total_cmp(&a.perimeter));
-    Ok(regions)
+    for contour in &contours {
+        found.push(grid.region(&contour, spare.pop().unwrap_or_default())?);
+    }
+    found.sort_by(|a, b| b.perimeter.total_cmp(&a.perimeter));
+    Ok(())
 }
 
 /// Sets the pixels enclosed by the regions' contours to 255 and all others to 0 (thesis 3.4.2).

@@ -10,7 +10,7 @@ use ptztrack_contract::{MotionMeta, Region};
 use super::afterimage::Afterimage;
 use super::background::{Background, Criterion, ForegroundTest};
 use super::carried_zones::CarriedZones;
-use super::contours::{Grid, fill_regions, regions};
+use super::contours::{Grid, fill_regions, find_regions};
 use super::extremes::Extremes;
 use super::morphology::clean;
 use super::persistence::Persistence;
@@ -136,6 +136,9 @@ pub struct Detector {
     segmentation: Segmentation,
     extremes: Extremes,
     zones: Option<ZoneCache>,
+    /// Memory: what was told of a picture before, emptied, and regions.
+    told: MotionMeta,
+    spare: Vec<Region>,
 }
 
 /// The mask of zones, drawn once.
@@ -208,11 +211,19 @@ impl Detector {
         let (open_size, close_size) = self.sizes(config);
         self.fit_mask(foreground.width(), foreground.height())?;
         self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?)?;
-        let mut found = self.found(config)?;
+        let MotionMeta { regions: mut found, mut outside } = std::mem::take(&mut self.told);
+        self.find_regions(config, &mut found)?;
         self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
-        let confirmed = self.persistence.confirmed(found, config.confirm_pictures);
-        let (regions, outside) = confirmed.into_iter().partition(|region| zones.allow(region.centroid));
+        let mut regions = self.persistence.confirmed(found, config.confirm_pictures);
+        outside.extend(regions.extract_if(.., |region| !zones.allow(region.centroid)));
         Ok(Some(MotionMeta { regions: config.choice.of(regions), outside }))
+    }
+
+    /// Takes back what it told, as memory for the next picture.
+    pub fn recycle(&mut self, mut motion: MotionMeta) {
+        self.spare.append(&mut motion.regions);
+        self.spare.append(&mut motion.outside);
+        self.told = motion;
     }
 
     /// The same of the reduced picture.
@@ -280,15 +291,21 @@ impl Detector {
         } else {
             self.afterimage.restart();
         }
-        let found = self.found(config)?;
+        let mut found = Vec::new();
+        self.find_regions(config, &mut found)?;
         Ok(self.chosen(found, config))
     }
 
-    /// The regions of `mask` that are neither too small nor too large, longest perimeter first.
-    fn found(&self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
-        let mut found = regions(&self.mask, self.grid())?;
-        found.retain(|region| (config.min_area..=config.max_area).contains(&region.area));
-        Ok(found)
+    /// Leaves the regions of `mask` that are neither too small nor too large in `found`, longest perimeter first.
+    fn find_regions(
+        &mut self,
+        config: &DetectorConfig,
+        found: &mut Vec<Region>,
+    ) -> Result<(), DetectorError> {
+        find_regions(&self.mask, self.grid(), found, &mut self.spare)?;
+        let areas = config.min_area..=config.max_area;
+        self.spare.extend(found.extract_if(.., |region| !areas.contains(&region.area)));
+        Ok(())
     }
 
     /// Those that are reported.

@@ -8,6 +8,8 @@ use ptztrack_contract::{Rect, Region};
 pub struct Persistence {
     /// Boxes of the last picture, each with the number of pictures it has been there.
     seen: Vec<(Rect, u32)>,
+    /// Memory for those of the next one.
+    now: Vec<(Rect, u32)>,
 }
 
 impl Persistence {
@@ -17,15 +19,17 @@ impl Persistence {
     }
 
     /// Those of `regions` that have been there for `pictures` pictures, this one included.
-    pub fn confirmed(&mut self, regions: Vec<Region>, pictures: u32) -> Vec<Region> {
+    pub fn confirmed(&mut self, mut regions: Vec<Region>, pictures: u32) -> Vec<Region> {
         let age = |bounds: &Rect| {
             let overlapping = self.seen.iter().filter(|(before, _)| overlap(before, bounds));
             overlapping.map(|(_, age)| *age).max().unwrap_or(0).saturating_add(1)
         };
-        let seen: Vec<_> = regions.iter().map(|region| (region.bounds, age(&region.bounds))).collect();
-        self.seen = seen;
-        let aged = regions.into_iter().zip(&self.seen);
-        aged.filter(|(_, (_, age))| *age >= pictures).map(|(region, _)| region).collect()
+        self.now.clear();
+        self.now.extend(regions.iter().map(|region| (region.bounds, age(&region.bounds))));
+        std::mem::swap(&mut self.seen, &mut self.now);
+        let mut ages = self.seen.iter().map(|(_, age)| *age);
+        regions.retain(|_| ages.next().is_some_and(|age| age >= pictures));
+        regions
     }
 }
 

@@ -44,6 +44,8 @@ struct RestlessPlace {
 #[derive(Debug, Default)]
 pub struct RegionTracks {
     tracks: Vec<Track>,
+    /// Memory for those of the next picture.
+    before: Vec<Track>,
     places: Vec<RestlessPlace>,
     last_id: u64,
 }
@@ -59,25 +61,24 @@ impl RegionTracks {
     /// seen. Where `motion` is not known, the camera is taken to rest.
     pub fn update(&mut self, regions: &mut [Region], motion: Option<&CameraMotion>, elapsed: Duration) {
         self.carry(motion.map_or(Homography::IDENTITY, |motion| motion.homography), elapsed);
-        let mut free: Vec<Track> = std::mem::take(&mut self.tracks);
+        std::mem::swap(&mut self.tracks, &mut self.before);
         // The oldest choose first: what breaks off is new.
-        free.sort_by_key(|track| std::cmp::Reverse(track.age));
-        let mut taken = vec![false; regions.len()];
-        for mut track in free {
-            let overlaps = regions.iter().map(|region| overlap(&track.bounds, &region.bounds)).enumerate();
-            let best = overlaps.filter(|(index, area)| !taken[*index] && *area > 0.0);
-            match best.max_by(|a, b| a.1.total_cmp(&b.1)) {
-                Some((index, _)) => {
-                    taken[index] = true;
-                    track.see(&regions[index], elapsed);
-                    regions[index].track = Some(track.told(0.0));
+        self.before.sort_by_key(|track| std::cmp::Reverse(track.age));
+        regions.iter_mut().for_each(|region| region.track = None);
+        for mut track in self.before.drain(..) {
+            let free = regions.iter_mut().filter(|region| region.track.is_none());
+            let overlaps = free.map(|region| (overlap(&track.bounds, &region.bounds), region));
+            match overlaps.filter(|(area, _)| *area > 0.0).max_by(|a, b| a.0.total_cmp(&b.0)) {
+                Some((_, region)) => {
+                    track.see(region, elapsed);
+                    region.track = Some(track.told(0.0));
                     self.tracks.push(track);
                 }
                 None if track.missed < MAX_MISSED => self.tracks.push(track),
                 None => {}
             }
         }
-        for (region, _) in regions.iter_mut().zip(taken).filter(|(_, taken)| !taken) {
+        for region in regions.iter_mut().filter(|region| region.track.is_none()) {
             self.last_id += 1;
             let track = Track::new(region, self.last_id);
             region.track = Some(track.told(0.0));

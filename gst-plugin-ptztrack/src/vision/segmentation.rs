@@ -27,6 +27,10 @@ pub struct Segmentation {
     extremes: Extremes,
     /// Of one row: sums of three pixels above each other.
     sums: Vec<u16>,
+    /// Whether anything is set in each column.
+    columns: Vec<u8>,
+    /// Of a part's columns.
+    heights: Vec<usize>,
 }
 
 impl Segmentation {
@@ -46,7 +50,7 @@ impl Segmentation {
             return Ok(());
         }
         clean(mask, width, open_size, close_size, &mut self.extremes);
-        let Some((columns, rows)) = extent(mask, width) else { return Ok(()) };
+        let Some((columns, rows)) = extent(mask, width, &mut self.columns) else { return Ok(()) };
         let mut boxes = Mat::default();
         let part = Luma::packed(mask, width).crop(columns.start, rows.start, columns.len(), rows.len());
         let count = part.with_mat(|part| {
@@ -60,7 +64,7 @@ impl Segmentation {
         for label in 1..count {
             let part = Part::of(&boxes, label, (columns.start, rows.start))?;
             let is_sure = part.count(&self.labels, &self.strong, width)? >= needed;
-            let kept = if is_sure { part.upright(&self.labels)? } else { 0..0 };
+            let kept = if is_sure { part.upright(&self.labels, &mut self.heights)? } else { 0..0 };
             part.keep(kept, &self.labels, mask, width)?;
         }
         Ok(())
@@ -115,12 +119,13 @@ fn threshold_row(
     usize::from(count)
 }
 
-/// The columns and rows that hold all that is set; `None` where nothing is.
-fn extent(mask: &[u8], width: usize) -> Option<(Range<usize>, Range<usize>)> {
+/// The columns and rows that hold all that is set; `None` where nothing is. `columns` is memory.
+fn extent(mask: &[u8], width: usize, columns: &mut Vec<u8>) -> Option<(Range<usize>, Range<usize>)> {
     let is_set = |row: &[u8]| row.iter().fold(0, |any, pixel| any | pixel) > 0;
     let rows = || mask.chunks_exact(width.max(1));
     let (first, last) = (rows().position(is_set)?, rows().rposition(is_set)?);
-    let mut columns = vec![0; width];
+    columns.clear();
+    columns.resize(width, 0);
     for row in rows().take(last + 1).skip(first) {
         columns.iter_mut().zip(row).for_each(|(any, pixel)| *any |= pixel);
     }
@@ -161,13 +166,14 @@ impl Part {
     }
 
     /// Its columns without a long low tail on either side: somebody stands upright, and their shadow lies (by the heights of
-    /// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003).
-    fn upright(&self, labels: &Mat) -> opencv::Result<Range<usize>> {
-        let mut heights = vec![0_usize; self.columns.len()];
+    /// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003). `heights` is memory.
+    fn upright(&self, labels: &Mat, heights: &mut Vec<usize>) -> opencv::Result<Range<usize>> {
+        heights.clear();
+        heights.resize(self.columns.len(), 0);
         for row in self.rows.clone() {
             let line = self.line(labels, row)?;
             line.iter()
-                .zip(&mut heights)
+                .zip(&mut *heights)
                 .for_each(|(label, height)| *height += usize::from(*label == self.label));
         }
         let tallest = heights.iter().copied().max().unwrap_or(0) as f32;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::sync::Arc;
+
 use opencv::core::{CV_8UC1, Mat, Point as Pixel, Scalar, Vector};
 use opencv::imgproc;
 use ptztrack_contract::Point;
@@ -15,9 +17,9 @@ pub enum ZoneError {
     TooFewPoints(String),
 }
 
-/// Polygons in normalised coordinates.
+/// Polygons in normalised coordinates. Copies share them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub struct Zones(Vec<Vec<Point>>);
+pub struct Zones(Arc<[Vec<Point>]>);
 
 impl Zones {
     /// How polygons are written.
@@ -49,7 +51,7 @@ impl Zones {
                 (point.y * height as f64 - 0.5).round() as i32,
             )
         };
-        for polygon in &self.0 {
+        for polygon in self.0.iter() {
             let polygon: Vector<Pixel> = polygon.iter().map(pixel).collect();
             imgproc::fill_poly_def(mask, &polygon, Scalar::all(value))?;
         }

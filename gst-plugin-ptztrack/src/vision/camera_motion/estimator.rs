@@ -4,7 +4,7 @@ use opencv::core::Point2f;
 use ptztrack_contract::{CameraMotion, Homography, Point};
 
 use super::corners::{self, Corner, Grid};
-use super::fit::{self, Centred, Fit, Pair};
+use super::fit::{self, Agreement, Centred, Fit, Pair};
 use super::flow::{self, Pyramid};
 use crate::vision::Luma;
 
@@ -47,6 +47,19 @@ struct Key {
     noise: f64,
 }
 
+/// What one picture says of the key picture's points; kept as memory for the next.
+#[derive(Debug, Default)]
+struct Comparison {
+    /// Where each point is now.
+    ends: Vec<Option<Point2f>>,
+    /// Those that were found, ...
+    pairs: Vec<Pair>,
+    /// ... and which of them agree.
+    agreement: Agreement,
+    /// Cells that have a point.
+    taken: Vec<bool>,
+}
+
 /// Estimates the motion of the camera from picture to picture (see the table of this module). Works on
 /// pictures about 320 pixels wide.
 #[derive(Debug, Default)]
@@ -54,6 +67,7 @@ pub struct CameraMotionEstimator {
     key: Option<Key>,
     /// Motion of the last picture, pixels: the camera goes on as it did.
     last: Homography,
+    comparison: Comparison,
 }
 
 impl CameraMotionEstimator {
@@ -83,8 +97,9 @@ impl CameraMotionEstimator {
             key.doubt(foreground);
         }
         let told = expected.map(|motion| to_pixels(&motion, size));
-        let guesses: Vec<_> = [self.last].into_iter().chain(told).chain([Homography::IDENTITY]).collect();
-        let Some((fit, ends)) = key.compare(&pyramid, &guesses, Centred::of(size.0, size.1))? else {
+        let guesses = [Some(self.last), told, Some(Homography::IDENTITY)].into_iter().flatten();
+        let comparison = &mut self.comparison;
+        let Some(fit) = key.compare(&pyramid, guesses, Centred::of(size.0, size.1), comparison)? else {
             self.last = Homography::IDENTITY;
             self.key = Some(Key::first(pyramid, grid)?);
             return Ok(None);
@@ -94,7 +109,7 @@ impl CameraMotionEstimator {
             return Ok(None);
         };
         self.last = back.then(&fit.homography);
-        let inliers = fit.agrees.iter().filter(|agrees| **agrees).count();
+        let inliers = comparison.agreement.count();
         let motion = CameraMotion {
             homography: to_frame(&self.last, size),
             covariance: [
@@ -104,7 +119,7 @@ impl CameraMotionEstimator {
             ],
             inliers: u32::try_from(inliers).unwrap_or(u32::MAX),
         };
-        self.key = Some(key.next(pyramid, grid, &fit, &ends)?);
+        self.key = Some(key.next(pyramid, grid, &fit, comparison)?);
         Ok(Some(motion))
     }
 }
@@ -125,17 +140,14 @@ impl Key {
         self.pyramid.picture().ok().map(|picture| Grid::of(&picture))
     }
 
-    /// Finds corners in some of the cells that have none.
-    fn top_up(&mut self, grid: Grid) -> opencv::Result<()> {
+    /// Finds corners in some of the cells that are not `taken`.
+    fn top_up(&mut self, grid: Grid, taken: &[bool]) -> opencv::Result<()> {
         let picture = self.pyramid.picture()?;
-        let mut taken = vec![false; grid.cells()];
-        for cell in self.points.iter().filter_map(|point| grid.cell(point.place)) {
-            taken[cell] = true;
-        }
         // Another few each time: in some cells there is nothing to find.
-        let free: Vec<usize> = (0..grid.cells()).filter(|cell| !taken[*cell]).collect();
-        let start = self.points.first().map_or(0, |point| point.place.x as usize) % free.len().max(1);
-        for &cell in free.iter().cycle().skip(start).take(TOP_UP.min(free.len())) {
+        let free = (0..grid.cells()).filter(|cell| !taken[*cell]);
+        let count = free.clone().count();
+        let start = self.points.first().map_or(0, |point| point.place.x as usize) % count.max(1);
+        for cell in free.cycle().skip(start).take(TOP_UP.min(count)) {
             let corner = corners::best(&picture, grid, cell)?;
             self.points
                 .extend(corner.filter(|corner| corner.stands_out(self.noise)).as_ref().map(Tracked::new));
@@ -156,28 +168,25 @@ impl Key {
         }
     }
 
-    /// How the picture moved from this one to `pyramid`, and where each point is now.
+    /// How the picture moved from this one to `pyramid`.
     fn compare(
         &self,
         pyramid: &Pyramid,
-        guesses: &[Homography],
+        guesses: impl Iterator<Item = Homography> + Clone,
         centred: Centred,
-    ) -> opencv::Result<Option<(Fit, Vec<Option<Point2f>>)>> {
-        let places: Vec<Point2f> = self.points.iter().map(|point| point.place).collect();
-        let from_key: Vec<Homography> = guesses.iter().map(|motion| self.to_last.then(motion)).collect();
-        for guess in &from_key {
-            let guesses: Vec<Point2f> = places.iter().map(|place| fit::apply(guess, *place)).collect();
-            let ends = flow::follow(&self.pyramid, pyramid, &places, &guesses)?;
-            let pairs: Vec<Pair> = self
-                .points
-                .iter()
-                .zip(&ends)
-                .filter_map(|(point, end)| {
-                    Some(Pair { from: point.place, to: (*end)?, weight: point.weight })
-                })
-                .collect();
-            if let Some(fit) = fit::fit(&pairs, &from_key, centred) {
-                return Ok(Some((fit, ends)));
+        Comparison { ends, pairs, agreement, .. }: &mut Comparison,
+    ) -> opencv::Result<Option<Fit>> {
+        let places = self.points.iter().map(|point| point.place);
+        let from_key = guesses.map(|motion| self.to_last.then(&motion));
+        for guess in from_key.clone() {
+            let guesses = places.clone().map(|place| fit::apply(&guess, place));
+            flow::follow(&self.pyramid, pyramid, places.clone(), guesses, ends)?;
+            pairs.clear();
+            pairs.extend(self.points.iter().zip(&*ends).filter_map(|(point, end)| {
+                Some(Pair { from: point.place, to: (*end)?, weight: point.weight })
+            }));
+            if let Some(fit) = fit::fit(pairs, from_key.clone(), centred, agreement) {
+                return Ok(Some(fit));
             }
         }
         Ok(None)
@@ -189,31 +198,30 @@ impl Key {
         pyramid: Pyramid,
         grid: Grid,
         fit: &Fit,
-        ends: &[Option<Point2f>],
+        Comparison { ends, agreement, taken, .. }: &mut Comparison,
     ) -> opencv::Result<Self> {
-        let found: Vec<usize> = (0..ends.len()).filter(|index| ends[*index].is_some()).collect();
-        for (&index, &agrees) in found.iter().zip(&fit.agrees) {
-            let weight = &mut self.points[index].weight;
-            *weight += 0.3 * (f64::from(u8::from(agrees)) - *weight);
+        let found = self.points.iter_mut().zip(&*ends).filter(|(_, end)| end.is_some());
+        for ((point, _), &agrees) in found.zip(&agreement.agrees) {
+            point.weight += 0.3 * (f64::from(u8::from(agrees)) - point.weight);
         }
-        let agreeing = fit.agrees.iter().filter(|agrees| **agrees).count();
         let near = travel(&fit.homography, grid) <= MAX_TRAVEL;
-        if near && agreeing as f64 >= MIN_AGREEING * self.points.len() as f64 {
+        if near && agreement.count() as f64 >= MIN_AGREEING * self.points.len() as f64 {
             self.to_last = fit.homography;
             return Ok(self);
         }
-        let mut taken = vec![false; grid.cells()];
-        let mut points = Vec::new();
-        for (&index, _) in found.iter().zip(&fit.agrees).filter(|(_, agrees)| **agrees) {
-            let Some(place) = ends[index] else { continue };
-            let Some(cell) = grid.cell(place) else { continue };
-            if !std::mem::replace(&mut taken[cell], true) {
-                points.push(Tracked { place, weight: self.points[index].weight });
-            }
-        }
-        let mut next = Self { pyramid, points, to_last: Homography::IDENTITY, noise: self.noise };
-        next.top_up(grid)?;
-        Ok(next)
+        taken.clear();
+        taken.resize(grid.cells(), false);
+        let (mut ends, mut agrees) = (ends.iter(), agreement.agrees.iter());
+        self.points.retain_mut(|point| {
+            let Some(place) = ends.next().copied().flatten() else { return false };
+            let agrees = agrees.next().is_some_and(|agrees| *agrees);
+            let Some(cell) = grid.cell(place).filter(|_| agrees) else { return false };
+            point.place = place;
+            !std::mem::replace(&mut taken[cell], true)
+        });
+        (self.pyramid, self.to_last) = (pyramid, Homography::IDENTITY);
+        self.top_up(grid, taken)?;
+        Ok(self)
     }
 }
 

@@ -14,14 +14,27 @@ pub(super) struct Pair {
 }
 
 /// A motion of the picture and how well it is known.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct Fit {
     /// In pixels, counted from the picture's middle in units of its half width.
     pub homography: Homography,
     /// Of the displacement in the middle: xx, xy, yy in squared pixels.
     pub covariance: [f64; 3],
+}
+
+/// What a fit says of each pair, and memory for the next one.
+#[derive(Debug, Default)]
+pub(super) struct Agreement {
     /// Which pairs agree.
     pub agrees: Vec<bool>,
+    offs: Vec<f64>,
+}
+
+impl Agreement {
+    /// How many pairs agree.
+    pub fn count(&self) -> usize {
+        self.agrees.iter().filter(|agrees| **agrees).count()
+    }
 }
 
 /// Fewer points, or a smaller share of what they weigh, say nothing about the background.
@@ -95,8 +108,13 @@ pub(super) fn apply(homography: &Homography, point: Point2f) -> Point2f {
 }
 
 /// The motion that most of `pairs` share: the best of `expected` ones and of trials through two points each
-/// (RANSAC), then least squares with Tukey's weights. `None` where too few agree.
-pub(super) fn fit(pairs: &[Pair], expected: &[Homography], centred: Centred) -> Option<Fit> {
+/// (RANSAC), then least squares with Tukey's weights. `None` where too few agree. `agreement` is of the same order as `pairs`.
+pub(super) fn fit(
+    pairs: &[Pair],
+    expected: impl Iterator<Item = Homography>,
+    centred: Centred,
+    agreement: &mut Agreement,
+) -> Option<Fit> {
     if pairs.len() < MIN_POINTS {
         return None;
     }
@@ -105,31 +123,34 @@ pub(super) fn fit(pairs: &[Pair], expected: &[Homography], centred: Centred) -> 
     let mut limit = 2.0 * tolerance(&homography, pairs);
     let mut solved = None;
     for _ in 0..ROUNDS {
-        let weights: Vec<f64> =
-            pairs.iter().map(|pair| pair.weight * tukey(off(&homography, pair), limit)).collect();
-        let normal = Normal::of(pairs, &weights, &homography, centred);
+        let normal = Normal::of(pairs, &homography, limit, centred);
         let parameters = normal.solve()?;
         homography = centred.leave(parameters);
-        limit = (4.0 * spread(&homography, pairs, limit)).clamp(4.0 * PRECISION, limit);
+        limit = (4.0 * spread(&homography, pairs, limit, &mut agreement.offs)).clamp(4.0 * PRECISION, limit);
         solved = Some(normal);
     }
-    let agrees: Vec<bool> = pairs.iter().map(|pair| off(&homography, pair) <= limit).collect();
-    let count = agrees.iter().filter(|agrees| **agrees).count();
-    let share: f64 =
-        pairs.iter().zip(&agrees).filter(|(_, agrees)| **agrees).map(|(pair, _)| pair.weight).sum();
-    if count < MIN_POINTS || share < MIN_SHARE * all || extent(pairs, &agrees, centred) < MIN_EXTENT {
+    agreement.agrees.clear();
+    agreement.agrees.extend(pairs.iter().map(|pair| off(&homography, pair) <= limit));
+    let agreeing = pairs.iter().zip(&agreement.agrees).filter(|(_, agrees)| **agrees).map(|(pair, _)| pair);
+    let share: f64 = agreeing.clone().map(|pair| pair.weight).sum();
+    if agreement.count() < MIN_POINTS || share < MIN_SHARE * all || extent(agreeing, centred) < MIN_EXTENT {
         return None;
     }
-    let deviation = spread(&homography, pairs, limit).max(PRECISION);
+    let deviation = spread(&homography, pairs, limit, &mut agreement.offs).max(PRECISION);
     let covariance = solved?.covariance(deviation * deviation);
-    Some(Fit { homography, covariance, agrees })
+    Some(Fit { homography, covariance })
 }
 
 /// The best of `expected` motions and of trials; no trial is made any more once one has support enough.
-fn start(pairs: &[Pair], expected: &[Homography], centred: Centred, enough: f64) -> Option<Homography> {
+fn start(
+    pairs: &[Pair],
+    expected: impl Iterator<Item = Homography>,
+    centred: Centred,
+    enough: f64,
+) -> Option<Homography> {
     let trials = (0..TRIALS).filter_map(|trial| similarity(pairs, trial, centred));
     let mut best: Option<(f64, Homography)> = None;
-    for map in expected.iter().copied().chain(trials) {
+    for map in expected.chain(trials) {
         let support = support(&map, pairs);
         if best.is_none_or(|best| support > best.0) {
             best = Some((support, map));
@@ -141,13 +162,11 @@ fn start(pairs: &[Pair], expected: &[Homography], centred: Centred, enough: f64)
     best.map(|(_, map)| map)
 }
 
-/// How far the pairs that agree lie apart, in half widths.
-fn extent(pairs: &[Pair], agrees: &[bool], centred: Centred) -> f64 {
-    let agreeing = pairs.iter().zip(agrees).filter(|(_, agrees)| **agrees);
-    let places: Vec<(f64, f64)> = agreeing.map(|(pair, _)| centred.enter(pair.from)).collect();
-    let range = |pick: fn(&(f64, f64)) -> f64| {
-        let (least, most) =
-            places.iter().map(pick).fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
+/// How far pairs lie apart, in half widths.
+fn extent<'a>(pairs: impl Iterator<Item = &'a Pair> + Clone, centred: Centred) -> f64 {
+    let range = |pick: fn((f64, f64)) -> f64| {
+        let values = pairs.clone().map(|pair| pick(centred.enter(pair.from)));
+        let (least, most) = values.fold((f64::MAX, f64::MIN), |(a, b), v| (a.min(v), b.max(v)));
         most - least
     };
     range(|place| place.0).max(range(|place| place.1))
@@ -194,11 +213,11 @@ fn tukey(off: f64, limit: f64) -> f64 {
     if part > 0.0 { part * part } else { 0.0 }
 }
 
-/// Standard deviation of the pairs that agree, from their median, which outliers among them do not move.
-fn spread(homography: &Homography, pairs: &[Pair], limit: f64) -> f64 {
-    let mut offs: Vec<f64> =
-        pairs.iter().map(|pair| off(homography, pair)).filter(|off| *off <= limit).collect();
-    offs.sort_by(f64::total_cmp);
+/// Standard deviation of the pairs that agree, from their median, which outliers among them do not move. `offs` is memory.
+fn spread(homography: &Homography, pairs: &[Pair], limit: f64, offs: &mut Vec<f64>) -> f64 {
+    offs.clear();
+    offs.extend(pairs.iter().map(|pair| off(homography, pair)).filter(|off| *off <= limit));
+    offs.sort_unstable_by(f64::total_cmp);
     // The median length of a vector with two normal components is 1.18 deviations.
     offs.get(offs.len() / 2).map_or(0.0, |median| median / 1.18)
 }
@@ -210,7 +229,8 @@ struct Normal {
 }
 
 impl Normal {
-    fn of(pairs: &[Pair], weights: &[f64], last: &Homography, centred: Centred) -> Self {
+    /// Pairs count the less the farther they are off the `last` solution, from `limit` on not at all.
+    fn of(pairs: &[Pair], last: &Homography, limit: f64, centred: Centred) -> Self {
         let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
         let mut add = |row: Parameters, value: f64, weight: f64| {
             for (i, &left) in row.iter().enumerate() {
@@ -220,7 +240,8 @@ impl Normal {
                 right[i] += weight * left * value;
             }
         };
-        for (pair, &weight) in pairs.iter().zip(weights).filter(|(_, weight)| **weight > 0.0) {
+        let weighted = pairs.iter().map(|pair| (pair, pair.weight * tukey(off(last, pair), limit)));
+        for (pair, weight) in weighted.filter(|(_, weight)| *weight > 0.0) {
             let ((x, y), (u, v)) = (centred.enter(pair.from), centred.enter(pair.to));
             add([x, -y, 1.0, 0.0, -u * x, -u * y], u, weight);
             add([y, x, 0.0, 1.0, -v * x, -v * y], v, weight);

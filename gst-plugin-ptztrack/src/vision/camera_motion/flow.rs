@@ -45,18 +45,20 @@ impl Pyramid {
     }
 }
 
-/// Follows `points` of `from` into `to`, where each is expected at its `guess`; `None` for one that is lost.
+/// Follows `points` of `from` into `to`, where each is expected at its `guess`; `None` in `out` for one that is lost.
 pub(super) fn follow(
     from: &Pyramid,
     to: &Pyramid,
-    points: &[Point2f],
-    guesses: &[Point2f],
-) -> opencv::Result<Vec<Option<Point2f>>> {
-    if points.is_empty() {
-        return Ok(Vec::new());
+    points: impl Iterator<Item = Point2f>,
+    guesses: impl Iterator<Item = Point2f>,
+    out: &mut Vec<Option<Point2f>>,
+) -> opencv::Result<()> {
+    out.clear();
+    let starts: Vector<Point2f> = points.collect();
+    let mut ends: Vector<Point2f> = guesses.collect();
+    if starts.is_empty() {
+        return Ok(());
     }
-    let starts = Vector::<Point2f>::from_slice(points);
-    let mut ends = Vector::<Point2f>::from_slice(guesses);
     let (mut status, mut residuals) = (Vector::<u8>::new(), Vector::<f32>::new());
     video::calc_optical_flow_pyr_lk(
         &from.levels,
@@ -76,7 +78,6 @@ pub(super) fn follow(
         MIN_EIGENVALUE,
     )?;
     let found = ends.iter().zip(status.iter().zip(residuals.iter()));
-    Ok(found
-        .map(|(end, (found, residual))| (found != 0 && residual <= MAX_RESIDUAL).then_some(end))
-        .collect())
+    out.extend(found.map(|(end, (found, residual))| (found != 0 && residual <= MAX_RESIDUAL).then_some(end)));
+    Ok(())
 }

@@ -15,17 +15,23 @@ const ALIKE: f32 = 6.0;
 
 /// A pixel of the background, and what is seen of it now.
 #[derive(Debug, Clone, Copy)]
-struct Sample {
+pub(super) struct Sample {
     mean: f32,
     seen: f32,
 }
 
 /// The factor by which the mean `mean` (8.8 fixed point) has to be multiplied to look like `seen`: the median ratio, where
 /// that explains more than half of what differs; else 1. Somebody who comes before the background is no change of light,
-/// however much of it they hide.
-pub(super) fn light_gain(seen: &[u8], mean: &[u16], age: &[u8], spans: &[(usize, usize)]) -> f32 {
+/// however much of it they hide. `samples` is memory.
+pub(super) fn light_gain(
+    seen: &[u8],
+    mean: &[u16],
+    age: &[u8],
+    spans: &[(usize, usize)],
+    samples: &mut Vec<Sample>,
+) -> f32 {
     let width = mean.len() / spans.len().max(1);
-    let mut samples = Vec::new();
+    samples.clear();
     for (y, &(start, end)) in spans.iter().enumerate().step_by(SAMPLING) {
         let places = (start..end).skip(y % SAMPLING).step_by(SAMPLING).map(|x| y * width + x);
         samples.extend(places.filter(|&at| age[at] >= KNOWN).filter_map(|at| {
@@ -58,7 +64,7 @@ mod tests {
 
     fn gain(seen: &[u8], age: u8) -> f32 {
         let mean: Vec<u16> = room().iter().map(|&grey| u16::from(grey) << 8).collect();
-        light_gain(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1])
+        light_gain(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1], &mut Vec::new())
     }
 
     #[test]

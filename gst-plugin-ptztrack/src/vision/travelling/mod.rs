@@ -64,6 +64,10 @@ pub struct TravellingBackground {
     back: Warp,
     foreground: Vec<u8>,
     shown: Vec<u8>,
+    /// Memory of [`gain::light_gain`].
+    light: Vec<gain::Sample>,
+    /// Of the canvas onto another.
+    anew: Warp,
 }
 
 impl TravellingBackground {
@@ -105,6 +109,7 @@ impl TravellingBackground {
             &self.model.luma,
             &self.model.age,
             self.forth.spans(),
+            &mut self.light,
         ));
         self.compare(how);
         let stale = self.changed() > if motion.is_some() { NEW_PICTURE } else { UNSEEN_MOTION };
@@ -169,9 +174,8 @@ impl TravellingBackground {
 
     /// Goes over to another canvas, whose pixels lie on the old one where `to_old` says.
     fn lay_anew(&mut self, to_old: &Homography, to_picture: Homography) {
-        let mut warp = Warp::default();
-        warp.prepare(self.model.size, self.model.size, to_old);
-        self.model.carry(&warp);
+        self.anew.prepare(self.model.size, self.model.size, to_old);
+        self.model.carry(&self.anew);
         self.to_picture = to_picture;
     }
 

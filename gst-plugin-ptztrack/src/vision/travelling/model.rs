@@ -73,6 +73,9 @@ pub(super) struct Model {
     row: Vec<f32>,
     alphas: Vec<u16>,
     extremes: [Vec<u8>; 2],
+    /// A plane of each kind, kept as memory.
+    wide: Vec<u16>,
+    narrow: Vec<u8>,
 }
 
 impl Model {
@@ -92,17 +95,19 @@ impl Model {
             row: Vec::new(),
             alphas: Vec::new(),
             extremes: Default::default(),
+            wide: Vec::new(),
+            narrow: Vec::new(),
         }
     }
 
     /// Lays all planes anew as `warp` says; what was never seen has no age.
     pub fn carry(&mut self, warp: &Warp) {
-        let mut wide = Vec::new();
+        let mut wide = std::mem::take(&mut self.wide);
         for plane in [&mut self.luma, &mut self.spread].into_iter().chain(&mut self.chroma) {
             warp.sample_wide(plane, 0, &mut wide);
             std::mem::swap(plane, &mut wide);
         }
-        let mut narrow = Vec::new();
+        let mut narrow = std::mem::take(&mut self.narrow);
         for plane in [&mut self.waited].into_iter().chain(&mut self.candidate) {
             warp.sample_nearest(plane, 0, &mut narrow);
             std::mem::swap(plane, &mut narrow);
@@ -110,6 +115,7 @@ impl Model {
         // A mean mixed with one of which nothing is known is not known.
         warp.sample_least(&self.age, 0, &mut narrow);
         std::mem::swap(&mut self.age, &mut narrow);
+        (self.wide, self.narrow) = (wide, narrow);
     }
 
     /// Makes everything lighter or darker by a factor. Colours fade with the light.
