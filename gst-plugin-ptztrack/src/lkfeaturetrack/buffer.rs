@@ -4,51 +4,71 @@
 
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
-    BufferMeta, ContractError, MOTION_ROI, MotionMeta, Rect, TARGET_ROI, TargetChange, TargetMessage,
-    TargetMeta, TargetState, Times, aspect,
+    BufferMeta, ContractError, Feature, MOTION_ROI, MotionMeta, Rect, TARGET_ROI, TargetChange,
+    TargetMessage, TargetMeta, TargetState, Times, aspect,
 };
 
 use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Detection, Report};
 
-/// What a detector saw: the motion meta where it is asked for and there, or else the regions of interest
-/// named `roi_type`.
-pub(super) fn detections(
-    buffer: &gst::BufferRef,
-    info: &VideoInfo,
-    roi_type: &str,
-) -> Result<Vec<Detection>, ContractError> {
-    let motion = (roi_type == MOTION_ROI).then(|| MotionMeta::of(buffer)).flatten();
-    if let Some(motion) = motion {
-        let MotionMeta { regions, outside } = motion?;
-        let regions = regions.into_iter().map(|region| (region, false));
-        return Ok(regions
-            .chain(outside.into_iter().map(|region| (region, true)))
-            .map(|(region, outside)| Detection {
-                bounds: region.bounds,
-                contour: region.contour,
-                restless: region.track.map_or(0.0, |track| track.restless as f32),
-                outside,
-            })
-            .collect());
-    }
-    Ok(buffer
-        .iter_meta::<VideoRegionOfInterestMeta>()
-        .filter(|region| region.roi_type() == roi_type)
-        .map(|region| Detection {
-            bounds: Rect::from_pixels(region.rect(), info.width(), info.height()),
-            ..Detection::default()
-        })
-        .collect())
+/// What a detector saw in one frame; kept as memory for the next.
+#[derive(Default)]
+pub(super) struct Detections {
+    list: Vec<Detection>,
+    motion: MotionMeta,
 }
 
-/// Attaches the target's own meta, and the standard one where there is a target.
+impl Detections {
+    /// Reads the motion meta where it is asked for and there, or else the regions of interest named `roi_type`.
+    pub fn read(
+        &mut self,
+        buffer: &gst::BufferRef,
+        info: &VideoInfo,
+        roi_type: &str,
+    ) -> Result<&[Detection], ContractError> {
+        let motion = (roi_type == MOTION_ROI).then(|| self.motion.refill(buffer)).flatten();
+        match motion.transpose() {
+            Ok(Some(())) => self.take_motion(),
+            Ok(None) => {
+                let regions = buffer.iter_meta::<VideoRegionOfInterestMeta>();
+                let bounds =
+                    regions.filter(|region| region.roi_type() == roi_type).map(|region| region.rect());
+                self.list.clear();
+                self.list.extend(bounds.map(|bounds| Detection {
+                    bounds: Rect::from_pixels(bounds, info.width(), info.height()),
+                    ..Detection::default()
+                }));
+            }
+            Err(error) => {
+                self.list.clear();
+                return Err(error);
+            }
+        }
+        Ok(&self.list)
+    }
+
+    fn take_motion(&mut self) {
+        let MotionMeta { regions, outside } = &mut self.motion;
+        self.list.resize_with(regions.len() + outside.len(), Detection::default);
+        let outside = outside.iter_mut().map(|region| (region, true));
+        let regions = regions.iter_mut().map(|region| (region, false)).chain(outside);
+        for (detection, (region, outside)) in self.list.iter_mut().zip(regions) {
+            // Each gets memory of the other.
+            std::mem::swap(&mut detection.contour, &mut region.contour);
+            detection.bounds = region.bounds;
+            detection.restless = region.track.map_or(0.0, |track| track.restless as f32);
+            detection.outside = outside;
+        }
+    }
+}
+
+/// Attaches the target's own meta, and the standard one where there is a target. Gives the points back, as memory.
 pub(super) fn attach(
     buffer: &mut gst::BufferRef,
     info: &VideoInfo,
     report: Report,
     capture_time: Option<gst::ClockTime>,
-) -> Result<(), glib::BoolError> {
+) -> Result<Vec<Feature>, glib::BoolError> {
     remove_regions_of_interest(buffer, TARGET_ROI);
     if matches!(report.state, TargetState::Tracking | TargetState::Occluded) {
         let pixels = report.bounds.to_pixels(info.width(), info.height());
@@ -68,7 +88,7 @@ pub(super) fn attach(
         aspect: aspect((info.width(), info.height()), info.par().into()),
         capture_time,
     };
-    meta.attach(buffer)
+    meta.attach(buffer).map(|()| meta.features)
 }
 
 /// The message that says so.

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::sync::{LazyLock, Mutex};
+use std::sync::{Arc, LazyLock, Mutex};
 
 use glib::Properties;
 use gst::prelude::*;
@@ -34,7 +34,8 @@ const RIGHT_BUTTON: i32 = 3;
 struct Settings {
     profile: Profile,
     selection: Selection,
-    roi_type: String,
+    /// Shared with each picture's copy of the settings.
+    roi_type: Arc<str>,
     confirm_frames: u32,
     coast_time_ns: u64,
     manual_size: f64,
@@ -48,7 +49,7 @@ impl Default for Settings {
         Self {
             profile: Profile::default(),
             selection: Selection::default(),
-            roi_type: MOTION_ROI.to_owned(),
+            roi_type: MOTION_ROI.into(),
             confirm_frames: 3,
             coast_time_ns: 3_000_000_000,
             manual_size: 0.25,
@@ -64,7 +65,7 @@ const FOREIGN_DETECTOR_PAUSE_S: f64 = 1.0;
 
 impl Settings {
     fn config(&self) -> vision::Config {
-        let own_detector = self.roi_type == MOTION_ROI;
+        let own_detector = *self.roi_type == *MOTION_ROI;
         vision::Config {
             profile: match self.profile {
                 Profile::Thesis => vision::Profile::Thesis,
@@ -106,6 +107,7 @@ struct Stream {
     info: VideoInfo,
     source: LumaSource,
     scene: SceneSource,
+    detections: buffer::Detections,
     tracker: vision::Tracker,
     state: TargetState,
     /// Running time of the last frame.
@@ -121,6 +123,7 @@ impl Stream {
             info,
             source: LumaSource::default(),
             scene: SceneSource::default(),
+            detections: buffer::Detections::default(),
             tracker: vision::Tracker::new(config),
             state: TargetState::Searching,
             last_time: None,
@@ -164,8 +167,8 @@ pub struct LkFeatureTrack {
     #[property(
         name = "roi-type", type = String, default = Some(MOTION_ROI), mutable_playing,
         blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect); another detector need not see every frame, once a second will do",
-        get = |imp: &Self| lock(&imp.settings).roi_type.clone(),
-        set = |imp: &Self, name: Option<String>| lock(&imp.settings).roi_type = name.unwrap_or_default()
+        get = |imp: &Self| lock(&imp.settings).roi_type.to_string(),
+        set = |imp: &Self, name: Option<String>| lock(&imp.settings).roi_type = name.unwrap_or_default().into()
     )]
     #[property(
         name = "confirm-frames", get, set, type = u32, member = confirm_frames, mutable_playing,
@@ -413,8 +416,9 @@ impl LkFeatureTrack {
             }
         };
         self.announce(stream, settings, &report, times, step);
-        if let Err(err) = buffer::attach(buffer, &stream.info, report, times.running_time) {
-            self.warn_once(stream, &format!("no meta can be attached: {err}"));
+        match buffer::attach(buffer, &stream.info, report, times.running_time) {
+            Ok(features) => stream.tracker.recycle(features),
+            Err(err) => self.warn_once(stream, &format!("no meta can be attached: {err}")),
         }
     }
 
@@ -427,9 +431,10 @@ impl LkFeatureTrack {
         step: gst::ClockTime,
     ) -> Result<vision::Report, String> {
         let mut fault = None;
-        let detections = buffer::detections(buffer, &stream.info, &settings.roi_type).unwrap_or_else(|err| {
+        let detections = stream.detections.read(buffer, &stream.info, &settings.roi_type);
+        let detections = detections.unwrap_or_else(|err| {
             fault = Some(format!("the detector's meta cannot be read: {err}"));
-            Vec::new()
+            &[]
         });
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &stream.info)
             .map_err(|err| format!("the frame cannot be mapped: {err}"))?;
@@ -444,7 +449,7 @@ impl LkFeatureTrack {
                 Err(err) => fault = Some(format!("camera motion cannot be measured: {err}")),
             }
         }
-        let report = stream.tracker.process(&seen, step.seconds_f64(), &detections).unwrap_or_else(|err| {
+        let report = stream.tracker.process(&seen, step.seconds_f64(), detections).unwrap_or_else(|err| {
             fault = Some(format!("tracking failed: {err}"));
             lost(stream.state)
         });

@@ -36,11 +36,12 @@ pub(super) struct Search<'a> {
     pub distance: f32,
 }
 
-/// The best corners of `patch` inside the contour.
-pub(super) fn find(patch: &Patch, search: &Search) -> opencv::Result<Vec<Point2f>> {
+/// Leaves the best corners of `patch` inside the contour in `found`.
+pub(super) fn find(patch: &Patch, search: &Search, found: &mut Vec<Point2f>) -> opencv::Result<()> {
+    found.clear();
     // Only the part of the patch around the contour is looked at: corner search is the dearest step.
     let Some(window) = window_of(patch, search.contour).filter(|_| search.count > 0) else {
-        return Ok(Vec::new());
+        return Ok(());
     };
     let mask = mask(patch, search, window)?;
     let grey = Mat::roi(patch.grey(), window)?;
@@ -57,7 +58,8 @@ pub(super) fn find(patch: &Patch, search: &Search) -> opencv::Result<Vec<Point2f
         0.04,
     )?;
     let offset = Point2f::new(window.x as f32, window.y as f32);
-    Ok(corners.iter().map(|corner| patch.leave(corner + offset)).collect())
+    found.extend(corners.iter().map(|corner| patch.leave(corner + offset)));
+    Ok(())
 }
 
 /// Splits ranked corners into those near their common middle and outliers.
@@ -131,15 +133,12 @@ fn mask(patch: &Patch, search: &Search, window: opencv::core::Rect) -> opencv::R
 }
 
 /// The ellipse inscribed in a box, as a polygon: where a body is, when no contour tells.
-pub(super) fn ellipse(bounds: Rect2f) -> Vec<Point2f> {
-    const CORNERS: u8 = 24;
+pub(super) fn ellipse(bounds: Rect2f) -> [Point2f; 24] {
     let middle = super::geometry::centre(bounds);
-    (0..CORNERS)
-        .map(|corner| {
-            let (sin, cos) = (f32::from(corner) / f32::from(CORNERS) * std::f32::consts::TAU).sin_cos();
-            middle + Point2f::new(cos * bounds.width / 2.0, sin * bounds.height / 2.0)
-        })
-        .collect()
+    std::array::from_fn(|corner| {
+        let (sin, cos) = (corner as f32 / 24.0 * std::f32::consts::TAU).sin_cos();
+        middle + Point2f::new(cos * bounds.width / 2.0, sin * bounds.height / 2.0)
+    })
 }
 
 #[cfg(test)]
@@ -149,6 +148,12 @@ mod tests {
     use super::super::synthetic::Scene;
     use super::*;
     use proptest::prelude::*;
+
+    fn found(patch: &Patch, search: &Search) -> Vec<Point2f> {
+        let mut found = Vec::new();
+        find(patch, search, &mut found).expect("corners");
+        found
+    }
 
     fn textured() -> Patch {
         let scene = Scene::new(160, 120);
@@ -161,7 +166,7 @@ mod tests {
     fn corners_lie_inside_the_contour_and_apart() {
         let contour = ellipse(Rect2f::new(40.0, 30.0, 40.0, 60.0));
         let search = Search { contour: &contour, taken: &[], count: 20, distance: 5.0 };
-        let corners = find(&textured(), &search).expect("corners");
+        let corners = found(&textured(), &search);
         assert!(corners.len() >= 8, "{}", corners.len());
         for (index, corner) in corners.iter().enumerate() {
             assert!(in_ellipse(Rect2f::new(38.0, 28.0, 44.0, 64.0), *corner));
@@ -172,9 +177,9 @@ mod tests {
     #[test]
     fn taken_places_are_left_alone() {
         let all = Search { contour: &[], taken: &[], count: 10, distance: 6.0 };
-        let first = find(&textured(), &all).expect("corners");
+        let first = found(&textured(), &all);
         let rest = Search { taken: &first, ..all };
-        for corner in find(&textured(), &rest).expect("corners") {
+        for corner in found(&textured(), &rest) {
             assert!(first.iter().all(|taken| length(corner - *taken) >= 5.0));
         }
     }
@@ -190,7 +195,7 @@ mod tests {
         let cut = Cut::new(&picture.luma(), Rect2f::new(0.0, 0.0, 60.0, 60.0), 1);
         let patch = Patch::cut(&picture.luma(), cut, 15).expect("cut");
         let search = Search { contour: &[], taken: &[], count: 1, distance: 5.0 };
-        let corner = find(&patch, &search).expect("corners")[0];
+        let corner = found(&patch, &search)[0];
         assert!(length(corner - Point2f::new(30.0, 20.0)) < 2.0, "{corner:?}");
     }
 
@@ -202,7 +207,7 @@ mod tests {
         let point = [Point2f::new(5.0, 5.0); 3];
         for contour in [&[][..], &point[..]] {
             let search = Search { contour, taken: &[], count: 9, distance: 3.0 };
-            assert!(find(&patch, &search).expect("corners").is_empty());
+            assert!(found(&patch, &search).is_empty());
         }
     }
 

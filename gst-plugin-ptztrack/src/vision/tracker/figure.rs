@@ -10,7 +10,7 @@ use opencv::core::{Point2f, Rect2f};
 
 use super::colour::{Colour, ColourModel, Histogram};
 use super::geometry::{centre, scaled};
-use super::sample::sample;
+use super::sample::Sampler;
 use crate::vision::{Luma, Observation};
 
 /// What is looked at around the target, in widths and heights of it.
@@ -28,7 +28,7 @@ const FIGURE: f32 = 0.6;
 const GROUND: f32 = 0.3;
 
 /// The cells around a target: what they look like and how they move.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Cells {
     lattice: Lattice,
     colours: Vec<Colour>,
@@ -36,6 +36,9 @@ pub(super) struct Cells {
     motion: Vec<f32>,
     /// Whether the cell lies in the picture.
     inside: Vec<bool>,
+    sampler: Sampler,
+    /// Memory: planes of the cells.
+    planes: [Vec<u8>; 3],
 }
 
 /// What tells the target by its looks.
@@ -48,14 +51,14 @@ pub(super) struct Looks<'a> {
 }
 
 /// A number of cells across and down.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(super) struct Grid {
     pub columns: usize,
     pub rows: usize,
 }
 
 /// Where the cells around a target lie.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, Default)]
 struct Lattice {
     area: Rect2f,
     grid: Grid,
@@ -84,30 +87,45 @@ impl Lattice {
 impl Cells {
     /// Looks around `bounds` (pixels of the picture).
     pub fn observe(seen: &Observation, bounds: Rect2f, grid: Grid) -> Self {
+        let mut cells = Self::default();
+        cells.look(seen, bounds, grid);
+        cells
+    }
+
+    /// Looks around other bounds, in the same memory.
+    pub fn look(&mut self, seen: &Observation, bounds: Rect2f, grid: Grid) {
         let area = scaled(bounds, CONTEXT.0, CONTEXT.1);
         let frame = Rect2f::new(0.0, 0.0, seen.luma.width() as f32, seen.luma.height() as f32);
-        let plane = |plane: &Luma| {
+        let Self { lattice, colours, motion, inside, sampler, planes } = self;
+        let mut sample = |plane: &Luma, out: &mut Vec<u8>| {
             let (across, down) = (plane.width() as f32 / frame.width, plane.height() as f32 / frame.height);
             let part = Rect2f::new(area.x * across, area.y * down, area.width * across, area.height * down);
-            sample(plane, part, grid.columns, grid.rows)
+            sampler.sample(plane, part, (grid.columns, grid.rows), out);
         };
         let count = grid.columns * grid.rows;
-        let luma = plane(&seen.scene.map_or(seen.luma, |scene| scene.luma));
-        let tints = match seen.scene.and_then(|scene| scene.chroma) {
-            Some([u, v]) => plane(&u).into_iter().zip(plane(&v)).map(|(u, v)| Some([u, v])).collect(),
-            None => vec![None; count],
-        };
-        let motion = match seen.scene {
-            Some(scene) => plane(&scene.foreground).into_iter().map(motion_log_odds).collect(),
-            None => vec![0.0; count],
-        };
-        let lattice = Lattice { area, grid };
-        Self {
-            lattice,
-            colours: luma.into_iter().zip(tints).collect(),
-            motion,
-            inside: (0..count).map(|index| frame.contains(lattice.place(index))).collect(),
+        *lattice = Lattice { area, grid };
+        let [first, second, third] = planes;
+        motion.clear();
+        match seen.scene {
+            Some(scene) => {
+                sample(&scene.foreground, first);
+                motion.extend(first.iter().map(|likelihood| motion_log_odds(*likelihood)));
+            }
+            None => motion.resize(count, 0.0),
         }
+        sample(&seen.scene.map_or(seen.luma, |scene| scene.luma), first);
+        colours.clear();
+        match seen.scene.and_then(|scene| scene.chroma) {
+            Some([u, v]) => {
+                sample(&u, second);
+                sample(&v, third);
+                let tints = second.iter().zip(&*third).map(|(u, v)| Some([*u, *v]));
+                colours.extend(first.iter().copied().zip(tints));
+            }
+            None => colours.extend(first.iter().map(|grey| (*grey, None))),
+        }
+        inside.clear();
+        inside.extend((0..count).map(|index| frame.contains(lattice.place(index))));
     }
 
     /// Size of a cell, pixels of the picture.
@@ -117,6 +135,13 @@ impl Cells {
 
     /// Logarithm of the odds of each cell, by motion and, where they are known, by colours.
     pub fn evidence(&self, looks: Option<Looks>) -> Evidence {
+        let mut evidence = Evidence::default();
+        self.weigh(looks, &mut evidence);
+        evidence
+    }
+
+    /// The same in the memory of other evidence.
+    pub fn weigh(&self, looks: Option<Looks>, evidence: &mut Evidence) {
         let odds = (0..self.colours.len()).map(|index| {
             let both = looks.map_or(self.motion[index], |Looks { colours, alone }| {
                 let (colour, lower) = (self.colours[index], self.lattice.lower(index));
@@ -131,7 +156,10 @@ impl Cells {
             });
             if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
         });
-        Evidence { grid: self.lattice.grid, odds: odds.collect(), motion: self.motion.clone() }
+        evidence.grid = self.lattice.grid;
+        evidence.odds.clear();
+        evidence.odds.extend(odds);
+        evidence.motion.clone_from(&self.motion);
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -165,7 +193,7 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 }
 
 /// Logarithm of the odds of each cell that it is figure.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Evidence {
     grid: Grid,
     odds: Vec<f32>,
@@ -284,6 +312,13 @@ impl Shape {
 
     /// The silhouette, larger by `scale`, to be held against evidence.
     pub fn template(&self, scale: f32) -> Template {
+        let mut template = Template::default();
+        self.cut(scale, &mut template);
+        template
+    }
+
+    /// The same in the memory of another template.
+    pub fn cut(&self, scale: f32, template: &mut Template) {
         let Grid { columns, rows } = self.grid;
         let middle = (columns as f32 / 2.0, rows as f32 / 2.0);
         let window = |compared: f32, context: f32, count: usize| {
@@ -305,13 +340,15 @@ impl Shape {
         let row = |y: usize| window_x.clone().map(move |x| (x, y));
         let count = (window_x.len() * window_y.len()).max(1) as f32;
         let mean = window_y.clone().map(|y| row(y).map(|(x, y)| at(x, y)).sum::<f32>()).sum::<f32>() / count;
-        let weights: Vec<f32> = window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean).collect();
+        let mut weights = std::mem::take(&mut template.weights);
+        weights.clear();
+        weights.extend(window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean));
         let first = (window_x.start as i32, window_y.start as i32);
         let upper_rows = window_y.filter(|y| (*y as f32) < middle.1).count();
         let (upper, lower) = weights.split_at(upper_rows * window_x.len());
         let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
         let norm = Halves { upper: norm(upper), lower: norm(lower) };
-        Template { first, columns: window_x.len(), upper_rows, weights, norm }
+        *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
     }
 
     /// How much of the silhouette, moved by so many cells, stands out. Where nothing is known of the background that is as much
@@ -346,7 +383,7 @@ impl Shape {
 }
 
 /// A silhouette of some size, less its mean: made once, and held against the evidence at many places.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Template {
     /// Column and row of its first cell.
     first: (i32, i32),
@@ -392,11 +429,20 @@ pub(super) struct FigureMap {
 impl FigureMap {
     /// What the evidence and the shape say together of the cells around the box.
     pub fn new(cells: &Cells, evidence: &Evidence, shape: &Shape) -> Self {
+        let mut map = Self { lattice: cells.lattice, probability: Vec::new() };
+        map.draw(cells, evidence, shape);
+        map
+    }
+
+    /// The same in the memory of another map.
+    pub fn draw(&mut self, cells: &Cells, evidence: &Evidence, shape: &Shape) {
         let odds = evidence.odds.iter().enumerate().map(|(index, odds)| odds + shape.log_odds(index));
         let probability = odds
             .zip(&cells.inside)
             .map(|(odds, inside)| if *inside { 1.0 / (1.0 + (-odds).exp()) } else { 0.0 });
-        Self { lattice: cells.lattice, probability: probability.collect() }
+        self.lattice = cells.lattice;
+        self.probability.clear();
+        self.probability.extend(probability);
     }
 
     /// How likely a place of the picture belongs to the target; 0 where the map does not reach.
@@ -408,8 +454,8 @@ impl FigureMap {
         if inside { self.probability[y as usize * columns + x as usize] } else { 0.0 }
     }
 
-    /// The mean over blocks of `side` x `side` cells, row after row.
-    pub fn reduced(&self, side: usize) -> Vec<f32> {
+    /// Leaves the mean over blocks of `side` x `side` cells, row after row, in `means`.
+    pub fn reduce(&self, side: usize, means: &mut Vec<f32>) {
         let whole = self.lattice.grid;
         let (columns, rows) = (whole.columns / side, whole.rows / side);
         let mean = |x: usize, y: usize| {
@@ -422,7 +468,8 @@ impl FigureMap {
                 .sum();
             sum / (side * side) as f32
         };
-        (0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| mean(x, y)).collect()
+        means.clear();
+        means.extend((0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| mean(x, y)));
     }
 
     /// The centre of mass (3.13 to 3.15) of the figure inside `bounds`; `None` where there is none.

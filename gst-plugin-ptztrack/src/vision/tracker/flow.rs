@@ -27,71 +27,97 @@ pub(super) struct Flow {
     pub max_return_error: Option<f32>,
 }
 
+/// Points that are followed into the next picture; kept as memory for the one after.
+#[derive(Debug, Default)]
+pub(super) struct Followed {
+    /// Where they were, frame pixels, ...
+    pub starts: Vec<Point2f>,
+    /// ... where they may be, ...
+    pub guesses: Vec<Point2f>,
+    /// ... and where they are: `None` for one that is lost.
+    pub found: Vec<Option<Point2f>>,
+    ends: Vec<Option<End>>,
+    returns: Vec<Point2f>,
+}
+
+impl Followed {
+    /// Other points, none of which has been followed yet, each with where it may be.
+    pub fn begin(&mut self, points: impl Iterator<Item = (Point2f, Point2f)>) {
+        self.starts.clear();
+        self.guesses.clear();
+        for (start, guess) in points {
+            self.starts.push(start);
+            self.guesses.push(guess);
+        }
+    }
+}
+
 impl Flow {
-    /// Follows `points` of `previous` (frame pixels) into `next`; `guesses` says where they may be.
-    /// `None` for a point that is lost. Both patches must be of one size.
-    pub fn follow(
-        &self,
-        previous: &Patch,
-        next: &Patch,
-        points: &[Point2f],
-        guesses: &[Point2f],
-    ) -> opencv::Result<Vec<Option<Point2f>>> {
-        let mut found = self.attempt(previous, next, points, guesses, self.window)?;
-        let lost: Vec<usize> = (0..points.len()).filter(|&index| found[index].is_none()).collect();
+    /// Follows `points` of `previous` into `next`. Both patches must be of one size.
+    pub fn follow(&self, previous: &Patch, next: &Patch, points: &mut Followed) -> opencv::Result<()> {
+        self.attempt(previous, next, points, self.window)?;
+        let lost = points.found.iter().filter(|place| place.is_none()).count();
         // Thesis 3.5.2: "if the feature is not found in the small window, the algorithm increases the
         // window size". Worth it only where the motion was too large, and then most points are lost.
-        if self.grown_window > self.window && 2 * lost.len() > points.len() {
-            let pick = |from: &[Point2f]| lost.iter().map(|&index| from[index]).collect::<Vec<_>>();
-            let again = self.attempt(previous, next, &pick(points), &pick(guesses), self.grown_window)?;
-            for (index, place) in lost.into_iter().zip(again) {
-                found[index] = place;
-            }
+        if self.grown_window > self.window && 2 * lost > points.starts.len() {
+            let mut again = Followed::default();
+            let pairs = points.starts.iter().copied().zip(points.guesses.iter().copied());
+            again.begin(pairs.zip(&points.found).filter(|(_, place)| place.is_none()).map(|(pair, _)| pair));
+            self.attempt(previous, next, &mut again, self.grown_window)?;
+            let lost = points.found.iter_mut().filter(|place| place.is_none());
+            lost.zip(again.found).for_each(|(place, found)| *place = found);
         }
-        Ok(found)
+        Ok(())
     }
 
     fn attempt(
         &self,
         previous: &Patch,
         next: &Patch,
-        points: &[Point2f],
-        guesses: &[Point2f],
+        points: &mut Followed,
         window: i32,
-    ) -> opencv::Result<Vec<Option<Point2f>>> {
-        let forth = lucas_kanade(previous, next, points, guesses, window)?;
-        let mut found: Vec<Option<Point2f>> = forth
-            .into_iter()
-            .map(|end| end.filter(|end| end.residual <= self.max_residual).map(|end| end.position))
-            .collect();
-        let Some(max_error) = self.max_return_error else { return Ok(found) };
+    ) -> opencv::Result<()> {
+        let Followed { starts, guesses, found, ends, returns } = points;
+        lucas_kanade(previous, next, starts, guesses, window, ends)?;
+        found.clear();
+        found.extend(
+            ends.iter().map(|end| {
+                end.as_ref().filter(|end| end.residual <= self.max_residual).map(|end| end.position)
+            }),
+        );
+        let Some(max_error) = self.max_return_error else { return Ok(()) };
         let limit = max_error * previous.step() as f32;
-        let ends: Vec<Point2f> =
-            found.iter().zip(guesses).map(|(end, guess)| end.unwrap_or(*guess)).collect();
-        let back = lucas_kanade(next, previous, &ends, points, window)?;
-        for ((place, returned), start) in found.iter_mut().zip(back).zip(points) {
-            if returned.is_none_or(|returned| length(returned.position - *start) > limit) {
+        returns.clear();
+        returns.extend(found.iter().zip(&*guesses).map(|(end, guess)| end.unwrap_or(*guess)));
+        lucas_kanade(next, previous, returns, starts, window, ends)?;
+        for ((place, returned), start) in found.iter_mut().zip(&*ends).zip(&*starts) {
+            if returned.as_ref().is_none_or(|returned| length(returned.position - *start) > limit) {
                 *place = None;
             }
         }
-        Ok(found)
+        Ok(())
     }
 }
 
+#[derive(Debug)]
 struct End {
     position: Point2f,
     residual: f32,
 }
 
+/// Leaves in `out` where `points` of one patch are in another, `None` for one that is not there.
 fn lucas_kanade(
     from: &Patch,
     to: &Patch,
     points: &[Point2f],
     guesses: &[Point2f],
     window: i32,
-) -> opencv::Result<Vec<Option<End>>> {
+    out: &mut Vec<Option<End>>,
+) -> opencv::Result<()> {
+    out.clear();
     if points.is_empty() || from.is_empty() || !from.fits(to) {
-        return Ok(points.iter().map(|_| None).collect());
+        out.extend(points.iter().map(|_| None));
+        return Ok(());
     }
     let starts: Vector<Point2f> = points.iter().map(|point| from.enter(*point)).collect();
     let mut ends: Vector<Point2f> = guesses.iter().map(|guess| to.enter(*guess)).collect();
@@ -113,15 +139,13 @@ fn lucas_kanade(
         video::OPTFLOW_USE_INITIAL_FLOW,
         MIN_EIGENVALUE,
     )?;
-    Ok(ends
-        .iter()
-        .zip(status.iter().zip(residuals.iter()))
-        .map(|(end, (status, residual))| {
-            let position = to.leave(end);
-            (status != 0 && position.x.is_finite() && position.y.is_finite())
-                .then_some(End { position, residual })
-        })
-        .collect())
+    let found = ends.iter().zip(status.iter().zip(residuals.iter()));
+    out.extend(found.map(|(end, (status, residual))| {
+        let position = to.leave(end);
+        (status != 0 && position.x.is_finite() && position.y.is_finite())
+            .then_some(End { position, residual })
+    }));
+    Ok(())
 }
 
 #[cfg(test)]
@@ -146,9 +170,15 @@ mod tests {
         let previous = Patch::cut(&still.luma(), Cut::new(&still.luma(), area, 1), 31).expect("cut");
         let cut = previous.as_cut().moved(&moved.luma(), guess);
         let next = Patch::cut(&moved.luma(), cut, 31).expect("cut");
-        let points = lattice();
-        let guesses: Vec<Point2f> = points.iter().map(|point| *point + guess).collect();
-        FLOW.follow(&previous, &next, &points, &guesses).expect("flow")
+        follow(&previous, &next, guess)
+    }
+
+    /// Where the lattice is found, expected so far from where it was.
+    fn follow(previous: &Patch, next: &Patch, guess: Point2f) -> Vec<Option<Point2f>> {
+        let mut points = Followed::default();
+        points.begin(lattice().into_iter().map(|point| (point, point + guess)));
+        FLOW.follow(previous, next, &mut points).expect("flow");
+        points.found
     }
 
     proptest! {
@@ -184,7 +214,7 @@ mod tests {
         let cut = Cut::new(&there.luma(), Rect2f::new(40.0, 40.0, 180.0, 160.0), 1);
         let previous = Patch::cut(&there.luma(), cut, 31).expect("cut");
         let next = Patch::cut(&gone.luma(), cut, 31).expect("cut");
-        let found = FLOW.follow(&previous, &next, &lattice(), &lattice()).expect("flow");
+        let found = follow(&previous, &next, Point2f::default());
         assert!(found.iter().all(Option::is_none));
     }
 }

@@ -64,11 +64,14 @@ pub(super) fn length(vector: Point2f) -> f32 {
     vector.x.hypot(vector.y)
 }
 
-/// The median of each coordinate by weight: half of the weight lies on either side.
-pub(super) fn weighted_median(vectors: impl Iterator<Item = (Point2f, f32)>) -> Point2f {
-    let vectors: Vec<_> = vectors.collect();
-    let of = |part: fn(&Point2f) -> f32| {
-        let mut values: Vec<_> = vectors.iter().map(|(vector, weight)| (part(vector), *weight)).collect();
+/// The median of each coordinate by weight: half of the weight lies on either side. `values` is memory.
+pub(super) fn weighted_median(
+    vectors: impl Iterator<Item = (Point2f, f32)> + Clone,
+    values: &mut Vec<(f32, f32)>,
+) -> Point2f {
+    let mut of = |part: fn(Point2f) -> f32| {
+        values.clear();
+        values.extend(vectors.clone().map(|(vector, weight)| (part(vector), weight)));
         values.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let half = values.iter().map(|(_, weight)| weight).sum::<f32>() / 2.0;
         let mut sum = 0.0;
@@ -140,9 +143,10 @@ mod tests {
     #[test]
     fn the_weight_decides_the_median() {
         let vectors = [(1.0, 0.1), (1.0, 0.1), (1.0, 0.1), (5.0, 0.9)];
-        let median = weighted_median(vectors.into_iter().map(|(x, weight)| (Point2f::new(x, -x), weight)));
+        let vectors = vectors.into_iter().map(|(x, weight)| (Point2f::new(x, -x), weight));
+        let median = weighted_median(vectors, &mut Vec::new());
         assert_eq!(median, Point2f::new(5.0, -5.0));
-        assert_eq!(weighted_median([].into_iter()), Point2f::default());
+        assert_eq!(weighted_median([].into_iter(), &mut Vec::new()), Point2f::default());
     }
 
     #[test]

@@ -57,7 +57,13 @@ pub(super) struct Points {
     /// The target's own recent motion against the background.
     travel: Point2f,
     rejected: Vec<Point2f>,
+    /// Memory for the next picture.
+    moves: Vec<Move>,
+    values: Vec<(f32, f32)>,
 }
+
+/// A point, where it was found, and how likely it lay on the figure.
+type Move = (Tracked, Point2f, f32);
 
 impl Points {
     /// Points that are known to lie on the target.
@@ -67,13 +73,13 @@ impl Points {
     }
 
     /// Where all points are.
-    pub fn positions(&self) -> Vec<Point2f> {
-        self.points.iter().map(|point| point.position).collect()
+    pub fn positions(&self) -> impl Iterator<Item = Point2f> {
+        self.points.iter().map(|point| point.position)
     }
 
     /// Where the points are that count.
-    pub fn members(&self) -> Vec<Point2f> {
-        self.points.iter().filter(|point| point.member).map(|point| point.position).collect()
+    pub fn members(&self) -> impl Iterator<Item = Point2f> {
+        self.points.iter().filter(|point| point.member).map(|point| point.position)
     }
 
     /// The points that were given up in the last frame, to be shown.
@@ -122,49 +128,60 @@ impl Points {
         figure: impl Fn(Point2f) -> f32,
     ) -> Option<Consensus> {
         self.rejected.clear();
-        let old: Vec<Tracked> = std::mem::take(&mut self.points);
-        let before: f32 = old.iter().filter(|point| point.member).map(|point| figure(point.position)).sum();
-        let mut moves = Vec::new();
-        for (point, place) in old.into_iter().zip(found) {
+        let before: f32 =
+            self.points.iter().filter(|point| point.member).map(|point| figure(point.position)).sum();
+        let mut moves = std::mem::take(&mut self.moves);
+        moves.clear();
+        for (point, place) in self.points.drain(..).zip(found) {
             match place {
                 Some(place) => moves.push((point, *place, figure(point.position))),
                 None => self.rejected.push(point.position),
             }
         }
-        let members: Vec<_> = moves.iter().filter(|(point, ..)| point.member).copied().collect();
-        if members.len() < MIN_CONSENSUS {
+        let consensus = self.agree(&moves, ego, expected, height, before);
+        self.moves = moves;
+        consensus
+    }
+
+    /// Takes up the points that moved, and tells how the target did; `before` is what its points weighed.
+    fn agree(
+        &mut self,
+        moves: &[Move],
+        ego: EgoMotion,
+        expected: Point2f,
+        height: f32,
+        before: f32,
+    ) -> Option<Consensus> {
+        let members = moves.iter().filter(|(point, ..)| point.member);
+        let first = members.clone().next().filter(|_| members.clone().count() >= MIN_CONSENSUS);
+        let Some((first, ..)) = first else {
             self.rejected.extend(moves.iter().map(|(_, place, _)| *place));
             return None;
-        }
+        };
         let tolerance = 1.5 + 0.02 * height + 0.25 * length(expected);
-        let own = |(point, place, _): &(Tracked, Point2f, f32)| *place - ego.apply(point.position);
-        let movers: Vec<_> = members
-            .iter()
-            .filter(|point| {
-                let own = own(point);
-                length(own - expected) <= tolerance && length(own) > BACKGROUND_SHARE * length(expected)
-            })
-            .copied()
-            .collect();
-        let measurable = length(expected) > MEASURABLE_STEP;
-        let voters = if measurable && movers.len() >= MIN_CONSENSUS { &movers } else { &members };
-        let middle =
-            weighted_median(voters.iter().map(|(point, place, weight)| (*place - point.position, *weight)));
-        let tolerance = 1.5 + 0.02 * height + 0.25 * length(middle - ego.at(members[0].0.position));
+        let moves_on = |(point, place, _): &Move| {
+            let own = *place - ego.apply(point.position);
+            length(own - expected) <= tolerance && length(own) > BACKGROUND_SHARE * length(expected)
+        };
+        let movers = members.clone().filter(|point| moves_on(point)).count();
+        let only_movers = length(expected) > MEASURABLE_STEP && movers >= MIN_CONSENSUS;
+        let voters = members.filter(|point| !only_movers || moves_on(point));
+        let shifts = voters.clone().map(|(point, place, weight)| (*place - point.position, *weight));
+        let middle = weighted_median(shifts, &mut self.values);
+        let tolerance = 1.5 + 0.02 * height + 0.25 * length(middle - ego.at(first.position));
         let agrees = |point: &Tracked, place: Point2f| length(place - point.position - middle) <= tolerance;
-        let agreeing: Vec<_> =
-            voters.iter().filter(|(point, place, _)| agrees(point, *place)).copied().collect();
-        let weight: f32 = agreeing.iter().map(|(.., weight)| weight).sum();
-        if agreeing.len() < MIN_CONSENSUS || weight <= f32::EPSILON {
+        let agreeing = voters.filter(|(point, place, _)| agrees(point, *place));
+        let weight: f32 = agreeing.clone().map(|(.., weight)| weight).sum();
+        if agreeing.clone().count() < MIN_CONSENSUS || weight <= f32::EPSILON {
             return None;
         }
-        let sum = agreeing.iter().fold(Point2f::default(), |sum, (point, place, weight)| {
+        let sum = agreeing.clone().fold(Point2f::default(), |sum, (point, place, weight)| {
             sum + (*place - point.position) * *weight
         });
         let motion = sum / weight;
-        let anchor = mean(agreeing.iter().map(|(point, ..)| point.position))?;
+        let anchor = mean(agreeing.map(|(point, ..)| point.position))?;
         self.travel = self.travel * MEMORY + (motion - ego.at(anchor));
-        for (point, place, weight) in moves {
+        for &(point, place, weight) in moves {
             let disagrees = !agrees(&point, place) || weight < GROUND_WEIGHT;
             let disagreements = if disagrees { point.disagreements + 1 } else { 0 };
             let travel = point.travel * MEMORY + (place - ego.apply(point.position));
@@ -230,8 +247,7 @@ mod tests {
     ) -> Option<Consensus> {
         let mut last = None;
         for _ in 0..frames {
-            let found: Vec<_> =
-                points.positions().into_iter().map(|point| Some(point + motion(point))).collect();
+            let found: Vec<_> = points.positions().map(|point| Some(point + motion(point))).collect();
             last = points.advance(&found, ego, Point2f::default(), 75.0, |_| 1.0);
         }
         last
@@ -266,7 +282,6 @@ mod tests {
             let walks = |point: Point2f| point.x > 125.0 + 3.0 * step as f32;
             let found: Vec<_> = points
                 .positions()
-                .into_iter()
                 .map(|point| Some(point + Point2f::new(if walks(point) { 3.0 } else { 0.0 }, 0.0)))
                 .collect();
             last = points.advance(&found, still(), Point2f::default(), 75.0, |point| {
@@ -282,7 +297,6 @@ mod tests {
         let mut points = Points::on_target(body());
         let found: Vec<_> = points
             .positions()
-            .into_iter()
             .map(|point| Some(point + Point2f::new(if point.x > 125.0 { 4.0 } else { 0.0 }, 0.0)))
             .collect();
         let consensus =
@@ -315,8 +329,7 @@ mod tests {
     fn points_carried_off_by_a_passer_by_are_dropped() {
         let mut points = Points::on_target(body());
         let count = points.len();
-        let mut found: Vec<_> =
-            points.positions().into_iter().map(|p| Some(p + Point2f::new(3.0, 0.0))).collect();
+        let mut found: Vec<_> = points.positions().map(|p| Some(p + Point2f::new(3.0, 0.0))).collect();
         found[0] = found[0].map(|p| p + Point2f::new(-12.0, 0.0));
         let consensus = points.advance(&found, still(), Point2f::default(), 75.0, |_| 1.0).expect("agree");
         assert!((consensus.motion.x - 3.0).abs() < 1e-3);
@@ -327,9 +340,9 @@ mod tests {
     fn new_points_count_only_after_probation() {
         let mut points = Points::on_target(body());
         points.propose([Point2f::new(120.0, 100.0)]);
-        assert_eq!((points.len(), points.members().len()), (21, 20));
+        assert_eq!((points.len(), points.members().count()), (21, 20));
         walk(&mut points, PROBATION as usize, still(), |_| Point2f::new(2.0, 0.0)).expect("agree");
-        assert_eq!(points.members().len(), 21);
+        assert_eq!(points.members().count(), 21);
     }
 
     #[test]

@@ -33,42 +33,68 @@ impl Tap {
     }
 }
 
-/// `area` of the picture at `width` x `height`, rows packed, bilinear, the border repeated where it leaves the picture.
-pub(super) fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
-    // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
-    match (area.width / width as f32).round().clamp(1.0, 3.0) as usize {
-        1 => averaged::<1>(luma, area, width, height),
-        2 => averaged::<2>(luma, area, width, height),
-        _ => averaged::<3>(luma, area, width, height),
-    }
+/// Samples parts of pictures, and keeps its memory for the next one.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Sampler {
+    across: Vec<Tap>,
+    down: Vec<Tap>,
+    sums: Vec<u16>,
 }
 
-/// The same with `FINE` x `FINE` samples for each pixel.
-fn averaged<const FINE: usize>(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
-    let taps = |start: f32, length: f32, count: usize, size: usize| -> Vec<Tap> {
-        let step = length / (count * FINE) as f32;
-        (0..count * FINE).map(|index| Tap::at(index, start, step, size)).collect()
-    };
-    let mut across = taps(area.x, area.width, width, luma.width());
-    let down = taps(area.y, area.height, height, luma.height());
-    let mut pixels = vec![0; width * height];
-    if luma.width() * luma.height() == 0 {
-        return pixels;
-    }
-    let (Some(first), Some(last)) = (across.first(), across.last()) else { return pixels };
-    let (left, right) = (first.before, last.after(luma.width()) + 1);
-    across.iter_mut().for_each(|tap| tap.before -= left);
-    // One more, of which nothing is taken, beyond the border.
-    let mut sums = vec![0_u16; right - left + 1];
-    for (row, taps) in pixels.chunks_exact_mut(width).zip(down.as_chunks::<FINE>().0) {
-        sums.fill(0);
-        for tap in taps {
-            let (upper, lower) = (luma.row(tap.before), luma.row(tap.after(luma.height())));
-            add(&mut sums, &upper[left..right], &lower[left..right], tap.part);
+impl Sampler {
+    /// Leaves in `pixels` `area` of the picture at `width` x `height`, rows packed, bilinear, the border repeated where it leaves
+    /// the picture.
+    pub fn sample(
+        &mut self,
+        luma: &Luma,
+        area: Rect2f,
+        (width, height): (usize, usize),
+        pixels: &mut Vec<u8>,
+    ) {
+        pixels.clear();
+        pixels.resize(width * height, 0);
+        // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
+        match (area.width / width as f32).round().clamp(1.0, 3.0) as usize {
+            1 => self.average::<1>(luma, area, width, height, pixels),
+            2 => self.average::<2>(luma, area, width, height, pixels),
+            _ => self.average::<3>(luma, area, width, height, pixels),
         }
-        average::<FINE>(row, &sums, &across);
     }
-    pixels
+
+    /// The same with `FINE` x `FINE` samples for each pixel.
+    fn average<const FINE: usize>(
+        &mut self,
+        luma: &Luma,
+        area: Rect2f,
+        width: usize,
+        height: usize,
+        pixels: &mut [u8],
+    ) {
+        let Self { across, down, sums } = self;
+        let tap = |taps: &mut Vec<Tap>, start: f32, length: f32, count: usize, size: usize| {
+            let step = length / (count * FINE) as f32;
+            taps.clear();
+            taps.extend((0..count * FINE).map(|index| Tap::at(index, start, step, size)));
+        };
+        tap(across, area.x, area.width, width, luma.width());
+        tap(down, area.y, area.height, height, luma.height());
+        if luma.width() * luma.height() == 0 {
+            return;
+        }
+        let (Some(first), Some(last)) = (across.first(), across.last()) else { return };
+        let (left, right) = (first.before, last.after(luma.width()) + 1);
+        across.iter_mut().for_each(|tap| tap.before -= left);
+        // One more, of which nothing is taken, beyond the border.
+        sums.resize(right - left + 1, 0);
+        for (row, taps) in pixels.chunks_exact_mut(width).zip(down.as_chunks::<FINE>().0) {
+            sums.fill(0);
+            for tap in taps {
+                let (upper, lower) = (luma.row(tap.before), luma.row(tap.after(luma.height())));
+                add(sums, &upper[left..right], &lower[left..right], tap.part);
+            }
+            average::<FINE>(row, sums, across);
+        }
+    }
 }
 
 /// Averages the samples of a row of pixels, from the sums of their columns.
@@ -97,6 +123,12 @@ mod tests {
     use proptest::prelude::*;
 
     const SIZE: (usize, usize) = (60, 40);
+
+    fn sample(luma: &Luma, area: Rect2f, width: usize, height: usize) -> Vec<u8> {
+        let mut pixels = Vec::new();
+        Sampler::default().sample(luma, area, (width, height), &mut pixels);
+        pixels
+    }
 
     proptest! {
         #[test]

@@ -150,6 +150,9 @@ pub(super) struct Selection {
     pub detector_pause_s: f64,
     candidates: Vec<Candidate>,
     released: Option<(Rect2f, f64)>,
+    /// Memory: boxes of candidates, before the last frame and of those that are gone in it.
+    before: Vec<Rect2f>,
+    gone: Vec<Rect2f>,
 }
 
 impl Selection {
@@ -184,10 +187,17 @@ impl Selection {
 
     /// Takes the detections of one frame, `dt_s` after the last; `ego` is how the background moved since, where that is
     /// known.
-    pub fn update(&mut self, sightings: Vec<Sighting>, ego: Option<EgoMotion>, frame: Frame, dt_s: f64) {
+    pub fn update(
+        &mut self,
+        sightings: impl IntoIterator<Item = Sighting>,
+        ego: Option<EgoMotion>,
+        frame: Frame,
+        dt_s: f64,
+    ) {
         self.suppressed.carry(ego);
         self.candidates.iter_mut().for_each(|candidate| candidate.carry(ego, dt_s));
-        let before: Vec<_> = self.candidates.iter().map(|candidate| candidate.sighting.bounds).collect();
+        self.before.clear();
+        self.before.extend(self.candidates.iter().map(|candidate| candidate.sighting.bounds));
         for sighting in sightings.into_iter().filter(|sighting| is_sound(sighting, frame)) {
             let same = self
                 .candidates
@@ -201,20 +211,23 @@ impl Selection {
                 None => self.candidates.push(Candidate::new(sighting)),
             }
         }
-        self.merge_and_split(&before);
+        self.merge_and_split();
         self.candidates
             .retain(|candidate| candidate.missed <= PATIENCE || candidate.missed_s <= self.detector_pause_s);
         self.follow_released(dt_s);
     }
 
-    /// Who is no longer seen where another is has merged with them; who is new where another was, `before`, has split off.
-    fn merge_and_split(&mut self, before: &[Rect2f]) {
-        let (old, new) = self.candidates.split_at_mut(before.len());
+    /// Who is no longer seen where another is has merged with them; who is new where another was before has split off.
+    fn merge_and_split(&mut self) {
+        let (old, new) = self.candidates.split_at_mut(self.before.len());
         let gone = old.iter().filter(|candidate| candidate.missed == 1 && candidate.frames > 1);
-        let gone: Vec<_> = gone.map(|candidate| candidate.sighting.bounds).collect();
-        for (candidate, before) in old.iter_mut().zip(before).filter(|(candidate, _)| candidate.missed == 0) {
+        self.gone.clear();
+        self.gone.extend(gone.map(|candidate| candidate.sighting.bounds));
+        for (candidate, before) in
+            old.iter_mut().zip(&self.before).filter(|(candidate, _)| candidate.missed == 0)
+        {
             let now = candidate.sighting.bounds;
-            let merged = gone.iter().filter(|gone| lies_in(**gone, now)).count();
+            let merged = self.gone.iter().filter(|gone| lies_in(**gone, now)).count();
             let split = new.iter().filter(|new| lies_in(new.sighting.bounds, *before)).count();
             candidate.sighting.merged =
                 (candidate.sighting.merged + merged as u32).saturating_sub(split as u32);
@@ -388,7 +401,7 @@ mod tests {
             let mut selection = Selection { detector_pause_s, ..Default::default() };
             (0..12).any(|n| {
                 let seen = (n % 4 == 0).then(|| at(100.0 + 2.0 * n as f32, 100.0, 40.0, 90.0));
-                selection.update(seen.into_iter().collect(), STILL, FRAME, DT);
+                selection.update(seen, STILL, FRAME, DT);
                 selection.choose(Choice::Largest, 3, false, FRAME).is_some()
             })
         };

@@ -118,6 +118,8 @@ pub struct Tracker {
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
     last_id: u64,
+    /// Memory for a report.
+    features: Vec<Feature>,
 }
 
 impl Tracker {
@@ -132,7 +134,13 @@ impl Tracker {
             lost: None,
             size: None,
             last_id: 0,
+            features: Vec::new(),
         }
+    }
+
+    /// Takes back what it reported, as memory for the next frame.
+    pub fn recycle(&mut self, features: Vec<Feature>) {
+        self.features = features;
     }
 
     /// Changes how it works from the next frame on.
@@ -184,10 +192,11 @@ impl Tracker {
         self.watch(seen, detections, frame, dt_s);
         let command = self.command.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
-        let mut report = Report::default();
+        let mut report = Report { features: std::mem::take(&mut self.features), ..Report::default() };
+        report.features.clear();
         if !same_stream {
             if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
-                report = report_of(TargetState::Lost, target, frame);
+                report = report_of(TargetState::Lost, target, frame, report.features);
                 changes.push(TargetChange::Lost);
                 phase = Phase::Searching;
             }
@@ -214,16 +223,21 @@ impl Tracker {
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
         self.lost =
             self.lost.take().map(|(target, ago_s)| (target, ago_s + dt_s)).filter(|(_, s)| *s <= KNOWN_S);
+        // Only the thesis asks for it.
+        let contour = |detection: &Detection| match self.config.profile {
+            Profile::Thesis => detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
+            Profile::Robust => Vec::new(),
+        };
         let sightings = detections.iter().map(|detection| Sighting {
             bounds: frame.rect_to_pixels(detection.bounds),
-            contour: detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
+            contour: contour(detection),
             restless: detection.restless,
             outside: detection.outside,
             ..Sighting::default()
         });
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
         self.selection.detector_pause_s = self.config.detector_pause_s;
-        self.selection.update(sightings.collect(), ego, frame, dt_s);
+        self.selection.update(sightings, ego, frame, dt_s);
     }
 
     fn follow(
@@ -242,10 +256,9 @@ impl Tracker {
         };
         let before = target.follow.estimate().bounds;
         let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
-        let sightings: Vec<_> = self.selection.current().cloned().collect();
         let mut sight = match hidden_s {
-            None => target.follow.follow(seen, dt_s as f32, &sightings)?,
-            Some(_) => target.follow.coast(seen, dt_s as f32, &sightings)?,
+            None => target.follow.follow(seen, dt_s as f32, &self.selection)?,
+            Some(_) => target.follow.coast(seen, dt_s as f32, &self.selection)?,
         };
         if sight != Sight::Seen
             && let Some(follow) = self.find_again(&target, seen, frame)?
@@ -271,7 +284,7 @@ impl Tracker {
         if let (Sight::Seen, Some(ego)) = (sight, ego) {
             target.dwell.watch(before, target.follow.estimate().bounds, ego, dt_s);
         }
-        *report = report_of(state, &target, frame);
+        *report = report_of(state, &target, frame, std::mem::take(&mut report.features));
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
             self.selection.suppressed.add(target.follow.estimate().bounds);
@@ -350,7 +363,7 @@ impl Tracker {
                 // It may move, and would be taken again at once.
                 self.selection.release(target.follow.estimate().bounds);
             }
-            *report = report_of(TargetState::Searching, &target, frame);
+            *report = report_of(TargetState::Searching, &target, frame, std::mem::take(&mut report.features));
             report.features.clear();
             report.released = Some(reason);
             changes.push(TargetChange::Released);
@@ -411,16 +424,19 @@ impl Tracker {
     ) -> Phase {
         self.selection.take(target.follow.estimate().bounds);
         changes.push(TargetChange::Acquired);
-        *report = report_of(TargetState::Tracking, &target, frame);
+        *report = report_of(TargetState::Tracking, &target, frame, std::mem::take(&mut report.features));
         Phase::Tracking(target)
     }
 }
 
-fn report_of(state: TargetState, target: &Target, frame: Frame) -> Report {
+/// `features` is memory.
+fn report_of(state: TargetState, target: &Target, frame: Frame, mut features: Vec<Feature>) -> Report {
     let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
     let points = target.follow.points();
-    let kept = points.members().into_iter().map(feature(true));
+    let kept = points.members().map(feature(true));
     let rejected = points.rejected().iter().copied().map(feature(false));
+    features.clear();
+    features.extend(kept.chain(rejected));
     let estimate = target.follow.estimate();
     let ego = estimate.ego_velocity;
     Report {
@@ -433,7 +449,7 @@ fn report_of(state: TargetState, target: &Target, frame: Frame) -> Report {
         velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
         ego_velocity: ego.map(|ego| frame.vector(ego)),
         confidence: f64::from(estimate.confidence),
-        features: kept.chain(rejected).collect(),
+        features,
     }
 }
 

@@ -15,13 +15,13 @@ use crate::vision::tracker::ego_motion::EgoMotion;
 use crate::vision::tracker::figure::{
     CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Level, Looks, Shape, Template,
 };
-use crate::vision::tracker::flow::Flow;
+use crate::vision::tracker::flow::{Flow, Followed};
 use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
 use crate::vision::tracker::grey_histogram::near_the_middle;
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::{Consensus, Points};
 use crate::vision::tracker::presence::Presence;
-use crate::vision::tracker::selection::Sighting;
+use crate::vision::tracker::selection::{Selection, Sighting};
 use crate::vision::{Luma, Observation};
 
 /// Cells of the map of figure and ground in one of the filter's, across and down.
@@ -139,6 +139,21 @@ pub(in super::super) struct Robust {
     seen_in_a_row: u32,
     pictures: u32,
     pictures_since_replenished: u32,
+    followed: Followed,
+    memory: Memory,
+}
+
+/// What is worked out of one picture, kept as memory for the next.
+#[derive(Default)]
+struct Memory {
+    cells: Cells,
+    evidence: Evidence,
+    template: Template,
+    response: Response,
+    /// The map of figure and ground in the filter's cells.
+    figure: Vec<f32>,
+    taken: Vec<Point2f>,
+    corners: Vec<Point2f>,
 }
 
 impl Robust {
@@ -180,28 +195,43 @@ impl Robust {
             seen_in_a_row: 0,
             pictures: 0,
             pictures_since_replenished: 0,
+            followed: Followed::default(),
+            memory: Memory::default(),
         };
         if let ([Some(upper), Some(lower)], Some(ground)) = cells.histograms(&target.map) {
             target.colours = Some(ColourModel::new([upper, lower], ground));
         }
-        let (_, evidence) = target.look_closely(seen)?;
-        let fit = target.shape.template(1.0).fit(&evidence, (0, 0));
-        let level = target.shape.level(&evidence, (0, 0), EVEN);
+        target.look_closely(seen);
+        let fit = target.shape.template(1.0).fit(&target.memory.evidence, (0, 0));
+        let level = target.shape.level(&target.memory.evidence, (0, 0), EVEN);
         target.usual = Usual::at_first(fit, level);
-        target.filter.learn(&seen.luma, bounds, &target.map.reduced(FINER), 1.0)?;
-        let corners = target.corners()?;
-        let found = corners::reject_outliers(corners, 2.0);
+        target.learn_looks(seen, 1.0)?;
+        target.find_corners()?;
+        let found = corners::reject_outliers(std::mem::take(&mut target.memory.corners), 2.0);
         target.points = Points::on_target(found.kept);
         target.points.reject(found.rejected);
         Ok((target.points.len() > 0).then_some(target))
     }
 
-    /// The map of figure and ground around the box as it is now.
-    fn look_closely(&mut self, seen: &Observation) -> opencv::Result<(Cells, Evidence)> {
-        let cells = Cells::observe(seen, self.estimate.bounds, self.grid);
-        let evidence = cells.evidence(self.looks());
-        self.map = FigureMap::new(&cells, &evidence, &self.shape);
-        Ok((cells, evidence))
+    /// Looks around the box as it is now: cells, their evidence, and the map of figure and ground.
+    fn look_closely(&mut self, seen: &Observation) {
+        self.look_at(seen, self.estimate.bounds);
+        let Memory { cells, evidence, .. } = &self.memory;
+        self.map.draw(cells, evidence, &self.shape);
+    }
+
+    /// Looks around a box: cells and their evidence.
+    fn look_at(&mut self, seen: &Observation, bounds: Rect2f) {
+        self.memory.cells.look(seen, bounds, self.grid);
+        let mut evidence = std::mem::take(&mut self.memory.evidence);
+        self.memory.cells.weigh(self.looks(), &mut evidence);
+        self.memory.evidence = evidence;
+    }
+
+    /// Has the filter learn the figure.
+    fn learn_looks(&mut self, seen: &Observation, rate: f32) -> opencv::Result<()> {
+        self.map.reduce(FINER, &mut self.memory.figure);
+        self.filter.learn(&seen.luma, self.estimate.bounds, &self.memory.figure, rate)
     }
 
     fn watch_background(&mut self, seen: &Observation, dt_s: f32) {
@@ -213,10 +243,10 @@ impl Robust {
     }
 
     /// Notices who else is near: one who was seen beside the target may be behind it, or it behind them, a moment later.
-    fn watch_others(&mut self, sightings: &[Sighting], dt_s: f32) {
+    fn watch_others(&mut self, sightings: &Selection, dt_s: f32) {
         let reach = scaled(self.estimate.bounds, CONTEXT.0, CONTEXT.1);
         let near =
-            sightings.iter().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
+            sightings.current().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
         self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
     }
 
@@ -239,31 +269,31 @@ impl Robust {
         let bounds = self.estimate.bounds;
         let shift = self.ego.at(centre(bounds)) + expected;
         let next = Patch::cut(luma, self.patch.as_cut().moved(luma, shift), GROWN_WINDOW)?;
-        let starts = self.points.positions();
-        let guesses: Vec<Point2f> = starts.iter().map(|start| self.ego.apply(*start) + expected).collect();
+        let ego = self.ego;
+        self.followed.begin(self.points.positions().map(|start| (start, ego.apply(start) + expected)));
         let flow = Flow {
             window: window_for(bounds, self.patch.step()),
             grown_window: GROWN_WINDOW,
             max_residual: MAX_RESIDUAL,
             max_return_error: Some(MAX_RETURN_ERROR),
         };
-        let found = flow.follow(&self.patch, &next, &starts, &guesses)?;
-        let map = &self.map;
-        let consensus = self.points.advance(&found, self.ego, expected, bounds.height, |point| map.at(point));
+        flow.follow(&self.patch, &next, &mut self.followed)?;
+        let (map, found) = (&self.map, &self.followed.found);
+        let consensus = self.points.advance(found, ego, expected, bounds.height, |point| map.at(point));
         Ok((next, consensus))
     }
 
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
-    fn locate(&self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
-        let cells = Cells::observe(seen, bounds, self.grid);
-        let evidence = cells.evidence(self.looks());
-        let response = self.filter.respond(&seen.luma, bounds)?;
+    fn locate(&mut self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
+        self.look_at(seen, bounds);
+        self.filter.respond(&seen.luma, bounds, &mut self.memory.response)?;
+        self.shape.cut(1.0, &mut self.memory.template);
+        let Memory { cells, evidence, template: silhouette, response, .. } = &self.memory;
         let cell = cells.cell() * FINER as f32;
-        let silhouette = self.shape.template(1.0);
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
         let score = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            self.agreement(&silhouette, &evidence, &response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
+            self.agreement(silhouette, evidence, response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
         };
         let places = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
         let (mut best, mut height) = ((0, 0), f32::NEG_INFINITY);
@@ -280,9 +310,9 @@ impl Robust {
         );
         let offset = Point2f::new((x as f32 + finer.x) * cell.x, (y as f32 + finer.y) * cell.y);
         let moved = (x * FINER as i32, y * FINER as i32);
-        let fit = silhouette.fit(&evidence, moved);
+        let fit = silhouette.fit(evidence, moved);
         let answer = response.at(best);
-        let level = self.shape.level(&evidence, moved, self.usual.level());
+        let level = self.shape.level(evidence, moved, self.usual.level());
         let shares = self.usual.shares(fit, level, answer, self.alone());
         Ok(Place { bounds: bounds + offset, fit, level, response: answer, shares, share: of_whole(shares) })
     }
@@ -312,9 +342,9 @@ impl Robust {
     /// Takes a place over as the target's own.
     fn settle(&mut self, seen: &Observation, place: &Place, dt_s: f32) -> opencv::Result<()> {
         self.estimate.bounds = place.bounds;
-        let (cells, evidence) = self.look_closely(seen)?;
+        self.look_closely(seen);
         if place.is_unhidden() {
-            self.learn(seen, place, &cells, &evidence, dt_s)?;
+            self.learn(seen, place, dt_s)?;
         }
         self.remember(&seen.luma)?;
         let bounds = self.estimate.bounds;
@@ -326,19 +356,12 @@ impl Robust {
     }
 
     /// Learns looks, silhouette and colours as they are now, and tries another size.
-    fn learn(
-        &mut self,
-        seen: &Observation,
-        place: &Place,
-        cells: &Cells,
-        evidence: &Evidence,
-        dt_s: f32,
-    ) -> opencv::Result<()> {
+    fn learn(&mut self, seen: &Observation, place: &Place, dt_s: f32) -> opencv::Result<()> {
         let rate = (LEARNING_PER_S * dt_s).min(MAX_LEARNING);
         self.usual.learn(place.fit, place.level, place.response, rate);
-        self.widen(evidence.beyond());
+        self.widen(self.memory.evidence.beyond());
         self.shape.learn(&self.map, rate);
-        let (figure, ground) = cells.histograms(&self.map);
+        let (figure, ground) = self.memory.cells.histograms(&self.map);
         let ground_rate = (GROUND_LEARNING_PER_S * dt_s).min(0.5);
         match (&mut self.colours, &figure, &ground) {
             (Some(colours), ..) => colours.learn(figure, rate, ground, ground_rate),
@@ -348,18 +371,24 @@ impl Robust {
             _ => (),
         }
         match self.pictures % 4 {
-            1 => self.try_size(seen, evidence, 1.0 + TRIED_GROWTH),
-            3 => self.try_size(seen, evidence, 1.0 / (1.0 + TRIED_GROWTH)),
-            _ => self.filter.learn(&seen.luma, self.estimate.bounds, &self.map.reduced(FINER), 2.0 * rate),
+            1 => self.try_size(seen, 1.0 + TRIED_GROWTH),
+            3 => self.try_size(seen, 1.0 / (1.0 + TRIED_GROWTH)),
+            _ => self.learn_looks(seen, 2.0 * rate),
         }
     }
 
-    fn try_size(&mut self, seen: &Observation, evidence: &Evidence, growth: f32) -> opencv::Result<()> {
+    fn try_size(&mut self, seen: &Observation, growth: f32) -> opencv::Result<()> {
         let bounds = self.estimate.bounds;
-        let respond =
-            |bounds| self.filter.respond(&seen.luma, bounds).map(|response| response.at((0, 0)).sum());
+        let Memory { evidence, template, response, .. } = &mut self.memory;
+        let mut respond = |bounds| {
+            let answered = self.filter.respond(&seen.luma, bounds, response);
+            answered.map(|()| response.at((0, 0)).sum())
+        };
         let (now, other) = (respond(bounds)?, respond(scaled(bounds, growth, growth))?);
-        let fit = |scale| self.shape.template(scale).fit(evidence, (0, 0)).mean();
+        let mut fit = |scale| {
+            self.shape.cut(scale, template);
+            template.fit(evidence, (0, 0)).mean()
+        };
         let usual = self.usual.response();
         if other / usual + fit(growth) > now / usual + fit(1.0) {
             self.grow(1.0 + GROWTH_GAIN * (growth - 1.0));
@@ -398,14 +427,14 @@ impl Robust {
             // What is there now may be whoever passes in front.
             return Ok(());
         }
-        if self.points.members().len() < MIN_MEMBERS {
+        if self.points.members().count() < MIN_MEMBERS {
             return self.seed();
         }
         let few = (self.points.len() as f32) < REPLENISH_SHARE * MAX_POINTS as f32;
         if few && self.pictures_since_replenished >= REPLENISH_PICTURES {
             self.pictures_since_replenished = 0;
-            let corners = self.corners()?;
-            self.points.propose(corners);
+            self.find_corners()?;
+            self.points.propose(self.memory.corners.drain(..));
         }
         Ok(())
     }
@@ -413,20 +442,23 @@ impl Robust {
     /// Starts with new points after the old ones were lost.
     fn seed(&mut self) -> opencv::Result<()> {
         self.points = Points::default();
-        self.points = Points::on_target(self.corners()?);
+        self.find_corners()?;
+        self.points = Points::on_target(self.memory.corners.drain(..));
         Ok(())
     }
 
-    /// Corners on the figure.
-    fn corners(&self) -> opencv::Result<Vec<Point2f>> {
+    /// Finds corners on the figure.
+    fn find_corners(&mut self) -> opencv::Result<()> {
         let bounds = self.estimate.bounds;
         let body = corners::ellipse(scaled(bounds, 0.95, 1.0));
-        let taken = self.points.positions();
+        let Memory { taken, corners, .. } = &mut self.memory;
+        taken.clear();
+        taken.extend(self.points.positions());
         let count = MAX_POINTS.saturating_sub(taken.len());
-        let search = Search { contour: &body, taken: &taken, count, distance: spacing(bounds) };
-        let mut found = corners::find(&self.patch, &search)?;
-        found.retain(|corner| self.map.at(*corner) >= ON_FIGURE);
-        Ok(found)
+        let search = Search { contour: &body, taken, count, distance: spacing(bounds) };
+        corners::find(&self.patch, &search, corners)?;
+        corners.retain(|corner| self.map.at(*corner) >= ON_FIGURE);
+        Ok(())
     }
 
     /// Moves the box as the camera and its own velocity take it.
@@ -448,10 +480,10 @@ impl Robust {
 
     /// A young target's box grows with the region that the detector sees it in; by how much its middle shifts, which is no
     /// motion of the target.
-    fn adopt(&mut self, sightings: &[Sighting]) -> Point2f {
+    fn adopt(&mut self, sightings: &Selection) -> Point2f {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
-        let own = sightings.iter().find(|sighting| {
+        let own = sightings.current().find(|sighting| {
             let region = sighting.bounds;
             !sighting.is_group()
                 && region.contains(middle)
@@ -476,9 +508,9 @@ impl Robust {
     }
 
     /// The best of what the detector saw within reach that looks like the target.
-    fn recognise(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
+    fn recognise(&mut self, seen: &Observation, sightings: &Selection) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
-        for sighting in sightings.iter().filter(|sighting| !sighting.another) {
+        for sighting in sightings.current().filter(|sighting| !sighting.another) {
             let bounds = self.box_in(sighting);
             if self.distance_in(bounds, UNSEEN_REACH) > 1.0 {
                 continue;
@@ -554,7 +586,7 @@ impl Robust {
     }
 
     /// The best place where a hidden target may be by now.
-    fn search(&self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
+    fn search(&mut self, seen: &Observation, sightings: &Selection) -> opencv::Result<Option<Place>> {
         let bounds = self.estimate.bounds;
         let mut best = self.recognise(seen, sightings)?;
         for sideways in [0.0, -0.6, 0.6] {
@@ -569,7 +601,7 @@ impl Robust {
 }
 
 impl Follow for Robust {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &Selection) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         let expected = self.estimate.own_velocity * dt_s;
@@ -628,7 +660,7 @@ impl Follow for Robust {
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
     }
 
-    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &Selection) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         self.unseen_s += dt_s;
@@ -649,7 +681,7 @@ impl Follow for Robust {
         self.presence = Presence::default();
         self.unseen_s = 0.0;
         self.course = self.measured();
-        self.look_closely(seen)?;
+        self.look_closely(seen);
         self.seed()?;
         Ok(Sight::Seen)
     }

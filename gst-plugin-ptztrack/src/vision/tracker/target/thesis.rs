@@ -6,12 +6,12 @@ use opencv::core::{Point2f, Rect2f};
 
 use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
 use crate::vision::tracker::corners::{self, Search};
-use crate::vision::tracker::flow::Flow;
+use crate::vision::tracker::flow::{Flow, Followed};
 use crate::vision::tracker::geometry::{around, centre, mean};
 use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::Points;
-use crate::vision::tracker::selection::Sighting;
+use crate::vision::tracker::selection::{Selection, Sighting};
 use crate::vision::{Luma, Observation};
 
 /// Standard deviations that a first corner may lie from the mean of all: "a 20% range from the standard deviation".
@@ -29,6 +29,7 @@ pub(in super::super) struct Thesis {
     points: Points,
     patch: Patch,
     greys: Option<GreyHistogram>,
+    followed: Followed,
 }
 
 impl Thesis {
@@ -39,10 +40,12 @@ impl Thesis {
         if patch.is_empty() {
             return Ok(None);
         }
-        let body =
-            if sighting.contour.len() >= 3 { sighting.contour.clone() } else { corners::ellipse(bounds) };
-        let search = Search { contour: &body, taken: &[], count: MAX_POINTS, distance: spacing(bounds) };
-        let found = corners::reject_outliers(corners::find(&patch, &search)?, DEVIATION_RANGE);
+        let ellipse = corners::ellipse(bounds);
+        let contour = if sighting.contour.len() >= 3 { &sighting.contour } else { &ellipse[..] };
+        let search = Search { contour, taken: &[], count: MAX_POINTS, distance: spacing(bounds) };
+        let mut corners = Vec::new();
+        corners::find(&patch, &search, &mut corners)?;
+        let found = corners::reject_outliers(corners, DEVIATION_RANGE);
         if found.kept.is_empty() {
             return Ok(None);
         }
@@ -56,7 +59,7 @@ impl Thesis {
             own_velocity: sighting.velocity,
             ego_velocity: None,
         };
-        let mut target = Self { estimate, points, patch, greys };
+        let mut target = Self { estimate, points, patch, greys, followed: Followed::default() };
         target.estimate.centroid = target.centre_of_mass()?;
         Ok(Some(target))
     }
@@ -70,21 +73,20 @@ impl Thesis {
 }
 
 impl Follow for Thesis {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &[Sighting]) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &Selection) -> opencv::Result<Sight> {
         let luma = &seen.luma;
         let expected = self.estimate.own_velocity * dt_s;
         let start = centre(self.estimate.bounds);
         let next = Patch::cut(luma, self.patch.as_cut().moved(luma, expected), GROWN_WINDOW)?;
-        let starts = self.points.positions();
-        let guesses: Vec<Point2f> = starts.iter().map(|start| *start + expected).collect();
+        self.followed.begin(self.points.positions().map(|start| (start, start + expected)));
         let flow = Flow {
             window: window_for(self.estimate.bounds, self.patch.step()),
             grown_window: GROWN_WINDOW,
             max_residual: MAX_RESIDUAL,
             max_return_error: None,
         };
-        let found = flow.follow(&self.patch, &next, &starts, &guesses)?;
-        let consensus = self.points.average(&found);
+        flow.follow(&self.patch, &next, &mut self.followed)?;
+        let consensus = self.points.average(&self.followed.found);
         self.patch = next;
         if let Some(consensus) = consensus {
             self.estimate.bounds += consensus.motion;
@@ -99,7 +101,7 @@ impl Follow for Thesis {
         }
         let own = (centre(bounds) - start) / dt_s;
         self.estimate.own_velocity += (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
-        if let Some(middle) = mean(self.points.positions().into_iter()) {
+        if let Some(middle) = mean(self.points.positions()) {
             self.estimate.bounds = around(middle, bounds.width, bounds.height);
         }
         let wanted = cut_around(luma, self.estimate.bounds);
@@ -111,7 +113,7 @@ impl Follow for Thesis {
     }
 
     /// The thesis loses what it does not see.
-    fn coast(&mut self, _: &Observation, _: f32, _: &[Sighting]) -> opencv::Result<Sight> {
+    fn coast(&mut self, _: &Observation, _: f32, _: &Selection) -> opencv::Result<Sight> {
         Ok(Sight::Gone)
     }
 
