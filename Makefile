@@ -77,8 +77,9 @@ demo: packages-demo
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
 ## bench: measure what following costs, on recordings of the room, and leave tables and plots in target/bench: whole pipelines beside
-##       decoding and other elements, live pictures as in the thesis' table 5.4, how late commands are, 1 to 16 cameras, and each
-##       algorithm by itself from 640x480 to 3840x2160 (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20)
+##       decoding and other elements, in MJPEG and MPEG-4, what they allocate, live pictures as in the thesis' table 5.4, how late
+##       commands are, 1 to 16 cameras, and each algorithm by itself from 640x480 to 3840x2160
+##       (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20)
 bench: packages-bench
 	$(CARGO) build --release $(PRODUCT)
 	$(CARGO) build --release $(BENCHMARKS)
@@ -89,6 +90,7 @@ bench: packages-bench
 	done
 	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
 		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
+	scripts/with-plugins release python3 benchmarks/allocations.py target/bench/still.{avi,mpeg4} --out target/bench
 	scripts/with-plugins release python3 benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench
 	$(CARGO) bench $(BENCHMARKS) --bench algorithms --bench elements | tee target/bench/algorithms.txt
 
