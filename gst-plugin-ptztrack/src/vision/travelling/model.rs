@@ -148,9 +148,14 @@ impl Model {
     /// Holds the picture against the model where `spans` say that it covers it (3.3, with the deviation measured
     /// in units of what noise makes): leaves the likelihood of foreground.
     pub fn compare(&mut self, picture: &Sampled, spans: &[(usize, usize)], how: Comparison, noise: &Noise) {
-        self.likelihood.fill(UNKNOWN);
         let (line, chroma_noise) = (noise.luma(), noise.chroma());
-        for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
+        for (y, &(start, end)) in spans.iter().enumerate() {
+            let whole = &mut self.likelihood[y * self.size.0..][..self.size.0];
+            whole[..start].fill(UNKNOWN);
+            whole[end..].fill(UNKNOWN);
+            if start >= end {
+                continue;
+            }
             let row = y * self.size.0 + start..y * self.size.0 + end;
             self.row.clear();
             self.row.resize(row.len(), 0.0);

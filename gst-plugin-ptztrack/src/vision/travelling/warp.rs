@@ -72,48 +72,50 @@ impl Warp {
 
     /// Samples `source` (rows packed) bilinearly; what it does not cover becomes `fill`.
     pub fn sample(&self, source: &[u8], fill: u8, out: &mut Vec<u8>) {
-        out.clear();
-        out.resize(self.size.0 * self.size.1, fill);
+        self.begin(fill, out);
         blend(self, source, out);
     }
 
     /// The same of 16-bit numbers.
     pub fn sample_wide(&self, source: &[u16], fill: u16, out: &mut Vec<u16>) {
-        self.each(source, fill, out, |source, shift| {
-            let at = |index: usize| u32::from(source.get(index).copied().unwrap_or(fill));
-            let (x, y) = (u32::from(shift.part_x), u32::from(shift.part_y));
-            let width = self.source.0;
-            let upper = at(0) * (16 - x) + if x > 0 { at(1) * x } else { 0 };
-            let lower =
-                if y > 0 { at(width) * (16 - x) + if x > 0 { at(width + 1) * x } else { 0 } } else { 0 };
-            ((upper * (16 - y) + lower * y + 128) >> 8) as u16
-        });
+        self.begin(fill, out);
+        blend_wide(self, source, out);
     }
 
     /// The nearest ones of numbers that cannot be mixed.
     pub fn sample_nearest(&self, source: &[u8], fill: u8, out: &mut Vec<u8>) {
-        let width = self.source.0;
-        self.each(source, fill, out, |source, shift| {
-            let nearest = usize::from(shift.part_x >= 8) + width * usize::from(shift.part_y >= 8);
-            source.get(nearest).copied().unwrap_or(fill)
+        self.begin(fill, out);
+        self.each_row(source, out, |source, shift, out| {
+            let nearest = usize::from(shift.part_x >= 8) + self.source.0 * usize::from(shift.part_y >= 8);
+            out.copy_from_slice(&source[nearest..][..out.len()]);
         });
     }
 
     /// The least of all those that are mixed.
     pub fn sample_least(&self, source: &[u8], fill: u8, out: &mut Vec<u8>) {
-        let width = self.source.0;
-        self.each(source, fill, out, |source, shift| {
-            let (right, below) = (usize::from(shift.part_x > 0), if shift.part_y > 0 { width } else { 0 });
-            let mixed = [0, right, below, below + right].into_iter();
-            mixed.map(|index| source.get(index).copied().unwrap_or(fill)).min().unwrap_or(fill)
+        self.begin(fill, out);
+        self.each_row(source, out, |source, shift, out| {
+            let (right, below) =
+                (usize::from(shift.part_x > 0), self.source.0 * usize::from(shift.part_y > 0));
+            let [a, b, c, d] = [0, right, below, below + right].map(|first| &source[first..][..out.len()]);
+            for (out, ((a, b), (c, d))) in out.iter_mut().zip(a.iter().zip(b).zip(c.iter().zip(d))) {
+                *out = (*a).min(*b).min(*c).min(*d);
+            }
         });
     }
 
-    /// Fills what is covered by `pick`, which is given the source from the pixel on that a shift of whole pixels leads to;
-    /// where there is nothing else to a shift, pixels are only copied.
-    fn each<T: Copy>(&self, source: &[T], fill: T, out: &mut Vec<T>, pick: impl Fn(&[T], Shift) -> T) {
-        out.clear();
+    /// Fills what is not covered; the rest is still to be written over.
+    fn begin<T: Copy>(&self, fill: T, out: &mut Vec<T>) {
         out.resize(self.size.0 * self.size.1, fill);
+        for (row, &(start, end)) in out.chunks_exact_mut(self.size.0.max(1)).zip(&self.spans) {
+            row[..start].fill(fill);
+            row[end..].fill(fill);
+        }
+    }
+
+    /// Calls `pick` for the rows of each run, with the source from the pixel on that a shift of whole pixels leads to; where there
+    /// is nothing else to a shift, pixels are only copied.
+    fn each_row(&self, source: &[u8], out: &mut [u8], pick: impl Fn(&[u8], Shift, &mut [u8])) {
         for run in &self.runs {
             for y in run.rows.clone() {
                 let source = &source[self.source_index(run, y)..];
@@ -121,9 +123,7 @@ impl Warp {
                 if run.shift.is_whole() {
                     out.copy_from_slice(&source[..out.len()]);
                 } else {
-                    for (index, out) in out.iter_mut().enumerate() {
-                        *out = pick(&source[index..], run.shift);
-                    }
+                    pick(source, run.shift, out);
                 }
             }
         }
@@ -184,9 +184,60 @@ fn widen(span: &mut (usize, usize), columns: &Range<usize>) {
     }
 }
 
+/// What can be mixed, in sixteenths of it.
+trait Mixed: Copy {
+    /// Holds 256 times as much.
+    type Sum: Copy + Default;
+
+    /// Sixteen times what lies `part` sixteenths of the way to `right`.
+    fn across(self, right: Self, part: u16) -> Self::Sum;
+
+    /// What lies `part` sixteenths of the way from one of those to the next.
+    fn down(upper: Self::Sum, lower: Self::Sum, part: u16) -> Self;
+}
+
+impl Mixed for u8 {
+    type Sum = u16;
+
+    #[inline(always)]
+    fn across(self, right: Self, part: u16) -> u16 {
+        u16::from(self) * (16 - part) + u16::from(right) * part
+    }
+
+    #[inline(always)]
+    fn down(upper: u16, lower: u16, part: u16) -> Self {
+        ((upper * (16 - part) + lower * part + 128) >> 8) as Self
+    }
+}
+
+impl Mixed for u16 {
+    type Sum = u32;
+
+    #[inline(always)]
+    fn across(self, right: Self, part: u16) -> u32 {
+        u32::from(self) * u32::from(16 - part) + u32::from(right) * u32::from(part)
+    }
+
+    #[inline(always)]
+    fn down(upper: u32, lower: u32, part: u16) -> Self {
+        ((upper * u32::from(16 - part) + lower * u32::from(part) + 128) >> 8) as Self
+    }
+}
+
 /// Fills what is covered bilinearly.
 #[multiversion(targets("x86_64+avx2"))]
 fn blend(warp: &Warp, source: &[u8], out: &mut [u8]) {
+    blend_runs(warp, source, out);
+}
+
+/// The same of 16-bit numbers.
+#[multiversion(targets("x86_64+avx2"))]
+fn blend_wide(warp: &Warp, source: &[u16], out: &mut [u16]) {
+    blend_runs(warp, source, out);
+}
+
+#[inline(always)]
+fn blend_runs<T: Mixed>(warp: &Warp, source: &[T], out: &mut [T]) {
     for run in &warp.runs {
         let Range { start, end } = run.columns;
         if run.shift.is_whole() {
@@ -198,15 +249,15 @@ fn blend(warp: &Warp, source: &[u8], out: &mut [u8]) {
         }
         let mut x = start;
         while x + 2 * BLOCK <= end {
-            blend_columns::<{ 2 * BLOCK }>(warp, run, x, source, out);
+            blend_columns::<T, { 2 * BLOCK }>(warp, run, x, source, out);
             x += 2 * BLOCK;
         }
         while x + BLOCK <= end {
-            blend_columns::<BLOCK>(warp, run, x, source, out);
+            blend_columns::<T, BLOCK>(warp, run, x, source, out);
             x += BLOCK;
         }
         while x < end {
-            blend_columns::<1>(warp, run, x, source, out);
+            blend_columns::<T, 1>(warp, run, x, source, out);
             x += 1;
         }
     }
@@ -214,24 +265,24 @@ fn blend(warp: &Warp, source: &[u8], out: &mut [u8]) {
 
 /// `N` columns of a run, from column `x` on.
 #[inline(always)]
-fn blend_columns<const N: usize>(warp: &Warp, run: &Run, x: usize, source: &[u8], out: &mut [u8]) {
+fn blend_columns<T: Mixed, const N: usize>(warp: &Warp, run: &Run, x: usize, source: &[T], out: &mut [T]) {
     let Range { start: top, end: bottom } = run.rows;
     if top >= bottom {
         return;
     }
     let (part_x, part_y) = (run.shift.part_x, run.shift.part_y);
     let first = warp.source_index(run, top) + (x - run.columns.start);
-    let mut upper = across::<N>(&source[first..], part_x);
+    let mut upper = across::<T, N>(&source[first..], part_x);
     for row in 0..bottom - top {
         let next = if part_y > 0 || top + row + 1 < bottom {
-            across::<N>(&source[first + (row + 1) * warp.source.0..], part_x)
+            across::<T, N>(&source[first + (row + 1) * warp.source.0..], part_x)
         } else {
             upper
         };
         let lower = if part_y > 0 { next } else { upper };
         let first = (top + row) * warp.size.0 + x;
         for (i, out) in out[first..first + N].iter_mut().enumerate() {
-            *out = ((upper[i] * (16 - part_y) + lower[i] * part_y + 128) >> 8) as u8;
+            *out = T::down(upper[i], lower[i], part_y);
         }
         upper = next;
     }
@@ -239,13 +290,13 @@ fn blend_columns<const N: usize>(warp: &Warp, run: &Run, x: usize, source: &[u8]
 
 /// Sixteen times what lies `part` sixteenths of the way from the first `N` pixels to the next ones.
 #[inline(always)]
-fn across<const N: usize>(pixels: &[u8], part: u16) -> [u16; N] {
+fn across<T: Mixed, const N: usize>(pixels: &[T], part: u16) -> [T::Sum; N] {
     // Where a weight is nothing, its column may lie outside.
     let right = usize::from(part > 0);
     let (left, right) = (&pixels[..N], &pixels[right..right + N]);
-    let mut mixed = [0; N];
+    let mut mixed = [T::Sum::default(); N];
     for (mixed, (&left, &right)) in mixed.iter_mut().zip(left.iter().zip(right)) {
-        *mixed = u16::from(left) * (16 - part) + u16::from(right) * part;
+        *mixed = left.across(right, part);
     }
     mixed
 }
