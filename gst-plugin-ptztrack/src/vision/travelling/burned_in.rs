@@ -73,8 +73,9 @@ fn learn(belief: &mut [u8], last: &mut [u8], now: &[u8], foreground: &[u8], gain
         belief.iter_mut().zip(last.iter_mut().zip(now).zip(foreground))
     {
         let gain = if foreground > super::UNKNOWN { gain } else { 0 };
-        let same = now.abs_diff(*last) <= SAME;
-        *belief = if same { belief.saturating_add(gain) } else { belief.saturating_sub(CHANGE) };
+        // Both are always done, one of them with nothing: no branch, of which the compiler could make no vector code.
+        let (gain, loss) = if now.abs_diff(*last) <= SAME { (gain, 0) } else { (0, CHANGE) };
+        *belief = belief.saturating_add(gain).saturating_sub(loss);
         *last = now;
     }
 }
