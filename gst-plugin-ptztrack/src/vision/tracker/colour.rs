@@ -97,13 +97,26 @@ fn grey_bins(grey: u8) -> (usize, usize, f32) {
 }
 
 fn tint_bin([u, v]: [u8; 2]) -> usize {
-    let bin = |tint: u8| {
-        let middle = TINTS as i32 / 2;
-        let offset = (i32::from(tint) - 128 + TINT_WIDTH / 2).div_euclid(TINT_WIDTH);
-        (offset + middle).clamp(0, TINTS as i32 - 1) as usize
-    };
-    bin(u) * TINTS + bin(v)
+    usize::from(TINT_BINS[usize::from(u)]) * TINTS + usize::from(TINT_BINS[usize::from(v)])
 }
+
+/// The bin of each colour difference: it is asked for more often than anything else.
+const TINT_BINS: [u8; 256] = {
+    let (mut bins, mut tint) = ([0; 256], 0);
+    while tint < bins.len() {
+        let place = (tint as i32 - 128 + TINT_WIDTH / 2).div_euclid(TINT_WIDTH) + TINTS as i32 / 2;
+        let last = TINTS as i32 - 1;
+        bins[tint] = if place < 0 {
+            0
+        } else if place > last {
+            last as u8
+        } else {
+            place as u8
+        };
+        tint += 1;
+    }
+    bins
+};
 
 /// Upper and lower body against what is beside them, and against other people.
 #[derive(Debug, Clone, PartialEq)]

@@ -33,12 +33,34 @@ impl Tap {
     }
 }
 
+/// A sample between two columns: the number of their pair, and by how much each of both counts, in one word.
+#[derive(Debug, Clone, Copy)]
+struct Column {
+    pair: usize,
+    weights: u64,
+}
+
+impl Column {
+    /// The weights stand the other way round than what they are multiplied with: the upper half of the product of two such
+    /// words is then what the sample comes to, and the lower half too small to reach there, even of a few of them.
+    fn of(tap: Tap, left: usize) -> Self {
+        let weights = u64::from(PARTS - tap.part) << 32 | u64::from(tap.part);
+        Self { pair: tap.before - left, weights }
+    }
+
+    fn sample(self, pairs: &[u64]) -> u64 {
+        pairs[self.pair].wrapping_mul(self.weights)
+    }
+}
+
 /// Samples parts of pictures, and keeps its memory for the next one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sampler {
-    across: Vec<Tap>,
+    across: Vec<Column>,
     down: Vec<Tap>,
     sums: Vec<u16>,
+    /// Each sum with the next one.
+    pairs: Vec<u64>,
 }
 
 impl Sampler {
@@ -70,42 +92,50 @@ impl Sampler {
         height: usize,
         pixels: &mut [u8],
     ) {
-        let Self { across, down, sums } = self;
-        let tap = |taps: &mut Vec<Tap>, start: f32, length: f32, count: usize, size: usize| {
+        let Self { across, down, sums, pairs } = self;
+        let taps = |start: f32, length: f32, count: usize, size: usize| {
             let step = length / (count * FINE) as f32;
-            taps.clear();
-            taps.extend((0..count * FINE).map(|index| Tap::at(index, start, step, size)));
+            (0..count * FINE).map(move |index| Tap::at(index, start, step, size))
         };
-        tap(across, area.x, area.width, width, luma.width());
-        tap(down, area.y, area.height, height, luma.height());
+        let columns = taps(area.x, area.width, width, luma.width());
+        let (Some(first), Some(last)) = (columns.clone().next(), columns.clone().next_back()) else { return };
         if luma.width() * luma.height() == 0 {
             return;
         }
-        let (Some(first), Some(last)) = (across.first(), across.last()) else { return };
         let (left, right) = (first.before, last.after(luma.width()) + 1);
-        across.iter_mut().for_each(|tap| tap.before -= left);
+        across.clear();
+        across.extend(columns.map(|tap| Column::of(tap, left)));
+        down.clear();
+        down.extend(taps(area.y, area.height, height, luma.height()));
         // One more, of which nothing is taken, beyond the border.
         sums.resize(right - left + 1, 0);
+        pairs.resize(right - left, 0);
         for (row, taps) in pixels.chunks_exact_mut(width).zip(down.as_chunks::<FINE>().0) {
             sums.fill(0);
             for tap in taps {
                 let (upper, lower) = (luma.row(tap.before), luma.row(tap.after(luma.height())));
                 add(sums, &upper[left..right], &lower[left..right], tap.part);
             }
-            average::<FINE>(row, sums, across);
+            pair(sums, pairs);
+            average::<FINE>(row, pairs, across);
         }
     }
 }
 
 /// Averages the samples of a row of pixels, from the sums of their columns.
-fn average<const FINE: usize>(row: &mut [u8], sums: &[u16], across: &[Tap]) {
+fn average<const FINE: usize>(row: &mut [u8], pairs: &[u64], across: &[Column]) {
     let scale = (FINE * FINE) as u32 * u32::from(PARTS) * u32::from(PARTS);
-    for (pixel, taps) in row.iter_mut().zip(across.as_chunks::<FINE>().0) {
-        let at = |tap: &Tap| {
-            let pair = &sums[tap.before..tap.before + 2];
-            u32::from(pair[0]) * u32::from(PARTS - tap.part) + u32::from(pair[1]) * u32::from(tap.part)
-        };
-        *pixel = ((taps.iter().map(at).sum::<u32>() + scale / 2) / scale) as u8;
+    for (pixel, columns) in row.iter_mut().zip(across.as_chunks::<FINE>().0) {
+        let sum = columns.iter().fold(0, |sum, column| column.sample(pairs).wrapping_add(sum));
+        *pixel = (((sum >> 32) as u32 + scale / 2) / scale) as u8;
+    }
+}
+
+/// Takes each sum and the next one into one word.
+#[multiversion(targets("x86_64+avx2"))]
+fn pair(sums: &[u16], pairs: &mut [u64]) {
+    for (pair, (&sum, &next)) in pairs.iter_mut().zip(sums.iter().zip(sums.iter().skip(1))) {
+        *pair = u64::from(next) << 32 | u64::from(sum);
     }
 }
 
