@@ -9,6 +9,7 @@
 //! oriented gradients in cells of 4x4 pixels. All of it happens on a grid of some 500 cells, whatever the size
 //! of the target.
 
+use multiversion::multiversion;
 use opencv::core::{DFT_COMPLEX_OUTPUT, DFT_INVERSE, DFT_REAL_OUTPUT, DFT_SCALE, Mat, Rect2f, Size, Vec2f};
 use opencv::imgproc;
 use opencv::prelude::*;
@@ -253,7 +254,10 @@ struct Features {
     sampler: Sampler,
     pixels: Vec<u8>,
     gradients: [Vec<f32>; 2],
+    votes: Votes,
+    /// Energy of the cells and of a border around them, and the norms of a row of cells.
     energy: Vec<f32>,
+    norms: Vec<f32>,
     strength: Mat,
     angle: Mat,
     cells: Mat,
@@ -274,40 +278,71 @@ impl Features {
             channel.resize(columns * rows, 0.0);
         }
         let [oriented @ .., tone] = self.channels.as_mut_slice() else { return Ok(()) };
+        self.votes.count(strength, angle);
         for cell in 0..columns * rows {
             let first = cell / columns * CELL * width + cell % columns * CELL;
-            let histogram = histogram(strength, angle, first, width);
+            let histogram = self.votes.histogram(first, width);
             for (channel, value) in oriented.iter_mut().zip(histogram) {
                 channel[cell] = value;
             }
         }
-        normalise(oriented, columns, rows, &mut self.energy);
+        normalise(oriented, (columns, rows), &mut self.energy, &mut self.norms);
         grey_cells(&grey, columns, rows, &mut self.cells, tone)
     }
 }
 
-/// Of the cell whose first pixel is `first`, rows `width` pixels apart; one more than there are orientations.
-fn histogram(strength: &[f32], angle: &[f32], first: usize, width: usize) -> [f32; ORIENTATIONS + 1] {
-    // The last wraps around to the first.
-    let mut histogram = [0.0; ORIENTATIONS + 1];
-    for row in (0..CELL).map(|y| first + y * width) {
-        for (strength, angle) in strength[row..row + CELL].iter().zip(&angle[row..row + CELL]) {
-            let turn = angle * (ORIENTATIONS as f32 / std::f32::consts::PI);
-            let lower = turn as usize;
-            let share = turn - lower as f32;
-            histogram[lower % ORIENTATIONS] += strength * (1.0 - share);
-            histogram[lower % ORIENTATIONS + 1] += strength * share;
-        }
+/// What each pixel adds to the two orientations that its gradient lies between.
+#[derive(Clone, Default)]
+struct Votes {
+    /// The lower one, not wrapped around.
+    orientations: Vec<u8>,
+    lower: Vec<f32>,
+    upper: Vec<f32>,
+}
+
+impl Votes {
+    /// Of gradients of that strength and angle.
+    fn count(&mut self, strength: &[f32], angle: &[f32]) {
+        self.orientations.resize(strength.len(), 0);
+        self.lower.resize(strength.len(), 0.0);
+        self.upper.resize(strength.len(), 0.0);
+        vote(strength, angle, &mut self.orientations, &mut self.lower, &mut self.upper);
     }
-    histogram[0] += histogram[ORIENTATIONS];
-    histogram
+
+    /// Of the cell whose first pixel is `first`, rows `width` pixels apart; one more than there are orientations.
+    fn histogram(&self, first: usize, width: usize) -> [f32; ORIENTATIONS + 1] {
+        // The last wraps around to the first.
+        let mut histogram = [0.0; ORIENTATIONS + 1];
+        for row in (0..CELL).map(|y| first + y * width).map(|start| start..start + CELL) {
+            let shares = self.lower[row.clone()].iter().zip(&self.upper[row.clone()]);
+            for (orientation, (lower, upper)) in self.orientations[row].iter().zip(shares) {
+                let orientation = usize::from(*orientation) % ORIENTATIONS;
+                histogram[orientation] += lower;
+                histogram[orientation + 1] += upper;
+            }
+        }
+        histogram[0] += histogram[ORIENTATIONS];
+        histogram
+    }
+}
+
+#[multiversion(targets("x86_64+avx2"))]
+fn vote(strength: &[f32], angle: &[f32], orientations: &mut [u8], lower: &mut [f32], upper: &mut [f32]) {
+    let votes = orientations.iter_mut().zip(lower.iter_mut().zip(upper));
+    for ((orientation, (lower, upper)), (strength, angle)) in votes.zip(strength.iter().zip(angle)) {
+        let turn = angle * (ORIENTATIONS as f32 / std::f32::consts::PI);
+        *orientation = turn as u8;
+        let share = turn - f32::from(*orientation);
+        *lower = strength * (1.0 - share);
+        *upper = strength * share;
+    }
 }
 
 /// Leaves central differences `across` and `down`, the border repeated, rows packed.
 fn gradients(grey: &Luma, [across, down]: &mut [Vec<f32>; 2]) {
     let (width, height) = (grey.width(), grey.height());
+    // What is left of the picture before is written over.
     for plane in [&mut *across, &mut *down] {
-        plane.clear();
         plane.resize(width * height, 0.0);
     }
     let rows = across.chunks_exact_mut(width.max(1)).zip(down.chunks_exact_mut(width.max(1)));
@@ -328,30 +363,41 @@ fn gradients(grey: &Luma, [across, down]: &mut [Vec<f32>; 2]) {
     }
 }
 
-/// Divides by the gradient energy of the 3x3 cells around, so that shade and contrast do not count. `energy` is memory.
-fn normalise(channels: &mut [Vec<f32>], columns: usize, rows: usize, energy: &mut Vec<f32>) {
+/// Divides by the gradient energy of the 3x3 cells around, so that shade and contrast do not count. `energy` and `norms` are
+/// memory.
+fn normalise(
+    channels: &mut [Vec<f32>],
+    (columns, rows): (usize, usize),
+    energy: &mut Vec<f32>,
+    norms: &mut Vec<f32>,
+) {
     const FAINT: f32 = 200.0;
     const BRIGHTEST: f32 = 0.6;
+    // There is nothing in the border around the cells.
+    let wide = columns + 2;
     energy.clear();
-    energy.extend(
-        (0..columns * rows)
-            .map(|cell| channels.iter().map(|channel| channel[cell] * channel[cell]).sum::<f32>()),
-    );
+    energy.resize(wide * (rows + 2), 0.0);
+    for channel in &*channels {
+        for (energy, cells) in energy.chunks_exact_mut(wide).skip(1).zip(channel.chunks_exact(columns)) {
+            energy[1..].iter_mut().zip(cells).for_each(|(energy, cell)| *energy += cell * cell);
+        }
+    }
+    let neighbours = |place: usize, count: usize| (place + 2).min(count) - place.saturating_sub(1);
     for y in 0..rows {
-        for x in 0..columns {
-            let mut sum = 0.0;
-            let mut count = 0.0;
-            for v in y.saturating_sub(1)..(y + 2).min(rows) {
-                for u in x.saturating_sub(1)..(x + 2).min(columns) {
-                    sum += energy[v * columns + u];
-                    count += 1.0;
-                }
+        norms.clear();
+        norms.resize(columns, 0.0);
+        for row in energy.chunks_exact(wide).skip(y).take(3) {
+            for first in 0..3 {
+                norms.iter_mut().zip(&row[first..]).for_each(|(norm, energy)| *norm += energy);
             }
-            let norm = (sum / count + FAINT).sqrt();
-            for channel in channels.iter_mut() {
-                let value = &mut channel[y * columns + x];
-                *value = (*value / norm).min(BRIGHTEST);
-            }
+        }
+        for (x, norm) in norms.iter_mut().enumerate() {
+            let count = (neighbours(x, columns) * neighbours(y, rows)) as f32;
+            *norm = (*norm / count + FAINT).sqrt();
+        }
+        for channel in channels.iter_mut() {
+            let cells = channel[y * columns..][..columns].iter_mut().zip(&*norms);
+            cells.for_each(|(value, norm)| *value = (*value / norm).min(BRIGHTEST));
         }
     }
 }
