@@ -2,35 +2,49 @@
 
 //! How much of each pixel a shape covers: strokes, discs and letters before they have a colour.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use opencv::core::Rect;
 
 use super::Spot;
 
-/// Most of an area is empty: blocks that are passed over together.
-const REDUCED_TOGETHER: usize = 16;
+/// Pixels of a row that are passed over together: most of an area is empty.
+pub(super) const TOGETHER: usize = 16;
+/// Rows have room for so many times that: then blocks of it are whole, reduced ones too.
+const ROOM: usize = 4 * TOGETHER;
 
 /// How much of each pixel of an area is covered: 0 to 255.
 #[derive(Debug, Default)]
 pub(super) struct Coverage {
     area: Rect,
+    /// Pixels from a row to the next, ...
+    stride: usize,
+    /// ... of which there are at least those of the area; nothing but what `spans` say is covered.
     pixels: Vec<u8>,
+    /// The columns of each row that may be covered.
+    spans: Vec<Range<usize>>,
 }
 
 impl Coverage {
     /// Nothing of `area` is covered.
     pub fn clear(&mut self, area: Rect) {
-        self.area = area;
-        self.pixels.clear();
-        self.pixels.resize(area.width.max(0) as usize * area.height.max(0) as usize, 0);
+        for (row, span) in self.pixels.chunks_exact_mut(self.stride.max(1)).zip(&self.spans) {
+            row[span.clone()].fill(0);
+        }
+        let (width, height) = (area.width.max(0) as usize, area.height.max(0) as usize);
+        (self.area, self.stride) = (area, width.next_multiple_of(ROOM));
+        self.spans.clear();
+        self.spans.resize(height, 0..0);
+        self.pixels.resize(self.pixels.len().max(self.stride * height), 0);
     }
 
     /// Covers `area`.
     pub fn fill(&mut self, area: Rect) {
-        let (inside, width) = (area & self.area, self.area.width.max(1) as usize);
-        for y in inside.y - self.area.y..inside.y - self.area.y + inside.height {
-            let start = y as usize * width + (inside.x - self.area.x) as usize;
-            self.pixels[start..start + inside.width as usize].fill(u8::MAX);
+        let inside = area & self.area;
+        let (left, top) = ((inside.x - self.area.x) as usize, (inside.y - self.area.y) as usize);
+        for y in top..top + inside.height as usize {
+            self.part(y, left..left + inside.width as usize).fill(u8::MAX);
         }
     }
 
@@ -39,33 +53,60 @@ impl Coverage {
         self.area
     }
 
-    /// Rows of the means of blocks of pixels, `across` and `down` times halved, into `out`.
-    pub fn reduce(&self, (across, down): (u32, u32), out: &mut Vec<u8>) {
-        let width = self.area.width.max(1) as usize;
-        out.clear();
-        let mut sums = [0_u16; REDUCED_TOGETHER];
-        for rows in self.pixels.chunks(width << down) {
-            for left in (0..width).step_by(REDUCED_TOGETHER << across) {
-                let right = width.min(left + (REDUCED_TOGETHER << across));
-                let sums = &mut sums[..(right - left).div_ceil(1 << across)];
-                sums.fill(0);
-                for row in rows.chunks_exact(width) {
-                    let row = &row[left..right];
-                    if row.iter().fold(0, |all, covered| all | covered) == 0 {
-                        continue;
-                    }
-                    for (sum, block) in sums.iter_mut().zip(row.chunks(1 << across)) {
-                        *sum += block.iter().map(|covered| u16::from(*covered)).sum::<u16>();
-                    }
+    fn width(&self) -> usize {
+        self.area.width.max(0) as usize
+    }
+
+    /// All of its pixels, row after row.
+    #[cfg(test)]
+    pub fn bytes(&self) -> Vec<u8> {
+        let row = |y: usize| &self.pixels[y * self.stride..][..self.width()];
+        (0..self.spans.len()).flat_map(row).copied().collect()
+    }
+
+    /// Columns of a row, to be covered.
+    fn part(&mut self, y: usize, columns: Range<usize>) -> &mut [u8] {
+        let span = &mut self.spans[y];
+        *span = hull(span, &columns);
+        &mut self.pixels[y * self.stride..][columns]
+    }
+
+    /// The means of blocks of pixels, `across` and `down` times halved, into `out`.
+    pub fn reduce(&self, (across, down): (u32, u32), out: &mut Self) {
+        match across {
+            0 => self.reduce_by::<1>(down, out),
+            1 => self.reduce_by::<2>(down, out),
+            _ => self.reduce_by::<4>(down, out),
+        }
+    }
+
+    /// The same of blocks that are `SIDE` pixels wide.
+    fn reduce_by<const SIDE: usize>(&self, down: u32, out: &mut Self) {
+        let (width, height) = (self.width().div_ceil(SIDE), self.spans.len().div_ceil(1 << down));
+        out.clear(Rect::new(0, 0, width as i32, height as i32));
+        let shift = SIDE.ilog2() + down;
+        for (y, spans) in self.spans.chunks(1 << down).enumerate() {
+            let span = spans.iter().fold(0..0, |all, span| hull(&all, span));
+            let columns = whole_blocks(&span, SIDE * TOGETHER);
+            let reduced = out.part(y, columns.start / SIDE..columns.end / SIDE).as_chunks_mut::<TOGETHER>().0;
+            for (block, reduced) in reduced.iter_mut().enumerate() {
+                let mut sums = [0; TOGETHER];
+                for row in (y << down)..(y << down) + spans.len() {
+                    let first = row * self.stride + columns.start + block * SIDE * TOGETHER;
+                    add_blocks::<SIDE>(&mut sums, &self.pixels[first..first + SIDE * TOGETHER]);
                 }
-                out.extend(sums.iter().map(|sum| (sum >> (across + down)) as u8));
+                reduced.iter_mut().zip(sums).for_each(|(reduced, sum)| *reduced = (sum >> shift) as u8);
             }
         }
     }
 
-    /// Its rows from the top.
-    pub fn rows(&self) -> impl Iterator<Item = &[u8]> {
-        self.pixels.chunks_exact(self.area.width.max(1) as usize)
+    /// Of its rows those of which anything may be covered, from the top: the row's number, a column, and the blocks of pixels from
+    /// there on. The last may reach beyond the area, where nothing is covered.
+    pub fn rows(&self) -> impl Iterator<Item = (usize, usize, &[[u8; TOGETHER]])> {
+        self.spans.iter().enumerate().filter(|(_, span)| !span.is_empty()).map(|(y, span)| {
+            let columns = whole_blocks(span, TOGETHER);
+            (y, columns.start, self.pixels[y * self.stride..][columns].as_chunks().0)
+        })
     }
 
     /// Covers what is at most `radius` from the line between two places, `strength` (0 to 1) of it. What is covered already
@@ -75,47 +116,66 @@ impl Coverage {
         let (dx, dy) = (to.x - from.x, to.y - from.y);
         let stroke = Stroke::new((dx, dy), reach, strength);
         let (left, right) =
-            limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, self.area.x, self.area.width);
+            limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, self.area.x, self.width());
         let (top, bottom) =
-            limits(from.y.min(to.y) - reach, from.y.max(to.y) + reach, self.area.y, self.area.height);
+            limits(from.y.min(to.y) - reach, from.y.max(to.y) + reach, self.area.y, self.spans.len());
         // A slanting stroke crosses a small part of each row.
         let half = if dy == 0.0 { f64::INFINITY } else { reach * dx.hypot(dy) / dy.abs() };
-        let width = self.area.width.max(1) as usize;
         for y in top..bottom {
             let down = f64::from(self.area.y) + y as f64 + 0.5 - from.y;
             let crossing = if dy == 0.0 { 0.0 } else { from.x + down * dx / dy };
-            let (near, far) =
-                limits(crossing - half - 1.0, crossing + half + 1.0, self.area.x, self.area.width);
+            let (near, far) = limits(crossing - half - 1.0, crossing + half + 1.0, self.area.x, self.width());
             let columns = near.max(left)..far.min(right);
             if columns.is_empty() {
                 continue;
             }
             let first = f64::from(self.area.x) + columns.start as f64 + 0.5 - from.x;
-            let row = &mut self.pixels[y * width..][columns];
-            stroke_row(row, stroke, first as f32, down as f32);
+            stroke_row(self.part(y, columns), stroke, first as f32, down as f32);
         }
     }
 
     /// Covers what `mask`, of which a row has `width` pixels, covers when its top left pixel lies at (`x`, `y`).
     pub fn add_mask(&mut self, mask: &[u8], width: usize, (x, y): (i32, i32)) {
-        let own = self.area.width.max(1) as usize;
+        let (skipped, first) = ((self.area.x - x).max(0) as usize, (x - self.area.x).max(0) as usize);
         for (line, row) in mask.chunks_exact(width.max(1)).zip(y..) {
-            if row < self.area.y || row >= self.area.y + self.area.height {
+            let line = line.get(skipped..).unwrap_or_default();
+            let columns = first..self.width().min(first + line.len());
+            if row < self.area.y || row >= self.area.y + self.area.height || columns.is_empty() {
                 continue;
             }
-            let start = (row - self.area.y) as usize * own;
-            let pixels = &mut self.pixels[start..start + own];
-            let (skipped, offset) = ((self.area.x - x).max(0) as usize, (x - self.area.x).max(0) as usize);
-            let pairs = pixels.iter_mut().skip(offset).zip(line.iter().skip(skipped));
-            pairs.for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
+            let pixels = self.part((row - self.area.y) as usize, columns);
+            pixels.iter_mut().zip(line).for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
         }
     }
 }
 
-/// From `low` to `high`, in pixels from `start` on, of which there are `size`.
-fn limits(low: f64, high: f64, start: i32, size: i32) -> (usize, usize) {
-    let limit = |value: f64| (value - f64::from(start)).clamp(0.0, f64::from(size.max(0))) as usize;
-    (limit(low.floor()), limit(high.ceil()))
+/// The columns of both and those between them.
+fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
+    match (a.is_empty(), b.is_empty()) {
+        (true, _) => b.clone(),
+        (_, true) => a.clone(),
+        _ => a.start.min(b.start)..a.end.max(b.end),
+    }
+}
+
+/// The blocks of `side` columns that hold `columns`.
+fn whole_blocks(columns: &Range<usize>, side: usize) -> Range<usize> {
+    columns.start / side * side..columns.end.next_multiple_of(side)
+}
+
+/// Adds what is covered in blocks of `SIDE` pixels beside each other.
+fn add_blocks<const SIDE: usize>(sums: &mut [u16; TOGETHER], covered: &[u8]) {
+    if covered.iter().fold(0, |all, covered| all | covered) > 0 {
+        for (sum, block) in sums.iter_mut().zip(covered.as_chunks::<SIDE>().0) {
+            *sum += block.iter().map(|covered| u16::from(*covered)).sum::<u16>();
+        }
+    }
+}
+
+/// The pixels that `low` to `high` touch, and at most one more, counted from `start` on, of which there are `size`.
+fn limits(low: f64, high: f64, start: i32, size: usize) -> (usize, usize) {
+    let limit = |value: f64| (value - f64::from(start)).clamp(0.0, size as f64) as usize;
+    (limit(low), size.min(limit(high) + 1))
 }
 
 /// From a place, to `(dx, dy)` beside it.
@@ -161,7 +221,7 @@ mod tests {
         let mut coverage = Coverage::default();
         coverage.clear(area);
         strokes.iter().for_each(|(from, to, radius)| coverage.add_stroke(*from, *to, *radius, 1.0));
-        coverage.rows().map(<[u8]>::to_vec).collect()
+        coverage.bytes().chunks_exact(coverage.width().max(1)).map(<[u8]>::to_vec).collect()
     }
 
     #[test]
@@ -184,13 +244,30 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_left_of_what_was_covered_before() {
+        let (mut coverage, mut reduced) = (Coverage::default(), Coverage::default());
+        for (area, fill) in [((40, 9), (3, 2, 30, 5)), ((11, 20), (0, 0, 11, 1)), ((90, 4), (70, 3, 1, 1))] {
+            let (x, y, width, height) = fill;
+            coverage.clear(Rect::new(0, 0, area.0, area.1));
+            coverage.fill(Rect::new(x, y, width, height));
+            coverage.reduce((1, 1), &mut reduced);
+            let sum =
+                |coverage: &Coverage| coverage.bytes().iter().map(|pixel| u32::from(*pixel)).sum::<u32>();
+            assert_eq!(sum(&coverage), 255 * (width * height) as u32);
+            assert!((4 * sum(&reduced)).abs_diff(sum(&coverage)) <= 4 * reduced.bytes().len() as u32);
+        }
+        coverage.clear(Rect::new(0, 0, 90, 4));
+        assert_eq!(coverage.rows().count(), 0);
+    }
+
+    #[test]
     fn a_mask_is_cut_to_the_area() {
         let mut coverage = Coverage::default();
         coverage.clear(Rect::new(5, 5, 2, 2));
         coverage.add_mask(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 3, (4, 4));
-        assert_eq!(coverage.rows().flatten().copied().collect::<Vec<_>>(), [5, 6, 8, 9]);
+        assert_eq!(coverage.bytes(), [5, 6, 8, 9]);
         coverage.add_mask(&[200; 9], 3, (6, 6));
-        assert_eq!(coverage.rows().flatten().copied().collect::<Vec<_>>(), [5, 6, 8, 200]);
+        assert_eq!(coverage.bytes(), [5, 6, 8, 200]);
         coverage.add_mask(&[255; 9], 3, (20, -9));
     }
 

@@ -204,7 +204,7 @@ pub struct Patch {
 #[derive(Debug, Default)]
 pub struct Pen {
     coverage: Coverage,
-    reduced: Vec<u8>,
+    reduced: Coverage,
     font: Font,
 }
 

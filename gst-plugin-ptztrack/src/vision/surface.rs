@@ -4,7 +4,7 @@
 
 use multiversion::multiversion;
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, TOGETHER};
 use super::draw::Colour;
 
 /// Where a format keeps one component (Y, U, red, ...) of its pixels, eight bits of each.
@@ -71,54 +71,47 @@ impl Surface<'_> {
 
     /// Lays `colour` over what `coverage` covers, whose area lies within the surface and begins on the grid. `kept` is
     /// memory for the next time.
-    pub(super) fn blend(&mut self, coverage: &Coverage, colour: Colour, kept: &mut Vec<u8>) {
+    pub(super) fn blend(&mut self, coverage: &Coverage, colour: Colour, kept: &mut Coverage) {
         let alpha = (255.0 * colour.alpha.clamp(0.0, 1.0)).round() as u8;
         let values = self.colours.components(colour);
         let area = coverage.area();
         let (left, top) = ((area.x - self.origin.0) as usize, (area.y - self.origin.1) as usize);
         let mut reduced = None;
         for (component, value) in self.components.iter().zip(values) {
-            let Component { plane, offset, step, stride, halvings: (across, down) } = *component;
-            let start = offset + (left >> across) * step;
-            let mut row_starts = ((top >> down)..).map(|row| start + row * stride);
-            let plane = &mut *self.planes[plane];
-            let mut lay = |row: &[u8]| {
-                let line = row_starts.next().and_then(|start| plane.get_mut(start..));
-                if let Some(line) = line {
-                    blend_row(line, step, row, value, alpha);
-                }
-            };
-            if (across, down) == (0, 0) {
-                coverage.rows().for_each(&mut lay);
-                continue;
+            let Component { plane, offset, step, stride, halvings } = *component;
+            if halvings != (0, 0) && reduced != Some(halvings) {
+                coverage.reduce(halvings, kept);
+                reduced = Some(halvings);
             }
-            if reduced != Some((across, down)) {
-                coverage.reduce((across, down), kept);
-                reduced = Some((across, down));
+            let coverage = if halvings == (0, 0) { coverage } else { &*kept };
+            let start = offset + (left >> halvings.0) * step + (top >> halvings.1) * stride;
+            for (y, first, covered) in coverage.rows() {
+                let line = self.planes[plane].get_mut(start + y * stride + first * step..);
+                line.into_iter().for_each(|line| blend_row(line, step, covered, value, alpha));
             }
-            let width = (area.width.max(1) as usize).div_ceil(1 << across);
-            kept.chunks_exact(width).for_each(&mut lay);
         }
     }
 }
 
-/// Most of what is drawn is empty: pixels that are passed over together.
-const TOGETHER: usize = 16;
-
 #[multiversion(targets("x86_64+avx2"))]
-fn blend_row(line: &mut [u8], step: usize, covered: &[u8], value: u8, alpha: u8) {
+fn blend_row(line: &mut [u8], step: usize, covered: &[[u8; TOGETHER]], value: u8, alpha: u8) {
     let step = step.max(1);
-    for (pixels, covered) in line.chunks_mut(TOGETHER * step).zip(covered.chunks(TOGETHER)) {
-        if covered.iter().fold(0, |all, covered| all | covered) == 0 {
+    for (pixels, covered) in line.chunks_mut(TOGETHER * step).zip(covered) {
+        if *covered == [0; TOGETHER] {
             continue;
         }
-        if step == 1 {
-            pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| over(pixel, value, *covered, alpha));
-        } else {
-            let pixels = pixels.iter_mut().step_by(step);
-            pixels.zip(covered).for_each(|(pixel, covered)| over(pixel, value, *covered, alpha));
+        match <&mut [u8; TOGETHER]>::try_from(&mut *pixels) {
+            // Of a length that is known, the compiler makes vector code.
+            Ok(pixels) if step == 1 => lay(pixels.iter_mut(), covered, value, alpha),
+            _ => lay(pixels.iter_mut().step_by(step), covered, value, alpha),
         }
     }
+}
+
+/// Lays `value` over pixels beside each other.
+#[inline(always)]
+fn lay<'a>(pixels: impl Iterator<Item = &'a mut u8>, covered: &[u8; TOGETHER], value: u8, alpha: u8) {
+    pixels.zip(covered).for_each(|(pixel, covered)| over(pixel, value, *covered, alpha));
 }
 
 /// Lays `value` over a pixel.
@@ -177,7 +170,7 @@ mod tests {
         ];
         let planes = [&mut luma[..], &mut chroma[..], &mut [], &mut []];
         let mut surface = Surface { planes, components: &components, colours: BT601, origin: (0, 0) };
-        surface.blend(&coverage, Colour::new(255, 0, 0), &mut Vec::new());
+        surface.blend(&coverage, Colour::new(255, 0, 0), &mut Coverage::default());
         assert_eq!(luma[4 * 8 + 4..][..4], [81, 100, 81, 100]);
         assert_eq!(chroma[2 * 8 + 4..][..4], [95, 170, 95, 170]);
         let touched = luma.iter().chain(&chroma).filter(|value| **value != 100).count();
@@ -195,7 +188,7 @@ mod tests {
         Surface { planes, components: &components, colours: ColourSpace::Rgb, origin: (0, 0) }.blend(
             &coverage,
             Colour::new(9, 9, 9),
-            &mut Vec::new(),
+            &mut Coverage::default(),
         );
         assert_eq!(bytes, [9; 10]);
     }
