@@ -102,9 +102,10 @@ impl DwellTime {
         self.tracked_s += dt_s;
     }
 
-    /// Takes the target's box before and after those seconds, and how the background moved.
+    /// Takes the target's box when it was last seen before those seconds, carried along with the background, its box after them,
+    /// and how the background moved in them.
     ///
-    /// Only frames in which both were seen tell whether the target stands: the others do not count.
+    /// Only frames in which it is seen tell whether the target stands: the others do not count.
     pub fn watch(&mut self, before: Rect2f, after: Rect2f, ego: EgoMotion, dt_s: f64) {
         let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
         let step = (centre(after) - ego.apply(centre(before))) / breadth(after).max(1.0);

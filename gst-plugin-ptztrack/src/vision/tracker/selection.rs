@@ -170,10 +170,11 @@ impl Selection {
     }
 
     /// The target is seen at `bounds`: who is seen beside it, in `confirm_frames` frames or more, is somebody else, wherever they
-    /// go from then on.
+    /// go from then on. What is above or below may be a part of it.
     pub fn tell_apart(&mut self, bounds: Rect2f, confirm_frames: u32) {
         for candidate in self.candidates.iter_mut().filter(|candidate| candidate.missed == 0) {
-            if (bounds & candidate.sighting.bounds).area() <= 0.0 {
+            let seen = candidate.sighting.bounds;
+            if (bounds & seen).area() <= 0.0 && !may_be_one(bounds, seen) {
                 candidate.frames_beside += 1;
                 candidate.sighting.another = candidate.frames_beside >= confirm_frames;
             }
@@ -227,7 +228,8 @@ impl Selection {
             old.iter_mut().zip(&self.before).filter(|(candidate, _)| candidate.missed == 0)
         {
             let now = candidate.sighting.bounds;
-            let merged = self.gone.iter().filter(|gone| lies_in(**gone, now)).count();
+            let others = self.gone.iter().filter(|gone| !may_be_one(**gone, *before));
+            let merged = others.filter(|gone| lies_in(**gone, now)).count();
             let split = new.iter().filter(|new| lies_in(new.sighting.bounds, *before)).count();
             candidate.sighting.merged =
                 (candidate.sighting.merged + merged as u32).saturating_sub(split as u32);
@@ -258,7 +260,7 @@ impl Selection {
         let ready = self.confirmed(confirm_frames).filter(|candidate| {
             let bounds = candidate.sighting.bounds;
             !candidate.sighting.outside
-                && (candidate.age_s >= EDGE_WAIT_S || !touches_edge(bounds, frame))
+                && (candidate.age_s >= EDGE_WAIT_S || !self.is_entering(bounds, frame))
                 && self.released.is_none_or(|(released, _)| overlap(released, bounds) == 0.0)
                 && !self.suppressed.holds(bounds)
                 && (!must_travel || candidate.travels())
@@ -276,6 +278,12 @@ impl Selection {
             Choice::Manual => None,
         };
         chosen.map(|candidate| &candidate.sighting)
+    }
+
+    /// Whether somebody is still coming into view, or leaving: a leg goes before the body.
+    fn is_entering(&self, bounds: Rect2f, frame: Frame) -> bool {
+        let body = self.current().filter(|sighting| may_be_one(bounds, sighting.bounds));
+        body.map(|part| part.bounds).any(|part| touches_edge(part, frame))
     }
 
     /// The detections of this frame that go somewhere, wholly in view, and may be the target: the largest first.
@@ -330,6 +338,14 @@ fn is_sound(sighting: &Sighting, frame: Frame) -> bool {
         && bounds.height >= MIN_SIDE
         && bounds.area() <= MAX_SHARE * frame.bounds().area()
         && share_inside(bounds, frame.bounds()) > 0.5
+}
+
+/// Whether two boxes stand one above the other, so near that they may be parts of one body: where clothes look like the wall
+/// behind them, legs and trunk are seen apart.
+fn may_be_one(a: Rect2f, b: Rect2f) -> bool {
+    let across = a.br().x.min(b.br().x) - a.x.max(b.x);
+    let between = a.y.max(b.y) - a.br().y.min(b.br().y);
+    across > 0.5 * a.width.min(b.width) && between < a.height.max(b.height)
 }
 
 fn touches_edge(bounds: Rect2f, frame: Frame) -> bool {
@@ -562,5 +578,34 @@ mod tests {
             selection.travelling(3, FRAME).len()
         };
         assert_eq!((travelling(false), travelling(true)), (1, 0));
+    }
+
+    #[test]
+    fn a_leg_goes_before_the_body() {
+        let (leg, body, bystander) =
+            (at(20.0, 300.0, 30.0, 100.0), at(0.0, 120.0, 45.0, 160.0), at(0.0, 120.0, 15.0, 280.0));
+        let chosen = |sightings: &[Sighting]| {
+            let selection = seen(5, sightings);
+            selection.choose(Choice::Largest, 3, false, FRAME).map(|sighting| sighting.bounds)
+        };
+        assert_eq!(chosen(std::slice::from_ref(&leg)), Some(leg.bounds), "of a dog, say");
+        assert_eq!(chosen(&[leg.clone(), body.clone()]), None);
+        assert_eq!(chosen(&[leg.clone(), bystander]), Some(leg.bounds), "beside it");
+        let inside = at(6.0, 120.0, 45.0, 160.0);
+        assert_eq!(chosen(&[leg, inside.clone()]), Some(inside.bounds), "all of the body");
+    }
+
+    #[test]
+    fn parts_of_one_body_are_no_others_and_no_group() {
+        let (trunk, legs, whole) =
+            (at(100.0, 100.0, 40.0, 80.0), at(105.0, 190.0, 30.0, 60.0), at(100.0, 100.0, 40.0, 150.0));
+        let mut selection = seen(1, &[trunk.clone(), legs.clone()]);
+        for _ in 0..5 {
+            selection.update(vec![trunk.clone(), legs.clone()], STILL, FRAME, DT);
+            selection.tell_apart(trunk.bounds, 3);
+        }
+        assert!(selection.current().all(|sighting| !sighting.another));
+        selection.update(vec![whole], STILL, FRAME, DT);
+        assert!(selection.current().all(|sighting| !sighting.is_group()));
     }
 }

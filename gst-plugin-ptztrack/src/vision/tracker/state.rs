@@ -92,6 +92,8 @@ struct Target {
     id: u64,
     follow: Box<dyn Follow>,
     dwell: DwellTime,
+    /// Its box when it was last seen, carried along with the background.
+    seen_at: Rect2f,
 }
 
 enum Phase {
@@ -254,7 +256,6 @@ impl Tracker {
             Phase::Tracking(target) => (target, None),
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
-        let before = target.follow.estimate().bounds;
         let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
         let mut sight = match hidden_s {
             None => target.follow.follow(seen, dt_s as f32, &self.selection)?,
@@ -281,9 +282,15 @@ impl Tracker {
             self.selection.tell_apart(target.follow.estimate().bounds, self.config.confirm_frames);
         }
         let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        let bounds = target.follow.estimate().bounds;
         if let (Sight::Seen, Some(ego)) = (sight, ego) {
-            target.dwell.watch(before, target.follow.estimate().bounds, ego, dt_s);
+            target.dwell.watch(target.seen_at, bounds, ego, dt_s);
         }
+        target.seen_at = match (sight, ego) {
+            (Sight::Seen, _) => bounds,
+            (_, Some(ego)) => ego.apply_to(target.seen_at),
+            _ => target.seen_at,
+        };
         *report = report_of(state, &target, frame, std::mem::take(&mut report.features));
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
@@ -401,7 +408,8 @@ impl Tracker {
         };
         let id = known.unwrap_or(self.last_id + 1);
         self.last_id = self.last_id.max(id);
-        Ok(Some(Target { id, follow, dwell: DwellTime::default() }))
+        let seen_at = follow.estimate().bounds;
+        Ok(Some(Target { id, follow, dwell: DwellTime::default(), seen_at }))
     }
 
     fn follow_anew(

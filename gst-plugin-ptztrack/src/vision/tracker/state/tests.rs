@@ -313,3 +313,56 @@ fn a_neighbour_in_the_same_clothes_is_not_taken_for_the_target() {
     assert!(farthest < 0.5, "{farthest} of the way");
     assert_eq!((state, id), (TargetState::Tracking, 1));
 }
+
+/// The width and height, in the end, of the box of somebody whom the detector sees in `first` for three seconds, and in `later` then.
+fn measured(first: Rect2f, later: Rect2f) -> (f64, f64) {
+    let street = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
+    let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    let mut report = chain.process(&street, DT, &[detection(first)]);
+    for region in [first, later] {
+        for _ in 0..30 {
+            report = chain.process(&street, DT, &[detection(region)]);
+        }
+    }
+    (report.bounds.width * SIZE.0 as f64, report.bounds.height * SIZE.1 as f64)
+}
+
+#[test]
+fn the_box_takes_the_size_of_the_whole_once_that_is_seen() {
+    let whole = Rect2f::new(200.0, 100.0, PERSON.0, PERSON.1);
+    let first = [
+        ("a trunk", Rect2f::new(205.0, 105.0, 30.0, 40.0)),
+        ("a shadow", Rect2f::new(190.0, 100.0, 70.0, 90.0)),
+    ];
+    for (name, first) in first {
+        let (width, height) = measured(first, whole);
+        assert!((width - 40.0).abs() < 6.0 && (height - 90.0).abs() < 6.0, "{name}: {width} x {height}");
+    }
+    let (_, height) = measured(whole, Rect2f::new(200.0, 100.0, 40.0, 45.0));
+    assert!(height > 80.0, "a table hides the legs: {height}");
+}
+
+#[test]
+fn whoever_walks_while_hidden_does_not_stand() {
+    let limits = Limits { stationary_s: 2.5, tracked_s: f64::INFINITY };
+    let tracker = Tracker::new(Config { limits, coast_s: 3.0, ..config() });
+    let mut chain = Chain { scene: SceneModel::default(), tracker };
+    let nobody = street((0.0, 0.0), &[]);
+    for _ in 0..10 {
+        step(&mut chain, &nobody);
+    }
+    let mut stand = |seconds: f64, x: f32| {
+        let picture = street((0.0, 0.0), &[(x, 100.0, 7)]);
+        let reports = (0..(seconds / DT) as usize)
+            .map(|_| chain.process(&picture, DT, &[detected(x, PERSON.0)]))
+            .collect::<Vec<_>>();
+        for _ in 0..12 {
+            step(&mut chain, &nobody);
+        }
+        reports
+    };
+    assert_eq!(stand(1.5, 60.0)[0].changes, [TargetChange::Acquired]);
+    let there = stand(3.0, 130.0);
+    assert_at(&there[17], 130.0, 100.0);
+    assert!(there.iter().any(|report| report.released == Some(ReleaseReason::Stationary)), "they stand now");
+}

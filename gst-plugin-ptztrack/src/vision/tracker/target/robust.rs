@@ -68,7 +68,7 @@ const TRIED_GROWTH: f32 = 0.06;
 const GROWTH_GAIN: f32 = 0.5;
 /// How far a side of the box goes outwards in one picture where there is figure beyond it, in sizes of the box.
 const WIDENING: f32 = 0.03;
-/// The box never grows or shrinks further than this from its first size.
+/// By its looks the box never grows or shrinks further than this from the size that the detector last gave it.
 const MAX_GROWTH: f32 = 4.0;
 /// How much of that it adopts in one picture.
 const ADOPTED: f32 = 0.3;
@@ -88,6 +88,9 @@ const ALONE_TIME_S: f32 = 4.0;
 /// it.
 const WHOLE: f32 = 0.7;
 const PART: f32 = 0.5;
+/// Of its height, one that shows it from head to foot; its width swings with every stride, for so many seconds.
+const NEARLY_WHOLE: f32 = 0.9;
+const STRIDE_S: f32 = 1.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
 /// Of a silhouette of which nothing is known yet.
@@ -131,7 +134,7 @@ pub(in super::super) struct Robust {
     presence: Presence,
     course: Course,
     ego: EgoMotion,
-    first_size: (f32, f32),
+    measured_size: (f32, f32),
     age_s: f32,
     unseen_s: f32,
     /// Since somebody else was near.
@@ -188,7 +191,7 @@ impl Robust {
             presence: Presence::default(),
             course: Course { middle: centre(bounds), velocity: sighting.velocity },
             ego: EgoMotion::default(),
-            first_size: (bounds.width, bounds.height),
+            measured_size: (bounds.width, bounds.height),
             age_s: 0.0,
             unseen_s: 0.0,
             alone_s: f32::INFINITY,
@@ -473,29 +476,33 @@ impl Robust {
         let limit = |size: f32, first: f32| size.clamp(first / MAX_GROWTH, first * MAX_GROWTH);
         self.estimate.bounds = around(
             centre(bounds),
-            limit(bounds.width * growth, self.first_size.0),
-            limit(bounds.height * growth, self.first_size.1),
+            limit(bounds.width * growth, self.measured_size.0),
+            limit(bounds.height * growth, self.measured_size.1),
         );
     }
 
-    /// A young target's box grows with the region that the detector sees it in; by how much its middle shifts, which is no
-    /// motion of the target.
-    fn adopt(&mut self, sightings: &Selection) -> Point2f {
+    /// The box grows with the region that the detector sees the target in, while it is young or nobody else is near, and narrows
+    /// with one that shows it from head to foot; by how much its middle shifts, which is no motion of the target.
+    fn adopt(&mut self, sightings: &Selection, dt_s: f32) -> Point2f {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
+        let (young, alone) = (self.age_s < YOUNG_S, self.alone());
+        let most = if alone > 0.5 { MAX_GROWTH } else { 2.0 };
         let own = sightings.current().find(|sighting| {
             let region = sighting.bounds;
             !sighting.is_group()
                 && region.contains(middle)
-                && region.width <= 2.0 * bounds.width
-                && region.height <= 2.0 * bounds.height
+                && region.width <= most * bounds.width
+                && region.height <= most * bounds.height
         });
-        let Some(region) = own.map(|sighting| sighting.bounds).filter(|_| self.age_s < YOUNG_S) else {
-            return Point2f::default();
-        };
+        let Some(region) = own.map(|sighting| sighting.bounds) else { return Point2f::default() };
+        // Young, it is still finding its size; later on one picture may show it together with what merely flickers beside it.
+        let larger = if young { ADOPTED } else { alone * dt_s / (dt_s + STRIDE_S) };
         // Along an axis in which the region is the smaller, part of the target is hidden or not seen.
-        let adopted = |old: f32, new: f32| if new > old { ADOPTED } else { 0.0 };
-        let (across, down) = (adopted(bounds.width, region.width), adopted(bounds.height, region.height));
+        let is_whole = region.height >= NEARLY_WHOLE * bounds.height;
+        let narrower = if is_whole && !young { larger } else { 0.0 };
+        let across = if region.width > bounds.width { larger } else { narrower };
+        let down = if region.height > bounds.height { larger } else { 0.0 };
         let off = centre(region) - middle;
         let shift = Point2f::new(off.x * across, off.y * down);
         let size = (
@@ -503,7 +510,9 @@ impl Robust {
             bounds.height + down * (region.height - bounds.height),
         );
         self.estimate.bounds = around(middle + shift, size.0, size.1);
-        self.first_size = size;
+        let measured = |old: f32, new: f32, adopted: f32| if adopted > 0.0 { new } else { old };
+        let (width, height) = self.measured_size;
+        self.measured_size = (measured(width, size.0, across), measured(height, size.1, down));
         shift
     }
 
@@ -622,7 +631,7 @@ impl Follow for Robust {
         }
         self.patch = next;
         let by_points = (consensus.map_or(carried, |consensus| consensus.motion) - self.ego.at(start)) / dt_s;
-        let start = start + self.adopt(sightings);
+        let start = start + self.adopt(sightings, dt_s);
         let spread = WIDE_SPREAD + (SPREAD - WIDE_SPREAD) * trust;
         let mut place = self.locate(seen, self.estimate.bounds, spread)?;
         self.unseen_s = if place.share < FOUND { self.unseen_s + dt_s } else { 0.0 };
