@@ -14,8 +14,10 @@ use crate::model::{CommandHistory, Delays, PanTilt, SpeedMap};
 /// slope over the logarithm of the field of view (proportional speed that shrinks all speeds as the view narrows), and a
 /// small correction at each of a few steps, straight in between (any other curve).
 ///
-/// Gain and exponent alone (the corrections held at zero) do not suffice: where field of view, latency and curve are wrong at
-/// once, the target is lost (test `everything_wrong_at_once_is_put_right_within_20_s`).
+/// Less does not suffice where field of view, latency and curve are wrong at once (test
+/// `everything_wrong_at_once_is_put_right_within_20_s`): with gain and exponent alone the target is lost, with a correction that
+/// only grows (increments from step to step, none below zero) a latency of 200 ms is taken for 709 ms, or for 309 ms with three
+/// increments instead of eight.
 #[derive(Debug)]
 pub(super) struct SpeedMapEstimator {
     regression: RecursiveLeastSquares<FEATURES>,
