@@ -59,7 +59,7 @@ pub enum LumaSourceError {
     Conversion(#[from] opencv::Error),
 }
 
-/// How the grey picture is won from plane 0.
+/// How the grey picture is obtained from plane 0.
 #[derive(Debug, Clone, Copy)]
 enum Access {
     /// It is the grey picture.

@@ -17,11 +17,11 @@ mod model;
 mod servo;
 mod settings;
 
-pub use control::{Access, Actuation, ActuatorStatus, Home};
+pub use control::{Access, Actuation, ActuatorStatus, Home, Mode};
 pub use estimation::{Estimates, Measurement, Mounting, Prediction, Visibility};
 pub use model::{
     CameraModel, Capabilities, CommandHistory, Delays, HardLimits, Lens, PanTilt, Position, Presets, Range,
     SoftLimits, SpeedCurve, SpeedMap, TableRow, View, around_deg, is_endless, magnified, narrower,
 };
 pub use servo::Servo;
-pub use settings::{Mode, ServoSettings};
+pub use settings::ServoSettings;

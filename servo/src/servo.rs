@@ -7,13 +7,13 @@ use std::mem;
 use std::time::Duration;
 
 use crate::control::{
-    Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, PointToPoint, ZoomDrive,
+    Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, PointToPoint, ZoomDrive,
 };
 use crate::estimation::{Estimates, Measurement, SelfCalibration, TargetEstimator, Visibility};
 use crate::model::{
     CameraModel, Capabilities, CommandHistory, Delays, Lens, PanTilt, SpeedMap, View, magnified,
 };
-use crate::settings::{Mode, ServoSettings};
+use crate::settings::ServoSettings;
 
 /// Steers one camera: takes what is measured, says what the camera is to do, hears what became of that. It speaks with
 /// nobody, and has no clock: both are the caller's.

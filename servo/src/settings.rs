@@ -2,32 +2,9 @@
 
 use std::time::Duration;
 
-use crate::control::Home;
+use crate::control::{Home, Mode};
 use crate::estimation::{Mounting, Prediction};
 use crate::model::{SoftLimits, SpeedCurve, SpeedMap};
-
-/// How the camera is moved.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Mode {
-    /// Continuously, by speed.
-    #[default]
-    Velocity,
-    /// From position to position: look, move, wait until at rest, look again.
-    Absolute,
-    /// Like `Absolute`, but the camera itself works out the angles.
-    Centre,
-}
-
-impl Mode {
-    /// As the property has it.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Velocity => "velocity",
-            Self::Absolute => "absolute",
-            Self::Centre => "centre",
-        }
-    }
-}
 
 /// Everything that can be set about the servo.
 #[derive(Debug, Clone, PartialEq)]

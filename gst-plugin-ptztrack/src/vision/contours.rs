@@ -4,7 +4,7 @@ use opencv::core::{Mat, Point as Pixel, Scalar, Vector};
 use opencv::imgproc;
 use ptztrack_contract::{Point, Rect, Region};
 
-/// How pixels of a mask lie in the frame it was won from.
+/// How pixels of a mask lie in the frame it was computed from.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grid {
     /// Width of the frame in pixels of the mask; not whole where the mask leaves columns out.

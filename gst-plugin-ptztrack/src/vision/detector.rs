@@ -70,7 +70,7 @@ pub struct DetectorConfig {
     pub warm_up: u32,
     /// When more than this fraction of the picture is foreground, the background is learned anew.
     pub relearn_fraction: f64,
-    /// A region is reported in the picture that shows it for the so-manieth time in a row.
+    /// A region is reported once it has been seen in this many pictures in a row.
     pub confirm_pictures: u32,
 }
 
@@ -275,7 +275,7 @@ impl Detector {
         Ok(())
     }
 
-    /// The regions of the foreground in `mask`, which was won from `luma`.
+    /// The regions of the foreground in `mask`, which was computed from `luma`.
     fn find(
         &mut self,
         luma: &Luma,

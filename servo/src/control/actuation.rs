@@ -2,7 +2,28 @@
 
 use std::time::Duration;
 
-use crate::settings::Mode;
+/// How the camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Mode {
+    /// Continuously, by speed.
+    #[default]
+    Velocity,
+    /// From position to position: look, move, wait until at rest, look again.
+    Absolute,
+    /// Like `Absolute`, but the camera itself works out the angles.
+    Centre,
+}
+
+impl Mode {
+    /// As the property has it.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Velocity => "velocity",
+            Self::Absolute => "absolute",
+            Self::Centre => "centre",
+        }
+    }
+}
 
 /// What the camera is to do.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -12,7 +12,7 @@ pub enum SpeedCurve {
     Cubic,
 }
 
-/// VAPIX speed steps (-100 to 100) and degrees per second: any growing curve, the same both ways.
+/// Speed steps (-100 to 100) and degrees per second: any growing curve, the same both ways.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SpeedMap {
     /// Degrees per second of the steps 0 to 100.

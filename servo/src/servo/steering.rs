@@ -7,10 +7,9 @@ use std::time::Duration;
 use ptztrack_contract::Point;
 
 use super::{Access, Actuation, ActuatorStatus, Servo};
-use crate::control::{ControlLaw, Jump, ZoomGoal};
+use crate::control::{ControlLaw, Jump, Mode, ZoomGoal};
 use crate::estimation::Measurement;
 use crate::model::{PanTilt, View, around_deg, narrower};
-use crate::settings::Mode;
 
 impl Servo {
     pub(super) fn velocity(
