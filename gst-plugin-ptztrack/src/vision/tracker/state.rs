@@ -221,6 +221,11 @@ impl Tracker {
         Ok(Report { changes, ..report })
     }
 
+    /// How the background moved, by what is seen of it or by what is known of the camera.
+    fn ego_motion(&self, seen: &Observation) -> Option<EgoMotion> {
+        EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default))
+    }
+
     /// Keeps account of what the detector sees, whether a target is followed or not.
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
         self.lost =
@@ -237,7 +242,7 @@ impl Tracker {
             outside: detection.outside,
             ..Sighting::default()
         });
-        let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        let ego = self.ego_motion(seen);
         self.selection.detector_pause_s = self.config.detector_pause_s;
         self.selection.update(sightings, ego, frame, dt_s);
     }
@@ -281,7 +286,7 @@ impl Tracker {
         if sight == Sight::Seen && target.follow.estimate().is_sure() && !target.dwell.is_on_trial() {
             self.selection.tell_apart(target.follow.estimate().bounds, self.config.confirm_frames);
         }
-        let ego = EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default));
+        let ego = self.ego_motion(seen);
         let bounds = target.follow.estimate().bounds;
         if let (Sight::Seen, Some(ego)) = (sight, ego) {
             target.dwell.watch(target.seen_at, bounds, ego, dt_s);

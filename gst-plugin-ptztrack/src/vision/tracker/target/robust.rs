@@ -70,6 +70,8 @@ const GROWTH_GAIN: f32 = 0.5;
 const WIDENING: f32 = 0.03;
 /// By its looks the box never grows or shrinks further than this from the size that the detector last gave it.
 const MAX_GROWTH: f32 = 4.0;
+/// A region that is larger than so many boxes shows somebody else as well, where others are near.
+const MAX_GROWTH_BESIDE_OTHERS: f32 = 2.0;
 /// How much of that it adopts in one picture.
 const ADOPTED: f32 = 0.3;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
@@ -88,8 +90,9 @@ const ALONE_TIME_S: f32 = 4.0;
 /// it.
 const WHOLE: f32 = 0.7;
 const PART: f32 = 0.5;
-/// Of its height, one that shows it from head to foot; its width swings with every stride, for so many seconds.
+/// How much of the height of the target a region has that shows it from head to foot.
 const NEARLY_WHOLE: f32 = 0.9;
+/// Time over which regions give the size of the target, seconds: their width swings with every stride.
 const STRIDE_S: f32 = 1.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
@@ -484,20 +487,12 @@ impl Robust {
     /// The box grows with the region that the detector sees the target in, while it is young or nobody else is near, and narrows
     /// with one that shows it from head to foot; by how much its middle shifts, which is no motion of the target.
     fn adopt(&mut self, sightings: &Selection, dt_s: f32) -> Point2f {
+        let Some(region) = self.own_region(sightings) else { return Point2f::default() };
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
-        let (young, alone) = (self.age_s < YOUNG_S, self.alone());
-        let most = if alone > 0.5 { MAX_GROWTH } else { 2.0 };
-        let own = sightings.current().find(|sighting| {
-            let region = sighting.bounds;
-            !sighting.is_group()
-                && region.contains(middle)
-                && region.width <= most * bounds.width
-                && region.height <= most * bounds.height
-        });
-        let Some(region) = own.map(|sighting| sighting.bounds) else { return Point2f::default() };
+        let young = self.age_s < YOUNG_S;
         // Young, it is still finding its size; later on one picture may show it together with what merely flickers beside it.
-        let larger = if young { ADOPTED } else { alone * dt_s / (dt_s + STRIDE_S) };
+        let larger = if young { ADOPTED } else { self.alone() * dt_s / (dt_s + STRIDE_S) };
         // Along an axis in which the region is the smaller, part of the target is hidden or not seen.
         let is_whole = region.height >= NEARLY_WHOLE * bounds.height;
         let narrower = if is_whole && !young { larger } else { 0.0 };
@@ -514,6 +509,20 @@ impl Robust {
         let (width, height) = self.measured_size;
         self.measured_size = (measured(width, size.0, across), measured(height, size.1, down));
         shift
+    }
+
+    /// The region that the detector sees the target in, and nobody else.
+    fn own_region(&self, sightings: &Selection) -> Option<Rect2f> {
+        let bounds = self.estimate.bounds;
+        let most = if self.alone() > 0.5 { MAX_GROWTH } else { MAX_GROWTH_BESIDE_OTHERS };
+        let own = sightings.current().find(|sighting| {
+            let region = sighting.bounds;
+            !sighting.is_group()
+                && region.contains(centre(bounds))
+                && region.width <= most * bounds.width
+                && region.height <= most * bounds.height
+        });
+        own.map(|sighting| sighting.bounds)
     }
 
     /// The best of what the detector saw within reach that looks like the target.
