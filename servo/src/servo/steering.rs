@@ -12,13 +12,16 @@ use crate::estimation::Measurement;
 use crate::model::{PanTilt, View, around_deg, narrower};
 
 impl Servo {
+    /// Part of the dead zone that tilt keeps while the camera pans: where else an axis comes to rest.
+    const ZONE_WHILE_PANNING: f64 = 1.0 / 3.0;
+
     pub(super) fn velocity(
         &mut self,
         measurement: &Measurement,
         actuator: &ActuatorStatus,
         now: Duration,
     ) -> Actuation {
-        let law = self.control_law(&self.view(measurement), actuator.interval);
+        let law = self.control_law(&self.view(measurement), actuator.interval, now);
         let delays = self.delays();
         let history = &self.camera.history;
         let offset = self.estimator.offset(now, history, &delays);
@@ -54,12 +57,16 @@ impl Servo {
         self.limits.apply(motion, position, (&hard, &self.settings.limits), lasting_s)
     }
 
-    fn control_law(&self, view: &View, interval: Duration) -> ControlLaw {
+    fn control_law(&self, view: &View, interval: Duration, now: Duration) -> ControlLaw {
         let settings = &self.settings;
         let interval_s = interval.as_secs_f64();
         // No error is worth a move that would leave nearly as large a one on the other side.
         let least_deg = 0.75 * self.camera.speed_map.deg_s(1) * interval_s;
-        let zone_deg = self.zone_deg(view, settings.dead_zone);
+        let mut zone_deg = self.zone_deg(view, settings.dead_zone);
+        if self.camera.history.rate_at(now).pan != 0.0 {
+            // It is there for the camera to stand still before somebody who stands. One that pans moves anyway.
+            zone_deg.tilt *= Self::ZONE_WHILE_PANNING;
+        }
         ControlLaw {
             // Told so rarely, the camera must not turn by more than the error until it is told again.
             gain: settings.gain.min(1.0 / interval_s),

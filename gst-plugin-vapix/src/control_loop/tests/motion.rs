@@ -60,6 +60,17 @@ fn a_walking_person_is_kept_in_the_middle() {
     }
 }
 
+/// Too little for a camera at rest to move for.
+#[test]
+fn while_it_pans_little_offsets_of_tilt_are_corrected_too() {
+    for (delay, zoom) in CASES {
+        let tilt = 1.3 / zoom;
+        let run = Setup::new(delay, zoom).run(10.0, |t| (PanTilt::new(brisk(zoom) * t, tilt), 20.0));
+        let last = run.frames.last().unwrap().offset.y.abs() / ASPECT;
+        assert!(last < 0.011, "{delay} ms, {zoom}x: {last} of the width");
+    }
+}
+
 #[test]
 fn a_step_in_the_targets_speed_neither_overshoots_nor_oscillates() {
     for (delay, zoom) in CASES {
