@@ -9,6 +9,8 @@ use crate::model::{PanTilt, SpeedMap};
 pub struct ControlLaw {
     /// Degrees per second for a degree of error, 1/s.
     pub gain: f64,
+    /// The same while a new target is sought.
+    pub seek_gain: f64,
     /// The error in degrees that each axis tolerates at rest.
     pub dead_zone_deg: PanTilt,
     /// Degrees per second that neither axis exceeds.
@@ -18,10 +20,15 @@ pub struct ControlLaw {
 }
 
 /// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.
+///
+/// It switches modes as the servos of disk drives do, from seeking to tracking: a new target is sought in haste, once and by
+/// dead reckoning, and then followed calmly by what the pictures show.
 #[derive(Debug, Default)]
 pub struct Controller {
     pan: Axis,
     tilt: Axis,
+    /// The target was in the middle once, as far as was reckoned: it is followed now.
+    found: bool,
     /// Scales the gain of a loop that oscillates; what the target does by itself is followed all the same.
     pub oscillation: OscillationGuard,
     /// The speed steps in force, for the quantiser's hysteresis.
@@ -31,13 +38,25 @@ pub struct Controller {
 impl Controller {
     /// The rate that brings the error to zero within about 1/gain while the target moves on.
     pub fn rate(&mut self, offset: &Offset, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
-        let Offset { seen, expected, target } = *offset;
-        let zone_deg = law.dead_zone_deg;
-        let law = &ControlLaw { gain: self.oscillation.gain_scale() * law.gain, ..*law };
+        let Offset { seen, expected, reckoned, target } = *offset;
+        let (zone_deg, scale) = (law.dead_zone_deg, self.oscillation.gain_scale());
+        self.pan.start_or_rest((seen.pan, expected.pan, zone_deg.pan), target.pan);
+        self.tilt.start_or_rest((seen.tilt, expected.tilt, zone_deg.tilt), target.tilt);
+        // What oscillated is wrong about the camera: it reckons wrongly too.
+        self.found |=
+            scale < 1.0 || reckoned.pan.abs() <= zone_deg.pan && reckoned.tilt.abs() <= zone_deg.tilt;
+        let correction = if self.found { expected * (scale * law.gain) } else { reckoned * law.seek_gain };
+        let wanted = correction + target;
         PanTilt {
-            pan: self.pan.rate((seen.pan, expected.pan, zone_deg.pan), target.pan, in_force.pan, law),
-            tilt: self.tilt.rate((seen.tilt, expected.tilt, zone_deg.tilt), target.tilt, in_force.tilt, law),
+            pan: self.pan.rate(wanted.pan, in_force.pan, law),
+            tilt: self.tilt.rate(wanted.tilt, in_force.tilt, law),
         }
+    }
+
+    /// Another target: what was seen so far tells nothing of it.
+    pub fn meet(&mut self) {
+        self.found = false;
+        self.oscillation.clear();
     }
 
     /// What holds at any time.
@@ -50,6 +69,7 @@ impl Controller {
     /// Both axes at rest.
     pub fn rest(&mut self) {
         (self.pan, self.tilt) = (Axis::default(), Axis::default());
+        self.found = false;
     }
 
     /// The speed steps for a rate.
@@ -68,13 +88,7 @@ impl Axis {
     /// The part of the dead zone that an axis must reach to come to rest: the rest is left to a tracker's tremble.
     const REST: f64 = 1.0 / 3.0;
 
-    fn rate(
-        &mut self,
-        (seen_deg, error_deg, dead_zone_deg): (f64, f64, f64),
-        target_deg_s: f64,
-        in_force_deg_s: f64,
-        law: &ControlLaw,
-    ) -> f64 {
+    fn start_or_rest(&mut self, (seen_deg, error_deg, dead_zone_deg): (f64, f64, f64), target_deg_s: f64) {
         let rest_deg = Self::REST * dead_zone_deg;
         self.moving = if self.moving {
             // Rests only for a target that would not leave the zone within a second.
@@ -83,7 +97,10 @@ impl Axis {
             // Starts for nothing that is foreseen only: once in a while a tremble looks like a start.
             error_deg.abs() > dead_zone_deg && seen_deg * error_deg.signum() > rest_deg
         };
-        let wanted = if self.moving { law.gain * error_deg + target_deg_s } else { 0.0 };
+    }
+
+    fn rate(&self, wanted_deg_s: f64, in_force_deg_s: f64, law: &ControlLaw) -> f64 {
+        let wanted = if self.moving { wanted_deg_s } else { 0.0 };
         let slewed =
             wanted.clamp(in_force_deg_s - law.max_change_deg_s, in_force_deg_s + law.max_change_deg_s);
         slewed.clamp(-law.max_deg_s, law.max_deg_s)
@@ -97,6 +114,7 @@ mod tests {
 
     const LAW: ControlLaw = ControlLaw {
         gain: 1.0,
+        seek_gain: 1.0,
         dead_zone_deg: PanTilt { pan: 1.0, tilt: 1.0 },
         max_deg_s: 100.0,
         max_change_deg_s: 1000.0,
@@ -112,7 +130,7 @@ mod tests {
 
     fn offset(pan: f64, tilt: f64, target: f64) -> Offset {
         let error = PanTilt::new(pan, tilt);
-        Offset { seen: error, expected: error, target: PanTilt::new(target, 0.0) }
+        Offset { seen: error, expected: error, reckoned: error, target: PanTilt::new(target, 0.0) }
     }
 
     #[test]
@@ -136,7 +154,9 @@ mod tests {
         let mut controller = Controller::default();
         let mut rate = |seen, expected| {
             let [seen, expected] = [seen, expected].map(|error| PanTilt::new(error, 0.0));
-            controller.rate(&Offset { seen, expected, target: still() }, still(), &LAW).pan
+            controller
+                .rate(&Offset { seen, expected, reckoned: expected, target: still() }, still(), &LAW)
+                .pan
         };
         assert_eq!((rate(0.2, 5.0), rate(-0.9, 5.0), rate(0.5, 5.0), rate(0.2, 5.0)), (0.0, 0.0, 5.0, 5.0));
     }
@@ -153,6 +173,21 @@ mod tests {
         let mut controller =
             Controller { oscillation: OscillationGuard::lowered_to(0.5), ..Controller::default() };
         assert_eq!(pan(&mut controller, 2.0, 5.0, &LAW), 6.0);
+    }
+
+    #[test]
+    fn a_new_target_is_sought_once_and_by_what_was_reckoned() {
+        let law = ControlLaw { seek_gain: 3.0, ..LAW };
+        let mut controller = Controller::default();
+        let mut rate = |reckoned| {
+            let [expected, reckoned] = [10.0, reckoned].map(|error| PanTilt::new(error, 0.0));
+            controller
+                .rate(&Offset { seen: expected, expected, reckoned, target: still() }, still(), &law)
+                .pan
+        };
+        assert_eq!((rate(10.0), rate(4.0), rate(0.5), rate(10.0)), (30.0, 12.0, 10.0, 10.0));
+        controller.meet();
+        assert_eq!(pan(&mut controller, 10.0, 0.0, &law), 30.0);
     }
 
     #[test]

@@ -34,6 +34,8 @@ pub struct Offset {
     pub seen: PanTilt,
     /// When a command sent now acts.
     pub expected: PanTilt,
+    /// What of that is left by dead reckoning since the target was met, whatever pictures have shown since.
+    pub reckoned: PanTilt,
     /// The target's own motion then, degrees per second.
     pub target: PanTilt,
 }
@@ -49,6 +51,8 @@ pub struct TargetEstimator {
     /// Where the target is, degrees above the horizon.
     elevation_deg: f64,
     taken_at: Duration,
+    /// When the target was first seen, and how far off the middle.
+    met: Option<(Duration, PanTilt)>,
 }
 
 impl TargetEstimator {
@@ -61,6 +65,7 @@ impl TargetEstimator {
             error: PanTilt::default(),
             elevation_deg: 0.0,
             taken_at: Duration::ZERO,
+            met: None,
         }
     }
 
@@ -72,7 +77,7 @@ impl TargetEstimator {
     /// Takes a picture of the target, seen with `view`, after these commands.
     pub fn see(&mut self, measurement: &Measurement, view: &View, history: &CommandHistory, delays: &Delays) {
         if measurement.id != self.id {
-            self.target_rate.clear();
+            self.clear();
             self.id = measurement.id;
         }
         if measurement.visibility == Visibility::Predicted {
@@ -100,6 +105,7 @@ impl TargetEstimator {
         self.error = view.error(measurement.centroid);
         self.elevation_deg = view.tilt_deg + self.error.tilt;
         self.taken_at = measurement.taken_at;
+        self.met.get_or_insert((self.taken_at, self.error));
     }
 
     /// How far the target moves through the picture when it goes round the camera by a degree, in degrees.
@@ -133,6 +139,7 @@ impl TargetEstimator {
     /// Forgets the target.
     pub fn clear(&mut self) {
         self.target_rate.clear();
+        self.met = None;
     }
 
     /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
@@ -172,7 +179,27 @@ impl TargetEstimator {
         let target = self.target_rate(self.horizon(now, delays));
         // Half round the camera, what goes up goes down in the picture.
         let target = PanTilt::new(target.pan, target.tilt * expected.pan.to_radians().cos());
-        Offset { seen: self.in_picture(self.error), expected: self.in_picture(expected), target }
+        let reckoned = self.reckoned(expected, now, history, delays);
+        Offset { seen: self.in_picture(self.error), expected: self.in_picture(expected), reckoned, target }
+    }
+
+    /// What of the expected error is left of the first one by the commands given since and the target's mean rate. A camera
+    /// that is later or slower than thought is told nothing twice by it, and one that is faster shows in what is expected.
+    fn reckoned(
+        &self,
+        expected: PanTilt,
+        now: Duration,
+        history: &CommandHistory,
+        delays: &Delays,
+    ) -> PanTilt {
+        let Some((met_at, first)) = self.met else { return PanTilt::default() };
+        let walked = self.walked(self.pace() * (now.saturating_sub(met_at) + delays.sum()).as_secs_f64());
+        let left = self.in_picture(first + walked - history.rotation(delays.sent_by(met_at), now));
+        let common = |one: f64, other: f64| {
+            if one * other > 0.0 { one.abs().min(other.abs()).copysign(one) } else { 0.0 }
+        };
+        // The steeper below the camera, the less is known of where a target will be, of either axis.
+        self.in_picture(expected).each(left, common) * self.seen_of_pan().powi(2)
     }
 
     /// The same error with what tilt alone is to do about it: while pan is under way, to look already as high as the target

@@ -15,6 +15,9 @@ impl Servo {
     /// Part of the dead zone that tilt keeps while the camera pans: where else an axis comes to rest.
     const ZONE_WHILE_PANNING: f64 = 1.0 / 3.0;
 
+    /// So many times the gain seeks a new target. With 2.5 it is found no sooner, and passed by more: motors take time.
+    const SEEK: f64 = 2.0;
+
     pub(super) fn velocity(
         &mut self,
         measurement: &Measurement,
@@ -67,9 +70,13 @@ impl Servo {
             // It is there for the camera to stand still before somebody who stands. One that pans moves anyway.
             zone_deg.tilt *= Self::ZONE_WHILE_PANNING;
         }
+        // Told so rarely, the camera must not turn by more than the error until it is told again.
+        let gain = settings.gain.min(1.0 / interval_s);
+        // In haste neither until that is seen, which may be so much later than is thought.
+        let seen_within_s = interval_s + self.delays().uncertainty.as_secs_f64();
         ControlLaw {
-            // Told so rarely, the camera must not turn by more than the error until it is told again.
-            gain: settings.gain.min(1.0 / interval_s),
+            gain,
+            seek_gain: (Self::SEEK * gain).min(1.0 / seen_within_s).max(gain),
             dead_zone_deg: PanTilt::new(zone_deg.pan.max(least_deg), zone_deg.tilt.max(least_deg)),
             max_deg_s: settings.max_speed_deg_s,
             max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
