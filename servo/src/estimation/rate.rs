@@ -61,6 +61,12 @@ impl RateAverage {
         )
     }
 
+    /// The mean as far as the motion as a whole stands out of the noise of both axes.
+    pub fn certain_mean(&self) -> PanTilt {
+        let (mean, variance) = (self.mean(), self.axes(|axis| axis.variance_of_mean()));
+        mean * certain_part(mean.dot(mean), variance.pan + variance.tilt)
+    }
+
     /// How the rate changes, per second: what of that goes beyond the changes to the other side just before. Who
     /// starts or turns keeps on; what sways comes back.
     fn trend(&self) -> PanTilt {
@@ -135,7 +141,11 @@ impl Samples {
     ///
     /// Somebody who stands before a tracker that trembles would else be led to and fro for ever.
     fn certain_mean(&self) -> f64 {
-        certain(self.mean(), self.variance() / self.0.len() as f64)
+        certain(self.mean(), self.variance_of_mean())
+    }
+
+    fn variance_of_mean(&self) -> f64 {
+        self.variance() / self.0.len() as f64
     }
 
     /// The rate to expect `lead_s` after the newest, if it changes by `slope` per second.
@@ -163,11 +173,17 @@ impl Samples {
     }
 }
 
-/// The part of a value of this variance that is no noise.
+/// What of a value of this variance is no noise.
 fn certain(value: f64, variance: f64) -> f64 {
-    let noise = Samples::CONFIDENCE.powi(2) * variance / (value * value);
+    let part = certain_part(value * value, variance);
     // What is no number, as at 0 of 0, stays out.
-    if noise < 1.0 { value * (1.0 - noise) } else { 0.0 }
+    if part > 0.0 { value * part } else { 0.0 }
+}
+
+/// The part, 0 to 1, of a value with this square; none where nobody can tell.
+fn certain_part(square: f64, variance: f64) -> f64 {
+    let noise = Samples::CONFIDENCE.powi(2) * variance / square;
+    if noise < 1.0 { 1.0 - noise } else { 0.0 }
 }
 
 #[cfg(test)]
