@@ -144,7 +144,7 @@ impl Servo {
     /// Whether this is one half-cycle too many about the target.
     fn oscillates(&mut self, measurement: &Measurement, view: &View) -> bool {
         if self.target.as_ref().is_some_and(|target| target.measurement.id != measurement.id) {
-            self.controller.meet();
+            self.controller.new_target();
         }
         let tolerated = (Self::OSCILLATION_ZONES * self.settings.dead_zone).max(Self::OSCILLATION_LEAST);
         let tolerated_deg = self.zone_deg(view, tolerated);

