@@ -43,6 +43,11 @@
 //! own limits, `camera-pan-min` to `camera-zoom-max` and `camera-endless-pan`. What the camera reported is logged in one line
 //! at level INFO. If the loop oscillates, the gain is lowered, with a warning.
 //!
+//! ## Seeking and following
+//! In `mode=velocity` a new target is sought at up to twice `gain`, by dead reckoning from the commands sent, until it is
+//! within `dead-zone` or for 2 s at most; from then on it is followed at `gain`, by what the pictures show. While the
+//! camera pans, tilt corrects offsets beyond a third of `dead-zone`.
+//!
 //! ## Between tracker and camera
 //! A picture may be scaled between the tracker and this sink. One that is cropped or gets borders is refused, with a
 //! warning. One that is flipped or turned (`videoflip`) cannot be told from any other: put that element in front of the

@@ -7,12 +7,19 @@ use std::time::Duration;
 use super::{PanTilt, SpeedMap};
 
 /// The rates the camera was told, so that the rotation not yet visible in the picture is known.
-#[derive(Debug, Default)]
-pub struct CommandHistory(VecDeque<Entry>);
-
 #[derive(Debug)]
+pub struct CommandHistory {
+    entries: VecDeque<Entry>,
+    /// Degrees per second squared by which the motors get from one rate to the next.
+    acceleration_deg_s2: f64,
+}
+
+#[derive(Debug, Clone, Copy)]
 struct Entry {
     since: Duration,
+    /// What the motors have reached by then ...
+    start: PanTilt,
+    /// ... and what they are told.
     rate: PanTilt,
     /// Where the rate comes from, and may be revised.
     steps: Option<(i8, i8)>,
@@ -22,70 +29,117 @@ impl CommandHistory {
     /// Longer than any latency that is allowed for, and than a slow camera goes without telling its position.
     pub const SPAN: Duration = Duration::from_secs(20);
 
+    /// Of motors that accelerate by so much.
+    pub fn accelerating(acceleration_deg_s2: f64) -> Self {
+        Self { entries: VecDeque::new(), acceleration_deg_s2 }
+    }
+
     /// From `at` on the camera turns with `rate`.
     pub fn push(&mut self, at: Duration, rate: PanTilt) {
-        self.add(Entry { since: at, rate, steps: None });
+        self.add(at, rate, None);
     }
 
     /// From `at` on the camera turns with these speed steps for pan and tilt.
     pub fn push_steps(&mut self, at: Duration, steps: (i8, i8), map: &SpeedMap) {
-        self.add(Entry { since: at, rate: rate_of(steps, map), steps: Some(steps) });
+        self.add(at, rate_of(steps, map), Some(steps));
     }
 
     /// Counts what was commanded in steps by another map.
     pub fn revise(&mut self, map: &SpeedMap) {
-        for entry in &mut self.0 {
+        let mut before: Option<Entry> = None;
+        for entry in &mut self.entries {
             entry.rate = entry.steps.map_or(entry.rate, |steps| rate_of(steps, map));
+            if let Some(before) = before {
+                entry.start = before.reached(entry.since, self.acceleration_deg_s2);
+            }
+            before = Some(*entry);
         }
     }
 
-    fn add(&mut self, entry: Entry) {
-        let at = entry.since;
-        self.0.push_back(entry);
+    fn add(&mut self, at: Duration, rate: PanTilt, steps: Option<(i8, i8)>) {
+        let before = self.entries.back();
+        let start = before.map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2));
+        self.entries.push_back(Entry { since: at, start, rate, steps });
         // The entry before the span is still in force at its beginning.
-        while self.0.get(1).is_some_and(|second| second.since + Self::SPAN < at) {
-            self.0.pop_front();
+        while self.entries.get(1).is_some_and(|second| second.since + Self::SPAN < at) {
+            self.entries.pop_front();
         }
     }
 
-    /// The rate in force at a time; zero before the first.
+    /// The rate that is commanded at a time; zero before the first.
     pub fn rate_at(&self, at: Duration) -> PanTilt {
-        self.0.iter().rev().find(|entry| entry.since <= at).map_or(PanTilt::default(), |entry| entry.rate)
+        self.entries
+            .iter()
+            .rev()
+            .find(|entry| entry.since <= at)
+            .map_or(PanTilt::default(), |entry| entry.rate)
     }
 
     /// The rates in force at some moment between two times, in order.
     pub fn rates_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = PanTilt> {
         let first = self.rate_at(from);
         let within = move |entry: &&Entry| entry.since > from && entry.since <= to;
-        iter::once(first).chain(self.0.iter().filter(within).map(|entry| entry.rate))
+        iter::once(first).chain(self.entries.iter().filter(within).map(|entry| entry.rate))
     }
 
     /// The speed steps in force between two times, last first, with how long each was, in seconds; what was
     /// not commanded in steps is left out.
     pub fn steps_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = ((i8, i8), f64)> {
-        let ends = iter::once(to).chain(self.0.iter().rev().map(move |entry| entry.since.min(to)));
-        self.0.iter().rev().zip(ends).filter_map(move |(entry, end)| {
+        let ends = iter::once(to).chain(self.entries.iter().rev().map(move |entry| entry.since.min(to)));
+        self.entries.iter().rev().zip(ends).filter_map(move |(entry, end)| {
             let lasted = end.saturating_sub(entry.since.max(from)).as_secs_f64();
             entry.steps.filter(|_| lasted > 0.0).map(|steps| (steps, lasted))
         })
     }
 
-    /// The rotation commanded between two times, degrees; from a later to an earlier it is the way back.
+    /// The rotation by what was commanded between two times, degrees; from a later to an earlier it is the way back.
     pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
         if to < from {
             return PanTilt::default() - self.rotation(to, from);
         }
         let mut rotation = PanTilt::default();
         let mut end = to;
-        for entry in self.0.iter().rev() {
+        for entry in self.entries.iter().rev() {
             let since = entry.since.max(from);
-            rotation = rotation + entry.rate * end.saturating_sub(since).as_secs_f64();
+            let turned = |time| entry.turned(time, self.acceleration_deg_s2);
+            rotation = rotation + turned(end.max(since)) - turned(since);
             end = end.min(since);
             if entry.since <= from {
                 break;
             }
         }
         rotation
+    }
+}
+
+impl Default for CommandHistory {
+    /// Of motors that reach each rate at once.
+    fn default() -> Self {
+        Self::accelerating(f64::INFINITY)
+    }
+}
+
+impl Entry {
+    /// The rate by a time in force.
+    fn reached(&self, at: Duration, acceleration_deg_s2: f64) -> PanTilt {
+        let seconds = at.saturating_sub(self.since).as_secs_f64();
+        self.start.each(self.rate, |start, rate| {
+            let change = rate - start;
+            let reached = seconds * acceleration_deg_s2;
+            if reached < change.abs() { start + reached.copysign(change) } else { rate }
+        })
+    }
+
+    /// The rotation from its beginning until then, degrees.
+    fn turned(&self, until: Duration, acceleration_deg_s2: f64) -> PanTilt {
+        let seconds = until.saturating_sub(self.since).as_secs_f64();
+        self.start.each(self.rate, |start, rate| {
+            let ramp_s = (rate - start).abs() / acceleration_deg_s2;
+            // As if it had had its rate from so much later on.
+            let lost_s =
+                if seconds < ramp_s { seconds - seconds * seconds / (2.0 * ramp_s) } else { ramp_s / 2.0 };
+            rate * seconds - (rate - start) * lost_s
+        })
     }
 }
 
@@ -122,6 +176,25 @@ mod tests {
     }
 
     #[test]
+    fn motors_take_time_from_one_rate_to_the_next() {
+        let mut history = CommandHistory::accelerating(100.0);
+        history.push_steps(ms(0), (20, 0), &SpeedMap::new(50.0, SpeedCurve::Linear));
+        history.push(ms(1000), PanTilt::new(-10.0, 0.0));
+        let pan = |history: &CommandHistory, from, to| history.rotation(ms(from), ms(to)).pan;
+        for (from, to, way) in [(0, 50, 0.125), (50, 100, 0.375), (100, 200, 1.0), (1000, 1200, 0.0)] {
+            assert!(
+                (pan(&history, from, to) - way).abs() < 1e-9,
+                "{from} to {to}: {}",
+                pan(&history, from, to)
+            );
+        }
+        assert_eq!((history.rate_at(ms(50)).pan, history.rate_at(ms(1000)).pan), (10.0, -10.0));
+        // Faster than was thought: it takes longer to turn back.
+        history.revise(&SpeedMap::new(100.0, SpeedCurve::Linear));
+        assert!((pan(&history, 1000, 1300) - 1.5).abs() < 1e-9, "{}", pan(&history, 1000, 1300));
+    }
+
+    #[test]
     fn steps_are_counted_anew_by_another_map() {
         let mut history = CommandHistory::default();
         history.push_steps(ms(0), (10, -20), &SpeedMap::new(100.0, SpeedCurve::Linear));
@@ -150,8 +223,9 @@ mod tests {
         fn rotations_add_up(
             rates in prop::collection::vec((1u64..400, -50.0..50.0f64), 0..20),
             cut in 0u64..4000,
+            acceleration in prop_oneof![Just(f64::INFINITY), 1.0..1000.0f64],
         ) {
-            let (mut history, mut at) = (CommandHistory::default(), 0);
+            let (mut history, mut at) = (CommandHistory::accelerating(acceleration), 0);
             for (wait, rate) in rates {
                 at += wait;
                 history.push(ms(at), PanTilt::new(rate, 0.0));
