@@ -224,6 +224,10 @@ impl Servo {
         self.limits.check_invariants();
         self.home.check_invariants();
         self.moves.check_invariants();
+        self.zoom.check_invariants();
+        self.camera.history.check_invariants();
+        self.calibration.check_invariants();
+        self.estimator.check_invariants();
         let sum = self.calibration.delays().sum();
         assert!(sum <= LONGEST_DELAY.max(self.settings.latency), "a delay of {sum:?}");
         let fov_deg = self.fov_deg(None);

@@ -131,6 +131,13 @@ impl ZoomController {
         (allowed.abs() > Self::REST).then_some((factor, allowed.abs() > Self::START))
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(self.seen_for() <= Self::WINDOW, "heights of {:?}", self.seen_for());
+        assert!(self.sizes.iter().all(|(_, size)| size.is_finite()), "a height that is no number");
+        assert!(self.sizes.iter().is_sorted_by_key(|(at, _)| *at), "heights out of order");
+    }
+
     fn size(&self, lead: Duration) -> Option<Size> {
         let (newest, _) = self.sizes.back()?;
         let sizes = Samples::new(self.sizes.iter().map(|(at, size)| (-(*newest - *at).as_secs_f64(), *size)));

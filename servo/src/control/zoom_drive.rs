@@ -49,6 +49,12 @@ impl ZoomDrive {
         self.controller.forget();
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        self.controller.check_invariants();
+        self.track.commands().check_invariants();
+    }
+
     /// The camera told its zoom step, or does not tell.
     pub fn told(&mut self, at: Duration, step: Option<f64>, delays: &Delays) {
         if let Some(step) = step {

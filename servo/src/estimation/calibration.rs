@@ -133,6 +133,14 @@ impl SelfCalibration {
         self.speeds.rescale((self.field_factor() / factor).ln());
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        let factor = self.field_factor();
+        assert!(factor.is_finite() && factor > 0.0, "a field of view of {factor} times the assumed one");
+        let delays = self.delays();
+        assert!(delays.command <= delays.sum(), "commands later than pictures show them: {delays:?}");
+    }
+
     /// The camera said where it looks at a time.
     pub fn positioned(&mut self, at: Duration, position: PanTilt) {
         self.field.positioned(at, position);

@@ -248,6 +248,18 @@ impl TargetEstimator {
         PanTilt::new(ahead.pan, mean + from_above * (ahead.tilt - mean))
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        let finite = |angles: PanTilt| angles.pan.is_finite() && angles.tilt.is_finite();
+        assert!(finite(self.error) && self.elevation_deg.is_finite(), "a target at {:?}", self.error);
+        assert!(finite(self.pace()), "a target that moves by {:?} degrees per second", self.pace());
+        assert!(
+            self.first_seen.is_none_or(|(_, error)| finite(error)),
+            "a target first seen at {:?}",
+            self.first_seen
+        );
+    }
+
     /// The target's own angular rate over the last moments.
     pub fn pace(&self) -> PanTilt {
         self.as_pan(self.target_rate.mean())
@@ -278,17 +290,17 @@ mod tests {
     #[test]
     fn a_moving_target_is_led() {
         let history = CommandHistory::default();
-        let mut aim = TargetEstimator::new(Prediction::Lead);
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
         for time in [0.92, 0.96, 1.0] {
             let walking = Measurement {
                 velocity: Vector { x: 0.1, y: 0.0 },
                 ..Measurement::at(0.5, 0.5, seconds(time))
             };
-            aim.see(&walking, &VIEW, &history, &delays());
+            estimator.see(&walking, &VIEW, &history, &delays());
         }
-        let rate = aim.target_rate(Duration::ZERO).pan;
+        let rate = estimator.target_rate(Duration::ZERO).pan;
         assert!((rate - 6.616).abs() < 0.01, "{rate}");
-        let error = aim.error_at_effect(seconds(1.1), &history, &delays()).pan;
+        let error = estimator.error_at_effect(seconds(1.1), &history, &delays()).pan;
         assert!((error - rate * 0.3).abs() < 1e-9, "{error}");
     }
 
@@ -296,17 +308,17 @@ mod tests {
     fn a_turn_under_way_is_not_commanded_again() {
         let mut history = CommandHistory::default();
         history.push(seconds(0.9), PanTilt::new(10.0, 0.0));
-        let mut aim = TargetEstimator::new(Prediction::Lead);
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
         // The background moves to the left at the camera's own rate: the target stands still.
         let still = Measurement {
             velocity: Vector { x: -0.15, y: 0.0 },
             ego_velocity: Some(Vector { x: -0.15, y: 0.0 }),
             ..Measurement::at(0.6, 0.5, seconds(1.0))
         };
-        aim.see(&still, &VIEW, &history, &delays());
-        assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
+        estimator.see(&still, &VIEW, &history, &delays());
+        assert_eq!(estimator.target_rate(Duration::ZERO), PanTilt::default());
         let offset = VIEW.error(still.centroid).pan;
-        let error = aim.error_at_effect(seconds(1.1), &history, &delays()).pan;
+        let error = estimator.error_at_effect(seconds(1.1), &history, &delays()).pan;
         assert!((error - (offset - 2.0)).abs() < 1e-9, "{error} of {offset}");
     }
 
@@ -314,43 +326,43 @@ mod tests {
     fn without_background_the_commands_tell_the_cameras_motion() {
         let mut history = CommandHistory::default();
         history.push(seconds(0.5), PanTilt::new(6.0, 0.0));
-        let mut aim = TargetEstimator::new(Prediction::Average);
+        let mut estimator = TargetEstimator::new(Prediction::Average);
         for time in [0.92, 0.96, 1.0] {
-            aim.see(&Measurement::at(0.5, 0.5, seconds(time)), &VIEW, &history, &delays());
+            estimator.see(&Measurement::at(0.5, 0.5, seconds(time)), &VIEW, &history, &delays());
         }
-        assert_eq!(aim.target_rate(Duration::ZERO).pan, 6.0);
+        assert_eq!(estimator.target_rate(Duration::ZERO).pan, 6.0);
     }
 
     #[test]
     fn another_target_has_another_motion() {
         let history = CommandHistory::default();
-        let mut aim = TargetEstimator::new(Prediction::Average);
+        let mut estimator = TargetEstimator::new(Prediction::Average);
         for time in [0.92, 0.96, 1.0] {
             let walking = Measurement {
                 velocity: Vector { x: 0.1, y: 0.0 },
                 ..Measurement::at(0.5, 0.5, seconds(time))
             };
-            aim.see(&walking, &VIEW, &history, &delays());
+            estimator.see(&walking, &VIEW, &history, &delays());
         }
-        aim.see(
+        estimator.see(
             &Measurement { id: 2, ..Measurement::at(0.5, 0.5, seconds(1.1)) },
             &VIEW,
             &history,
             &delays(),
         );
-        assert_eq!(aim.target_rate(Duration::ZERO), PanTilt::default());
+        assert_eq!(estimator.target_rate(Duration::ZERO), PanTilt::default());
     }
 
     #[test]
     fn the_average_is_the_plain_mean() {
         let history = CommandHistory::default();
-        let mut aim = TargetEstimator::new(Prediction::Average);
+        let mut estimator = TargetEstimator::new(Prediction::Average);
         for (time, x) in [(0.2, 0.1), (0.4, -0.05), (0.6, 0.2)] {
             let trembling =
                 Measurement { velocity: Vector { x, y: 0.0 }, ..Measurement::at(0.5, 0.5, seconds(time)) };
-            aim.see(&trembling, &VIEW, &history, &delays());
+            estimator.see(&trembling, &VIEW, &history, &delays());
         }
-        let rate = aim.target_rate(seconds(0.4)).pan;
+        let rate = estimator.target_rate(seconds(0.4)).pan;
         assert!((rate - 6.616 * 0.25 / 0.3).abs() < 0.01, "{rate}");
     }
 
@@ -363,7 +375,7 @@ mod tests {
         const NEARER_DEG_S: f64 = -1.0;
         const PICTURE_S: f64 = 0.04;
         let history = CommandHistory::default();
-        let mut aim = TargetEstimator::new(Prediction::Lead);
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
         let degrees = VIEW.rate(Point { x: 0.5, y: 0.5 }, Vector { x: 1.0, y: 1.0 });
         let mut rates = Vec::new();
         for (picture, rise) in STEP.iter().cycle().take(5 * STEP.len()).enumerate() {
@@ -373,8 +385,8 @@ mod tests {
                 ego_velocity: Some(Vector::default()),
                 ..Measurement::at(0.5, 0.5, seconds(PICTURE_S * picture as f64))
             };
-            aim.see(&walking, &VIEW, &history, &delays());
-            rates.push(aim.target_rate(LATENCY).tilt);
+            estimator.see(&walking, &VIEW, &history, &delays());
+            rates.push(estimator.target_rate(LATENCY).tilt);
         }
         let step = &rates[rates.len() - STEP.len()..];
         let off = step.iter().map(|rate| (rate - NEARER_DEG_S).abs()).sum::<f64>() / STEP.len() as f64;
@@ -384,15 +396,15 @@ mod tests {
     /// Somebody who goes faster and faster, and is hidden at 0.4 s; and the mean rate and the last of what was seen.
     fn hidden(ego_velocity: Option<Vector>) -> (TargetEstimator, f64, f64) {
         let history = CommandHistory::default();
-        let mut aim = TargetEstimator::new(Prediction::Lead);
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
         let at = |frame: u32| seconds(0.04 * f64::from(frame));
         for frame in 1..=10 {
             let velocity = Vector { x: 0.02 * f64::from(frame), y: 0.0 };
             let seen = Measurement { velocity, ego_velocity, ..Measurement::at(0.6, 0.5, at(frame)) };
-            aim.see(&seen, &VIEW, &history, &delays());
+            estimator.see(&seen, &VIEW, &history, &delays());
         }
-        let (mean, last) = (aim.pace().pan, aim.target_rate(Duration::ZERO).pan);
-        assert!(aim.target_rate(LATENCY).pan > last);
+        let (mean, last) = (estimator.pace().pan, estimator.target_rate(Duration::ZERO).pan);
+        assert!(estimator.target_rate(LATENCY).pan > last);
         for frame in 11..=25 {
             let echo = Measurement {
                 visibility: Visibility::Predicted,
@@ -400,18 +412,18 @@ mod tests {
                 ego_velocity,
                 ..Measurement::at(0.7, 0.5, at(frame))
             };
-            aim.see(&echo, &VIEW, &history, &delays());
+            estimator.see(&echo, &VIEW, &history, &delays());
         }
-        (aim, mean, last)
+        (estimator, mean, last)
     }
 
     #[test]
     fn who_is_hidden_goes_on_at_a_plain_rate() {
         for ego in [None, Some(Vector::default())] {
-            let (aim, mean, last) = hidden(ego);
-            let rate = aim.target_rate(LATENCY).pan;
+            let (estimator, mean, last) = hidden(ego);
+            let rate = estimator.target_rate(LATENCY).pan;
             assert!((mean..last).contains(&rate), "{rate} after {mean} to {last}");
-            assert_eq!(aim.target_rate(Duration::from_secs(1)).pan, rate);
+            assert_eq!(estimator.target_rate(Duration::from_secs(1)).pan, rate);
         }
     }
 
@@ -427,21 +439,21 @@ mod tests {
         let mut history = CommandHistory::default();
         history.push(seconds(1.0), PanTilt::new(50.0, 0.0));
         let begins = 1.2 + late_ms as f64 / 1000.0;
-        let mut aim = TargetEstimator::new(Prediction::Lead);
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
         for picture in 0..=32 {
             let time = 0.8 + f64::from(picture) * 0.02;
             let seen_deg_s = own_deg_s - if time >= begins { 50.0 } else { 0.0 };
             let per_deg = VIEW.rate(Point { x: 0.5, y: 0.5 }, Vector { x: 1.0, y: 0.0 }).pan;
             let velocity = Vector { x: seen_deg_s / per_deg, y: 0.0 };
             let seen = Measurement { velocity, ..Measurement::at(0.5, 0.5, seconds(time)) };
-            aim.see(
+            estimator.see(
                 &seen,
                 &VIEW,
                 &history,
                 &Delays { uncertainty: Duration::from_millis(uncertainty_ms), ..delays() },
             );
         }
-        aim.pace().pan
+        estimator.pace().pan
     }
 
     #[test]

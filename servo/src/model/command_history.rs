@@ -92,6 +92,16 @@ impl CommandHistory {
         })
     }
 
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(self.entries.iter().is_sorted_by_key(|entry| entry.since), "commands out of order");
+        let finite = |turn: PanTilt| turn.pan.is_finite() && turn.tilt.is_finite();
+        assert!(
+            self.entries.iter().all(|entry| finite(entry.start) && finite(entry.rate)),
+            "a rate that is no number"
+        );
+    }
+
     /// The rotation by what was commanded between two times, degrees; from a later to an earlier it is the way back.
     pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
         if to < from {
