@@ -20,6 +20,7 @@
 
 #[cfg(feature = "gst")]
 mod codec;
+mod duration;
 #[cfg(feature = "gst")]
 mod error;
 #[cfg(feature = "gst")]
@@ -40,6 +41,7 @@ mod target;
 #[cfg(feature = "gst")]
 mod target_meta;
 
+pub use duration::mistaken_unit;
 pub use geometry::{Point, Rect, Vector, aspect};
 pub use homography::Homography;
 pub use target::{TARGET_ROI, TargetState};

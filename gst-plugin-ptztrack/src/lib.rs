@@ -10,6 +10,7 @@
 
 mod allocation;
 pub mod bgavgdetect;
+mod duration;
 pub mod lkfeaturetrack;
 use ptztrack_contract::lock;
 pub mod luma_source;

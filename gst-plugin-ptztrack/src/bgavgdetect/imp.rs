@@ -18,8 +18,9 @@ use ptztrack_contract::{
 
 use super::settings::{Settings, ZoneSetting};
 use super::stream::{Heard, Stream, StreamError};
-use super::{Output, Profile, Selection, Test, caps};
+use super::{Output, Profile, RegionSelection, Test, caps};
 use crate::allocation::refuse_crop;
+use crate::duration;
 use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
@@ -50,7 +51,8 @@ pub struct BgAvgDetect {
         blurb = "Weight of a new picture in the running mean, for pictures alpha-interval apart"
     )]
     #[property(
-        name = "alpha-interval", get, set, type = u64, member = alpha_interval_ns, mutable_playing,
+        name = "alpha-interval", get, type = u64, member = alpha_interval_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "alpha-interval", value) { lock(&imp.settings).alpha_interval_ns = value },
         default = Settings::default().alpha_interval_ns, maximum = 3_600_000_000_000,
         blurb = "Distance of pictures that alpha is for, in nanoseconds; for others it is scaled (0 = alpha for every picture)"
     )]
@@ -95,7 +97,7 @@ pub struct BgAvgDetect {
         blurb = "Cut regions to where the picture still changes, so that the trail of the mean does not count"
     )]
     #[property(
-        name = "selection", get, set, type = Selection, member = selection, mutable_playing,
+        name = "selection", get, set, type = RegionSelection, member = selection, mutable_playing,
         blurb = "Which regions are reported",
         builder(Settings::default().selection)
     )]
@@ -135,17 +137,20 @@ pub struct BgAvgDetect {
         blurb = "Frames in a row that must show a region before it is reported"
     )]
     #[property(
-        name = "settle-time", get, set, type = u64, member = settle_time_ns, mutable_playing,
+        name = "settle-time", get, type = u64, member = settle_time_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "settle-time", value) { lock(&imp.settings).settle_time_ns = value },
         default = Settings::default().settle_time_ns, maximum = 60_000_000_000,
         blurb = "How long pictures may still show the camera moving after it stopped, in nanoseconds"
     )]
     #[property(
-        name = "max-gap", get, set, type = u64, member = max_gap_ns, mutable_playing,
+        name = "max-gap", get, type = u64, member = max_gap_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "max-gap", value) { lock(&imp.settings).max_gap_ns = value },
         default = Settings::default().max_gap_ns, maximum = 3_600_000_000_000,
         blurb = "Longest interruption (DISCONT, gap) after which the background still holds, in nanoseconds"
     )]
     #[property(
-        name = "end-delay", get, set, type = u64, member = end_delay_ns, mutable_playing,
+        name = "end-delay", get, type = u64, member = end_delay_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "end-delay", value) { lock(&imp.settings).end_delay_ns = value },
         default = Settings::default().end_delay_ns, maximum = 3_600_000_000_000,
         blurb = "How long nothing must move before motion is reported to have ended, in nanoseconds"
     )]

@@ -125,7 +125,7 @@ pub enum Test {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
 #[enum_type(name = "GstBgAvgDetectSelection")]
 #[repr(i32)]
-pub enum Selection {
+pub enum RegionSelection {
     /// The one of longest contour.
     #[enum_value(name = "The region whose contour is longest", nick = "largest-perimeter")]
     LargestPerimeter,

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Output, Profile, Selection, Test};
+use super::{Output, Profile, RegionSelection, Test};
 use crate::vision::{Criterion, DetectorConfig, ForegroundTest, RegionChoice, ZoneError, Zones};
 
 /// Polygons as written and as read.
@@ -35,7 +35,7 @@ pub(super) struct Settings {
     pub open_size: i32,
     pub close_size: i32,
     pub shed_trail: bool,
-    pub selection: Selection,
+    pub selection: RegionSelection,
     pub min_area: f64,
     pub max_area: f64,
     pub zones: ZoneSetting,
@@ -65,7 +65,7 @@ impl Default for Settings {
             open_size: -1,
             close_size: -1,
             shed_trail: true,
-            selection: Selection::default(),
+            selection: RegionSelection::default(),
             min_area: 0.001,
             max_area: 0.8,
             zones: ZoneSetting::default(),
@@ -100,8 +100,8 @@ impl Settings {
             close_size: usize::try_from(self.close_size).ok(),
             shed_trail: self.shed_trail,
             choice: match self.selection {
-                Selection::LargestPerimeter => RegionChoice::LargestPerimeter,
-                Selection::All => RegionChoice::All,
+                RegionSelection::LargestPerimeter => RegionChoice::LargestPerimeter,
+                RegionSelection::All => RegionChoice::All,
             },
             min_area: self.min_area,
             max_area: self.max_area,

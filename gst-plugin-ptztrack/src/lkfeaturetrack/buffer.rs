@@ -9,7 +9,7 @@ use ptztrack_contract::{
 };
 
 use crate::region_of_interest::remove_regions_of_interest;
-use crate::vision::{Detection, Report};
+use crate::vision::{Detection, Tracked};
 
 /// What a detector saw in one frame; kept as memory for the next.
 #[derive(Default)]
@@ -66,25 +66,25 @@ impl Detections {
 pub(super) fn attach(
     buffer: &mut gst::BufferRef,
     info: &VideoInfo,
-    report: Report,
+    tracked: Tracked,
     capture_time: Option<gst::ClockTime>,
 ) -> Result<Vec<Feature>, glib::BoolError> {
     remove_regions_of_interest(buffer, TARGET_ROI);
-    if matches!(report.state, TargetState::Tracking | TargetState::Occluded) {
-        let pixels = report.bounds.to_pixels(info.width(), info.height());
+    if matches!(tracked.state, TargetState::Tracking | TargetState::Occluded) {
+        let pixels = tracked.bounds.to_pixels(info.width(), info.height());
         if pixels.2 > 0 && pixels.3 > 0 {
             VideoRegionOfInterestMeta::add(buffer, TARGET_ROI, pixels);
         }
     }
     let meta = TargetMeta {
-        state: report.state,
-        id: report.id,
-        bounds: report.bounds,
-        centroid: report.centroid,
-        velocity: report.velocity,
-        ego_velocity: report.ego_velocity,
-        confidence: report.confidence,
-        features: report.features,
+        state: tracked.state,
+        id: tracked.id,
+        bounds: tracked.bounds,
+        centroid: tracked.centroid,
+        velocity: tracked.velocity,
+        ego_velocity: tracked.ego_velocity,
+        confidence: tracked.confidence,
+        features: tracked.features,
         aspect: aspect((info.width(), info.height()), info.par().into()),
         capture_time,
     };
@@ -92,16 +92,16 @@ pub(super) fn attach(
 }
 
 /// The message that says so.
-pub(super) fn message(report: &Report, change: TargetChange, times: Times) -> TargetMessage {
+pub(super) fn message(tracked: &Tracked, change: TargetChange, times: Times) -> TargetMessage {
     TargetMessage {
         change,
-        reason: report.released.filter(|_| change == TargetChange::Released),
+        reason: tracked.released.filter(|_| change == TargetChange::Released),
         times,
-        state: report.state,
-        id: report.id,
-        bounds: report.bounds,
-        centroid: report.centroid,
-        velocity: report.velocity,
-        confidence: report.confidence,
+        state: tracked.state,
+        id: tracked.id,
+        bounds: tracked.bounds,
+        centroid: tracked.centroid,
+        velocity: tracked.velocity,
+        confidence: tracked.confidence,
     }
 }

@@ -13,12 +13,13 @@ use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
 use ptztrack_contract::{CameraEvent, MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
 
 use super::scene_source::SceneSource;
-use super::{Profile, Selection, buffer};
+use super::{Profile, TargetSelection, buffer};
 use crate::allocation::refuse_crop;
+use crate::duration;
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
-use crate::vision::{self, CameraMoves, Observation};
+use crate::vision::{self, CameraMoves, Observation, TargetRequest};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("lkfeaturetrack", gst::DebugColorFlags::empty(), Some("Feature point tracker"))
@@ -33,7 +34,7 @@ const RIGHT_BUTTON: i32 = 3;
 #[derive(Debug, Clone)]
 struct Settings {
     profile: Profile,
-    selection: Selection,
+    selection: TargetSelection,
     /// Shared with each picture's copy of the settings.
     roi_type: Arc<str>,
     confirm_frames: u32,
@@ -48,7 +49,7 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             profile: Profile::default(),
-            selection: Selection::default(),
+            selection: TargetSelection::default(),
             roi_type: MOTION_ROI.into(),
             confirm_frames: 3,
             coast_time_ns: 3_000_000_000,
@@ -72,17 +73,17 @@ impl Settings {
                 Profile::Robust => vision::Profile::Robust,
             },
             choice: match self.selection {
-                Selection::Largest => vision::Choice::Largest,
-                Selection::First => vision::Choice::First,
-                Selection::NearestCentre => vision::Choice::NearestCentre,
-                Selection::Manual => vision::Choice::Manual,
+                TargetSelection::Largest => vision::Choice::Largest,
+                TargetSelection::First => vision::Choice::First,
+                TargetSelection::NearestCentre => vision::Choice::NearestCentre,
+                TargetSelection::Manual => vision::Choice::Manual,
             },
             confirm_frames: self.confirm_frames,
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             manual_size: self.manual_size,
             must_travel: self.profile == Profile::Robust && own_detector,
             detector_pause_s: if own_detector { 0.0 } else { FOREIGN_DETECTOR_PAUSE_S },
-            limits: vision::Limits {
+            limits: vision::TimeLimits {
                 stationary_s: limit_s(self.stationary_timeout_ns),
                 tracked_s: limit_s(self.max_tracking_time_ns),
             },
@@ -93,13 +94,6 @@ impl Settings {
 /// A time limit in seconds; none where it is 0.
 fn limit_s(limit_ns: u64) -> f64 {
     if limit_ns == 0 { f64::INFINITY } else { gst::ClockTime::from_nseconds(limit_ns).seconds_f64() }
-}
-
-/// What an operator or the application asked for; carried out with the next frame.
-#[derive(Debug, Clone, Copy)]
-enum Command {
-    Select(Point),
-    Release,
 }
 
 /// What the streaming thread keeps from frame to frame.
@@ -160,7 +154,7 @@ pub struct LkFeatureTrack {
         builder(Settings::default().profile)
     )]
     #[property(
-        name = "selection", get, set, type = Selection, member = selection, mutable_playing,
+        name = "selection", get, set, type = TargetSelection, member = selection, mutable_playing,
         blurb = "Which detection becomes the target",
         builder(Settings::default().selection)
     )]
@@ -176,7 +170,8 @@ pub struct LkFeatureTrack {
         blurb = "Frames in which a detection must be seen before it becomes the target"
     )]
     #[property(
-        name = "coast-time", get, set, type = u64, member = coast_time_ns, mutable_playing,
+        name = "coast-time", get, type = u64, member = coast_time_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "coast-time", value) { lock(&imp.settings).coast_time_ns = value },
         maximum = 60_000_000_000, default = Settings::default().coast_time_ns,
         blurb = "How long a hidden target is looked for where it should be, in nanoseconds (0: it is lost at once)"
     )]
@@ -186,17 +181,20 @@ pub struct LkFeatureTrack {
         blurb = "Height of the box around a place selected by hand where nothing was detected, in frame heights"
     )]
     #[property(
-        name = "message-interval", get, set, type = u64, member = message_interval_ns, mutable_playing,
+        name = "message-interval", get, type = u64, member = message_interval_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "message-interval", value) { lock(&imp.settings).message_interval_ns = value },
         maximum = 3_600_000_000_000, default = Settings::default().message_interval_ns,
         blurb = "Time between two position messages while there is a target, in nanoseconds (0: none)"
     )]
     #[property(
-        name = "stationary-timeout", get, set, type = u64, member = stationary_timeout_ns, mutable_playing,
+        name = "stationary-timeout", get, type = u64, member = stationary_timeout_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "stationary-timeout", value) { lock(&imp.settings).stationary_timeout_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().stationary_timeout_ns,
         blurb = "A target that stands still for longer is released and not taken again until it moves, in nanoseconds (0: never)"
     )]
     #[property(
-        name = "max-tracking-time", get, set, type = u64, member = max_tracking_time_ns, mutable_playing,
+        name = "max-tracking-time", get, type = u64, member = max_tracking_time_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "max-tracking-time", value) { lock(&imp.settings).max_tracking_time_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().max_tracking_time_ns,
         blurb = "A target that is tracked for longer is released and not taken again until it has moved and 3 s have passed, in nanoseconds (0: never)"
     )]
@@ -205,7 +203,7 @@ pub struct LkFeatureTrack {
     stream: Mutex<Option<Stream>>,
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
-    command: Mutex<Option<Command>>,
+    request: Mutex<Option<TargetRequest>>,
     camera: Mutex<CameraMoves>,
 }
 
@@ -290,7 +288,7 @@ impl BaseTransformImpl for LkFeatureTrack {
             self.wake_detector();
         }
         *lock(&self.size) = None;
-        *lock(&self.command) = None;
+        *lock(&self.request) = None;
         *lock(&self.camera) = CameraMoves::default();
         Ok(())
     }
@@ -332,14 +330,12 @@ impl BaseTransformImpl for LkFeatureTrack {
             return Ok(gst::FlowSuccess::Ok);
         }
         let settings = lock(&self.settings).clone();
-        let command = lock(&self.command).take();
+        let request = lock(&self.request).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
         stream.tracker.set_camera_rests(!lock(&self.camera).is_moving());
-        match command {
-            Some(Command::Select(place)) => stream.tracker.select(place),
-            Some(Command::Release) => stream.tracker.release(),
-            None => (),
+        if let Some(request) = request {
+            stream.tracker.request(request);
         }
         self.track(&mut stream, &settings, buffer);
         *lock(&self.stream) = Some(stream);
@@ -374,14 +370,14 @@ impl LkFeatureTrack {
     fn select(&self, place: Point) {
         let inside = |coordinate| (0.0..=1.0).contains(&coordinate);
         if inside(place.x) && inside(place.y) {
-            *lock(&self.command) = Some(Command::Select(place));
+            *lock(&self.request) = Some(TargetRequest::Select(place));
         } else {
             gst::warning!(CAT, imp = self, "nothing to select outside the frame: {place:?}");
         }
     }
 
     fn release(&self) {
-        *lock(&self.command) = Some(Command::Release);
+        *lock(&self.request) = Some(TargetRequest::Release);
     }
 
     fn navigate(&self, event: &gst::EventRef) {
@@ -406,8 +402,8 @@ impl LkFeatureTrack {
         let before = stream.last_time;
         let step = stream.step(times.running_time);
         lock(&self.camera).pass(step.into());
-        let report = match self.look(stream, settings, buffer, step) {
-            Ok(report) => report,
+        let tracked = match self.look(stream, settings, buffer, step) {
+            Ok(tracked) => tracked,
             Err(reason) => {
                 // Says nothing about the target: the next frame continues the last one that could be read.
                 stream.last_time = before;
@@ -415,8 +411,8 @@ impl LkFeatureTrack {
                 return;
             }
         };
-        self.announce(stream, settings, &report, times, step);
-        match buffer::attach(buffer, &stream.info, report, times.running_time) {
+        self.announce(stream, settings, &tracked, times, step);
+        match buffer::attach(buffer, &stream.info, tracked, times.running_time) {
             Ok(features) => stream.tracker.recycle(features),
             Err(err) => self.warn_once(stream, &format!("no meta can be attached: {err}")),
         }
@@ -429,7 +425,7 @@ impl LkFeatureTrack {
         settings: &Settings,
         buffer: &gst::BufferRef,
         step: gst::ClockTime,
-    ) -> Result<vision::Report, String> {
+    ) -> Result<vision::Tracked, String> {
         let mut fault = None;
         let detections = stream.detections.read(buffer, &stream.info, &settings.roi_type);
         let detections = detections.unwrap_or_else(|err| {
@@ -449,14 +445,14 @@ impl LkFeatureTrack {
                 Err(err) => fault = Some(format!("camera motion cannot be measured: {err}")),
             }
         }
-        let report = stream.tracker.process(&seen, step.seconds_f64(), detections).unwrap_or_else(|err| {
+        let tracked = stream.tracker.process(&seen, step.seconds_f64(), detections).unwrap_or_else(|err| {
             fault = Some(format!("tracking failed: {err}"));
             lost(stream.state)
         });
         if let Some(fault) = fault {
             self.warn_once(stream, &fault);
         }
-        Ok(report)
+        Ok(tracked)
     }
 
     /// Tells the bus and upstream what changed.
@@ -464,24 +460,24 @@ impl LkFeatureTrack {
         &self,
         stream: &mut Stream,
         settings: &Settings,
-        report: &vision::Report,
+        tracked: &vision::Tracked,
         times: Times,
         step: gst::ClockTime,
     ) {
-        for change in &report.changes {
-            gst::info!(CAT, imp = self, "target {} {change:?}", report.id);
-            self.post(report, *change, times);
+        for change in &tracked.changes {
+            gst::info!(CAT, imp = self, "target {} {change:?}", tracked.id);
+            self.post(tracked, *change, times);
         }
-        let has_target = has_target(report.state);
+        let has_target = has_target(tracked.state);
         let interval = gst::ClockTime::from_nseconds(settings.message_interval_ns);
         stream.since_message = stream.since_message.saturating_add(step);
         if has_target && !interval.is_zero() && stream.since_message >= interval {
             stream.since_message = gst::ClockTime::ZERO;
-            self.post(report, TargetChange::Position, times);
+            self.post(tracked, TargetChange::Position, times);
         }
         // While there is a target the detector must know where, so that it does not take it for background.
-        if std::mem::replace(&mut stream.state, report.state) != report.state || has_target {
-            let event = TrackerEvent { state: report.state, bounds: has_target.then_some(report.bounds) };
+        if std::mem::replace(&mut stream.state, tracked.state) != tracked.state || has_target {
+            let event = TrackerEvent { state: tracked.state, bounds: has_target.then_some(tracked.bounds) };
             // Nobody has to listen.
             let _ = self.obj().sink_pad().push_event(event.to_event());
         }
@@ -496,8 +492,8 @@ impl LkFeatureTrack {
         }
     }
 
-    fn post(&self, report: &vision::Report, change: TargetChange, times: Times) {
-        let structure = buffer::message(report, change, times).to_structure();
+    fn post(&self, tracked: &vision::Tracked, change: TargetChange, times: Times) {
+        let structure = buffer::message(tracked, change, times).to_structure();
         let obj = self.obj();
         let message = gst::message::Element::builder(structure).src(&*obj).build();
         if obj.post_message(message).is_err() {
@@ -518,14 +514,14 @@ impl LkFeatureTrack {
 }
 
 /// What there is to tell after the tracker failed in that state: it has let go of its target, if any.
-fn lost(state: TargetState) -> vision::Report {
+fn lost(state: TargetState) -> vision::Tracked {
     if !has_target(state) {
-        return vision::Report::default();
+        return vision::Tracked::default();
     }
-    vision::Report {
+    vision::Tracked {
         state: TargetState::Lost,
         changes: vec![TargetChange::Lost],
-        ..vision::Report::default()
+        ..vision::Tracked::default()
     }
 }
 

@@ -78,7 +78,7 @@ mod scene_source;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
 #[enum_type(name = "GstLkFeatureTrackSelection")]
 #[repr(i32)]
-pub enum Selection {
+pub enum TargetSelection {
     /// The one of largest area.
     #[default]
     #[enum_value(name = "The detection of largest area", nick = "largest")]

@@ -10,9 +10,10 @@ use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, Targe
 
 use super::{caps, pixels};
 use crate::allocation::refuse_crop;
+use crate::duration;
 use crate::lock::lock;
 use crate::pad_templates;
-use crate::vision::{self, ColourSpace, FrameSize, Parts, Patch, Pen, Seen, Shape, Trail};
+use crate::vision::{self, ColourSpace, FrameSize, OverlayRectangle, Parts, Pen, Seen, Shape, Trail};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("ptzoverlay", gst::DebugColorFlags::empty(), Some("PTZ tracking overlay"))
@@ -110,7 +111,8 @@ pub struct PtzOverlay {
         blurb = "Draw where the target was during the last trail-duration"
     )]
     #[property(
-        name = "trail-duration", get, set, type = u64, member = trail_duration_ns, mutable_playing,
+        name = "trail-duration", get, type = u64, member = trail_duration_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, "trail-duration", value) { lock(&imp.settings).trail_duration_ns = value },
         default = Settings::default().trail_duration_ns, maximum = 60_000_000_000,
         blurb = "How long the trail reaches back, in nanoseconds"
     )]
@@ -416,7 +418,7 @@ fn remember(
     trail.expire(pts.seconds_f64(), duration.seconds_f64());
 }
 
-fn compose(patches: Vec<Patch>) -> Result<Option<VideoOverlayComposition>, String> {
+fn compose(patches: Vec<OverlayRectangle>) -> Result<Option<VideoOverlayComposition>, String> {
     let rectangles = patches.into_iter().map(rectangle).collect::<Result<Vec<_>, _>>()?;
     if rectangles.is_empty() {
         return Ok(None);
@@ -424,8 +426,8 @@ fn compose(patches: Vec<Patch>) -> Result<Option<VideoOverlayComposition>, Strin
     VideoOverlayComposition::new(&rectangles).map(Some).map_err(|err| err.to_string())
 }
 
-fn rectangle(patch: Patch) -> Result<VideoOverlayRectangle, String> {
-    let Patch { x, y, width, height, pixels } = patch;
+fn rectangle(patch: OverlayRectangle) -> Result<VideoOverlayRectangle, String> {
+    let OverlayRectangle { x, y, width, height, pixels } = patch;
     let mut buffer = gst::Buffer::from_mut_slice(pixels);
     gst_video::VideoMeta::add(
         buffer.make_mut(),

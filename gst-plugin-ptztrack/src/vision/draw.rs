@@ -187,7 +187,7 @@ fn outlined(width: i32) -> i32 {
 
 /// A drawn part of the frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Patch {
+pub struct OverlayRectangle {
     /// Its left edge in the frame.
     pub x: i32,
     /// Its top edge in the frame.
@@ -222,7 +222,7 @@ impl Pen {
 
     /// Draws `shapes`, later ones over earlier ones, into as few and small patches as hold them; patches
     /// never overlap and lie inside the frame.
-    pub fn patches(&mut self, shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
+    pub fn patches(&mut self, shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<OverlayRectangle>> {
         let bounded = shapes.iter().map(|shape| Ok((shape, shape.bounds(frame)?)));
         let bounded = bounded.collect::<opencv::Result<Vec<_>>>()?;
         let mut areas = joined(bounded.iter().map(|(_, bounds)| *bounds), |a, b| !(*a & *b).empty());
@@ -232,7 +232,7 @@ impl Pen {
         areas.into_iter().map(|area| self.patch(&bounded, area)).collect()
     }
 
-    fn patch(&mut self, shapes: &[(&Shape, Rect)], area: Rect) -> opencv::Result<Patch> {
+    fn patch(&mut self, shapes: &[(&Shape, Rect)], area: Rect) -> opencv::Result<OverlayRectangle> {
         let (width, height) = (area.width as usize, area.height as usize);
         let mut pixels = vec![0; width * height * 4];
         let at = |offset| Component { offset, step: 4, stride: 4 * width, ..Component::default() };
@@ -245,7 +245,13 @@ impl Pen {
         for (shape, bounds) in shapes.iter().filter(|(_, bounds)| !(*bounds & area).empty()) {
             shape.draw(self, *bounds, &mut surface)?;
         }
-        Ok(Patch { x: area.x, y: area.y, width: area.width as u32, height: area.height as u32, pixels })
+        Ok(OverlayRectangle {
+            x: area.x,
+            y: area.y,
+            width: area.width as u32,
+            height: area.height as u32,
+            pixels,
+        })
     }
 
     /// Lays a colour over what `cover` covers within `bounds`.
@@ -297,11 +303,11 @@ mod tests {
     const FRAME: FrameSize = FrameSize { width: 64, height: 48 };
     const RED: Colour = Colour::new(255, 0, 0);
 
-    fn draw(shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<Patch>> {
+    fn draw(shapes: &[Shape], frame: FrameSize) -> opencv::Result<Vec<OverlayRectangle>> {
         Pen::default().patches(shapes, frame)
     }
 
-    fn pixel(patch: &Patch, x: i32, y: i32) -> [u8; 4] {
+    fn pixel(patch: &OverlayRectangle, x: i32, y: i32) -> [u8; 4] {
         let start = (((y - patch.y) * patch.width as i32 + x - patch.x) * 4) as usize;
         [0, 1, 2, 3].map(|channel| patch.pixels[start + channel])
     }
@@ -374,7 +380,7 @@ mod tests {
             }).collect();
             let patches = draw(&shapes, frame).unwrap();
             prop_assert!(patches.len() <= MAX_PATCHES);
-            let area = |p: &Patch| Rect::new(p.x, p.y, p.width as i32, p.height as i32);
+            let area = |p: &OverlayRectangle| Rect::new(p.x, p.y, p.width as i32, p.height as i32);
             for (index, patch) in patches.iter().enumerate() {
                 prop_assert_eq!(patch.pixels.len(), (patch.width * patch.height * 4) as usize);
                 prop_assert_eq!(area(patch) & Rect::new(0, 0, width as i32, height as i32), area(patch));

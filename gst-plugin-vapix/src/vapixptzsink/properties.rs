@@ -12,6 +12,7 @@ use gst::prelude::*;
 
 use super::settings::Settings;
 use super::{Authentication, Mode, Prediction, SpeedCurve};
+use ptztrack_contract::mistaken_unit;
 use vapix::wire::{Location, Secret};
 
 /// When a value that was set counts, and who must hear of it.
@@ -244,13 +245,14 @@ fn duration(
     let builder = glib::ParamSpecUInt64::builder(name).maximum(nanoseconds(*range.end()));
     let spec = mutable(builder.default_value(nanoseconds(default_of(field))).blurb(blurb), takes).build();
     converted((spec, takes), field, nanoseconds, move |value: u64| {
-        let (least, most) = (range.start(), range.end());
-        match value {
-            1..1_000_000 => Err(format!(
-                "`{name}`={value} is {value} ns: durations are in nanoseconds, and {value} ms would be {value}000000"
-            )),
-            _ if range.contains(&Duration::from_nanos(value)) => Ok(Duration::from_nanos(value)),
-            _ => Err(format!("`{name}`={value} ns is not between {least:?} and {most:?}")),
+        if let Some(mistake) = mistaken_unit(name, value) {
+            return Err(mistake);
+        }
+        let (least, most, duration) = (range.start(), range.end(), Duration::from_nanos(value));
+        if range.contains(&duration) {
+            Ok(duration)
+        } else {
+            Err(format!("`{name}`={value} ns is not between {least:?} and {most:?}"))
         }
     })
 }

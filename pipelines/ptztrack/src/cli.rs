@@ -19,14 +19,14 @@ use crate::shard::Shard;
 #[command(name = "ptztrack", version)]
 pub struct Options {
     #[command(subcommand)]
-    pub command: Command,
+    pub command: Task,
     /// How what happens is written to standard error
     #[arg(long, global = true, value_enum, default_value = "text")]
     pub log_format: Format,
 }
 
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub enum Task {
     /// Follow with all cameras of a file; SIGHUP reads it again and touches only what changed
     Run {
         /// The file; `ptztrack example-config` prints one with everything in it

@@ -17,7 +17,7 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{CommandFactory, Parser};
-use cli::{Command, Options, Serving};
+use cli::{Options, Serving, Task};
 use config::{Config, Http};
 use log::Log;
 use service::Origin;
@@ -68,23 +68,23 @@ fn run(options: Options) -> Result<(), Failure> {
     gst::init().map_err(|err| err.to_string())?;
     let log = Arc::new(Log::new(options.log_format));
     match options.command {
-        Command::Run { file, serving, shard, watchdog } => {
+        Task::Run { file, serving, shard, watchdog } => {
             follow(Origin::File { path: file, shard, watchdog }, &serving, log)
         }
-        Command::Follow(follow_one) => {
+        Task::Follow(follow_one) => {
             let config = Config { cameras: vec![follow_one.camera()?], http: None, mqtt: None };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
-        Command::Check { file } => {
+        Task::Check { file } => {
             let config = Config::load(&file).map_err(Failure::mistaken)?;
             config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }
-        Command::Man { folder } => {
+        Task::Man { folder } => {
             Ok(clap_mangen::generate_to(Options::command(), folder).map_err(|err| err.to_string())?)
         }
-        Command::ExampleConfig => {
+        Task::ExampleConfig => {
             print!("{}", config::EXAMPLE);
             Ok(())
         }

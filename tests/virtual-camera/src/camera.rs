@@ -23,7 +23,7 @@ use crate::{
     rtsp::RtspServer,
     sync::lock,
     truth::{GroundTruth, Mask, Sighting},
-    vapix::{Answer, Args, device::Device, parse_args},
+    vapix::{Args, CgiResponse, device::Device, parse_args},
     world::{self, Exposure, FootageError, World},
 };
 
@@ -153,33 +153,33 @@ impl Camera {
     }
 
     /// Runs `ptz.cgi`.
-    pub fn ptz(&self, args: &Args) -> Answer {
+    pub fn ptz(&self, args: &Args) -> CgiResponse {
         self.update(|state| state.device.ptz(args, self.now()))
     }
 
     /// Runs `ptz.cgi` for the client with this cookie, if the control queue lets it.
-    pub fn queued_ptz(&self, args: &Args, cookie: Option<&str>) -> Answer {
+    pub fn queued_ptz(&self, args: &Args, cookie: Option<&str>) -> CgiResponse {
         self.update(|state| {
             let harmless = self.settings.queue_lets_stop && is_stop(args);
             let (now, moves) = (self.now(), !harmless && args.iter().all(|arg| arg.0 != "query"));
             let queue = state.device.queue.as_mut();
             match queue.and_then(|queue| queue.objection(cookie, moves, now)) {
-                Some(objection) => Answer::error(objection),
+                Some(objection) => CgiResponse::error(objection),
                 None => state.device.ptz(args, now),
             }
         })
     }
 
     /// Runs `ptzqueue.cgi`.
-    pub fn queue(&self, args: &Args, cookie: Option<&str>) -> Answer {
+    pub fn queue(&self, args: &Args, cookie: Option<&str>) -> CgiResponse {
         self.update(|state| match &mut state.device.queue {
             Some(queue) => queue.answer(args, cookie, self.now()),
-            None => Answer::error("control queue is off"),
+            None => CgiResponse::error("control queue is off"),
         })
     }
 
     /// Runs `param.cgi`.
-    pub fn param(&self, args: &Args, _cookie: Option<&str>) -> Answer {
+    pub fn param(&self, args: &Args, _cookie: Option<&str>) -> CgiResponse {
         self.update(|state| state.device.param(args))
     }
 
@@ -418,7 +418,7 @@ impl VirtualCamera {
     /// An operator at the camera's own controls: does what `ptz.cgi` would do with this query, past password, queue
     /// and faults, and not among [`Self::commands`]. Returns whether the camera takes it.
     pub fn operate(&self, query: &str) -> bool {
-        self.camera.ptz(&parse_args(query.as_bytes())) == Answer::Accepted
+        self.camera.ptz(&parse_args(query.as_bytes())) == CgiResponse::Accepted
     }
 
     /// An operator goes to the front of the control queue, or leaves it. Without a queue nothing happens.

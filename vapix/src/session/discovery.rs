@@ -92,7 +92,7 @@ impl Discovery {
     }
 
     /// The camera is known by now as this; returns it where that is another than was told.
-    pub fn news(&mut self, camera: String) -> Option<String> {
+    pub fn changed(&mut self, camera: String) -> Option<String> {
         (self.told.as_ref() != Some(&camera)).then(|| self.told.insert(camera).clone())
     }
 

@@ -54,7 +54,7 @@ impl ModeSupport {
     }
 
     /// The camera accepted a move towards the target by this mode; returns it where that is another than was told.
-    pub fn news(&mut self, mode: Mode) -> Option<Mode> {
+    pub fn changed(&mut self, mode: Mode) -> Option<Mode> {
         (std::mem::replace(&mut self.told, mode) != mode).then_some(mode)
     }
 

@@ -135,7 +135,7 @@ impl Session {
         }
         if !homeward && !command.is_stop() {
             let mode = self.mode(servo, now);
-            self.events.extend(self.modes.news(mode).map(SessionEvent::Mode));
+            self.events.extend(self.modes.changed(mode).map(SessionEvent::Mode));
         }
         self.modes.accepted(command);
         self.succeeded(true, servo);
@@ -269,8 +269,8 @@ impl Session {
 
     /// After the last question it is known whom we met.
     fn discovered(&mut self, servo: &Servo, now: Duration) {
-        let news = self.discovery.news(self.description.to_string());
-        self.events.extend(news.map(SessionEvent::Discovered));
+        let changed = self.discovery.changed(self.description.to_string());
+        self.events.extend(changed.map(SessionEvent::Discovered));
         self.judge_limits(servo);
         if !self.connection.connected() {
             // It told nothing: that is a fault after all.

@@ -75,7 +75,7 @@ enum Repeat {
 }
 
 /// A complete answer.
-struct Answer {
+struct CompleteResponse {
     status: StatusCode,
     body: String,
 }
@@ -207,7 +207,7 @@ impl Client {
     /// One exchange: the answer to a GET of this path and query, with the challenges, the redirect to
     /// the camera's own HTTPS and the closed connection that may lie in between.
     /// All of it takes no longer than an answer may.
-    async fn get(&mut self, target: &str, repeat: Repeat) -> Result<Answer, Error> {
+    async fn get(&mut self, target: &str, repeat: Repeat) -> Result<CompleteResponse, Error> {
         if self.locked_out {
             return Err(self.bad_credentials());
         }
@@ -227,7 +227,7 @@ impl Client {
         target: &str,
         repeat: Repeat,
         broken: &mut Option<Error>,
-    ) -> Result<Answer, Error> {
+    ) -> Result<CompleteResponse, Error> {
         // Whether the signature answers a challenge of this very exchange.
         let mut signed_fresh = false;
         for _ in 0..MAX_ATTEMPTS {
@@ -257,7 +257,7 @@ impl Client {
             } else if status.is_success() {
                 self.accepted |= self.authenticator.is_signing();
                 let body = self.body(response).await?;
-                return Ok(Answer { status, body });
+                return Ok(CompleteResponse { status, body });
             } else {
                 let reason = status.canonical_reason().unwrap_or("");
                 return Err(Error::Status { status: status.as_u16(), reason });

@@ -30,7 +30,7 @@ const TRIAL_STEP: f32 = 0.25;
 
 /// After how many seconds a target is given up; infinite: never.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
+pub struct TimeLimits {
     /// Of standing still.
     pub stationary_s: f64,
     /// Of being followed, hidden or not.
@@ -133,7 +133,7 @@ impl DwellTime {
     }
 
     /// Why the target is to be given up now, if it is.
-    pub fn exhausted(&self, limits: Limits) -> Option<ReleaseReason> {
+    pub fn exhausted(&self, limits: TimeLimits) -> Option<ReleaseReason> {
         let patience_s =
             if self.is_on_trial() { TRIAL_S.min(limits.stationary_s) } else { limits.stationary_s };
         if self.still_s > patience_s {
@@ -152,7 +152,7 @@ mod tests {
 
     const DT: f64 = 0.04;
     const WIDTH: f32 = 40.0;
-    const LIMITS: Limits = Limits { stationary_s: 10.0, tracked_s: f64::INFINITY };
+    const LIMITS: TimeLimits = TimeLimits { stationary_s: 10.0, tracked_s: f64::INFINITY };
 
     /// Whether a target is given up as standing within `seconds`, its middle in pixels and its size by time, in a
     /// picture that moves as `ego` every frame.
@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn the_time_of_tracking_counts_however_it_moves() {
-        let limits = Limits { stationary_s: f64::INFINITY, tracked_s: 2.0 };
+        let limits = TimeLimits { stationary_s: f64::INFINITY, tracked_s: 2.0 };
         let mut dwell = DwellTime::default();
         for frame in 0..8 {
             dwell.pass(0.25);

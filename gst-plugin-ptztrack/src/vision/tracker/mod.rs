@@ -38,6 +38,6 @@ mod suppressed_regions;
 mod synthetic;
 mod target;
 
-pub use dwell_time::Limits;
+pub use dwell_time::TimeLimits;
 pub use selection::Choice;
-pub use state::{Config, Detection, Profile, Report, Tracker};
+pub use state::{Config, Detection, Profile, TargetRequest, Tracked, Tracker};

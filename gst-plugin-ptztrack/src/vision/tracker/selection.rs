@@ -143,7 +143,7 @@ impl Candidate {
 
 /// Follows detections until one is sure enough to become the target.
 #[derive(Default)]
-pub(super) struct Selection {
+pub(super) struct TargetSelector {
     /// Who is not chosen until they move.
     pub suppressed: SuppressedRegions,
     /// The longest that a detector may take from one look to the next, seconds; 0 for one that sees every frame.
@@ -155,7 +155,7 @@ pub(super) struct Selection {
     gone: Vec<Rect2f>,
 }
 
-impl Selection {
+impl TargetSelector {
     /// Forgets everything: another stream begins.
     pub fn reset(&mut self) {
         self.candidates.clear();
@@ -367,8 +367,8 @@ mod tests {
         Sighting { bounds: Rect2f::new(x, y, width, height), ..Sighting::default() }
     }
 
-    fn seen(frames: usize, sightings: &[Sighting]) -> Selection {
-        let mut selection = Selection::default();
+    fn seen(frames: usize, sightings: &[Sighting]) -> TargetSelector {
+        let mut selection = TargetSelector::default();
         for _ in 0..frames {
             selection.update(sightings.to_vec(), STILL, FRAME, DT);
         }
@@ -403,7 +403,7 @@ mod tests {
     #[test]
     fn a_flicker_is_not_chosen() {
         assert!(seen(2, &[at(100.0, 100.0, 40.0, 90.0)]).choose(Choice::Largest, 3, false, FRAME).is_none());
-        let mut selection = Selection::default();
+        let mut selection = TargetSelector::default();
         for n in 0..9 {
             selection.update(vec![at(50.0 * n as f32, 100.0, 20.0, 30.0)], STILL, FRAME, DT);
         }
@@ -414,7 +414,7 @@ mod tests {
     #[test]
     fn a_detector_need_not_see_every_frame() {
         let confirmed = |detector_pause_s: f64| {
-            let mut selection = Selection { detector_pause_s, ..Default::default() };
+            let mut selection = TargetSelector { detector_pause_s, ..Default::default() };
             (0..12).any(|n| {
                 let seen = (n % 4 == 0).then(|| at(100.0 + 2.0 * n as f32, 100.0, 40.0, 90.0));
                 selection.update(seen, STILL, FRAME, DT);
@@ -434,7 +434,7 @@ mod tests {
 
     #[test]
     fn the_velocity_of_a_detection_is_known() {
-        let mut selection = Selection::default();
+        let mut selection = TargetSelector::default();
         for n in 0..8 {
             selection.update(vec![at(100.0 + 6.0 * n as f32, 100.0, 30.0, 60.0)], STILL, FRAME, DT);
         }
@@ -444,7 +444,7 @@ mod tests {
 
     #[test]
     fn what_comes_into_view_or_goes_behind_something_does_not_move_by_that() {
-        let mut selection = Selection::default();
+        let mut selection = TargetSelector::default();
         for n in 0..8 {
             selection.update(vec![at(100.0, 100.0, 60.0 - 4.0 * n as f32, 90.0)], STILL, FRAME, DT);
         }
@@ -454,7 +454,7 @@ mod tests {
 
     /// Whether what looks like `path` at each frame is chosen within two seconds, where it must travel.
     fn chosen(ego: EgoMotion, path: impl Fn(f32) -> Sighting) -> bool {
-        let mut selection = Selection::default();
+        let mut selection = TargetSelector::default();
         (0..20).any(|n| {
             selection.update(vec![path(n as f32)], Some(ego), FRAME, DT);
             selection.choose(Choice::Largest, 3, true, FRAME).is_some()
@@ -532,7 +532,7 @@ mod tests {
     #[test]
     fn who_was_seen_beside_the_target_stays_somebody_else() {
         let target = at(300.0, 100.0, 40.0, 90.0);
-        let mut selection = Selection::default();
+        let mut selection = TargetSelector::default();
         let mut walk = |frames: std::ops::Range<usize>| {
             for n in frames {
                 let other = at(100.0 + 10.0 * n as f32, 100.0, 40.0, 90.0);
@@ -568,7 +568,7 @@ mod tests {
     fn somebody_else_does_not_travel_as_the_target_might() {
         let path = |n: usize| at(100.0 + 20.0 * n as f32, 100.0, 40.0, 90.0);
         let travelling = |beside: bool| {
-            let mut selection = Selection::default();
+            let mut selection = TargetSelector::default();
             for n in 0..6 {
                 selection.update(vec![path(n)], Some(EgoMotion::default()), FRAME, DT);
                 if beside {

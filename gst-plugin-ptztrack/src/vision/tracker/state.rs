@@ -3,10 +3,10 @@
 use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, Vector};
 
-use super::dwell_time::{DwellTime, Limits};
+use super::dwell_time::{DwellTime, TimeLimits};
 use super::ego_motion::EgoMotion;
 use super::geometry::{ASPECT, Frame, around};
-use super::selection::{Choice, Selection, Sighting};
+use super::selection::{Choice, Sighting, TargetSelector};
 use super::target::{Follow, Robust, Sight, Thesis};
 use crate::vision::Observation;
 
@@ -46,7 +46,7 @@ pub struct Config {
     /// The longest that the detector may take from one look to the next, seconds; 0 for one that sees every frame.
     pub detector_pause_s: f64,
     /// How long a target is followed at most.
-    pub limits: Limits,
+    pub limits: TimeLimits,
 }
 
 /// Something that a detector saw, in frame sizes.
@@ -64,7 +64,7 @@ pub struct Detection {
 
 /// What the tracker knows after one frame, in frame sizes (per second).
 #[derive(Debug, Clone, PartialEq)]
-pub struct Report {
+pub struct Tracked {
     /// What it does.
     pub state: TargetState,
     /// What happened in this frame, in order.
@@ -103,8 +103,12 @@ enum Phase {
     Occluded(Target, f64),
 }
 
-enum Command {
+/// What an operator or the application asked for; carried out with the next frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TargetRequest {
+    /// Follow what is at this place: the detection there, or else a box of [`Config::manual_size`] around it.
     Select(Point),
+    /// Let the target go.
     Release,
 }
 
@@ -112,15 +116,15 @@ enum Command {
 pub struct Tracker {
     config: Config,
     phase: Phase,
-    selection: Selection,
-    command: Option<Command>,
+    selection: TargetSelector,
+    request: Option<TargetRequest>,
     camera_rests: bool,
     /// Whom it lost, and how many seconds ago.
     lost: Option<(Target, f64)>,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
     last_id: u64,
-    /// Memory for a report.
+    /// Memory for the next frame's features.
     features: Vec<Feature>,
 }
 
@@ -130,8 +134,8 @@ impl Tracker {
         Self {
             config,
             phase: Phase::Searching,
-            selection: Selection::default(),
-            command: None,
+            selection: TargetSelector::default(),
+            request: None,
             camera_rests: true,
             lost: None,
             size: None,
@@ -155,15 +159,9 @@ impl Tracker {
         self.camera_rests = rests;
     }
 
-    /// With the next frame, follows what is at `place`: the detection there, or else a box of
-    /// [`Config::manual_size`] around it.
-    pub fn select(&mut self, place: Point) {
-        self.command = Some(Command::Select(place));
-    }
-
-    /// With the next frame, lets the target go.
-    pub fn release(&mut self) {
-        self.command = Some(Command::Release);
+    /// With the next frame, carries this out.
+    pub fn request(&mut self, request: TargetRequest) {
+        self.request = Some(request);
     }
 
     /// The next frame does not continue the last one: what was followed is lost.
@@ -180,7 +178,7 @@ impl Tracker {
         seen: &Observation,
         dt_s: f64,
         detections: &[Detection],
-    ) -> opencv::Result<Report> {
+    ) -> opencv::Result<Tracked> {
         let dt_s = if dt_s.is_finite() { dt_s.max(MIN_DT_S) } else { f64::INFINITY };
         let size = (seen.luma.width(), seen.luma.height());
         let frame = Frame { width: size.0.max(1) as f32, height: size.1.max(1) as f32 };
@@ -192,33 +190,33 @@ impl Tracker {
             self.lost = None;
         }
         self.watch(seen, detections, frame, dt_s);
-        let command = self.command.take();
+        let request = self.request.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
-        let mut report = Report { features: std::mem::take(&mut self.features), ..Report::default() };
-        report.features.clear();
+        let mut tracked = Tracked { features: std::mem::take(&mut self.features), ..Tracked::default() };
+        tracked.features.clear();
         if !same_stream {
             if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
-                report = report_of(TargetState::Lost, target, frame, report.features);
+                tracked = tracked_of(TargetState::Lost, target, frame, tracked.features);
                 changes.push(TargetChange::Lost);
                 phase = Phase::Searching;
             }
         } else {
-            phase = self.follow(phase, seen, dt_s, frame, &mut report, &mut changes)?;
+            phase = self.follow(phase, seen, dt_s, frame, &mut tracked, &mut changes)?;
         }
-        phase = match command {
-            Some(Command::Select(place)) => {
-                self.take_over(phase, seen, place, frame, &mut report, &mut changes)?
+        phase = match request {
+            Some(TargetRequest::Select(place)) => {
+                self.take_over(phase, seen, place, frame, &mut tracked, &mut changes)?
             }
-            Some(Command::Release) => {
-                self.let_go(phase, ReleaseReason::Request, frame, &mut report, &mut changes)
+            Some(TargetRequest::Release) => {
+                self.let_go(phase, ReleaseReason::Request, frame, &mut tracked, &mut changes)
             }
             None => phase,
         };
         if matches!(phase, Phase::Searching) && changes.is_empty() {
-            phase = self.acquire_chosen(seen, frame, &mut report, &mut changes)?;
+            phase = self.acquire_chosen(seen, frame, &mut tracked, &mut changes)?;
         }
         self.phase = phase;
-        Ok(Report { changes, ..report })
+        Ok(Tracked { changes, ..tracked })
     }
 
     /// How the background moved, by what is seen of it or by what is known of the camera.
@@ -253,7 +251,7 @@ impl Tracker {
         seen: &Observation,
         dt_s: f64,
         frame: Frame,
-        report: &mut Report,
+        tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
         let (mut target, hidden_s) = match phase {
@@ -296,17 +294,17 @@ impl Tracker {
             (_, Some(ego)) => ego.apply_to(target.seen_at),
             _ => target.seen_at,
         };
-        *report = report_of(state, &target, frame, std::mem::take(&mut report.features));
+        *tracked = tracked_of(state, &target, frame, std::mem::take(&mut tracked.features));
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
             self.selection.suppressed.add(target.follow.estimate().bounds);
-            return Ok(self.let_go(Phase::Tracking(target), reason, frame, report, changes));
+            return Ok(self.let_go(Phase::Tracking(target), reason, frame, tracked, changes));
         }
         Ok(match state {
             TargetState::Tracking => Phase::Tracking(target),
             TargetState::Occluded => {
                 let left = (1.0 - hidden_s.unwrap_or(0.0) / coast_s.max(dt_s)).max(0.0);
-                report.confidence *= left;
+                tracked.confidence *= left;
                 Phase::Occluded(target, hidden_s.unwrap_or(0.0))
             }
             _ => {
@@ -340,7 +338,7 @@ impl Tracker {
         seen: &Observation,
         place: Point,
         frame: Frame,
-        report: &mut Report,
+        tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
         let pixels = frame.point_to_pixels(place);
@@ -349,10 +347,10 @@ impl Tracker {
             .at(pixels)
             .cloned()
             .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), ..Sighting::default() });
-        let old = self.let_go(old, ReleaseReason::Request, frame, report, changes);
+        let old = self.let_go(old, ReleaseReason::Request, frame, tracked, changes);
         self.lost = None;
         match self.acquire(seen, &sighting)? {
-            Some(target) => Ok(self.begin(target, frame, report, changes)),
+            Some(target) => Ok(self.begin(target, frame, tracked, changes)),
             None => Ok(old),
         }
     }
@@ -367,7 +365,7 @@ impl Tracker {
         phase: Phase,
         reason: ReleaseReason,
         frame: Frame,
-        report: &mut Report,
+        tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
         if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
@@ -375,9 +373,10 @@ impl Tracker {
                 // It may move, and would be taken again at once.
                 self.selection.release(target.follow.estimate().bounds);
             }
-            *report = report_of(TargetState::Searching, &target, frame, std::mem::take(&mut report.features));
-            report.features.clear();
-            report.released = Some(reason);
+            *tracked =
+                tracked_of(TargetState::Searching, &target, frame, std::mem::take(&mut tracked.features));
+            tracked.features.clear();
+            tracked.released = Some(reason);
             changes.push(TargetChange::Released);
         }
         Phase::Searching
@@ -387,7 +386,7 @@ impl Tracker {
         &mut self,
         seen: &Observation,
         frame: Frame,
-        report: &mut Report,
+        tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
         let Config { choice, confirm_frames, must_travel, .. } = self.config;
@@ -398,7 +397,7 @@ impl Tracker {
                 if must_travel {
                     target.dwell = DwellTime::on_trial();
                 }
-                Ok(self.begin(target, frame, report, changes))
+                Ok(self.begin(target, frame, tracked, changes))
             }
             None => Ok(Phase::Searching),
         }
@@ -432,18 +431,18 @@ impl Tracker {
         &mut self,
         target: Target,
         frame: Frame,
-        report: &mut Report,
+        tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
         self.selection.take(target.follow.estimate().bounds);
         changes.push(TargetChange::Acquired);
-        *report = report_of(TargetState::Tracking, &target, frame, std::mem::take(&mut report.features));
+        *tracked = tracked_of(TargetState::Tracking, &target, frame, std::mem::take(&mut tracked.features));
         Phase::Tracking(target)
     }
 }
 
 /// `features` is memory.
-fn report_of(state: TargetState, target: &Target, frame: Frame, mut features: Vec<Feature>) -> Report {
+fn tracked_of(state: TargetState, target: &Target, frame: Frame, mut features: Vec<Feature>) -> Tracked {
     let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
     let points = target.follow.points();
     let kept = points.members().map(feature(true));
@@ -452,7 +451,7 @@ fn report_of(state: TargetState, target: &Target, frame: Frame, mut features: Ve
     features.extend(kept.chain(rejected));
     let estimate = target.follow.estimate();
     let ego = estimate.ego_velocity;
-    Report {
+    Tracked {
         state,
         changes: Vec::new(),
         released: None,
@@ -466,7 +465,7 @@ fn report_of(state: TargetState, target: &Target, frame: Frame, mut features: Ve
     }
 }
 
-impl Default for Report {
+impl Default for Tracked {
     /// There is no target.
     fn default() -> Self {
         Self {

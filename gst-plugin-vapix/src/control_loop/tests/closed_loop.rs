@@ -203,7 +203,7 @@ impl Simulation {
                 self.show(&shot, run);
             }
         }
-        self.talk(run);
+        self.exchange(run);
     }
 
     fn pose(&self) -> PanTilt {
@@ -271,7 +271,7 @@ impl Simulation {
         self.control.measure(measurement, self.now);
     }
 
-    fn talk(&mut self, run: &mut Run) {
+    fn exchange(&mut self, run: &mut Run) {
         if let Some((request, sent)) = self.in_flight {
             if self.now < sent + self.setup.round_trip {
                 return;

@@ -21,7 +21,7 @@ use super::{
 use crate::{
     Fault,
     camera::Camera,
-    vapix::{Answer, Args, parse_args, queue::Queue},
+    vapix::{Args, CgiResponse, parse_args, queue::Queue},
 };
 
 /// More than any request needs.
@@ -73,7 +73,7 @@ async fn answer(
     site: &Site,
     connection: &Connection,
     request: Request,
-    run: fn(&Camera, &Args, Option<&str>) -> Answer,
+    run: fn(&Camera, &Args, Option<&str>) -> CgiResponse,
     note: fn(&Camera, &str, u16),
 ) -> Response {
     let camera = &site.camera;
@@ -87,7 +87,7 @@ async fn answer(
     };
     match trouble(&fault, site.guard.wrong_logins()) {
         Trouble::None => {}
-        Trouble::Answer(response) => {
+        Trouble::Response(response) => {
             note(camera, &query, response.status().as_u16());
             return response;
         }
@@ -112,10 +112,10 @@ async fn answer(
             tokio::time::sleep(camera.service_time()).await;
         }
         match run(camera, &parse_args(query.as_bytes()), cookie.as_deref()) {
-            Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
-            Answer::Text(text) if fault == Fault::LineFeeds => plain(text.replace("\r\n", "\n")),
-            Answer::Text(text) => plain(text),
-            Answer::Introduced { cookie, text } => {
+            CgiResponse::Accepted => StatusCode::NO_CONTENT.into_response(),
+            CgiResponse::Text(text) if fault == Fault::LineFeeds => plain(text.replace("\r\n", "\n")),
+            CgiResponse::Text(text) => plain(text),
+            CgiResponse::Introduced { cookie, text } => {
                 ([(header::SET_COOKIE, cookie)], plain(text)).into_response()
             }
         }
@@ -171,7 +171,7 @@ async fn arguments(request: Request) -> Result<String, Response> {
 /// What a fault does instead of answering.
 enum Trouble {
     None,
-    Answer(Response),
+    Response(Response),
     Cut(Ending),
     Silence,
 }
@@ -184,17 +184,17 @@ fn trouble(fault: &Fault, wrong_logins: u64) -> Trouble {
         Fault::Refuse | Fault::Reboot | Fault::Reset => Trouble::Cut(Ending::Reset),
         Fault::Garbage(bytes) => Trouble::Cut(Ending::Garbage(bytes.clone())),
         Fault::Hang | Fault::BlackHole => Trouble::Silence,
-        Fault::Status(code) => Trouble::Answer(status(*code).into_response()),
+        Fault::Status(code) => Trouble::Response(status(*code).into_response()),
         Fault::Redirect { status: code, location } => {
-            Trouble::Answer((status(*code), [(header::LOCATION, location.clone())]).into_response())
+            Trouble::Response((status(*code), [(header::LOCATION, location.clone())]).into_response())
         }
         Fault::LockOut(after) if wrong_logins >= *after => {
-            Trouble::Answer(StatusCode::FORBIDDEN.into_response())
+            Trouble::Response(StatusCode::FORBIDDEN.into_response())
         }
         Fault::LockOut(_) => Trouble::None,
-        Fault::EndlessBody => Trouble::Answer(endless(Bytes::from_static(&[b'x'; 8192]), Duration::ZERO)),
-        Fault::Drip(pause) => Trouble::Answer(endless(Bytes::from_static(b"x"), *pause)),
-        Fault::ErrorBody(text) => Trouble::Answer(plain(text.clone())),
-        Fault::EmptyOk => Trouble::Answer(Response::new(Body::empty())),
+        Fault::EndlessBody => Trouble::Response(endless(Bytes::from_static(&[b'x'; 8192]), Duration::ZERO)),
+        Fault::Drip(pause) => Trouble::Response(endless(Bytes::from_static(b"x"), *pause)),
+        Fault::ErrorBody(text) => Trouble::Response(plain(text.clone())),
+        Fault::EmptyOk => Trouble::Response(Response::new(Body::empty())),
     }
 }

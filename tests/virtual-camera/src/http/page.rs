@@ -15,7 +15,7 @@ use super::{Site, picture::jpeg};
 use crate::{
     Limits, ReceivedCommand, Status,
     kinematics::Pose,
-    vapix::{Answer, parse_args},
+    vapix::{CgiResponse, parse_args},
     wish::{PictureError, Wish, argument},
 };
 
@@ -27,7 +27,7 @@ pub(super) async fn page() -> Html<&'static str> {
 }
 
 #[derive(Serialize)]
-struct Report {
+struct StatusReply {
     status: Status,
     limits: Limits,
     /// Corners of the view in the overview, from 0 to 1.
@@ -46,7 +46,7 @@ pub(super) async fn status(
     commands.drain(..commands.len().saturating_sub(COMMANDS));
     let status = site.camera.status();
     let pose = Pose { pan_deg: status.pan_deg, tilt_deg: status.tilt_deg, zoom_step: status.zoom_step };
-    let report = Report {
+    let report = StatusReply {
         outline: site.camera.world.outline(&pose),
         limits: site.camera.world.limits(),
         status,
@@ -78,8 +78,8 @@ pub(super) async fn overview(State(site): State<Arc<Site>>) -> Result<Response, 
 pub(super) async fn steer(State(site): State<Arc<Site>>, RawQuery(query): RawQuery) -> Response {
     let query = query.unwrap_or_default();
     let response = match site.camera.ptz(&parse_args(query.as_bytes())) {
-        Answer::Accepted => StatusCode::NO_CONTENT.into_response(),
-        Answer::Text(text) | Answer::Introduced { text, .. } => text.into_response(),
+        CgiResponse::Accepted => StatusCode::NO_CONTENT.into_response(),
+        CgiResponse::Text(text) | CgiResponse::Introduced { text, .. } => text.into_response(),
     };
     site.camera.note_command(&query, response.status().as_u16());
     response

@@ -20,7 +20,7 @@ use crate::{
 };
 
 #[derive(Serialize)]
-struct Report {
+struct TruthReply {
     /// Of the picture, in pixels; everything below counts in them.
     size: (u32, u32),
     people: Vec<GroundTruth>,
@@ -37,7 +37,7 @@ pub(super) async fn truth(
     let size = Wish::parse(&args, &site.camera)?.size;
     let exposure = exposure(&args, &site.camera)?;
     let camera = site.camera.clone();
-    let found = tokio::task::spawn_blocking(move || Report {
+    let found = tokio::task::spawn_blocking(move || TruthReply {
         size,
         people: camera.ground_truth(exposure, size),
         silhouette: camera.silhouette(exposure, size).map(|mask| runs(&mask)).unwrap_or_default(),

@@ -5,7 +5,7 @@
 use std::{collections::BTreeMap, fmt::Write, time::Duration};
 
 use super::{
-    Answer, Args, help,
+    Args, CgiResponse, help,
     params::Params,
     ptz::{Adjustment, Preset, Question, Request},
     queue::Queue,
@@ -50,14 +50,14 @@ impl Device {
     }
 
     /// `ptz.cgi` with `args`, arriving at `now`.
-    pub fn ptz(&mut self, args: &Args, now: Duration) -> Answer {
+    pub fn ptz(&mut self, args: &Args, now: Duration) -> CgiResponse {
         match self.try_ptz(args, now) {
             Ok(answer) => answer,
-            Err(message) => Answer::error(message),
+            Err(message) => CgiResponse::error(message),
         }
     }
 
-    fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<Answer, String> {
+    fn try_ptz(&mut self, args: &Args, now: Duration) -> Result<CgiResponse, String> {
         let known = |arg: &&(String, String)| self.api == PtzApi::Extended || arg.0 != "proportionalspeed";
         let refused = |name: &str| self.api == PtzApi::Attributes && name == "proportionalspeed";
         if let Some((name, _)) = args.iter().find(|(name, _)| !self.moves.take(name) || refused(name)) {
@@ -74,12 +74,12 @@ impl Device {
             self.adjust(adjustment);
         }
         let text = match request.question {
-            None => return Ok(Answer::Accepted),
+            None => return Ok(CgiResponse::Accepted),
             Some(Question::Driver) => "Sony_camblock\r\n".into(),
             Some(Question::Help) => help::commands(&self.moves),
             Some(Question::About(subject)) => self.tell(&subject)?,
         };
-        Ok(Answer::Text(text))
+        Ok(CgiResponse::Text(text))
     }
 
     fn preset(&self, preset: &Preset) -> Result<Motion, String> {
@@ -192,7 +192,7 @@ impl Device {
     }
 
     /// `param.cgi` with `args`.
-    pub fn param(&mut self, args: &Args) -> Answer {
+    pub fn param(&mut self, args: &Args) -> CgiResponse {
         let answer = self.params.answer(args);
         let proportional = &mut self.head.kinematics_mut().proportional_speed;
         self.params.apply_to(proportional);
@@ -226,13 +226,13 @@ mod tests {
         Device::new(&settings, head, limits, (640, 480))
     }
 
-    fn ask(device: &mut Device, query: &str, seconds: u64) -> Answer {
+    fn ask(device: &mut Device, query: &str, seconds: u64) -> CgiResponse {
         device.ptz(&parse_args(query.as_bytes()), Duration::from_secs(seconds))
     }
 
-    fn text(answer: Answer) -> String {
+    fn text(answer: CgiResponse) -> String {
         match answer {
-            Answer::Text(text) => text,
+            CgiResponse::Text(text) => text,
             answer => panic!("no text: {answer:?}"),
         }
     }
@@ -242,14 +242,14 @@ mod tests {
         let mut device = device(PtzApi::Classic);
         assert_eq!(
             ask(&mut device, "pan=150&tilt=-4.5&zoom=100&focus=900&autofocus=off", 1),
-            Answer::Accepted
+            CgiResponse::Accepted
         );
         assert_eq!(
             text(ask(&mut device, "query=position", 9)),
             "pan=20.5000\r\ntilt=-4.5000\r\nzoom=100\r\niris=5748\r\nfocus=900\r\n\
              brightness=4999\r\nautofocus=off\r\nautoiris=on\r\n"
         );
-        assert_eq!(ask(&mut device, "gotoserverpresetname=Home", 9), Answer::Accepted);
+        assert_eq!(ask(&mut device, "gotoserverpresetname=Home", 9), CgiResponse::Accepted);
         assert!(
             text(ask(&mut device, "query=position", 20))
                 .starts_with("pan=0.0000\r\ntilt=0.0000\r\nzoom=1\r\n")
@@ -276,7 +276,7 @@ mod tests {
             ("pan=5&tilt=1&speed=50", true),
             ("move=stop", true),
         ] {
-            assert_eq!(ask(&mut device, query, 1) == Answer::Accepted, taken, "{query}");
+            assert_eq!(ask(&mut device, query, 1) == CgiResponse::Accepted, taken, "{query}");
         }
         let list = text(ask(&mut device, "info=1", 1));
         assert!(
@@ -291,7 +291,7 @@ mod tests {
         let query = "query=attributes&camera=1&format=text";
         assert_eq!(
             ask(&mut device(PtzApi::Classic), query, 0),
-            Answer::Text("Error:query: unknown value: attributes\r\n".into())
+            CgiResponse::Text("Error:query: unknown value: attributes\r\n".into())
         );
         let text = text(ask(&mut device(PtzApi::Extended), query, 0));
         assert!(text.contains("value=1 | speed=0.05,"), "{text}");
@@ -310,7 +310,7 @@ mod tests {
                 },
             );
             let query = "continuouspantiltmove=0,50&proportionalspeed=disabled";
-            assert_eq!(ask(&mut device, query, 1), Answer::Accepted);
+            assert_eq!(ask(&mut device, query, 1), CgiResponse::Accepted);
             device.head.advance(Duration::from_millis(1064));
             assert!((device.head.now().tilt_rate_deg_s - expected).abs() < 1e-6, "{:?}", device.head.now());
         }
@@ -322,7 +322,7 @@ mod tests {
         let query = "continuouspantiltmove=0,50&proportionalspeed=disabled";
         assert_eq!(
             ask(&mut device, query, 1),
-            Answer::Text("Error:proportionalspeed: not supported\r\n".into())
+            CgiResponse::Text("Error:proportionalspeed: not supported\r\n".into())
         );
         assert!(device.head.is_at_rest());
         assert!(text(ask(&mut device, "query=attributes", 1)).contains("speeds="));
@@ -339,7 +339,7 @@ mod tests {
             [("gotoserverpresetno=2", 8.0), ("move=home", 0.0), ("gotoserverpresetname=Gate", 8.0)]
         {
             let now = device.head.now().time.as_secs();
-            assert_eq!(ask(&mut device, query, now + 1), Answer::Accepted);
+            assert_eq!(ask(&mut device, query, now + 1), CgiResponse::Accepted);
             device.head.advance(Duration::from_secs(now + 20));
             assert_eq!(device.head.now().pose.pan_deg, pan, "{query}");
         }
@@ -374,7 +374,7 @@ mod tests {
     fn proportional_speed_is_switched_by_parameter() {
         let mut device = device(PtzApi::Classic);
         let update = "action=update&PTZ.Various.V1.ProportionalSpeedEnabled=false";
-        assert_eq!(device.param(&parse_args(update.as_bytes())), Answer::Text("OK\n".into()));
+        assert_eq!(device.param(&parse_args(update.as_bytes())), CgiResponse::Text("OK\n".into()));
         assert!(!device.head.kinematics().proportional_speed.enabled);
     }
 }

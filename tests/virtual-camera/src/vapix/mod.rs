@@ -18,7 +18,7 @@ pub(crate) fn parse_args(encoded: &[u8]) -> Args {
 
 /// What a CGI says.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) enum Answer {
+pub(crate) enum CgiResponse {
     /// 204: accepted.
     Accepted,
     /// 200 with text.
@@ -27,7 +27,7 @@ pub(crate) enum Answer {
     Introduced { cookie: String, text: String },
 }
 
-impl Answer {
+impl CgiResponse {
     /// A failure, which VAPIX reports as success with a text.
     pub fn error(message: impl std::fmt::Display) -> Self {
         Self::Text(format!("Error:{message}\r\n"))

@@ -2,7 +2,7 @@
 
 //! `param.cgi`: the camera's parameters.
 
-use super::{Answer, Args, device::field_angles};
+use super::{Args, CgiResponse, device::field_angles};
 use crate::{
     kinematics::{Head, Limits, ProportionalSpeed, ZOOM_RANGE},
     settings::{Auth, Moves, Settings},
@@ -188,13 +188,13 @@ impl Params {
     }
 
     /// `action=list` or `action=update`.
-    pub fn answer(&mut self, args: &Args) -> Answer {
+    pub fn answer(&mut self, args: &Args) -> CgiResponse {
         let value = |name: &str| args.iter().find(|arg| arg.0 == name).map(|arg| arg.1.as_str());
         match value("action") {
-            Some("list") => Answer::Text(self.list(value("group"))),
-            Some("update") => Answer::Text(self.update(args)),
-            Some(action) => Answer::Text(format!("# Error: Unknown action '{action}'\n")),
-            None => Answer::Text("# Error: Missing argument 'action'\n".into()),
+            Some("list") => CgiResponse::Text(self.list(value("group"))),
+            Some("update") => CgiResponse::Text(self.update(args)),
+            Some(action) => CgiResponse::Text(format!("# Error: Unknown action '{action}'\n")),
+            None => CgiResponse::Text("# Error: Missing argument 'action'\n".into()),
         }
     }
 
@@ -276,7 +276,7 @@ mod tests {
 
     fn ask(params: &mut Params, query: &str) -> String {
         match params.answer(&parse_args(query.as_bytes())) {
-            Answer::Text(text) => text,
+            CgiResponse::Text(text) => text,
             answer => panic!("no text: {answer:?}"),
         }
     }

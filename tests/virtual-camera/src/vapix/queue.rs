@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use super::{Answer, Args};
+use super::{Args, CgiResponse};
 
 /// Who stands in line. The first is in control; whoever is not heard of for a while is out.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl Queue {
     }
 
     /// `ptzqueue.cgi` with `args`.
-    pub fn answer(&mut self, args: &Args, cookie: Option<&str>, now: Duration) -> Answer {
+    pub fn answer(&mut self, args: &Args, cookie: Option<&str>, now: Duration) -> CgiResponse {
         self.forget_silent(now);
         let control = args.iter().find(|arg| arg.0 == "control").map_or("", |arg| arg.1.as_str());
         let id = self.id(cookie);
@@ -66,18 +66,21 @@ impl Queue {
                 if self.place(id) == 0 {
                     self.line.push(Client { id, heard: now });
                 }
-                Answer::Introduced { cookie: format!("{}={id}; path=/", Self::COOKIE), text: self.tell(id) }
+                CgiResponse::Introduced {
+                    cookie: format!("{}={id}; path=/", Self::COOKIE),
+                    text: self.tell(id),
+                }
             }
             ("query", Some(id)) => {
                 self.hear(id, now);
-                Answer::Text(self.tell(id))
+                CgiResponse::Text(self.tell(id))
             }
             ("drop", Some(id)) => {
                 self.line.retain(|client| client.id != id);
-                Answer::Accepted
+                CgiResponse::Accepted
             }
-            ("query" | "drop", None) => Answer::error("cookie required"),
-            _ => Answer::error(format!("control: invalid value: {control}")),
+            ("query" | "drop", None) => CgiResponse::error("cookie required"),
+            _ => CgiResponse::error(format!("control: invalid value: {control}")),
         }
     }
 
@@ -118,8 +121,8 @@ mod tests {
 
     fn ask(queue: &mut Queue, control: &str, cookie: Option<&str>, now: Duration) -> String {
         match queue.answer(&parse_args(format!("control={control}").as_bytes()), cookie, now) {
-            Answer::Text(text) | Answer::Introduced { text, .. } => text.chars().take(12).collect(),
-            Answer::Accepted => "yes".into(),
+            CgiResponse::Text(text) | CgiResponse::Introduced { text, .. } => text.chars().take(12).collect(),
+            CgiResponse::Accepted => "yes".into(),
         }
     }
 

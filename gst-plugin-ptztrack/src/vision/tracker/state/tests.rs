@@ -18,7 +18,7 @@ fn config() -> Config {
         manual_size: 0.3,
         must_travel: false,
         detector_pause_s: 0.0,
-        limits: Limits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
+        limits: TimeLimits { stationary_s: f64::INFINITY, tracked_s: f64::INFINITY },
     }
 }
 
@@ -29,7 +29,7 @@ struct Chain {
 }
 
 impl Chain {
-    fn process(&mut self, picture: &Picture, dt_s: f64, detections: &[Detection]) -> Report {
+    fn process(&mut self, picture: &Picture, dt_s: f64, detections: &[Detection]) -> Tracked {
         let luma = picture.luma();
         let whole = vision::Picture { luma, chroma: None };
         let elapsed = Duration::try_from_secs_f64(dt_s).unwrap_or_default();
@@ -54,8 +54,8 @@ fn following(profile: Profile, picture: &Picture, x: f32, y: f32) -> Chain {
 
 fn following_with(config: Config, picture: &Picture, x: f32, y: f32) -> Chain {
     let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config) };
-    let report = chain.process(picture, DT, &[detection(Rect2f::new(x, y, PERSON.0, PERSON.1))]);
-    assert_eq!(report.changes, [TargetChange::Acquired]);
+    let tracked = chain.process(picture, DT, &[detection(Rect2f::new(x, y, PERSON.0, PERSON.1))]);
+    assert_eq!(tracked.changes, [TargetChange::Acquired]);
     chain
 }
 
@@ -69,19 +69,19 @@ fn detected(x: f32, width: f32) -> Detection {
     detection(Rect2f::new(x, 100.0, width, PERSON.1))
 }
 
-fn step(chain: &mut Chain, picture: &Picture) -> Report {
+fn step(chain: &mut Chain, picture: &Picture) -> Tracked {
     chain.process(picture, DT, &[])
 }
 
 #[track_caller]
-fn assert_at(report: &Report, x: f32, y: f32) {
-    assert_near(report, x, y, 8.0);
+fn assert_at(tracked: &Tracked, x: f32, y: f32) {
+    assert_near(tracked, x, y, 8.0);
 }
 
 #[track_caller]
-fn assert_near(report: &Report, x: f32, y: f32, tolerance: f32) {
-    assert_eq!((report.state, report.id), (TargetState::Tracking, 1), "{:?}", report.bounds);
-    let off = ((report.bounds.x * SIZE.0 as f64) as f32 - x, (report.bounds.y * SIZE.1 as f64) as f32 - y);
+fn assert_near(tracked: &Tracked, x: f32, y: f32, tolerance: f32) {
+    assert_eq!((tracked.state, tracked.id), (TargetState::Tracking, 1), "{:?}", tracked.bounds);
+    let off = ((tracked.bounds.x * SIZE.0 as f64) as f32 - x, (tracked.bounds.y * SIZE.1 as f64) as f32 - y);
     assert!(off.0.abs().max(off.1.abs()) < tolerance, "{off:?} pixels off");
 }
 
@@ -114,9 +114,9 @@ fn the_panning_camera_does_not_drag_the_walker() {
     for n in 1..30 {
         // The camera keeps the walker in the middle: only the street moves.
         let (pan, x) = (-9.0 * n as f32, 200.0 + (n % 3) as f32);
-        let report = step(&mut tracker, &street((pan, 0.0), &[(x, 100.0, 7)]));
-        assert_at(&report, x, 100.0);
-        let ego = report.ego_velocity.expect("textured").x * SIZE.0 as f64 * DT;
+        let tracked = step(&mut tracker, &street((pan, 0.0), &[(x, 100.0, 7)]));
+        assert_at(&tracked, x, 100.0);
+        let ego = tracked.ego_velocity.expect("textured").x * SIZE.0 as f64 * DT;
         assert!((ego + 9.0).abs() < 0.5, "{ego}");
     }
 }
@@ -127,8 +127,8 @@ fn somebody_standing_is_kept_under_a_camera_that_starts_to_pan() {
     let mut pan = 0.0;
     for n in 1..30 {
         pan -= if n > 10 { 7.0 } else { 0.0 };
-        let report = step(&mut tracker, &street((pan, 0.0), &[(200.0 + pan, 100.0, 7)]));
-        assert_at(&report, 200.0 + pan, 100.0);
+        let tracked = step(&mut tracker, &street((pan, 0.0), &[(200.0 + pan, 100.0, 7)]));
+        assert_at(&tracked, 200.0 + pan, 100.0);
     }
 }
 
@@ -138,8 +138,8 @@ fn a_large_motion_of_the_whole_picture_is_followed() {
     let mut x = 60.0;
     for speed in [12.0, 28.0, 44.0, 60.0, 60.0] {
         x += speed;
-        let report = step(&mut tracker, &street((x - 60.0, 0.0), &[(x, 100.0, 7)]));
-        assert_at(&report, x, 100.0);
+        let tracked = step(&mut tracker, &street((x - 60.0, 0.0), &[(x, 100.0, 7)]));
+        assert_at(&tracked, x, 100.0);
     }
 }
 
@@ -147,7 +147,7 @@ fn a_large_motion_of_the_whole_picture_is_followed() {
 fn two_who_cross_are_not_confused() {
     let mut tracker =
         following(Profile::Robust, &street((0.0, 0.0), &[(60.0, 100.0, 7), (360.0, 104.0, 99)]), 60.0, 100.0);
-    let mut last = Report::default();
+    let mut last = Tracked::default();
     for n in 1..34 {
         let (x, other) = (60.0 + 9.0 * n as f32, 360.0 - 9.0 * n as f32);
         // The other passes in front.
@@ -160,7 +160,7 @@ fn two_who_cross_are_not_confused() {
 fn hidden_for_a_second_and_found_again() {
     let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
     let mut changes = Vec::new();
-    let mut last = Report::default();
+    let mut last = Tracked::default();
     for n in 1..40 {
         let mut picture = street((0.0, 0.0), &[(40.0 + 8.0 * n as f32, 100.0, 7)]);
         picture.paint(Rect2f::new(150.0, 0.0, 110.0, 320.0), 4321);
@@ -189,11 +189,11 @@ fn a_hidden_target_goes_on_as_fast_as_before() {
     let mut changes = Vec::new();
     let mut off = 0.0_f32;
     for n in 1..50 {
-        let report = step(&mut tracker, &picture(&[(x(n), 100.0, 7)]));
-        if report.state == TargetState::Occluded {
-            off = off.max(((report.bounds.x * SIZE.0 as f64) as f32 - x(n)).abs());
+        let tracked = step(&mut tracker, &picture(&[(x(n), 100.0, 7)]));
+        if tracked.state == TargetState::Occluded {
+            off = off.max(((tracked.bounds.x * SIZE.0 as f64) as f32 - x(n)).abs());
         }
-        changes.extend(report.changes);
+        changes.extend(tracked.changes);
     }
     assert_eq!(changes, [TargetChange::Occluded, TargetChange::Reacquired]);
     assert!(off < PERSON.0 / 2.0, "{off} pixels off");
@@ -212,9 +212,9 @@ fn who_turns_round_is_followed_on() {
         let (width, texture) = if n < 15 { (PERSON.0, 7) } else { (30.0 + 3.0 * (n % 5) as f32, 20 + n) };
         let mut picture = street((0.0, 0.0), &[]);
         picture.paint(Rect2f::new(x, 100.0, width, PERSON.1), texture);
-        let report = tracker.process(&picture, DT, &[detected(x, width)]);
-        assert_eq!((report.state, report.id), (TargetState::Tracking, 1), "picture {n}");
-        let middle = (report.centroid.x * SIZE.0 as f64) as f32;
+        let tracked = tracker.process(&picture, DT, &[detected(x, width)]);
+        assert_eq!((tracked.state, tracked.id), (TargetState::Tracking, 1), "picture {n}");
+        let middle = (tracked.centroid.x * SIZE.0 as f64) as f32;
         assert!((middle - x - width / 2.0).abs() < 15.0, "picture {n}: {middle} for {}", x + width / 2.0);
     }
 }
@@ -235,8 +235,8 @@ fn a_long_gap_is_a_loss() {
     let picture = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
     for gap in [3.0, f64::NAN, f64::INFINITY] {
         let mut tracker = following(Profile::Robust, &picture, 80.0, 100.0);
-        let report = tracker.process(&picture, gap, &[]);
-        assert_eq!(report.changes, [TargetChange::Lost], "{gap}");
+        let tracked = tracker.process(&picture, gap, &[]);
+        assert_eq!(tracked.changes, [TargetChange::Lost], "{gap}");
     }
 }
 
@@ -244,7 +244,7 @@ fn a_long_gap_is_a_loss() {
 fn who_comes_out_changed_beside_a_hidden_target_is_followed_on() {
     let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(40.0, 100.0, 7)]), 40.0, 100.0);
     let walk = |tracker: &mut Chain, texture: u32| {
-        let mut last = Report::default();
+        let mut last = Tracked::default();
         for n in 1..24 {
             let mut picture = street((0.0, 0.0), &[]);
             if n < 8 {
@@ -281,9 +281,9 @@ fn beside_another(
     }
     let mut first = street((0.0, 0.0), &[(80.0, 100.0, 7)]);
     other(&mut first, 80.0 + BESIDE);
-    let report = tracker.process(&first, DT, &[detected(80.0, PERSON.0)]);
-    assert_eq!(report.changes, [TargetChange::Acquired]);
-    let (mut farthest, mut last) = (0.0_f32, report);
+    let tracked = tracker.process(&first, DT, &[detected(80.0, PERSON.0)]);
+    assert_eq!(tracked.changes, [TargetChange::Acquired]);
+    let (mut farthest, mut last) = (0.0_f32, tracked);
     for n in 1..30 {
         let x = 80.0 + 6.0 * n as f32;
         let people = [(x, 100.0, 7)];
@@ -318,13 +318,13 @@ fn a_neighbour_in_the_same_clothes_is_not_taken_for_the_target() {
 fn measured(first: Rect2f, later: Rect2f) -> (f64, f64) {
     let street = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
     let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
-    let mut report = chain.process(&street, DT, &[detection(first)]);
+    let mut tracked = chain.process(&street, DT, &[detection(first)]);
     for region in [first, later] {
         for _ in 0..30 {
-            report = chain.process(&street, DT, &[detection(region)]);
+            tracked = chain.process(&street, DT, &[detection(region)]);
         }
     }
-    (report.bounds.width * SIZE.0 as f64, report.bounds.height * SIZE.1 as f64)
+    (tracked.bounds.width * SIZE.0 as f64, tracked.bounds.height * SIZE.1 as f64)
 }
 
 #[test]
@@ -344,7 +344,7 @@ fn the_box_takes_the_size_of_the_whole_once_that_is_seen() {
 
 #[test]
 fn whoever_walks_while_hidden_does_not_stand() {
-    let limits = Limits { stationary_s: 2.5, tracked_s: f64::INFINITY };
+    let limits = TimeLimits { stationary_s: 2.5, tracked_s: f64::INFINITY };
     let tracker = Tracker::new(Config { limits, coast_s: 3.0, ..config() });
     let mut chain = Chain { scene: SceneModel::default(), tracker };
     let nobody = street((0.0, 0.0), &[]);
@@ -364,5 +364,8 @@ fn whoever_walks_while_hidden_does_not_stand() {
     assert_eq!(stand(1.5, 60.0)[0].changes, [TargetChange::Acquired]);
     let there = stand(3.0, 130.0);
     assert_at(&there[17], 130.0, 100.0);
-    assert!(there.iter().any(|report| report.released == Some(ReleaseReason::Stationary)), "they stand now");
+    assert!(
+        there.iter().any(|tracked| tracked.released == Some(ReleaseReason::Stationary)),
+        "they stand now"
+    );
 }

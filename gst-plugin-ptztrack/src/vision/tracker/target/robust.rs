@@ -21,7 +21,7 @@ use crate::vision::tracker::grey_histogram::near_the_middle;
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::{Consensus, Points};
 use crate::vision::tracker::presence::Presence;
-use crate::vision::tracker::selection::{Selection, Sighting};
+use crate::vision::tracker::selection::{Sighting, TargetSelector};
 use crate::vision::{Luma, Observation};
 
 /// Cells of the map of figure and ground in one of the filter's, across and down.
@@ -249,7 +249,7 @@ impl Robust {
     }
 
     /// Notices who else is near: one who was seen beside the target may be behind it, or it behind them, a moment later.
-    fn watch_others(&mut self, sightings: &Selection, dt_s: f32) {
+    fn watch_others(&mut self, sightings: &TargetSelector, dt_s: f32) {
         let reach = scaled(self.estimate.bounds, CONTEXT.0, CONTEXT.1);
         let near =
             sightings.current().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
@@ -486,7 +486,7 @@ impl Robust {
 
     /// The box grows with the region that the detector sees the target in, while it is young or nobody else is near, and narrows
     /// with one that shows it from head to foot; by how much its middle shifts, which is no motion of the target.
-    fn adopt(&mut self, sightings: &Selection, dt_s: f32) -> Point2f {
+    fn adopt(&mut self, sightings: &TargetSelector, dt_s: f32) -> Point2f {
         let Some(region) = self.own_region(sightings) else { return Point2f::default() };
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
@@ -512,7 +512,7 @@ impl Robust {
     }
 
     /// The region that the detector sees the target in, and nobody else.
-    fn own_region(&self, sightings: &Selection) -> Option<Rect2f> {
+    fn own_region(&self, sightings: &TargetSelector) -> Option<Rect2f> {
         let bounds = self.estimate.bounds;
         let most = if self.alone() > 0.5 { MAX_GROWTH } else { MAX_GROWTH_BESIDE_OTHERS };
         let own = sightings.current().find(|sighting| {
@@ -526,7 +526,7 @@ impl Robust {
     }
 
     /// The best of what the detector saw within reach that looks like the target.
-    fn recognise(&mut self, seen: &Observation, sightings: &Selection) -> opencv::Result<Option<Place>> {
+    fn recognise(&mut self, seen: &Observation, sightings: &TargetSelector) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
         for sighting in sightings.current().filter(|sighting| !sighting.another) {
             let bounds = self.box_in(sighting);
@@ -604,7 +604,7 @@ impl Robust {
     }
 
     /// The best place where a hidden target may be by now.
-    fn search(&mut self, seen: &Observation, sightings: &Selection) -> opencv::Result<Option<Place>> {
+    fn search(&mut self, seen: &Observation, sightings: &TargetSelector) -> opencv::Result<Option<Place>> {
         let bounds = self.estimate.bounds;
         let mut best = self.recognise(seen, sightings)?;
         for sideways in [0.0, -0.6, 0.6] {
@@ -619,7 +619,7 @@ impl Robust {
 }
 
 impl Follow for Robust {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &Selection) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         let expected = self.estimate.own_velocity * dt_s;
@@ -678,7 +678,7 @@ impl Follow for Robust {
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
     }
 
-    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &Selection) -> opencv::Result<Sight> {
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         self.unseen_s += dt_s;

@@ -7,11 +7,11 @@ use super::{
     clothes::{FACE, HAIR, Outfit, SHIRT, SHOES, SKIN, TILE, TROUSERS},
     figure::{Build, Frame},
     gait::{Arm, BodyPose, Leg},
-    mesh::{Detail, Patch, Ring, egg, skin},
+    mesh::{Detail, Ring, SkinPatch, egg, skin},
 };
 
 /// All of the body's skin.
-pub(crate) fn patches(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail) -> Vec<Patch> {
+pub(crate) fn patches(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail) -> Vec<SkinPatch> {
     let size = build.height;
     let mut patches = vec![
         skin(&trunk(pose, build, &PELVIS, 1.0), TROUSERS, [0.1, 0.0], detail),
@@ -252,7 +252,7 @@ const HEAD: [[f64; 5]; 11] = [
     [0.132, 0.0, 0.0, -0.006, 1.0],
 ];
 
-fn head(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail, patches: &mut Vec<Patch>) {
+fn head(pose: &BodyPose, build: &Build, outfit: &Outfit, detail: Detail, patches: &mut Vec<SkinPatch>) {
     let size = build.height;
     let chin = pose.head.place(skull(pose, build), [0.0, -0.022 * size, 0.0]);
     let at = |right: f64, up: f64, ahead: f64| pose.head.place(chin, [right * size, up * size, ahead * size]);

@@ -29,14 +29,14 @@ pub(crate) struct Vertex {
 }
 
 /// Four-cornered patches of skin of one material.
-pub(crate) struct Patch {
+pub(crate) struct SkinPatch {
     pub material: usize,
     pub vertices: Vec<Vertex>,
     /// Vertices of a ring; the first one comes again at the end, with its other place in the cloth.
     pub columns: usize,
 }
 
-impl Patch {
+impl SkinPatch {
     /// The same skin elsewhere, by place and normal of each vertex.
     pub fn moved(mut self, to: impl Fn(Vector, Vector) -> (Vector, Vector)) -> Self {
         for vertex in &mut self.vertices {
@@ -54,7 +54,7 @@ pub(crate) struct Detail {
 }
 
 /// Lays a skin over rings. `cloth` is where in the material it begins.
-pub(crate) fn skin(rings: &[Ring], material: usize, cloth: [f64; 2], detail: Detail) -> Patch {
+pub(crate) fn skin(rings: &[Ring], material: usize, cloth: [f64; 2], detail: Detail) -> SkinPatch {
     let smooth = smoothed(rings, detail.steps);
     let columns = detail.corners + 1;
     let mut vertices = Vec::with_capacity(smooth.len() * columns);
@@ -81,7 +81,7 @@ pub(crate) fn skin(rings: &[Ring], material: usize, cloth: [f64; 2], detail: Det
             });
         }
     }
-    let mut patch = Patch { material, vertices, columns };
+    let mut patch = SkinPatch { material, vertices, columns };
     find_normals(&mut patch, &smooth);
     patch
 }
@@ -133,7 +133,7 @@ fn catmull_rom(share: f64) -> [f64; 4] {
 }
 
 /// Across the neighbours of every vertex; outwards from the middle of its ring.
-fn find_normals(patch: &mut Patch, rings: &[Ring]) {
+fn find_normals(patch: &mut SkinPatch, rings: &[Ring]) {
     let (columns, rows) = (patch.columns, rings.len());
     for (row, ring) in rings.iter().enumerate() {
         for column in 0..columns {

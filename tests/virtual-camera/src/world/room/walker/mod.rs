@@ -25,7 +25,7 @@ use self::{
     clothes::Outfit,
     figure::Build,
     gait::Gait,
-    mesh::{Detail, Patch},
+    mesh::{Detail, SkinPatch},
     paint::Moment,
 };
 use super::{
@@ -139,7 +139,7 @@ impl Walker {
     /// The body as a floor like a mirror shows it.
     pub fn reflection(&self, pose: &BodyPose, view: &View, light: &Light) -> Option<Layer> {
         let below = |[x, y, z]: Vector| [x, -y, z];
-        let mirrored = |patch: Patch| patch.moved(|place, normal| (below(place), below(normal)));
+        let mirrored = |patch: SkinPatch| patch.moved(|place, normal| (below(place), below(normal)));
         let moments: [Moment; MOMENTS] = std::array::from_fn(|_| Moment {
             patches: self.patches(pose, view).into_iter().map(mirrored).collect(),
             view: view.clone(),
@@ -164,7 +164,7 @@ impl Walker {
         Some(bounds)
     }
 
-    fn patches(&self, pose: &BodyPose, view: &View) -> Vec<Patch> {
+    fn patches(&self, pose: &BodyPose, view: &View) -> Vec<SkinPatch> {
         let depth = view.seen(pose.pelvis)[2].max(1.0);
         // Corners of limbs must not show close up.
         let close = view.pinhole.focal / depth > 700.0;

@@ -9,7 +9,7 @@ use super::{
     },
     clothes::Cloth,
     fill::{CARRIED, Corner, triangle},
-    mesh::{Detail, Patch, Ring, Vertex, skin},
+    mesh::{Detail, Ring, SkinPatch, Vertex, skin},
 };
 use crate::{
     picture::Plane,
@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// The part of the picture that these skins lie in; none where one of them is behind the camera.
-fn window(patches: &[Patch], view: &View) -> Option<Window> {
+fn window(patches: &[SkinPatch], view: &View) -> Option<Window> {
     let vertices = patches.iter().flat_map(|patch| &patch.vertices);
     let pixels: Vec<_> = vertices.map(|vertex| Some(view.pixel(vertex.place)?.0)).collect::<Option<_>>()?;
     Window::around(pixels.into_iter(), view.size)
@@ -31,7 +31,7 @@ fn corner(window: &Window, (x, y): (f64, f64), aside: (f64, f64), carried: [f32;
 
 /// Every triangle of a patch that faces the camera.
 fn facing(
-    patch: &Patch,
+    patch: &SkinPatch,
     view: &View,
     corner: impl Fn(&Vertex, (f64, f64), f64) -> Corner,
 ) -> Vec<[Corner; 3]> {
@@ -66,7 +66,7 @@ fn facing(
 
 /// A body at one moment of an exposure, and how the camera sees it then.
 pub(super) struct Moment {
-    pub patches: Vec<Patch>,
+    pub patches: Vec<SkinPatch>,
     pub view: View,
 }
 
@@ -100,8 +100,8 @@ fn sample(
     (nearness, colours): (&mut [f32], &mut [[u8; 4]]),
 ) {
     // The nearest first: what is hidden need not be coloured.
-    let depth = |patch: &Patch| view.seen(patch.vertices[patch.vertices.len() / 2].place)[2];
-    let mut order: Vec<(f64, &Patch)> = patches.iter().map(|patch| (depth(patch), patch)).collect();
+    let depth = |patch: &SkinPatch| view.seen(patch.vertices[patch.vertices.len() / 2].place)[2];
+    let mut order: Vec<(f64, &SkinPatch)> = patches.iter().map(|patch| (depth(patch), patch)).collect();
     order.sort_by(|one, other| one.0.total_cmp(&other.0));
     for (depth, patch) in order {
         // Moments together are twice as fine.
@@ -209,7 +209,7 @@ fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
 }
 
 /// Marks the pixels whose centre the body covers.
-pub(super) fn mark(patches: &[Patch], view: &View, mask: &mut Plane) {
+pub(super) fn mark(patches: &[SkinPatch], view: &View, mask: &mut Plane) {
     let Some(window) = window(patches, view) else { return };
     for patch in patches {
         for corners in facing(patch, view, |_, pixel, _| corner(&window, pixel, (0.0, 0.0), [0.0; 4])) {

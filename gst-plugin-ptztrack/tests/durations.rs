@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Durations of all three elements, set by somebody who thinks in milliseconds.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use gst::prelude::*;
+
+fn durations(element: &gst::Element) -> Vec<String> {
+    let properties = element.list_properties();
+    let durations =
+        properties.iter().filter(|spec| spec.blurb().is_some_and(|blurb| blurb.contains("in nanoseconds")));
+    durations.map(|spec| spec.name().to_string()).collect()
+}
+
+fn warnings(bus: &gst::Bus) -> Vec<String> {
+    let messages = std::iter::from_fn(|| bus.pop_filtered(&[gst::MessageType::Warning]));
+    messages
+        .map(|message| match message.view() {
+            gst::MessageView::Warning(warning) => warning.error().to_string(),
+            _ => unreachable!(),
+        })
+        .collect()
+}
+
+#[test]
+fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
+    gst::init().unwrap();
+    gstptztrack::plugin_register_static().unwrap();
+    for (factory, count) in [("bgavgdetect", 4), ("lkfeaturetrack", 4), ("ptzoverlay", 1)] {
+        let element = gst::ElementFactory::make(factory).build().unwrap();
+        let bus = gst::Bus::new();
+        element.set_bus(Some(&bus));
+        let names = durations(&element);
+        assert_eq!(names.len(), count, "{factory}: {names:?}");
+        for name in names {
+            for right in [0u64, 1_000_000, 2_000_000_000] {
+                element.set_property(&name, right);
+                assert_eq!((element.property(&name), warnings(&bus)), (right, vec![]), "{factory} {name}");
+            }
+            for wrong in [1u64, 300, 999_999] {
+                element.set_property(&name, wrong);
+                let [warning] = warnings(&bus).try_into().unwrap();
+                let expected = format!("`{name}`={wrong} is {wrong} ns: durations are in nanoseconds");
+                assert!(warning.starts_with(&expected), "{warning}");
+                assert_eq!(element.property::<u64>(&name), 2_000_000_000, "{factory} {name}");
+            }
+        }
+    }
+}
