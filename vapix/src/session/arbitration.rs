@@ -54,6 +54,7 @@ impl Arbitration {
 
     /// More than the noise of a camera at rest, in so short a time.
     const DRIFT_DEG: f64 = 0.3;
+    /// The same for the zoom, of 9999.
     const DRIFT_ZOOM_STEPS: f64 = 20.0;
 
     /// Judges where the camera looks. An operator found keeps it for `give_way`; zero: none is looked for.
