@@ -6,6 +6,10 @@ use std::time::Duration;
 use crate::model::PanTilt;
 
 /// Mean of a rate over a window of time (thesis 3.16: one second), whatever the frame rate.
+///
+/// A Kalman filter of the rate and its change was measured in its place: as near to the target in the room (0.054 for the
+/// oracle), but a filter quick enough for somebody who turns back follows the gait's sway too, half as far again, and with
+/// noisy velocities it is twice as far off. It takes no less code.
 #[derive(Debug)]
 pub struct RateAverage {
     window: Duration,
