@@ -101,12 +101,19 @@ impl TargetEstimator {
                 self.likeliest(view.rate(measurement.centroid, measurement.velocity), commanded)
             }
         };
-        let seen = self.seen_of_pan();
-        self.target_rate.push(measurement.taken_at, PanTilt::new(rate.pan * seen, rate.tilt));
+        if is_finite(rate) {
+            let seen = self.seen_of_pan();
+            self.target_rate.push(measurement.taken_at, PanTilt::new(rate.pan * seen, rate.tilt));
+        }
     }
 
     fn place(&mut self, measurement: &Measurement, view: &View) {
-        self.error = view.error(measurement.centroid);
+        let error = view.error(measurement.centroid);
+        if !is_finite(error) {
+            // From a tracker of others, far beyond any picture.
+            return;
+        }
+        self.error = error;
         self.elevation_deg = view.tilt_deg + self.error.tilt;
         self.taken_at = measurement.taken_at;
         self.first_seen.get_or_insert((self.taken_at, self.error));
@@ -250,11 +257,10 @@ impl TargetEstimator {
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        let finite = |angles: PanTilt| angles.pan.is_finite() && angles.tilt.is_finite();
-        assert!(finite(self.error) && self.elevation_deg.is_finite(), "a target at {:?}", self.error);
-        assert!(finite(self.pace()), "a target that moves by {:?} degrees per second", self.pace());
+        assert!(is_finite(self.error) && self.elevation_deg.is_finite(), "a target at {:?}", self.error);
+        assert!(is_finite(self.pace()), "a target that moves by {:?} degrees per second", self.pace());
         assert!(
-            self.first_seen.is_none_or(|(_, error)| finite(error)),
+            self.first_seen.is_none_or(|(_, error)| is_finite(error)),
             "a target first seen at {:?}",
             self.first_seen
         );
@@ -271,8 +277,30 @@ impl TargetEstimator {
     }
 }
 
+fn is_finite(angles: PanTilt) -> bool {
+    angles.pan.is_finite() && angles.tilt.is_finite()
+}
+
 #[cfg(test)]
 mod tests {
+    /// The contract lets any finite number through.
+    #[test]
+    fn a_place_or_a_velocity_beyond_all_measure_is_no_measurement() {
+        let history = CommandHistory::default();
+        let mut estimator = TargetEstimator::new(Prediction::Lead);
+        estimator.see(&Measurement::at(0.6, 0.5, seconds(1.0)), &VIEW, &history, &delays());
+        let before = estimator.error();
+        let far = Measurement {
+            centroid: Point { x: 0.5, y: 1e308 },
+            velocity: Vector { x: 0.0, y: f64::MAX },
+            ego_velocity: Some(Vector { x: 0.0, y: f64::MIN }),
+            ..Measurement::at(0.5, 0.5, seconds(1.04))
+        };
+        estimator.see(&far, &VIEW, &history, &delays());
+        estimator.check_invariants();
+        assert_eq!(estimator.error(), before);
+    }
+
     use super::*;
     use ptztrack_contract::Point;
 

@@ -59,7 +59,7 @@ impl FaultKind {
 }
 
 impl Connection {
-    /// A single lost packet costs no more than two commands; doubled with each failure.
+    /// A single lost packet costs one or two commands at the usual rate; doubled with each failure.
     const FIRST_PAUSE: Duration = Duration::from_millis(125);
 
     /// Short enough for control to be back within two seconds of the camera's return.

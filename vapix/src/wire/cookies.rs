@@ -20,7 +20,7 @@ pub fn answer_to_cookie(header: &str) -> Option<String> {
 pub(super) struct Cookies(Vec<(String, String)>);
 
 impl Cookies {
-    /// Cameras set one or two; no header of ours then exceeds the 8 KiB that servers take.
+    /// Cameras set one or two; together they stay near the 8 KiB that servers take for a header.
     const MOST: usize = 8;
     const LONGEST_BYTES: usize = 1024;
 
