@@ -65,8 +65,8 @@ impl LimitEnforcer {
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        if let Some((_, PanTilt { pan, tilt })) = self.told {
-            assert!(pan.is_finite() && tilt.is_finite(), "a position of {pan}, {tilt} degrees");
+        if let Some((_, position)) = self.told {
+            assert!(position.is_finite(), "a position of {}, {} degrees", position.pan, position.tilt);
         }
         assert!(!self.at_limit || self.told.is_some(), "at a limit, and nobody knows where");
     }

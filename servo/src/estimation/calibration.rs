@@ -27,8 +27,7 @@ impl ObservedRotation {
         let lasted = measurement.taken_at.checked_sub(before)?;
         let fits = !lasted.is_zero() && lasted <= Self::LONGEST;
         let rate = view.rate(measurement.centroid, velocity) * -1.0;
-        let sound = rate.pan.is_finite() && rate.tilt.is_finite();
-        (fits && sound).then_some(Self { from: before, to: measurement.taken_at, rate })
+        (fits && rate.is_finite()).then_some(Self { from: before, to: measurement.taken_at, rate })
     }
 
     /// How long it took.

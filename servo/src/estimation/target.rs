@@ -101,7 +101,7 @@ impl TargetEstimator {
                 self.likeliest(view.rate(measurement.centroid, measurement.velocity), commanded)
             }
         };
-        if is_finite(rate) {
+        if rate.is_finite() {
             let seen = self.seen_of_pan();
             self.target_rate.push(measurement.taken_at, PanTilt::new(rate.pan * seen, rate.tilt));
         }
@@ -109,7 +109,7 @@ impl TargetEstimator {
 
     fn place(&mut self, measurement: &Measurement, view: &View) {
         let error = view.error(measurement.centroid);
-        if !is_finite(error) {
+        if !error.is_finite() {
             // From a tracker of others, far beyond any picture.
             return;
         }
@@ -257,10 +257,10 @@ impl TargetEstimator {
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        assert!(is_finite(self.error) && self.elevation_deg.is_finite(), "a target at {:?}", self.error);
-        assert!(is_finite(self.pace()), "a target that moves by {:?} degrees per second", self.pace());
+        assert!(self.error.is_finite() && self.elevation_deg.is_finite(), "a target at {:?}", self.error);
+        assert!(self.pace().is_finite(), "a target that moves by {:?} degrees per second", self.pace());
         assert!(
-            self.first_seen.is_none_or(|(_, error)| is_finite(error)),
+            self.first_seen.is_none_or(|(_, error)| error.is_finite()),
             "a target first seen at {:?}",
             self.first_seen
         );
@@ -277,12 +277,22 @@ impl TargetEstimator {
     }
 }
 
-fn is_finite(angles: PanTilt) -> bool {
-    angles.pan.is_finite() && angles.tilt.is_finite()
-}
-
 #[cfg(test)]
 mod tests {
+    use super::*;
+    use ptztrack_contract::Point;
+
+    const VIEW: View = View { horizontal_fov_deg: 60.0, aspect: 4.0 / 3.0, tilt_deg: 0.0 };
+    const LATENCY: Duration = Duration::from_millis(200);
+
+    fn delays() -> Delays {
+        Delays::of_sum(LATENCY, Duration::ZERO)
+    }
+
+    fn seconds(seconds: f64) -> Duration {
+        Duration::from_secs_f64(seconds)
+    }
+
     /// The contract lets any finite number through.
     #[test]
     fn a_place_or_a_velocity_beyond_all_measure_is_no_measurement() {
@@ -299,20 +309,6 @@ mod tests {
         estimator.see(&far, &VIEW, &history, &delays());
         estimator.check_invariants();
         assert_eq!(estimator.error(), before);
-    }
-
-    use super::*;
-    use ptztrack_contract::Point;
-
-    const VIEW: View = View { horizontal_fov_deg: 60.0, aspect: 4.0 / 3.0, tilt_deg: 0.0 };
-    const LATENCY: Duration = Duration::from_millis(200);
-
-    fn delays() -> Delays {
-        Delays::of_sum(LATENCY, Duration::ZERO)
-    }
-
-    fn seconds(seconds: f64) -> Duration {
-        Duration::from_secs_f64(seconds)
     }
 
     #[test]

@@ -95,9 +95,8 @@ impl CommandHistory {
     /// What holds at any time.
     pub fn check_invariants(&self) {
         assert!(self.entries.iter().is_sorted_by_key(|entry| entry.since), "commands out of order");
-        let finite = |turn: PanTilt| turn.pan.is_finite() && turn.tilt.is_finite();
         assert!(
-            self.entries.iter().all(|entry| finite(entry.start) && finite(entry.rate)),
+            self.entries.iter().all(|entry| entry.start.is_finite() && entry.rate.is_finite()),
             "a rate that is no number"
         );
     }

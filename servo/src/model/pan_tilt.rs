@@ -27,6 +27,11 @@ impl PanTilt {
         self.pan * other.pan + self.tilt * other.tilt
     }
 
+    /// Whether both are numbers, and not infinite.
+    pub fn is_finite(self) -> bool {
+        self.pan.is_finite() && self.tilt.is_finite()
+    }
+
     /// The turn from here to there, pan the short way round.
     pub fn turn_to(self, there: Self) -> Self {
         let turn = there - self;
