@@ -36,6 +36,8 @@ mod meta;
 mod motion;
 mod named;
 #[cfg(feature = "gst")]
+mod refused_values;
+#[cfg(feature = "gst")]
 mod scene;
 mod target;
 #[cfg(feature = "gst")]
@@ -57,6 +59,7 @@ mod forms {
     };
     pub use crate::meta::BufferMeta;
     pub use crate::motion::{MOTION_ROI, MotionMeta, Region, RegionTrack};
+    pub use crate::refused_values::RefusedValues;
     pub use crate::scene::{CameraMotion, Plane, SceneMeta};
     pub use crate::target_meta::{Feature, TargetMeta};
 }

@@ -47,3 +47,28 @@ fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
         }
     }
 }
+
+/// `gst-launch-1.0` sets properties while the elements have no bus yet.
+#[test]
+fn what_was_refused_before_there_was_a_bus_is_told_at_the_start_and_only_once() {
+    gst::init().unwrap();
+    gstptztrack::plugin_register_static().unwrap();
+    let pipeline = gst::parse::launch(
+        "videotestsrc ! bgavgdetect settle-time=300 ! lkfeaturetrack coast-time=300 ! ptzoverlay trail-duration=300 ! fakesink",
+    )
+    .unwrap();
+    let bus = pipeline.bus().unwrap();
+    pipeline.set_state(gst::State::Ready).unwrap();
+    assert_eq!(warnings(&bus), Vec::<String>::new());
+    pipeline.set_state(gst::State::Paused).unwrap();
+    let mut told = warnings(&bus);
+    told.sort();
+    let [coast, settle, trail] = told.try_into().unwrap();
+    assert!(coast.starts_with("`coast-time`=300 is 300 ns"), "{coast}");
+    assert!(settle.starts_with("`settle-time`=300 is 300 ns"), "{settle}");
+    assert!(trail.starts_with("`trail-duration`=300 is 300 ns"), "{trail}");
+    pipeline.set_state(gst::State::Ready).unwrap();
+    pipeline.set_state(gst::State::Paused).unwrap();
+    assert_eq!(warnings(&bus), Vec::<String>::new());
+    pipeline.set_state(gst::State::Null).unwrap();
+}

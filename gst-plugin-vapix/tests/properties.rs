@@ -93,6 +93,25 @@ fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
     }
 }
 
+/// `gst-launch-1.0` sets properties while the element has no bus yet.
+#[test]
+fn what_was_refused_before_there_was_a_bus_is_told_at_the_start() {
+    init();
+    let pipeline = gst::parse::launch("videotestsrc ! vapixptzsink latency=300 rotation=45").unwrap();
+    let bus = pipeline.bus().unwrap();
+    assert!(pipeline.set_state(gst::State::Paused).is_err(), "it has no location");
+    let told: Vec<String> = std::iter::from_fn(|| bus.pop_filtered(&[gst::MessageType::Warning]))
+        .filter_map(|message| match message.view() {
+            gst::MessageView::Warning(warning) => Some(warning.error().to_string()),
+            _ => None,
+        })
+        .collect();
+    let [latency, rotation] = told.try_into().unwrap();
+    assert!(latency.starts_with("`latency`=300 is 300 ns: durations are in nanoseconds"), "{latency}");
+    assert!(rotation.contains("[0, 90, 180, 270]"), "{rotation}");
+    pipeline.set_state(gst::State::Null).unwrap();
+}
+
 #[test]
 fn a_rotation_is_by_quarters() {
     let rig = Rig::ready("http://192.168.0.90").with("rotation", 90u32).with("rotation", 45u32);

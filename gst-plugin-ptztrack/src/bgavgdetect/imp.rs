@@ -12,8 +12,8 @@ use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, Region, SceneMeta,
-    TargetState, Times, TrackerEvent,
+    BufferMeta, CameraEvent, MOTION_ROI, MotionChange, MotionMessage, MotionMeta, RefusedValues, Region,
+    SceneMeta, TargetState, Times, TrackerEvent,
 };
 
 use super::settings::{Settings, ZoneSetting};
@@ -52,7 +52,7 @@ pub struct BgAvgDetect {
     )]
     #[property(
         name = "alpha-interval", get, type = u64, member = alpha_interval_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "alpha-interval", value) { lock(&imp.settings).alpha_interval_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "alpha-interval", value) { lock(&imp.settings).alpha_interval_ns = value },
         default = Settings::default().alpha_interval_ns, maximum = 3_600_000_000_000,
         blurb = "Distance of pictures that alpha is for, in nanoseconds; for others it is scaled (0 = alpha for every picture)"
     )]
@@ -138,19 +138,19 @@ pub struct BgAvgDetect {
     )]
     #[property(
         name = "settle-time", get, type = u64, member = settle_time_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "settle-time", value) { lock(&imp.settings).settle_time_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "settle-time", value) { lock(&imp.settings).settle_time_ns = value },
         default = Settings::default().settle_time_ns, maximum = 60_000_000_000,
         blurb = "How long pictures may still show the camera moving after it stopped, in nanoseconds"
     )]
     #[property(
         name = "max-gap", get, type = u64, member = max_gap_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "max-gap", value) { lock(&imp.settings).max_gap_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "max-gap", value) { lock(&imp.settings).max_gap_ns = value },
         default = Settings::default().max_gap_ns, maximum = 3_600_000_000_000,
         blurb = "Longest interruption (DISCONT, gap) after which the background still holds, in nanoseconds"
     )]
     #[property(
         name = "end-delay", get, type = u64, member = end_delay_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "end-delay", value) { lock(&imp.settings).end_delay_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "end-delay", value) { lock(&imp.settings).end_delay_ns = value },
         default = Settings::default().end_delay_ns, maximum = 3_600_000_000_000,
         blurb = "How long nothing must move before motion is reported to have ended, in nanoseconds"
     )]
@@ -171,6 +171,7 @@ pub struct BgAvgDetect {
     stream: Mutex<Option<Stream>>,
     duty: Mutex<Duty>,
     heard: Mutex<Heard>,
+    refused: RefusedValues,
 }
 
 impl Default for BgAvgDetect {
@@ -182,6 +183,7 @@ impl Default for BgAvgDetect {
             stream: Mutex::default(),
             duty: Mutex::default(),
             heard: Mutex::default(),
+            refused: RefusedValues::default(),
         }
     }
 }
@@ -232,6 +234,7 @@ impl BaseTransformImpl for BgAvgDetect {
     const TRANSFORM_IP_ON_PASSTHROUGH: bool = false;
 
     fn start(&self) -> Result<(), gst::ErrorMessage> {
+        self.refused.warn(&*self.obj());
         *lock(&self.duty) = Duty::default();
         *lock(&self.heard) = Heard::default();
         self.apply_output();

@@ -10,7 +10,9 @@ use gst_base::subclass::BaseTransformMode;
 use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
 use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{CameraEvent, MOTION_ROI, Point, TargetChange, TargetState, Times, TrackerEvent};
+use ptztrack_contract::{
+    CameraEvent, MOTION_ROI, Point, RefusedValues, TargetChange, TargetState, Times, TrackerEvent,
+};
 
 use super::scene_source::SceneSource;
 use super::{Profile, TargetSelection, buffer};
@@ -171,7 +173,7 @@ pub struct LkFeatureTrack {
     )]
     #[property(
         name = "coast-time", get, type = u64, member = coast_time_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "coast-time", value) { lock(&imp.settings).coast_time_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "coast-time", value) { lock(&imp.settings).coast_time_ns = value },
         maximum = 60_000_000_000, default = Settings::default().coast_time_ns,
         blurb = "How long a hidden target is looked for where it should be, in nanoseconds (0: it is lost at once)"
     )]
@@ -182,19 +184,19 @@ pub struct LkFeatureTrack {
     )]
     #[property(
         name = "message-interval", get, type = u64, member = message_interval_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "message-interval", value) { lock(&imp.settings).message_interval_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "message-interval", value) { lock(&imp.settings).message_interval_ns = value },
         maximum = 3_600_000_000_000, default = Settings::default().message_interval_ns,
         blurb = "Time between two position messages while there is a target, in nanoseconds (0: none)"
     )]
     #[property(
         name = "stationary-timeout", get, type = u64, member = stationary_timeout_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "stationary-timeout", value) { lock(&imp.settings).stationary_timeout_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "stationary-timeout", value) { lock(&imp.settings).stationary_timeout_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().stationary_timeout_ns,
         blurb = "A target that stands still for longer is released and not taken again until it moves, in nanoseconds (0: never)"
     )]
     #[property(
         name = "max-tracking-time", get, type = u64, member = max_tracking_time_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "max-tracking-time", value) { lock(&imp.settings).max_tracking_time_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "max-tracking-time", value) { lock(&imp.settings).max_tracking_time_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().max_tracking_time_ns,
         blurb = "A target that is tracked for longer is released and not taken again until it has moved and 3 s have passed, in nanoseconds (0: never)"
     )]
@@ -205,6 +207,7 @@ pub struct LkFeatureTrack {
     size: Mutex<Option<(u32, u32)>>,
     request: Mutex<Option<TargetRequest>>,
     camera: Mutex<CameraMoves>,
+    refused: RefusedValues,
 }
 
 #[glib::object_subclass]
@@ -281,6 +284,11 @@ impl BaseTransformImpl for LkFeatureTrack {
     const MODE: BaseTransformMode = BaseTransformMode::AlwaysInPlace;
     const PASSTHROUGH_ON_SAME_CAPS: bool = false;
     const TRANSFORM_IP_ON_PASSTHROUGH: bool = false;
+
+    fn start(&self) -> Result<(), gst::ErrorMessage> {
+        self.refused.warn(&*self.obj());
+        Ok(())
+    }
 
     fn stop(&self) -> Result<(), gst::ErrorMessage> {
         let stream = lock(&self.stream).take();

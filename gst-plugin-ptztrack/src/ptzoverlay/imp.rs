@@ -6,7 +6,7 @@ use glib::Properties;
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_video::{VideoFormat, VideoOverlayComposition, VideoOverlayCompositionMeta, VideoOverlayRectangle};
-use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, TargetMeta, TargetState};
+use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, RefusedValues, TargetMeta, TargetState};
 
 use super::{caps, pixels};
 use crate::allocation::refuse_crop;
@@ -112,7 +112,7 @@ pub struct PtzOverlay {
     )]
     #[property(
         name = "trail-duration", get, type = u64, member = trail_duration_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, "trail-duration", value) { lock(&imp.settings).trail_duration_ns = value },
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "trail-duration", value) { lock(&imp.settings).trail_duration_ns = value },
         default = Settings::default().trail_duration_ns, maximum = 60_000_000_000,
         blurb = "How long the trail reaches back, in nanoseconds"
     )]
@@ -131,6 +131,7 @@ pub struct PtzOverlay {
     settings: Mutex<Settings>,
     format: Mutex<Option<Format>>,
     memory: Mutex<Memory>,
+    refused: RefusedValues,
     sinkpad: gst::Pad,
     srcpad: gst::Pad,
 }
@@ -169,6 +170,7 @@ impl ObjectSubclass for PtzOverlay {
             settings: Mutex::default(),
             format: Mutex::default(),
             memory: Mutex::default(),
+            refused: RefusedValues::default(),
             sinkpad,
             srcpad,
         }
@@ -213,6 +215,9 @@ impl ElementImpl for PtzOverlay {
         &self,
         transition: gst::StateChange,
     ) -> Result<gst::StateChangeSuccess, gst::StateChangeError> {
+        if transition == gst::StateChange::ReadyToPaused {
+            self.refused.warn(&*self.obj());
+        }
         let success = self.parent_change_state(transition)?;
         if transition == gst::StateChange::PausedToReady {
             *lock(&self.format) = None;

@@ -8,6 +8,7 @@ use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::prelude::*;
+use ptztrack_contract::RefusedValues;
 
 use super::camera_task::{self, CameraTask, Event, Predecessor};
 use super::clock::Clock;
@@ -54,6 +55,7 @@ pub struct VapixPtzSink {
     pending_status: Mutex<PendingStatus>,
     /// Held by whoever pushes it; nobody waits for this one.
     pushing: Mutex<()>,
+    pub(super) refused: RefusedValues,
 }
 
 #[glib::object_subclass]
@@ -228,7 +230,7 @@ impl VapixPtzSink {
             let refused = settings.judge_limits();
             (settings.clone(), refused)
         };
-        self.warn_of_refused(&refused);
+        self.warn_of_refused(refused);
         let Some(client) = settings.client(environment) else {
             gst::element_imp_error!(
                 self,

@@ -45,8 +45,9 @@
 //!
 //! ## Seeking and following
 //! In `mode=velocity` a new target is sought at up to twice `gain`, by dead reckoning from the commands sent, until it is
-//! within `dead-zone` or for 2 s at most; from then on it is followed at `gain`, by what the pictures show. While the
-//! camera pans, tilt corrects offsets beyond a third of `dead-zone`.
+//! within `dead-zone` or for 2 s at most; from then on it is followed at `gain`, by what the pictures show. Steeply below
+//! the camera, and while the gain is lowered because the loop oscillates, it is followed from the start. While the camera
+//! pans, tilt corrects offsets beyond a third of `dead-zone`.
 //!
 //! ## Between tracker and camera
 //! A picture may be scaled between the tracker and this sink. One that is cropped or gets borders is refused, with a

@@ -33,7 +33,7 @@ impl VapixPtzSink {
                 }
             }
         }
-        self.warn_of_refused(&refused);
+        self.warn_of_refused(refused);
     }
 
     /// From here on the camera task hears of changes; at first of those since it was started with `before`.
@@ -49,13 +49,14 @@ impl VapixPtzSink {
             *lock(&self.task) = Some(task);
             refused
         };
-        self.warn_of_refused(&refused);
+        self.warn_of_refused(refused);
     }
 
-    /// Tells of values that were refused.
-    pub(super) fn warn_of_refused(&self, refused: &[String]) {
-        for refused in refused {
-            gst::element_imp_warning!(self, gst::ResourceError::Settings, ("{refused}"));
+    /// Tells of values that were refused, by now or before there was a bus.
+    pub(super) fn warn_of_refused(&self, refused: Vec<String>) {
+        for reason in refused {
+            self.refused.add(&*self.obj(), reason);
         }
+        self.refused.warn(&*self.obj());
     }
 }

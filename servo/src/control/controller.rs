@@ -36,11 +36,13 @@ pub struct Controller {
 impl Controller {
     /// The rate that brings the error to zero, within about 1/gain once the target is followed, while it moves on.
     pub fn rate(&mut self, offset: &Offset, in_force: PanTilt, law: &ControlLaw) -> PanTilt {
-        let Offset { seen, expected, reckoned, target } = *offset;
+        let Offset { seen, expected, reckoned, steepness, target } = *offset;
         let scale = self.oscillation.gain_scale();
         // A loop that oscillates has a wrong model of the camera, so its dead reckoning is wrong too.
         let reckoned = reckoned.filter(|_| scale >= 1.0);
-        let law = &ControlLaw { gain: scale * law.gain, ..*law };
+        // Steeply below the camera a direction says little of where the target will be: there it is sought as it is followed.
+        let seek_gain = law.gain + (law.seek_gain - law.gain) * (1.0 - steepness);
+        let law = &ControlLaw { gain: scale * law.gain, seek_gain, ..*law };
         let [pan, tilt] = [|pair: PanTilt| pair.pan, |pair: PanTilt| pair.tilt].map(|axis| Motion {
             seen_deg: axis(seen),
             expected_deg: axis(expected),
@@ -150,7 +152,13 @@ mod tests {
 
     fn offset(pan: f64, tilt: f64, target: f64) -> Offset {
         let error = PanTilt::new(pan, tilt);
-        Offset { seen: error, expected: error, reckoned: Some(error), target: PanTilt::new(target, 0.0) }
+        Offset {
+            seen: error,
+            expected: error,
+            reckoned: Some(error),
+            steepness: 0.0,
+            target: PanTilt::new(target, 0.0),
+        }
     }
 
     #[test]
@@ -173,10 +181,8 @@ mod tests {
     fn what_is_only_foreseen_starts_nothing() {
         let mut controller = Controller::default();
         let mut rate = |seen, expected| {
-            let [seen, expected] = [seen, expected].map(|error| PanTilt::new(error, 0.0));
-            controller
-                .rate(&Offset { seen, expected, reckoned: Some(expected), target: still() }, still(), &LAW)
-                .pan
+            let foreseen = offset(expected, 0.0, 0.0);
+            controller.rate(&Offset { seen: PanTilt::new(seen, 0.0), ..foreseen }, still(), &LAW).pan
         };
         assert_eq!((rate(0.2, 5.0), rate(-0.9, 5.0), rate(0.5, 5.0), rate(0.2, 5.0)), (0.0, 0.0, 5.0, 5.0));
     }
@@ -200,14 +206,8 @@ mod tests {
         let law = ControlLaw { seek_gain: 3.0, ..LAW };
         let mut controller = Controller::default();
         let mut rate = |reckoned| {
-            let [expected, reckoned] = [10.0, reckoned].map(|error| PanTilt::new(error, 0.0));
-            controller
-                .rate(
-                    &Offset { seen: expected, expected, reckoned: Some(reckoned), target: still() },
-                    still(),
-                    &law,
-                )
-                .pan
+            let reckoned = Some(PanTilt::new(reckoned, 0.0));
+            controller.rate(&Offset { reckoned, ..offset(10.0, 0.0, 0.0) }, still(), &law).pan
         };
         assert_eq!((rate(10.0), rate(4.0), rate(0.5), rate(10.0)), (30.0, 12.0, 10.0, 10.0));
         controller.new_target();
@@ -215,13 +215,21 @@ mod tests {
     }
 
     #[test]
+    fn steeply_below_a_new_target_is_sought_no_faster_and_no_slower_than_it_is_followed() {
+        let law = ControlLaw { seek_gain: 3.0, ..LAW };
+        let sought = |steepness| {
+            let offset = Offset { steepness, ..offset(10.0, 0.0, 0.0) };
+            Controller::default().rate(&offset, still(), &law).pan
+        };
+        assert_eq!([0.0, 0.5, 1.0].map(sought), [30.0, 20.0, 10.0]);
+    }
+
+    #[test]
     fn an_axis_that_is_held_does_not_keep_the_other_from_following() {
         let law = ControlLaw { seek_gain: 3.0, ..LAW };
         let mut controller = Controller::default();
         let mut pan = |reckoned: Option<PanTilt>| {
-            let expected = PanTilt::new(10.0, 8.0);
-            let offset = Offset { seen: expected, expected, reckoned, target: still() };
-            controller.rate(&offset, still(), &law).pan
+            controller.rate(&Offset { reckoned, ..offset(10.0, 8.0, 0.0) }, still(), &law).pan
         };
         assert_eq!(pan(Some(PanTilt::new(4.0, 8.0))), 12.0);
         assert_eq!(pan(Some(PanTilt::new(0.5, 8.0))), 10.0);

@@ -199,10 +199,8 @@ impl SpeedMapEstimator {
             return;
         }
         // What is bounded by proportional speed tells nothing of the map.
-        let believed = (axis.rate)(history.rotation(from, to)) / turn.seconds();
-        let Some(way) = self.way(about, from, to).filter(|_| !maps.believed.is_capped(believed)) else {
-            return;
-        };
+        let bounded = maps.believed.is_capped(low.abs().max(high.abs()));
+        let Some(way) = self.way(about, from, to).filter(|_| !bounded) else { return };
         let (seen, commanded) = ((axis.rate)(turn.rate) * low.signum(), way.degrees / turn.seconds());
         let noise = NOISE_FIELDS_S * fov_deg;
         let mut features = way.features;

@@ -37,6 +37,8 @@ pub struct Offset {
     /// The part of `expected` that dead reckoning since the target was first seen leaves, never more than that; `None` where that
     /// is too long ago to tell.
     pub reckoned: Option<PanTilt>,
+    /// How steeply below or above the camera the target is, from 0 at the horizon to 1: the squared sine of its elevation.
+    pub steepness: f64,
     /// The target's own motion then, degrees per second.
     pub target: PanTilt,
 }
@@ -97,8 +99,9 @@ impl TargetEstimator {
             ),
             None => {
                 let (sent, uncertainty) = (delays.sent_by(measurement.taken_at), delays.uncertainty);
-                let commanded = history.rates_between(sent.saturating_sub(uncertainty), sent + uncertainty);
-                self.likeliest(view.rate(measurement.centroid, measurement.velocity), commanded)
+                let (from, to) = (sent.saturating_sub(uncertainty), sent + uncertainty);
+                let camera = history.rates_between(from, to).chain([history.reached_at(from)]);
+                self.likeliest(view.rate(measurement.centroid, measurement.velocity), camera)
             }
         };
         if rate.is_finite() {
@@ -190,8 +193,13 @@ impl TargetEstimator {
         let target = self.target_rate(self.horizon(now, delays));
         // Half round the camera, what goes up goes down in the picture.
         let target = PanTilt::new(target.pan, target.tilt * expected.pan.to_radians().cos());
-        let reckoned = self.reckoned(expected, now, history, delays);
-        Offset { seen: self.in_picture(self.error), expected: self.in_picture(expected), reckoned, target }
+        Offset {
+            seen: self.in_picture(self.error),
+            expected: self.in_picture(expected),
+            reckoned: self.reckoned(expected, now, history, delays),
+            steepness: self.steepness(),
+            target,
+        }
     }
 
     /// The first error, plus the target's mean motion since, less all turns commanded since; where that and the expected error
@@ -214,9 +222,7 @@ impl TargetEstimator {
         let common = |one: f64, other: f64| {
             if one * other > 0.0 { one.abs().min(other.abs()).copysign(one) } else { 0.0 }
         };
-        // Steeply below the camera a direction says little of where the target will be: both axes count by the squared cosine of
-        // the elevation.
-        Some(self.in_picture(expected).each(left, common) * self.seen_of_pan().powi(2))
+        Some(self.in_picture(expected).each(left, common))
     }
 
     /// The same error with what tilt alone is to do about it: while pan is under way, to look already as high as the target
@@ -246,13 +252,16 @@ impl TargetEstimator {
         }
     }
 
-    /// Pan by its trend; tilt by its mean, and by its trend only as far as the target is seen from above. Seen from the side, a
+    /// Pan by its trend; tilt by its mean, and by its trend only as far as the target is steeply below. Seen from the side, a
     /// walker's steps move the silhouette's middle up and down faster than the walker comes nearer, and do not last.
     fn leading_rate(&self, lead: Duration) -> PanTilt {
         let ahead = self.target_rate.ahead(lead);
         let mean = self.target_rate.certain_mean().tilt;
-        let from_above = 1.0 - self.seen_of_pan().powi(2);
-        PanTilt::new(ahead.pan, mean + from_above * (ahead.tilt - mean))
+        PanTilt::new(ahead.pan, mean + self.steepness() * (ahead.tilt - mean))
+    }
+
+    fn steepness(&self) -> f64 {
+        1.0 - self.seen_of_pan().powi(2)
     }
 
     /// What holds at any time.

@@ -68,11 +68,16 @@ impl CommandHistory {
 
     /// The rate that is commanded at a time; zero before the first.
     pub fn rate_at(&self, at: Duration) -> PanTilt {
-        self.entries
-            .iter()
-            .rev()
-            .find(|entry| entry.since <= at)
-            .map_or(PanTilt::default(), |entry| entry.rate)
+        self.entry_at(at).map_or(PanTilt::default(), |entry| entry.rate)
+    }
+
+    fn entry_at(&self, at: Duration) -> Option<&Entry> {
+        self.entries.iter().rev().find(|entry| entry.since <= at)
+    }
+
+    /// The rate that the motors have reached at a time.
+    pub fn reached_at(&self, at: Duration) -> PanTilt {
+        self.entry_at(at).map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2))
     }
 
     /// The rates in force at some moment between two times, in order.

@@ -74,7 +74,7 @@ enum Repeat {
     Never,
 }
 
-/// A complete answer.
+/// A response whose body was received whole.
 struct CompleteResponse {
     status: StatusCode,
     body: String,
