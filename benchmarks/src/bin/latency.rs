@@ -3,9 +3,10 @@
 //! From a decoded picture at `bgavgdetect` to the command that it led to, at the camera: `latency SECONDS WxH`.
 //!
 //! A virtual camera shows somebody in the room by MJPEG over HTTP and is moved after them, all in this process and by the
-//! clock. A command is counted against the newest picture that had come to `bgavgdetect` before the camera had the command:
-//! later pictures cannot have led to it. Prints a line of CSV with a header: commands that move the camera, median and 99th
-//! percentile in milliseconds.
+//! clock. Commands may follow each other as fast as the sink allows, so that none waits for its turn. Counted is the first
+//! command that the camera has after a picture came to `bgavgdetect`, before the next picture came: what follows it is not
+//! the picture's delay. Prints a line of CSV with a header: commands that move the camera, median and 99th percentile in
+//! milliseconds.
 
 use std::error::Error;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -30,7 +31,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let launch = format!(
         "souphttpsrc is-live=true do-timestamp=true location={url}/axis-cgi/mjpg/video.cgi?resolution={size} \
          ! multipartdemux ! jpegdec ! queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0 \
-         ! bgavgdetect name=detect ! lkfeaturetrack ! vapixptzsink location={url}"
+         ! bgavgdetect name=detect ! lkfeaturetrack ! vapixptzsink max-rate=50 location={url}"
     );
     let pipeline = gst::parse::launch(&launch)?.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
     let arrivals = Arc::new(Mutex::new(Vec::<Duration>::new()));
@@ -47,13 +48,16 @@ fn main() -> Result<(), Box<dyn Error>> {
     let commands = camera.commands();
     pipeline.set_state(gst::State::Null)?;
     let arrivals = arrivals.lock().unwrap_or_else(PoisonError::into_inner);
-    let moves = commands
+    let moves: Vec<Duration> = commands
         .iter()
-        .filter(|command| command.time > start && command.query.contains("continuouspantiltmove"));
-    let mut delays: Vec<f64> = moves
-        .filter_map(|command| {
-            let picture = arrivals.iter().rev().find(|arrival| **arrival <= command.time)?;
-            Some(1000.0 * (command.time - *picture).as_secs_f64())
+        .filter(|command| command.time > start && command.query.contains("continuouspantiltmove"))
+        .map(|command| command.time)
+        .collect();
+    let mut delays: Vec<f64> = arrivals
+        .windows(2)
+        .filter_map(|pictures| {
+            let first = moves.iter().find(|time| (pictures[0]..pictures[1]).contains(time))?;
+            Some(1000.0 * (*first - pictures[0]).as_secs_f64())
         })
         .collect();
     delays.sort_by(f64::total_cmp);
