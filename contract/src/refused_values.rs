@@ -21,7 +21,7 @@ impl RefusedValues {
 
     /// Warns of what was not told yet. To be called when the element starts.
     pub fn warn(&self, element: &impl IsA<gst::Element>) {
-        if element.bus().is_none() {
+        if !is_heard(element) {
             return;
         }
         let refused = mem::take(&mut *lock(&self.0));
@@ -29,4 +29,13 @@ impl RefusedValues {
             gst::element_warning!(element, gst::LibraryError::Settings, ("{reason}"));
         }
     }
+}
+
+/// Whether a message reaches an application. A bin gives its children a bus of its own before it has one itself.
+fn is_heard(element: &impl IsA<gst::Element>) -> bool {
+    let mut top = element.upcast_ref::<gst::Element>().clone().upcast::<gst::Object>();
+    while let Some(parent) = top.parent() {
+        top = parent;
+    }
+    top.downcast::<gst::Element>().is_ok_and(|top| top.bus().is_some())
 }

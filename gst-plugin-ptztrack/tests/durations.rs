@@ -54,7 +54,7 @@ fn what_was_refused_before_there_was_a_bus_is_told_at_the_start_and_only_once() 
     gst::init().unwrap();
     gstptztrack::plugin_register_static().unwrap();
     let pipeline = gst::parse::launch(
-        "videotestsrc ! bgavgdetect settle-time=300 ! lkfeaturetrack coast-time=300 ! ptzoverlay trail-duration=300 ! fakesink",
+        "videotestsrc ! bgavgdetect settle-time=300 zones=x ! lkfeaturetrack coast-time=300 ! ptzoverlay trail-duration=300 ! fakesink",
     )
     .unwrap();
     let bus = pipeline.bus().unwrap();
@@ -63,12 +63,30 @@ fn what_was_refused_before_there_was_a_bus_is_told_at_the_start_and_only_once() 
     pipeline.set_state(gst::State::Paused).unwrap();
     let mut told = warnings(&bus);
     told.sort();
-    let [coast, settle, trail] = told.try_into().unwrap();
+    let [coast, settle, trail, zones] = told.try_into().unwrap();
     assert!(coast.starts_with("`coast-time`=300 is 300 ns"), "{coast}");
     assert!(settle.starts_with("`settle-time`=300 is 300 ns"), "{settle}");
     assert!(trail.starts_with("`trail-duration`=300 is 300 ns"), "{trail}");
+    assert!(zones.starts_with("zones stays as it was"), "{zones}");
     pipeline.set_state(gst::State::Ready).unwrap();
     pipeline.set_state(gst::State::Paused).unwrap();
     assert_eq!(warnings(&bus), Vec::<String>::new());
+    pipeline.set_state(gst::State::Null).unwrap();
+}
+
+/// As applications build a bin of a description, set its properties and put it into their pipeline.
+#[test]
+fn what_is_refused_in_a_bin_without_a_pipeline_is_told_at_the_start() {
+    gst::init().unwrap();
+    gstptztrack::plugin_register_static().unwrap();
+    let bin =
+        gst::parse::bin_from_description("videotestsrc ! bgavgdetect name=d ! fakesink", false).unwrap();
+    bin.by_name("d").unwrap().set_property("settle-time", 300u64);
+    let pipeline = gst::Pipeline::new();
+    pipeline.add(&bin).unwrap();
+    let bus = pipeline.bus().unwrap();
+    pipeline.set_state(gst::State::Paused).unwrap();
+    let [warning] = warnings(&bus).try_into().unwrap();
+    assert!(warning.starts_with("`settle-time`=300 is 300 ns"), "{warning}");
     pipeline.set_state(gst::State::Null).unwrap();
 }

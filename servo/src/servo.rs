@@ -213,6 +213,7 @@ impl Servo {
 
     /// Until when the camera goes on as it was last told, while it is found out whether it is ours.
     pub fn undecided_until(&self, now: Duration) -> Option<Duration> {
+        // As long as it goes on without a picture of the target, by default.
         const LONGEST: Duration = Duration::from_secs(1);
         let since = self.target.as_ref()?.undecided_since?;
         Some(since + LONGEST).filter(|until| now < *until)

@@ -362,11 +362,10 @@ impl BgAvgDetect {
     ) {
         match text.unwrap_or_default().parse::<ZoneSetting>() {
             Ok(zones) => *field(&mut lock(&self.settings)) = zones,
-            Err(error) => gst::element_imp_warning!(
-                self,
-                gst::LibraryError::Settings,
-                ("{name} stays as it was: {error}. Write {}", Zones::GRAMMAR)
-            ),
+            Err(error) => {
+                let reason = format!("{name} stays as it was: {error}. Write {}", Zones::GRAMMAR);
+                self.refused.add(&*self.obj(), reason);
+            }
         }
     }
 

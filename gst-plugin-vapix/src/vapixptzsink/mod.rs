@@ -28,8 +28,8 @@
 //! User and password are taken from `user` and `password`, from `location` (`http://user:password@host`; they are removed
 //! from it at once), or from the environment variables `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process
 //! lists and of the parser's log. `user`, `password` and everything about the servo can be changed while playing;
-//! `location`, `camera`, `auth`, `timeout`, `ca-file`, `insecure` and `lockstep` take effect at the next change from READY
-//! to PAUSED.
+//! `location`, `camera`, `auth`, `timeout`, `ca-file`, `insecure`, `home-at-start`, `dead-man`, `dead-man-socket` and
+//! `lockstep` take effect at the next change from READY to PAUSED.
 //!
 //! With `lockstep` the servo's time is the stream's running time and stands still between buffers: each buffer waits until
 //! the camera has answered what is due at its time. A simulated camera that advances only then gives the same run every

@@ -40,13 +40,12 @@ impl Controller {
         let scale = self.oscillation.gain_scale();
         // A loop that oscillates has a wrong model of the camera, so its dead reckoning is wrong too.
         let reckoned = reckoned.filter(|_| scale >= 1.0);
-        // Steeply below the camera a direction says little of where the target will be: there it is sought as it is followed.
-        let seek_gain = law.gain + (law.seek_gain - law.gain) * (1.0 - steepness);
-        let law = &ControlLaw { gain: scale * law.gain, seek_gain, ..*law };
+        let law = &ControlLaw { gain: scale * law.gain, ..*law };
         let [pan, tilt] = [|pair: PanTilt| pair.pan, |pair: PanTilt| pair.tilt].map(|axis| Motion {
             seen_deg: axis(seen),
             expected_deg: axis(expected),
             reckoned_deg: reckoned.map(axis),
+            steepness,
             target_deg_s: axis(target),
             in_force_deg_s: axis(in_force),
             dead_zone_deg: axis(law.dead_zone_deg),
@@ -84,6 +83,7 @@ struct Motion {
     seen_deg: f64,
     expected_deg: f64,
     reckoned_deg: Option<f64>,
+    steepness: f64,
     target_deg_s: f64,
     in_force_deg_s: f64,
     dead_zone_deg: f64,
@@ -122,9 +122,14 @@ impl Axis {
 
     fn correction(&mut self, motion: &Motion, law: &ControlLaw) -> f64 {
         self.follows |= motion.reckoned_deg.is_none_or(|reckoned| reckoned.abs() <= motion.dead_zone_deg);
+        let follow = law.gain * motion.expected_deg;
         match motion.reckoned_deg {
-            Some(reckoned) if !self.follows => law.seek_gain * reckoned,
-            _ => law.gain * motion.expected_deg,
+            // Steeply below the camera a direction says little of where the target will be: there it is sought as it is
+            // followed.
+            Some(reckoned) if !self.follows => {
+                follow + (1.0 - motion.steepness) * (law.seek_gain * reckoned - follow)
+            }
+            _ => follow,
         }
     }
 }
@@ -215,13 +220,15 @@ mod tests {
     }
 
     #[test]
-    fn steeply_below_a_new_target_is_sought_no_faster_and_no_slower_than_it_is_followed() {
+    fn steeply_below_a_new_target_is_sought_as_it_is_followed() {
         let law = ControlLaw { seek_gain: 3.0, ..LAW };
-        let sought = |steepness| {
-            let offset = Offset { steepness, ..offset(10.0, 0.0, 0.0) };
+        let sought = |reckoned, steepness| {
+            let reckoned = Some(PanTilt::new(reckoned, 0.0));
+            let offset = Offset { reckoned, steepness, ..offset(10.0, 0.0, 0.0) };
             Controller::default().rate(&offset, still(), &law).pan
         };
-        assert_eq!([0.0, 0.5, 1.0].map(sought), [30.0, 20.0, 10.0]);
+        assert_eq!([0.0, 0.5, 1.0].map(|steepness| sought(10.0, steepness)), [30.0, 20.0, 10.0]);
+        assert_eq!(sought(4.0, 1.0), 10.0);
     }
 
     #[test]

@@ -171,6 +171,7 @@ impl TargetEstimator {
     /// The error, the way round on which the camera is by so many degrees: half round from the target it would else turn
     /// back at each tremble.
     fn round(&self, under_way_deg: f64) -> PanTilt {
+        // Less than 180, as a place beyond half round is measured to either side of it, by some degrees.
         const HALF_ROUND_DEG: f64 = 150.0;
         let turns_back = self.error.pan.abs() > HALF_ROUND_DEG && self.error.pan * under_way_deg < 0.0;
         let round_deg = if turns_back { 360f64.copysign(under_way_deg) } else { 0.0 };
