@@ -39,9 +39,9 @@ BENCH_SECONDS ?= 16
 ROUNDS ?= 5
 LIVE_SECONDS ?= 20
 # A package of its own, which shares what is compiled.
-BENCHMARKS := --manifest-path benchmarks/Cargo.toml --target-dir target
+BENCHMARKS := --manifest-path tests/benchmarks/Cargo.toml --target-dir target
 # The runner must be of the version that the benchmarks are built with.
-GUNGRAUN := $(shell sed -n 's/^gungraun = "=\(.*\)"/\1/p' benchmarks/Cargo.toml)
+GUNGRAUN := $(shell sed -n 's/^gungraun = "=\(.*\)"/\1/p' tests/benchmarks/Cargo.toml)
 
 ## help: list the targets
 help:
@@ -88,19 +88,19 @@ bench: packages-bench
 		target/release/record target/bench/still.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 0; \
 		target/release/record target/bench/turning.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 5; \
 	done
-	scripts/with-plugins release python3 benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
+	scripts/with-plugins release python3 tests/benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
 		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
-	scripts/with-plugins release python3 benchmarks/allocations.py target/bench/still.{avi,mpeg4} --out target/bench
-	scripts/with-plugins release python3 benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench
+	scripts/with-plugins release python3 tests/benchmarks/allocations.py target/bench/still.{avi,mpeg4} --out target/bench
+	scripts/with-plugins release python3 tests/benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench
 	$(CARGO) bench $(BENCHMARKS) --bench algorithms --bench elements | tee target/bench/algorithms.txt
 
 ## bench-check: count the instructions that each element takes for fixed pictures, and fail where one is more than a tenth off the
-##       counts in benchmarks/instructions.csv (ARGS=--accept writes these)
+##       counts in tests/benchmarks/instructions.csv (ARGS=--accept writes these)
 bench-check: packages-bench
 	$(CARGO) install --quiet --locked gungraun-runner --version $(GUNGRAUN) --root target/tools
 	rm -rf target/gungraun
 	CARGO_TARGET_DIR="$(CURDIR)/target" GUNGRAUN_RUNNER="$(CURDIR)/target/tools/bin/gungraun-runner" $(CARGO) bench $(BENCHMARKS) --bench instructions -- --save-summary=json
-	python3 benchmarks/check_instructions.py target/gungraun benchmarks/instructions.csv $(ARGS)
+	python3 tests/benchmarks/check_instructions.py target/gungraun tests/benchmarks/instructions.csv $(ARGS)
 
 ## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
 ##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;

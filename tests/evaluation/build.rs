@@ -14,8 +14,11 @@ const NO_PART_OF_A_RUN: [&str; 8] =
 
 fn main() -> io::Result<()> {
     let parts = [
-        ("TRACKER_SOURCES", vec!["contract/src", "gst-plugin-ptztrack/src"]),
-        ("SERVO_SOURCES", vec!["contract/src", "servo/src", "vapix/src", "gst-plugin-vapix/src"]),
+        ("TRACKER_SOURCES", vec!["crates/contract/src", "gst-plugin-ptztrack/src"]),
+        (
+            "SERVO_SOURCES",
+            vec!["crates/contract/src", "crates/servo/src", "crates/vapix/src", "gst-plugin-vapix/src"],
+        ),
         ("LABORATORY_SOURCES", vec!["tests/virtual-camera/src", "tests/evaluation/src", "Cargo.lock"]),
     ];
     for (name, folders) in parts {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! Instructions that each element takes, which vary less than time does: `make bench-check` compares them with
-//! `benchmarks/instructions.csv`.
+//! `tests/benchmarks/instructions.csv`.
 
 #![allow(missing_docs, reason = "what the macros make has none")]
 
