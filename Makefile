@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -52,15 +52,20 @@ build: packages-build
 	$(CARGO) build --release $(PRODUCT)
 
 ## test: check formatting, lint, build, run all tests
-test: packages-test lint
-	$(CARGO) build --workspace --examples --lib --bins
-	@# With cameras on this machine the tests speak plain HTTP: no proxy has a way to these.
-	env -u http_proxy -u HTTP_PROXY G_DEBUG=fatal-criticals scripts/with-plugins debug timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
+test: packages-test check-format
+	@# Clippy's own compiler builds what is tested, so that nothing is compiled twice; it denies warnings as in `make lint`.
+	export RUSTC_WORKSPACE_WRAPPER="$$(command -v clippy-driver)" CLIPPY_ARGS="-Dwarnings__CLIPPY_HACKERY__"; \
+	$(CARGO) build --workspace --all-targets; \
+	: With cameras on this machine the tests speak plain HTTP, no proxy has a way to these. Most tests wait and compute nothing.; \
+	env -u http_proxy -u HTTP_PROXY G_DEBUG=fatal-criticals RUST_TEST_THREADS=$${RUST_TEST_THREADS:-4} scripts/with-plugins debug \
+		timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
 
 ## lint: check formatting, run clippy and shell syntax checks, warnings denied
-lint: packages-build
-	$(CARGO) fmt --all --check
+lint: packages-build check-format
 	$(CARGO) clippy --workspace --all-targets -- -D warnings
+
+check-format: packages-build
+	$(CARGO) fmt --all --check
 	@for script in scripts/* pipelines/*.sh .ci/run; do if head -1 $$script | grep -q bash; then bash -n $$script; fi; done
 
 ## demo: follow a person in real footage and leave video, plot and summary in target/demo
