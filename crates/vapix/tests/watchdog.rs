@@ -12,7 +12,7 @@ use std::process::{Command as Process, ExitStatus};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use vapix::watchdog::{Lease, StopOrder, Watchdog, WatchdogAddress};
+use vapix::watchdog::{Lease, Standing, StopOrder, Watchdog, WatchdogAddress};
 use vapix::wire::{Client, ClientSettings, Command, Credentials, Identity, Location, Secret, Trust};
 use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
@@ -55,7 +55,14 @@ impl Application {
     }
 
     async fn hold(&mut self, in_doubt: bool) {
-        self.lease.hold(order(self.client.identity(), in_doubt)).await.unwrap();
+        let standing = self.ask_to_hold(in_doubt).await;
+        assert!(matches!(standing, Standing::Held), "{standing:?}");
+    }
+
+    async fn ask_to_hold(&mut self, in_doubt: bool) -> Standing {
+        self.lease.hold(order(self.client.identity(), in_doubt));
+        self.lease.settled().await;
+        self.lease.standing().unwrap()
     }
 
     /// Moves, as an application does that plays by the rules.
@@ -264,12 +271,35 @@ async fn without_a_camera_to_stop_it_can_be_ended_and_is_started_anew() {
     });
     // Not more often than once a second.
     let begin = Instant::now();
-    let identity = application.client.identity();
-    while application.lease.hold(order(identity.clone(), false)).await.is_err() {
+    while !matches!(application.ask_to_hold(false).await, Standing::Held) {
         assert!(begin.elapsed() < PATIENCE);
         tokio::time::sleep(MOMENT).await;
     }
     let (_camera, program) = application.die();
+    ends(&program);
+}
+
+/// It is there, and does nothing: whoever counted on it would leave a camera turning.
+#[tokio::test]
+async fn one_that_hangs_is_noticed() {
+    let mut application = Application::new("stopped").moving().await;
+    let pid = application.process();
+    signal(pid, libc::SIGSTOP);
+    let begin = Instant::now();
+    loop {
+        assert!(begin.elapsed() < PATIENCE, "nobody notices");
+        match application.ask_to_hold(false).await {
+            Standing::Failed(failure) => break assert!(failure.to_string().contains("no answer for 2 s")),
+            _ => tokio::time::sleep(MOMENT).await,
+        }
+    }
+    signal(pid, libc::SIGCONT);
+    while !matches!(application.ask_to_hold(false).await, Standing::Held) {
+        assert!(begin.elapsed() < PATIENCE, "it does not go on");
+        tokio::time::sleep(MOMENT).await;
+    }
+    let (camera, program) = application.die();
+    rests(&camera);
     ends(&program);
 }
 

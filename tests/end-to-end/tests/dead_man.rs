@@ -3,10 +3,11 @@
 //! However an application dies, in the middle of a pan, the camera's last order is a stop.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
 use end_to_end::scene::{assert_left_at_rest, wait_until_following};
-use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, signal, tool};
+use end_to_end::{GstLaunch, PATIENCE, Watchdog, plugin_folder, scene, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 /// How often the stick that an operator holds says where to.
@@ -196,6 +197,33 @@ fn without_a_watchdog_one_warning_says_so() {
         output.contains("no watchdog process: `/nonexistent/vapix-watchdog` cannot be started"),
         "{output}"
     );
+}
+
+/// Neither does the picture wait for it, nor the camera for long; and two cameras have no worker more than there are.
+#[test]
+fn a_watchdog_that_never_starts_keeps_no_camera_from_following() {
+    let cameras = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    let program = plugin_folder().join(format!("sleeper-{}", std::process::id()));
+    std::fs::write(&program, "#!/bin/sh\nexec sleep 60\n").unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let mut command = tool("gst-launch-1.0");
+    command.env("VAPIX_WATCHDOG", &program);
+    let pipelines = cameras.each_ref().map(|camera| scene::follow(camera).replace(" name=servo", ""));
+    command.arg("-m").args(pipelines.join(" ").split_whitespace());
+    let mut launch = GstLaunch::spawn(command);
+    launch.wait_for_line(
+        "no watchdog process: the watchdog process ended or does not listen: no answer for 2 s",
+    );
+    cameras.iter().for_each(wait_until_following);
+    // They are followed, not only set going once.
+    for camera in &cameras {
+        let before = camera.status().commands;
+        assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 10), "not steered");
+    }
+    launch.signal("INT");
+    launch.finish();
+    cameras.iter().for_each(assert_left_at_rest);
+    std::fs::remove_file(program).unwrap();
 }
 
 /// Not by who only looks, nor before there is something to stop.

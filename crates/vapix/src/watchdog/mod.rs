@@ -8,16 +8,18 @@
 //! application ─ Lease ─ Watchdog ─ AF_UNIX ─▶ vapix-watchdog: serve ─ guard ─▶ camera
 //! ```
 //! An application has one watchdog for all its cameras; it starts it when it first moves one, or connects to one that runs
-//! elsewhere. What passes between them is one JSON object on a line, see [`protocol`].
+//! elsewhere. What passes between them is one JSON object on a line, see [`protocol`]. The watchdog answers each line, so that
+//! an application knows before it moves a camera that somebody will stop it.
 
 mod camera_lock;
+mod connection;
 mod guard;
 mod lease;
 mod link;
 mod protocol;
 mod serve;
 
-pub use lease::Lease;
+pub use lease::{Lease, Standing};
 pub use link::{Unavailable, Watchdog, WatchdogAddress};
 pub use protocol::StopOrder;
 pub use serve::{Armed, serve};

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What an application tells its watchdog. It says all there is to say each time: a watchdog that was started anew, or took
+//! What an application tells its watchdog, and what that answers. It says all there is to say each time: a watchdog that was started anew, or took
 //! over, needs to know nothing of before.
 
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,22 @@ pub enum Message {
     },
 }
 
+/// What the watchdog says to each [`Message`], once it has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// The camera will be stopped when this lease ends.
+    Held {
+        /// Which lease.
+        lease: u64,
+    },
+    /// The camera will be left alone.
+    Released {
+        /// Which lease.
+        lease: u64,
+    },
+}
+
 /// How a camera is stopped.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StopOrder {
@@ -42,9 +58,7 @@ impl Message {
     /// # Errors
     /// Where a value has no JSON form, which none of these lacks but a path that is not UTF-8.
     pub fn to_line(&self) -> Result<Vec<u8>, serde_json::Error> {
-        let mut line = serde_json::to_vec(self)?;
-        line.push(b'\n');
-        Ok(line)
+        to_line(self)
     }
 
     /// Reads a line.
@@ -54,6 +68,30 @@ impl Message {
     pub fn of_line(line: &[u8]) -> Result<Self, serde_json::Error> {
         serde_json::from_slice(line)
     }
+}
+
+impl Answer {
+    /// With the end of the line.
+    ///
+    /// # Errors
+    /// Never: a number has a JSON form.
+    pub fn to_line(self) -> Result<Vec<u8>, serde_json::Error> {
+        to_line(&self)
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn of_line(line: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(line)
+    }
+}
+
+fn to_line(value: &impl Serialize) -> Result<Vec<u8>, serde_json::Error> {
+    let mut line = serde_json::to_vec(value)?;
+    line.push(b'\n');
+    Ok(line)
 }
 
 #[cfg(test)]
@@ -80,5 +118,7 @@ mod tests {
         assert_eq!(Message::of_line(&line).unwrap(), message);
         assert!(!format!("{message:?}").contains("geheim"));
         assert!(Message::of_line(b"{}").is_err());
+        let answer = Answer::Held { lease: 7 };
+        assert_eq!(Answer::of_line(&answer.to_line().unwrap()).unwrap(), answer);
     }
 }

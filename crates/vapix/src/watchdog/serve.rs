@@ -11,7 +11,7 @@ use tokio::time::Instant;
 
 use super::LEASE;
 use super::guard::{Held, guard};
-use super::protocol::Message;
+use super::protocol::{Answer, Message};
 
 /// A line that is longer is none: real ones have less than a kilobyte.
 const MAX_LINE_BYTES: u64 = 64 * 1024;
@@ -55,6 +55,7 @@ impl Drop for ArmedCamera<'_> {
 pub async fn serve(application: UnixStream, armed: &'static Armed) {
     let mut guards = JoinSet::new();
     let mut leases: HashMap<u64, watch::Sender<Option<Held>>> = HashMap::new();
+    let (application, answers) = application.into_split();
     let mut lines = BufReader::new(application);
     let mut line = Vec::new();
     loop {
@@ -71,12 +72,13 @@ pub async fn serve(application: UnixStream, armed: &'static Armed) {
             Ok(Message::Release { lease }) => (lease, None),
             _ => break,
         };
-        match held {
+        let answer = match held {
             None => {
                 // Its guard sees that before it sees that nobody speaks any more.
                 if let Some(sender) = leases.remove(&lease) {
                     sender.send_replace(None);
                 }
+                Answer::Released { lease }
             }
             Some(_) if leases.len() >= MAX_LEASES && !leases.contains_key(&lease) => break,
             Some(_) => {
@@ -86,7 +88,12 @@ pub async fn serve(application: UnixStream, armed: &'static Armed) {
                     sender
                 });
                 sender.send_replace(held);
+                Answer::Held { lease }
             }
+        };
+        // Who does not read it knows nothing of answers, or hangs: neither is waited for.
+        if let Ok(line) = answer.to_line() {
+            let _ = answers.try_write(&line);
         }
         // Those that have ended.
         while guards.try_join_next().is_some() {}

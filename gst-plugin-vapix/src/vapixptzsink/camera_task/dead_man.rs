@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use vapix::watchdog::{Lease, StopOrder, Unavailable, Watchdog};
+use vapix::watchdog::{Lease, Standing, StopOrder, Unavailable, Watchdog};
 
 /// What `stats` says of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -57,34 +57,54 @@ impl DeadMan {
     /// Looks whether there is something to be started, before it is needed; what is to be told once.
     pub fn check(&mut self) -> Option<Unavailable> {
         let checked = self.lease.as_ref()?.check();
-        self.turned_out(checked, DeadManState::Ready)
+        self.failed(checked.err()?)
     }
 
-    /// Takes or renews the lease, before a move is sent or while it lasts; what is to be told once.
-    pub async fn hold(&mut self, order: StopOrder) -> Option<Unavailable> {
-        self.order = Some(order);
-        self.renew().await
-    }
-
-    /// Whether it is time to renew it, or the watchdog knows something else.
-    pub fn is_due(&self, in_doubt: bool) -> bool {
-        self.order.as_ref().is_none_or(|order| order.in_doubt != in_doubt)
-            || self.lease.as_ref().and_then(Lease::renew_at).is_none_or(|at| at <= Instant::now())
-    }
-
-    /// Resolves when it is to be renewed, where it is held.
-    pub async fn due(&self) {
-        match self.lease.as_ref().and_then(Lease::renew_at) {
-            Some(at) => tokio::time::sleep_until(at.into()).await,
-            None => std::future::pending().await,
+    /// Asks for the lease, or renews it, before a move is sent or while it lasts.
+    pub fn hold(&mut self, order: StopOrder) {
+        if let Some(lease) = &mut self.lease {
+            lease.hold(order.clone());
+            self.order = Some(order);
         }
     }
 
-    /// Says again what was said last.
-    pub async fn renew(&mut self) -> Option<Unavailable> {
-        let (lease, order) = (self.lease.as_mut()?, self.order.clone()?);
-        let held = lease.hold(order).await;
-        self.turned_out(held, DeadManState::Armed)
+    /// Renews it where it is time to, and sees how it stands; what is to be told once.
+    pub fn keep(&mut self) -> Option<Unavailable> {
+        let lease = self.lease.as_mut()?;
+        if lease.renew_at().is_some_and(|at| at <= Instant::now())
+            && let Some(order) = &self.order
+        {
+            lease.hold(order.clone());
+        }
+        match lease.standing()? {
+            Standing::Held => self.state = DeadManState::Armed,
+            Standing::Awaited => {}
+            Standing::Failed(failure) => return self.failed(failure),
+        }
+        None
+    }
+
+    /// Whether a camera at rest is not to be moved yet: it is not known whether there is a watchdog to stop it.
+    pub fn is_awaited(&self) -> bool {
+        let awaited = || matches!(self.lease.as_ref().and_then(Lease::standing), Some(Standing::Awaited));
+        self.state != DeadManState::Unavailable && awaited()
+    }
+
+    /// Whether the watchdog knows something else of what is in doubt, or nothing.
+    pub fn is_outdated(&self, in_doubt: bool) -> bool {
+        self.order.as_ref().is_none_or(|order| order.in_doubt != in_doubt)
+    }
+
+    /// Resolves when it is to be renewed, or how it stands may have changed.
+    pub async fn due(&self) {
+        let Some((lease, at)) = self.lease.as_ref().and_then(|lease| lease.renew_at().map(|at| (lease, at)))
+        else {
+            return std::future::pending().await;
+        };
+        tokio::select! {
+            () = tokio::time::sleep_until(at.into()) => {}
+            () = lease.settled(), if self.is_awaited() => {}
+        }
     }
 
     /// The camera rests, or is not ours to stop.
@@ -98,10 +118,8 @@ impl DeadMan {
         }
     }
 
-    fn turned_out(&mut self, result: Result<(), Unavailable>, well: DeadManState) -> Option<Unavailable> {
-        let before = std::mem::replace(&mut self.state, well);
-        let failure = result.err()?;
-        self.state = DeadManState::Unavailable;
+    fn failed(&mut self, failure: Unavailable) -> Option<Unavailable> {
+        let before = std::mem::replace(&mut self.state, DeadManState::Unavailable);
         (before != DeadManState::Unavailable).then_some(failure)
     }
 }

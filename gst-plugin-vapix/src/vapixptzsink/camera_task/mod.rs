@@ -125,6 +125,7 @@ impl CameraTask {
             dead_man: DeadMan::new(watchdog),
             state,
             former: None,
+            move_waits: false,
         };
         let running = runtime.spawn(task.run());
         let task = Self { camera, mailbox, statistics, paused_at: Mutex::default() };
@@ -256,6 +257,8 @@ struct Task<O> {
     state: TaskState<O>,
     /// Who we were when the camera last moved, where it has not confirmed a stop since.
     former: Option<Option<Credentials>>,
+    /// A move waits until it is known whether the watchdog would end it.
+    move_waits: bool,
 }
 
 impl<O: Fn(Event) + Send + Sync> Task<O> {
@@ -269,40 +272,63 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 self.change_credentials().await;
             }
             self.fall_back();
-            self.keep_lease().await;
+            self.keep_lease();
             self.state.publish();
             if self.state.is_over() {
                 break;
             }
             let now = self.state.mailbox.now();
             match self.state.control.next_request(now) {
+                Next::Do(request) if self.awaits_lease(&request) => {
+                    self.wait(self.state.control.stale_at()).await;
+                }
                 Next::Do(request) => self.perform(request).await,
                 Next::Wait(until) => {
-                    let until = until.into_iter().chain(self.state.deadline).min();
                     self.state.tell_settled();
-                    tokio::select! {
-                        () = self.state.mailbox.arrived() => {}
-                        () = self.state.mailbox.sleep_until(until) => {}
-                        () = self.dead_man.due() => {}
-                    }
+                    self.wait(until).await;
                 }
             }
         }
         self.state.give_up();
     }
 
-    /// For as long as the camera may move on our behalf, the watchdog is to stop it where we cannot.
-    async fn keep_lease(&mut self) {
-        let Self { client, dead_man, state, .. } = self;
-        let in_doubt = state.control.session().in_doubt();
-        let mut missing = None;
-        if !state.is_ours_to_stop() {
-            dead_man.release();
-        } else if dead_man.is_due(in_doubt) {
-            let (identity, command) = (client.identity(), state.control.stop());
-            missing = dead_man.hold(StopOrder { identity, command, in_doubt }).await;
+    /// Until something comes up, or this time.
+    async fn wait(&self, until: Option<Duration>) {
+        let until = until.into_iter().chain(self.state.deadline).min();
+        tokio::select! {
+            () = self.state.mailbox.arrived() => {}
+            () = self.state.mailbox.sleep_until(until) => {}
+            () = self.dead_man.due() => {}
         }
-        state.tell_dead_man(dead_man.state(), missing);
+    }
+
+    /// For as long as the camera may move on our behalf, or is to, the watchdog is to stop it where we cannot.
+    fn keep_lease(&mut self) {
+        let Self { client, dead_man, state, move_waits, .. } = self;
+        let in_doubt = state.control.session().in_doubt();
+        if !std::mem::take(move_waits) {
+            if !state.is_ours_to_stop() {
+                dead_man.release();
+            } else if dead_man.is_outdated(in_doubt) {
+                let (identity, command) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, command, in_doubt });
+            }
+        }
+        state.keep_dead_man(dead_man);
+    }
+
+    /// Whether this would set a camera going that nobody is known to stop yet. One that moves is not left to itself for that.
+    fn awaits_lease(&mut self, request: &Request) -> bool {
+        let Self { client, dead_man, state, move_waits, .. } = self;
+        if is_move(request) && state.control.session().is_at_rest() {
+            if dead_man.is_outdated(true) {
+                let (identity, command) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, command, in_doubt: true });
+            }
+            state.keep_dead_man(dead_man);
+            *move_waits = dead_man.is_awaited();
+        }
+        *move_waits
     }
 
     /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
@@ -345,10 +371,9 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
         state.control.sending(&request, sent);
         let stop = state.control.stop();
         lock(&state.statistics).stop = Some(stop);
-        if matches!(&request, Request::Command(command) if !command.is_stop()) {
-            let order = StopOrder { identity: client.identity(), command: stop, in_doubt: true };
-            let missing = dead_man.hold(order).await;
-            state.tell_dead_man(dead_man.state(), missing);
+        if is_move(&request) {
+            dead_man.hold(StopOrder { identity: client.identity(), command: stop, in_doubt: true });
+            state.keep_dead_man(dead_man);
         }
         let mut exchange = pin!(exchange(client, &request));
         let mut give_up_at = None;
@@ -365,13 +390,14 @@ impl<O: Fn(Event) + Send + Sync> Task<O> {
                 answer = &mut exchange => return state.answered(&request, answer, sent),
                 () = mailbox.arrived() => state.take_mail(),
                 () = mailbox.sleep_until(until) => {}
-                () = dead_man.due() => {
-                    let missing = dead_man.renew().await;
-                    state.tell_dead_man(dead_man.state(), missing);
-                }
+                () = dead_man.due() => state.keep_dead_man(dead_man),
             }
         }
     }
+}
+
+fn is_move(request: &Request) -> bool {
+    matches!(request, Request::Command(command) if !command.is_stop())
 }
 
 /// The answer to a job.

@@ -7,6 +7,7 @@ use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use super::dead_man::DeadMan;
 use super::mailbox::{Mail, Mailbox};
 use super::{DeadManState, Event, LAST_RETRIES, STOP_GRACE};
 use crate::control_loop::{ControlLoop, Status};
@@ -110,6 +111,12 @@ impl<O: Fn(Event)> TaskState<O> {
     pub fn is_ours_to_stop(&self) -> bool {
         let session = self.control.session();
         !session.stays_at_rest() && !session.halted() && !session.is_taken_over(self.mailbox.now())
+    }
+
+    /// Has the watchdog go on, where it is to stop the camera, and tells how it stands with it.
+    pub fn keep_dead_man(&self, dead_man: &mut DeadMan) {
+        let missing = dead_man.keep();
+        self.tell_dead_man(dead_man.state(), missing);
     }
 
     /// How it stands with the watchdog, and whether it is missing since just now.
