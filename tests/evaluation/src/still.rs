@@ -9,7 +9,7 @@ use std::{
 };
 
 use gst::prelude::*;
-use virtual_camera::{GroundTruth, People, Person, Picture, Sighting, Silhouette};
+use virtual_camera::{GroundTruth, People, Person, Picture, Sighting};
 
 use crate::{
     album::Album,
@@ -152,7 +152,7 @@ fn sighting(person: &Person, size: (u32, u32)) -> Sighting {
         position_m: None,
         direction_deg: None,
     };
-    Sighting { silhouette: Silhouette::of_box(&truth.bounds, size), truth }
+    Sighting::of_box(truth, size)
 }
 
 fn info(sample: &gst::Sample) -> Option<gst_video::VideoInfo> {

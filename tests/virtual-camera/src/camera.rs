@@ -24,7 +24,7 @@ use crate::{
     sync::lock,
     truth::{GroundTruth, Mask, Sighting},
     vapix::{Args, CgiResponse, device::Device, parse_args},
-    world::{self, Exposure, FootageError, World},
+    world::{self, Exposure, FootageError, LONGEST_SHUTTER, World},
 };
 
 /// How often a moving camera tells those who wait for it.
@@ -78,12 +78,13 @@ impl Camera {
         let world = world::open(&settings)?;
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.longest_delay()
-            + world.shutter(settings.video.exposure)
+            + settings.video.exposure * LONGEST_SHUTTER
             + imaging::MEMORY
             + Duration::from_secs(2);
         let limits = settings.kinematics.limits_in(world.limits());
         let head =
-            Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory);
+            Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory)
+                .turning(settings.turning);
         let device = Device::new(&settings, head, limits, world.view_size());
         let state = State {
             device,
@@ -296,7 +297,7 @@ impl Camera {
     /// The picture whose exposure began at `time`, not later than now.
     pub fn picture(&self, time: Duration, size: (u32, u32)) -> Result<Picture, FootageError> {
         let opening = self.pose_at(time);
-        let duration = self.world.shutter(self.settings.video.exposure);
+        let duration = self.world.shutter(self.settings.video.exposure, time);
         let closing = self.pose_at(time + duration);
         let mut picture = self.world.render(&Exposure { time, opening, closing, duration }, size)?;
         let imaging = &self.settings.imaging;

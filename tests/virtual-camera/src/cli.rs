@@ -33,10 +33,13 @@ pub struct Options {
     /// Which of the thesis' tests the room shows, again and again: light, occlusion, speed, direction and subject
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=72))]
     room_test: Option<u32>,
-    /// What people in the room do instead of a test: nobody, cross, cross-alike, part, overtake, stop-and-go, sit, approach, run
-    /// or wander
+    /// What people in the room do instead of a test: nobody, cross, cross-alike, part, overtake, stop-and-go, sit, approach, run,
+    /// wander, group or near
     #[arg(long, value_name = "ACTION", value_parser = action)]
     action: Option<Action>,
+    /// How many more people there are in the room: they walk along in a group, else they wander about
+    #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
+    others: u8,
     /// What happens in the room by itself: door, film, sun, switch, draught
     #[arg(long, value_name = "EVENT", value_delimiter = ',', value_parser = event)]
     events: Vec<Event>,
@@ -112,6 +115,9 @@ pub struct Options {
     /// Hold all pictures back for so many milliseconds, every seven seconds
     #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
     video_stall: f64,
+    /// Leave exposure as it is right for a bright room, instead of letting the camera control it
+    #[arg(long)]
+    fixed_exposure: bool,
     /// How strongly exposure, white balance and focus swing after a turn, 0 to 1
     #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = share)]
     hunting: f64,
@@ -261,6 +267,7 @@ impl TryFrom<Options> for Settings {
                     .then(|| Stall { every: STALL_EVERY, lasts: milliseconds(options.video_stall) }),
             },
             imaging: Imaging {
+                fixed_exposure: options.fixed_exposure,
                 hunting: options.hunting,
                 night: options.night.map(Duration::from_secs_f64),
                 overlay: options.overlay,
@@ -335,6 +342,7 @@ impl Options {
         let test = test.ok_or("--room-test is from 1 to 72")?;
         Ok(RoomSettings {
             action: self.action.unwrap_or_default(),
+            others: usize::from(self.others),
             events: self.events.clone(),
             shadows: self.cast_shadows,
             reflections: self.reflecting_floor,

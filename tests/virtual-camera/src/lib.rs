@@ -47,7 +47,7 @@ pub use kinematics::{
 pub use picture::{Picture, Plane};
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
-pub use truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette};
+pub use truth::{Bounds, GroundTruth, Kind, Mask, Sighting, Silhouette};
 pub use world::{
     Action, Change, Event, FootageError, Lane, Lighting, MotError, Occlusion, People, Person, PhotoError,
     PhotoPlace, PhotoSettings, RoomSettings, Subject, SyntheticSettings, Waypoint, read_mot,

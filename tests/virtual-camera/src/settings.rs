@@ -253,6 +253,8 @@ pub struct Settings {
     pub queue_lets_stop: bool,
     /// Where it looks at first, and the preset `Home`; `None` is what suits the world.
     pub home: Option<Pose>,
+    /// Speed steps (−100 to 100) of pan and tilt at which it turns when it starts; 0, 0 is at rest.
+    pub turning: (f64, f64),
     /// Who moves its time on.
     pub clock: Clock,
 }
@@ -279,6 +281,7 @@ impl Default for Settings {
             control_queue: None,
             queue_lets_stop: false,
             home: None,
+            turning: (0.0, 0.0),
             clock: Clock::Real,
         }
     }

@@ -173,13 +173,35 @@ impl Silhouette {
     }
 }
 
-/// One person in a picture: where, and in what shape.
+/// What somebody or something that moves is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Kind {
+    /// On two legs.
+    #[default]
+    Person,
+    /// On wheels.
+    Vehicle,
+}
+
+/// One person, or vehicle, in a picture: where, and in what shape.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sighting {
     /// Who and where.
     pub truth: GroundTruth,
     /// In what shape; the box where no more is known.
     pub silhouette: Silhouette,
+    /// What it is.
+    pub kind: Kind,
+    /// Numbers of those who hide a part of them, in ascending order; things that hide them have none.
+    pub hidden_by: Vec<u32>,
+}
+
+impl Sighting {
+    /// A person of whom only the box is known, in a picture of `size`; nobody hides them.
+    pub fn of_box(truth: GroundTruth, size: (u32, u32)) -> Self {
+        let silhouette = Silhouette::of_box(&truth.bounds, size);
+        Self { truth, silhouette, kind: Kind::Person, hidden_by: Vec::new() }
+    }
 }
 
 #[cfg(test)]

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use common::{PATIENCE, client, get};
 use virtual_camera::{
-    Action, Bounds, Clock, GroundTruth, Mask, Pose, RoomSettings, Settings, Video, VirtualCamera, World,
+    Action, Bounds, Clock, GroundTruth, Kind, Lighting, Mask, Pose, RoomSettings, Settings, Sighting, Video,
+    VirtualCamera, World,
 };
 
 const SIZE: (u32, u32) = (320, 240);
@@ -203,4 +204,101 @@ fn nobody_is_nobody_and_somebody_alone_is_one() {
         assert!(camera.ground_truth_from(&home, time, SIZE).is_empty());
     }
     assert_eq!(RoomSettings { action: Action::Nobody, ..RoomSettings::default() }.duration().as_secs(), 600);
+}
+
+fn camera_in(room: RoomSettings) -> VirtualCamera {
+    let video = Video { size: Some(SIZE), ..Video::default() };
+    let world = World::Room(room);
+    VirtualCamera::start(Settings { world, video, clock: Clock::Stepped, ..Settings::default() }).unwrap()
+}
+
+/// Everybody half a second apart, as a camera sees them that looks along `pose` and nobody moves.
+fn sightings(camera: &VirtualCamera, seconds: u64) -> Vec<Vec<Sighting>> {
+    let times = (0..2 * seconds).map(|half| Duration::from_millis(500 * half));
+    times
+        .map(|time| {
+            camera.advance_to(time + camera.video_delay());
+            camera.people(time, SIZE)
+        })
+        .collect()
+}
+
+#[test]
+fn a_group_comes_in_together_and_its_truth_says_who_hides_whom() {
+    for others in [2, 7] {
+        let room = RoomSettings { action: Action::Group, others, ..RoomSettings::test(2, 3).unwrap() };
+        let moments = sightings(&camera_in(room), 9);
+        let in_view = |people: &Vec<Sighting>| people.iter().filter(|one| one.truth.in_view > 0.9).count();
+        assert!(moments.iter().any(|people| in_view(people) > others), "{others}");
+        let all: Vec<&Sighting> = moments.iter().flatten().collect();
+        assert!(all.iter().all(|one| one.kind == Kind::Person && one.truth.id <= others as u32 + 1));
+        let hidden: Vec<_> = all.iter().filter(|one| !one.hidden_by.is_empty()).collect();
+        assert!(hidden.len() * 4 > all.len(), "{} of {}", hidden.len(), all.len());
+        assert!(hidden.iter().all(|one| one.truth.unhidden < 1.0 && !one.hidden_by.contains(&one.truth.id)));
+    }
+}
+
+#[test]
+fn others_wander_about_from_the_beginning_while_the_person_does_what_they_always_do() {
+    let plain = RoomSettings::test(2, 4).unwrap();
+    let busy = sightings(&camera_in(RoomSettings { others: 6, ..plain.clone() }), 6);
+    let alone = sightings(&camera_in(plain), 6);
+    for (busy, alone) in busy.iter().zip(&alone) {
+        let person =
+            |people: &[Sighting]| people.iter().find(|one| one.truth.id == 1).map(|one| one.truth.bounds);
+        assert_eq!(person(busy), person(alone));
+        assert!(busy.len() >= 3 && alone.len() <= 1);
+    }
+    let places: std::collections::BTreeSet<_> =
+        busy.iter().flatten().map(|one| (one.truth.id, one.truth.position_m.unwrap()[0] as i64)).collect();
+    assert!(places.len() > 14, "they move: {places:?}");
+}
+
+#[test]
+fn who_is_near_fills_the_picture() {
+    let room = RoomSettings { action: Action::Near, ..RoomSettings::test(1, 2).unwrap() };
+    let duration = room.duration().as_millis() as u64;
+    let camera = camera_in(room);
+    let down = Pose { tilt_deg: -35.0, ..Pose::default() };
+    let heights = (0..duration / 100).map(|step| {
+        let seen = camera.ground_truth_from(&down, Duration::from_millis(100 * step), SIZE);
+        seen.first().filter(|one| one.in_view > 0.5).map_or(0.0, |one| one.bounds.height)
+    });
+    let highest = heights.fold(0.0, f64::max);
+    assert!(highest > 0.75 * f64::from(SIZE.1), "{highest}");
+}
+
+#[test]
+fn a_world_may_begin_with_the_person_in_view_and_the_camera_turning() {
+    let room = RoomSettings { begins: Duration::from_secs(5), ..RoomSettings::test(1, 1).unwrap() };
+    let whole = RoomSettings::test(1, 1).unwrap().duration();
+    assert_eq!(room.duration(), whole - Duration::from_secs(5));
+    let settings = Settings {
+        world: World::Room(room),
+        turning: (30.0, 0.0),
+        clock: Clock::Stepped,
+        ..Settings::default()
+    };
+    let camera = VirtualCamera::start(settings).unwrap();
+    assert!(camera.ground_truth(Duration::ZERO, SIZE)[0].in_view > 0.99);
+    let status = camera.status();
+    assert!(status.moving && status.pan_rate_deg_s > 5.0, "{status:?}");
+    camera.advance_to(Duration::from_secs(1));
+    assert!((camera.status().pan_deg - camera.home().pan_deg - status.pan_rate_deg_s).abs() < 0.1);
+}
+
+#[test]
+fn every_room_is_bright_enough_to_see_unless_it_is_to_be_dark() {
+    let mean = |seed, lighting| {
+        let room = RoomSettings { lighting, ..RoomSettings::test(1, seed).unwrap() };
+        let picture = camera_in(room).picture(Duration::ZERO, SIZE).unwrap();
+        let luma = &picture.planes[0].data;
+        luma.iter().map(|value| f64::from(*value)).sum::<f64>() / luma.len() as f64
+    };
+    // By night and by day.
+    for seed in [3, 7] {
+        assert!((60.0..110.0).contains(&mean(seed, Lighting::Optimal)), "seed {seed}");
+    }
+    assert!((50.0..110.0).contains(&mean(3, Lighting::Dim)));
+    assert!(mean(7, Lighting::Dark) < 45.0);
 }

@@ -3,7 +3,7 @@
 //! Runs that nobody ran.
 
 use crate::record::{
-    Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Sighting, Silhouette, Suite, TestId, TrackerName,
+    Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Sighting, Suite, TestId, TrackerName,
 };
 
 /// Test 7 with ours, at ten pictures a second.
@@ -48,10 +48,7 @@ pub(crate) fn frame(size: (u32, u32)) -> FrameRecord {
 
 /// As if everybody in it were as wide and high as their box all over.
 pub(crate) fn judged_by_boxes(frame: FrameRecord) -> FrameRecord {
-    let sighting = |truth: &crate::record::GroundTruth| Sighting {
-        silhouette: Silhouette::of_box(&truth.bounds, frame.size),
-        truth: truth.clone(),
-    };
+    let sighting = |truth: &crate::record::GroundTruth| Sighting::of_box(truth.clone(), frame.size);
     let people: Vec<_> = frame.truth.iter().chain(&frame.others).map(sighting).collect();
     let estimate = frame.estimate.clone();
     frame.judged(estimate, &people)

@@ -19,6 +19,9 @@ pub(crate) use noise_filter::NoiseFilter;
 /// How the camera treats its pictures; the default does nothing to them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Imaging {
+    /// Whether exposure is set for a bright room once and for all, instead of by the camera itself as it goes. Recordings
+    /// are as they were exposed.
+    pub fixed_exposure: bool,
     /// How strongly exposure, white balance and focus swing while they find their way after a turn, 0 to 1.
     pub hunting: f64,
     /// How often it changes between day (colour) and night (grey); it begins with day.

@@ -136,6 +136,15 @@ impl Head {
         head
     }
 
+    /// The same head turning already, at these speed steps (−100 to 100) of pan and tilt, until told otherwise.
+    pub fn turning(mut self, (pan, tilt): (f64, f64)) -> Self {
+        self.start(Motion::PanTilt { pan, tilt });
+        (self.pan.rate, self.tilt.rate) = (self.continuous_deg_s(pan), self.continuous_deg_s(tilt));
+        self.history.clear();
+        self.remember();
+        self
+    }
+
     /// A command that arrives `at` this time: it acts after the command delay.
     pub fn command(&mut self, at: Duration, motion: Motion) {
         self.advance(at);

@@ -9,6 +9,7 @@ mod mot;
 mod panorama;
 mod photo;
 pub(crate) mod room;
+mod sensor;
 mod sighting;
 mod synthetic;
 mod timeline;
@@ -22,6 +23,7 @@ use panorama::Panorama;
 pub use panorama::Person;
 pub use photo::{Lane, PhotoError, PhotoPlace, PhotoSettings};
 pub use room::{Action, Change, Event, Lighting, Occlusion, RoomSettings, Subject};
+pub(crate) use sensor::LONGEST_SHUTTER;
 pub use synthetic::{SyntheticSettings, Waypoint};
 
 use crate::{
@@ -75,8 +77,9 @@ pub(crate) trait World: Send + Sync {
     fn frame_rate(&self) -> f64;
     /// Number of the world's picture at a time.
     fn frame_at(&self, time: Duration) -> u64;
-    /// How long the shutter is open where it is set to `set`: longer where it is dim, as cameras do by themselves.
-    fn shutter(&self, set: Duration) -> Duration {
+    /// How long the shutter is open at a time where it is set to `set`: longer where it is dim, as cameras do by
+    /// themselves, but no longer than [`LONGEST_SHUTTER`] times that.
+    fn shutter(&self, set: Duration, _time: Duration) -> Duration {
         set
     }
     /// What the sensor catches, at any `size`.

@@ -14,7 +14,7 @@ use crate::{
     picture::Picture,
     settings::Settings,
     sync::lock,
-    truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette},
+    truth::{Bounds, GroundTruth, Mask, Sighting},
 };
 
 /// A pinhole recording by a camera that stands still.
@@ -151,7 +151,7 @@ impl World for Panorama {
         let people = lock(&self.recording).people(self.timeline.frame_at(exposure.time));
         let to_view = self.overview_to_view(&exposure.opening, size);
         let seen = people.iter().filter_map(|person| self.seen(person, &to_view, size));
-        seen.map(|truth| Sighting { silhouette: Silhouette::of_box(&truth.bounds, size), truth }).collect()
+        seen.map(|truth| Sighting::of_box(truth, size)).collect()
     }
 
     fn silhouette(&self, _: &Exposure, _: (u32, u32)) -> Option<Mask> {

@@ -7,7 +7,7 @@ use crate::{
     geometry::{Pinhole, aim},
     kinematics::Pose,
     picture::Plane,
-    truth::{Bounds, GroundTruth, Mask, Sighting, Silhouette},
+    truth::{Bounds, GroundTruth, Kind, Mask, Sighting, Silhouette},
 };
 
 /// A body is measured in no more pixels than this across and down: one seen larger is measured as if it were smaller.
@@ -59,7 +59,7 @@ pub(super) fn sight(
     let [whole, visible] = [whole, unhidden].map(mask);
     let mut silhouette = Silhouette::new((left - pixel, top - pixel), (pixel, pixel), whole, visible);
     silhouette.cut_to(size);
-    Sighting { truth, silhouette }
+    Sighting { truth, silhouette, kind: Kind::Person, hidden_by: Vec::new() }
 }
 
 /// Which pixels are more than half covered.

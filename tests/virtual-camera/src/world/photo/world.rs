@@ -22,7 +22,8 @@ use crate::{
         Exposure, FootageError, World,
         blur::motion_blur,
         layer::{ASIDE, Layer, MOMENTS, Window},
-        room::{sensor::Sensor, view::View},
+        room::view::View,
+        sensor::Sensor,
         sighting::{mask, sight},
     },
 };
@@ -115,7 +116,7 @@ impl Photo {
             obstacle,
             sprites: Sprites::open(&photo.walker)?,
             way,
-            sensor: Sensor::new(photo.lighting, false, &seeded),
+            sensor: Sensor::new(photo.lighting, 1.0, settings.imaging.fixed_exposure, &seeded),
             optics: Optics { wide_fov_deg: photo.place.fov_deg, max_magnification },
             view_size: settings.video.size.unwrap_or(VIEW_SIZE),
             settings: photo.clone(),
@@ -173,7 +174,6 @@ impl Photo {
             self.hide(&exposure.opening, &close, &mut unhidden);
             layer.over(&mut canvas, unhidden, sweep);
         }
-        self.sensor.expose(&mut canvas, self.frame_at(exposure.time), time);
         Ok(canvas)
     }
 
@@ -324,8 +324,8 @@ impl World for Photo {
         (time.as_nanos() * u128::from(FRAME_RATE) / 1_000_000_000) as u64
     }
 
-    fn shutter(&self, set: Duration) -> Duration {
-        self.sensor.shutter(set)
+    fn shutter(&self, set: Duration, time: Duration) -> Duration {
+        self.sensor.shutter(set, time)
     }
 
     fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
@@ -334,7 +334,9 @@ impl World for Photo {
             let pose = exposure.pose(share);
             (pose, self.view(&pose, size))
         };
-        self.take(exposure, &seen(0.0).1, sweep, seen)
+        let mut picture = self.take(exposure, &seen(0.0).1, sweep, seen)?;
+        self.sensor.expose(&mut picture, self.frame_at(exposure.time), exposure.time.as_secs_f64());
+        Ok(picture)
     }
 
     fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
@@ -350,7 +352,9 @@ impl World for Photo {
     fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
         let (pose, pinhole) = self.overview_view();
         let (view, exposure) = (View::new(&pose, pinhole, OVERVIEW_SIZE), Exposure::at(time, pose));
-        Ok(Arc::new(self.take(&exposure, &view, (0.0, 0.0), |_| (pose, view.clone()))?))
+        let mut picture = self.take(&exposure, &view, (0.0, 0.0), |_| (pose, view.clone()))?;
+        self.sensor.expose_once(&mut picture, self.frame_at(time), time.as_secs_f64());
+        Ok(Arc::new(picture))
     }
 
     fn overview_size(&self) -> (u32, u32) {

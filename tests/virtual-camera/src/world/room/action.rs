@@ -29,11 +29,15 @@ pub enum Action {
     Run,
     /// Walks to and fro for three minutes, at changing speeds, with stops.
     Wander,
+    /// Walks across the room in a group: [`super::RoomSettings::others`] walk with them.
+    Group,
+    /// Passes so close to the camera that they fill the picture.
+    Near,
 }
 
 impl Action {
     /// Every one, with its name for command lines and tables.
-    pub const ALL: [(Self, &'static str); 11] = [
+    pub const ALL: [(Self, &'static str); 13] = [
         (Self::Test, "test"),
         (Self::Nobody, "nobody"),
         (Self::Cross, "cross"),
@@ -45,6 +49,8 @@ impl Action {
         (Self::Approach, "approach"),
         (Self::Run, "run"),
         (Self::Wander, "wander"),
+        (Self::Group, "group"),
+        (Self::Near, "near"),
     ];
 
     /// A number for streams of chance; the way of a thesis test has those of the tests.

@@ -6,12 +6,11 @@ use super::{
     event::{self, Event},
     light::Light,
     raster::cover,
-    sensor::soften,
     settings::RoomSettings,
     view::{Canvas, Vector, View},
     walker::{BodyPose, Walker},
 };
-use crate::{picture::Plane, seeded::Seeded};
+use crate::{picture::Plane, seeded::Seeded, world::sensor::soften};
 
 /// Part of the light that is left in a shadow, and that a floor reflects.
 const SHADED: f64 = 0.55;

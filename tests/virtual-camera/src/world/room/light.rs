@@ -29,13 +29,15 @@ pub(crate) struct Strength {
 impl Strength {
     /// Lamps all over the ceiling, and daylight.
     pub const DAY: Self = Self { around: 0.42, lamp: (0.62, 2.4), window: (0.5, 1.5) };
-    /// A few lamps in the dark: what is not beside one is a shade darker or lighter than black.
-    pub const NIGHT: Self = Self { around: 0.045, lamp: (0.34, 0.9), window: (0.03, 1.0) };
+    /// A few lamps in the dark, painted brighter than they are by [`Self::NIGHT_PAINTED`], so that the dark has shades.
+    pub const NIGHT: Self = Self { around: 0.135, lamp: (1.0, 0.9), window: (0.09, 1.0) };
+    /// Part of the painted light that there really is by night: 3 stops less.
+    pub const NIGHT_PAINTED: f64 = 0.12;
 }
 
 impl Light {
     /// What a surface at `point` facing along `normal` (a unit vector) sends back of its brightness: about 0.4 to 1.15 by
-    /// day, 0.06 to 0.5 by night.
+    /// day, 0.2 to 1 as painted by night.
     pub fn at(&self, point: Vector, normal: Vector) -> f64 {
         let falling = |&source: &Vector, (strength, radius): (f64, f64)| {
             let way = subtract(source, point);

@@ -8,7 +8,6 @@ mod event;
 pub(crate) mod light;
 mod raster;
 mod scene;
-pub(crate) mod sensor;
 mod settings;
 pub(crate) mod view;
 mod walker;

@@ -16,8 +16,10 @@ const STRAIGHT_AHEAD: Pose = Pose { pan_deg: 0.0, tilt_deg: -13.0, zoom_step: 1.
 pub enum Lighting {
     /// All lamps are on.
     Optimal,
-    /// Half of the light.
+    /// A seventh of the light: the camera makes up for it with a longer exposure, and with gain by night.
     Dim,
+    /// So little light that the picture stays dark whatever the camera does.
+    Dark,
 }
 
 /// What stands between the camera and the person's way.
@@ -68,6 +70,10 @@ pub struct RoomSettings {
     pub subject: Subject,
     /// What goes on instead of a test; of a test's settings light and subject count in any case.
     pub action: Action,
+    /// How many more people there are: they walk along in a group, else they wander about before and behind the person.
+    pub others: usize,
+    /// How far the action has come when the world begins. Later than two seconds, the person is in the first view already.
+    pub begins: Duration,
     /// What happens besides.
     pub events: Vec<Event>,
     /// Whether low sun lets people cast long shadows.
@@ -89,6 +95,8 @@ impl Default for RoomSettings {
             direction: Change::Fixed,
             subject: Subject::A,
             action: Action::Test,
+            others: 0,
+            begins: Duration::ZERO,
             events: Vec::new(),
             shadows: false,
             reflections: false,
@@ -110,6 +118,8 @@ impl RoomSettings {
             speed: change(index / 18),
             direction: change(index / 36),
             action: Action::Test,
+            others: 0,
+            begins: Duration::ZERO,
             events: Vec::new(),
             shadows: false,
             reflections: false,
@@ -120,9 +130,10 @@ impl RoomSettings {
     /// The number of the test of this kind.
     pub fn number(&self) -> u32 {
         let (direction, speed) = (self.direction as u32, self.speed as u32);
-        let (occlusion, lighting, subject) =
-            (self.occlusion as u32, self.lighting as u32, self.subject as u32);
-        1 + 36 * direction + 18 * speed + 6 * occlusion + 3 * lighting + subject
+        // The tests know no darkness.
+        let dim = u32::from(self.lighting != Lighting::Optimal);
+        let (occlusion, subject) = (self.occlusion as u32, self.subject as u32);
+        1 + 36 * direction + 18 * speed + 6 * occlusion + 3 * dim + subject
     }
 
     /// The number of the way that is walked: tests that differ by light and occlusion alone share one, so that
@@ -137,12 +148,13 @@ impl RoomSettings {
 
     /// From the start of the world, empty for two seconds, to the end of the person's way.
     pub fn duration(&self) -> Duration {
-        Walk::new(self).map_or(NOBODY_THERE, |walk| Duration::from_secs_f64(walk.duration()))
+        let whole = Walk::new(self).map_or(NOBODY_THERE, |walk| Duration::from_secs_f64(walk.duration()));
+        whole.saturating_sub(self.begins)
     }
 
-    /// Where the camera looks at first: the person comes in at the side of the widest view.
+    /// Where the camera looks at first: the person comes in at the side of the widest view, or is in it.
     pub fn home(&self) -> Pose {
-        Walk::new(self).map_or(STRAIGHT_AHEAD, |walk| walk.home())
+        Walk::new(self).map_or(STRAIGHT_AHEAD, |walk| walk.home(self.begins.as_secs_f64()))
     }
 }
 

@@ -6,8 +6,8 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     effects::Effects,
+    light::Strength,
     scene::{Plan, Scene, Style},
-    sensor::{Sensor, soften},
     settings::RoomSettings,
     view::View,
     walker::{BodyPose, Walker, obstacles},
@@ -23,6 +23,7 @@ use crate::{
         Exposure, FootageError, World,
         blur::motion_blur,
         layer::MOMENTS,
+        sensor::{Sensor, soften},
         sighting::{mask, sight},
     },
 };
@@ -48,6 +49,8 @@ pub(crate) struct Room {
     walkers: Vec<Walker>,
     effects: Effects,
     sensor: Sensor,
+    /// How far everything has come when the world begins.
+    begins: Duration,
     optics: Optics,
     view_size: (u32, u32),
 }
@@ -75,9 +78,11 @@ impl Room {
             scene: Scene::of(plan),
             walkers,
             effects: Effects::new(room),
+            begins: room.begins,
             sensor: Sensor::new(
                 room.lighting,
-                Style::of(room.seed).night,
+                if Style::of(room.seed).night { Strength::NIGHT_PAINTED } else { 1.0 },
+                settings.imaging.fixed_exposure,
                 &seeded.fork(SENSOR).fork(u64::from(room.number())),
             ),
             optics: Optics { wide_fov_deg: WIDE_FOV_DEG, max_magnification },
@@ -85,10 +90,15 @@ impl Room {
         }
     }
 
+    /// How far everything has come at a time since the world began, in seconds.
+    fn seconds(&self, time: Duration) -> f64 {
+        (self.begins + time).as_secs_f64()
+    }
+
     /// Everybody at a time, the farthest from the camera first.
     fn bodies_at<'a>(&'a self, time: Duration) -> Vec<Body<'a>> {
-        let body =
-            |(id, walker): (u32, &'a Walker)| Body { id, walker, pose: walker.pose_at(time.as_secs_f64()) };
+        let seconds = self.seconds(time);
+        let body = |(id, walker): (u32, &'a Walker)| Body { id, walker, pose: walker.pose_at(seconds) };
         let mut bodies: Vec<_> = (1..).zip(&self.walkers).map(body).collect();
         let away = |body: &Body| body.pose.place[0].hypot(body.pose.place[2]);
         bodies.sort_by(|one, other| away(other).total_cmp(&away(one)));
@@ -99,8 +109,8 @@ impl Room {
         View::new(pose, self.pinhole(pose.zoom_step, size), size)
     }
 
-    /// The light of an exposure on a picture through `view`, which is the camera's as the shutter opens, as the sensor counts
-    /// it; `seen` says what the camera sees at a part of the exposure, 0 to 1.
+    /// The light of an exposure on a picture through `view`, which is the camera's as the shutter opens; `seen` says what the
+    /// camera sees at a part of the exposure, 0 to 1.
     fn take(
         &self,
         exposure: &Exposure,
@@ -108,7 +118,7 @@ impl Room {
         sweep: (f64, f64),
         seen: impl Fn(f64) -> View,
     ) -> Picture {
-        let time = exposure.time.as_secs_f64();
+        let time = self.seconds(exposure.time);
         let bodies = self.bodies_at(exposure.time);
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
         self.scene.draw_shell(view, &mut canvas);
@@ -130,28 +140,32 @@ impl Room {
         }
         self.effects.switch(time, &mut canvas);
         canvas.planes.iter_mut().for_each(soften);
-        self.sensor.expose(&mut canvas, self.frame_at(exposure.time), time);
         canvas
     }
 
-    /// What is seen through a view of the first of `bodies`, which the others are nearer than: all of it, and what
-    /// nothing hides.
-    fn shape(&self, bodies: &[Body], time: Duration, view: &View) -> [Plane; 2] {
+    /// What is seen through a view of the first of `bodies`, which the others are nearer than: all of it, what nothing
+    /// hides, and the numbers of those of the others who hide it.
+    fn shape(&self, bodies: &[Body], time: Duration, view: &View) -> ([Plane; 2], Vec<u32>) {
         let mut shapes = bodies.iter().map(|body| {
             let mut shape = Plane::filled(view.size.0, view.size.1, 0);
             body.walker.silhouette(&body.pose, view, &mut shape);
-            shape
+            (body.id, shape)
         });
-        let whole = shapes.next().unwrap_or_else(|| Plane::filled(view.size.0, view.size.1, 0));
-        let mut unhidden = whole.clone();
+        let whole =
+            shapes.next().map_or_else(|| Plane::filled(view.size.0, view.size.1, 0), |(_, whole)| whole);
+        let (mut unhidden, mut hidden_by) = (whole.clone(), Vec::new());
         if let Some(body) = bodies.first() {
-            self.scene.hide(body.pose.place, time.as_secs_f64(), view, &mut unhidden);
+            self.scene.hide(body.pose.place, self.seconds(time), view, &mut unhidden);
         }
-        for nearer in shapes {
+        for (id, nearer) in shapes {
+            if whole.data.iter().zip(&nearer.data).any(|(whole, nearer)| *whole > 0 && *nearer > 0) {
+                hidden_by.push(id);
+            }
             let hidden = unhidden.data.iter_mut().zip(nearer.data).filter(|(_, nearer)| *nearer > 0);
             hidden.for_each(|(pixel, _)| *pixel = 0);
         }
-        [whole, unhidden]
+        hidden_by.sort_unstable();
+        ([whole, unhidden], hidden_by)
     }
 
     /// The first of `bodies`, which the others are nearer than, in a view, inside of it or not; `None` unless all of them
@@ -160,8 +174,14 @@ impl Room {
         let (body, view) = (bodies.first()?, self.view(pose, size));
         let [left, top, right, bottom] = body.walker.bounds(&body.pose, &view)?;
         let bounds = Bounds { left, top, width: right - left, height: bottom - top };
-        let shape = |close: &View| self.shape(bodies, time, close);
-        Some(sight(body.id, body.pose.place, bounds, (pose, &view), size, shape))
+        let mut hidden_by = Vec::new();
+        let shapes = |close: &View| {
+            let (shapes, hiding) = self.shape(bodies, time, close);
+            hidden_by = hiding;
+            shapes
+        };
+        let sighting = sight(body.id, body.pose.place, bounds, (pose, &view), size, shapes);
+        Some(Sighting { hidden_by, ..sighting })
     }
 }
 
@@ -186,14 +206,16 @@ impl World for Room {
         (time.as_nanos() * u128::from(FRAME_RATE) / 1_000_000_000) as u64
     }
 
-    fn shutter(&self, set: Duration) -> Duration {
-        self.sensor.shutter(set)
+    fn shutter(&self, set: Duration, time: Duration) -> Duration {
+        self.sensor.shutter(set, time)
     }
 
     fn render(&self, exposure: &Exposure, size: (u32, u32)) -> Result<Picture, FootageError> {
         let sweep = self.sweep(exposure, size);
         let seen = |share| self.view(&exposure.pose(share), size);
-        Ok(self.take(exposure, &seen(0.0), sweep, seen))
+        let mut picture = self.take(exposure, &seen(0.0), sweep, seen);
+        self.sensor.expose(&mut picture, self.frame_at(exposure.time), exposure.time.as_secs_f64());
+        Ok(picture)
     }
 
     fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
@@ -208,7 +230,7 @@ impl World for Room {
         let (bodies, view) = (self.bodies_at(exposure.time), self.view(&exposure.opening, size));
         let mut seen = Plane::filled(view.size.0, view.size.1, 0);
         for first in 0..bodies.len() {
-            let [_, unhidden] = self.shape(&bodies[first..], exposure.time, &view);
+            let ([_, unhidden], _) = self.shape(&bodies[first..], exposure.time, &view);
             seen.data.iter_mut().zip(unhidden.data).for_each(|(pixel, one)| *pixel = one.max(*pixel));
         }
         Some(mask(seen))
@@ -217,7 +239,9 @@ impl World for Room {
     fn overview(&self, time: Duration) -> Result<Arc<Picture>, FootageError> {
         let (pose, pinhole) = self.overview_view();
         let (view, exposure) = (View::new(&pose, pinhole, OVERVIEW_SIZE), Exposure::at(time, pose));
-        Ok(Arc::new(self.take(&exposure, &view, (0.0, 0.0), |_| view.clone())))
+        let mut picture = self.take(&exposure, &view, (0.0, 0.0), |_| view.clone());
+        self.sensor.expose_once(&mut picture, self.frame_at(time), time.as_secs_f64());
+        Ok(Arc::new(picture))
     }
 
     fn overview_size(&self) -> (u32, u32) {

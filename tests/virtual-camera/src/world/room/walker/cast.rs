@@ -26,11 +26,21 @@ const WANDERING: f64 = 180.0;
 /// The part of the floor in which they walk: from side to side and ahead of the camera, in metres.
 const FLOOR: ((f64, f64), (f64, f64)) = ((-4.2, 4.2), (4.9, 6.9));
 
+/// Those in a group walk so far apart, in metres, and so fast.
+const APART: f64 = 0.62;
+const GROUP_SPEED: f64 = 1.25;
+/// Where others walk about before and behind the person's way, ahead of the camera and from side to side.
+const BEFORE: (f64, f64) = (3.7, 4.5);
+const BEHIND: (f64, f64) = (6.4, 7.2);
+const WIDTH: (f64, f64) = (-5.5, 5.5);
+/// Their stream of chance.
+const OTHERS: u64 = 0x07e5;
+
 /// Somebody in the room.
 #[derive(Debug, Clone)]
 pub(super) struct Role {
     pub subject: Subject,
-    /// Whose clothes they wear: their number, from 0.
+    /// Whose clothes they wear: their number, from 0. The first three are the subjects' own.
     pub clothes: usize,
     pub way: Way,
 }
@@ -51,11 +61,68 @@ pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
         Action::Approach => alone(stage.approach(&mut chance)),
         Action::Run => alone(stage.run()),
         Action::Wander => alone(stage.wander(&mut chance)),
+        Action::Group => stage.group(&mut chance, settings.others),
+        Action::Near => alone(stage.near(&mut chance)),
     };
     let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
     let subjects: Vec<_> = std::iter::once(settings.subject).chain(others).collect();
-    let role = |(way, clothes): (Way, usize)| Role { subject: subjects[clothes], clothes, way };
+    let role = |(way, clothes): (Way, usize)| Role { subject: subjects[clothes % 3], clothes, way };
     ways.into_iter().map(role).collect()
+}
+
+/// Those who wander about besides, `before` them being the people of the action itself.
+pub(super) fn others(settings: &RoomSettings, before: usize) -> Vec<Role> {
+    if settings.action == Action::Group {
+        return Vec::new();
+    }
+    let seeded = Seeded::new(settings.seed).fork(0xca57).fork(OTHERS);
+    let other = |number: usize| {
+        let mut chance = seeded.fork(number as u64);
+        let subject = chance.pick(&[Subject::B, Subject::C]);
+        // Two behind the person's way for each before it, where they may hide them.
+        let band = if number % 3 == 2 { BEFORE } else { BEHIND };
+        Role { subject, clothes: before + number, way: about(band, &mut chance) }
+    };
+    (0..settings.others).map(other).collect()
+}
+
+/// Somebody who is there from the beginning and walks about in a part of the floor, so far ahead of the camera.
+fn about((near, far): (f64, f64), chance: &mut Seeded) -> Way {
+    let place = |chance: &mut Seeded| (chance.range(WIDTH.0, WIDTH.1), chance.range(near, far));
+    let start = place(chance);
+    Way {
+        start,
+        heading: chance.range(-PI, PI),
+        departure: chance.range(0.0, 2.0),
+        above_deg: 0.0,
+        legs: strolling(start, chance, place),
+    }
+}
+
+/// From place to place for as long as somebody wanders, with stops, at changing speeds.
+fn strolling(
+    mut place: (f64, f64),
+    chance: &mut Seeded,
+    somewhere: impl Fn(&mut Seeded) -> (f64, f64),
+) -> Vec<Leg> {
+    let (mut legs, mut seconds) = (Vec::new(), 3.0);
+    while seconds < WANDERING {
+        let next = somewhere(chance);
+        let (length, speed) = ((next.0 - place.0).hypot(next.1 - place.1), chance.range(0.7, 1.7));
+        if length < 1.2 {
+            continue;
+        }
+        let pause = chance.range(0.5, 4.0);
+        if chance.unit() < 0.3 {
+            legs.extend([To(next, speed), Stand(pause)]);
+            seconds += pause + 1.0;
+        } else {
+            legs.push(Past(next, speed));
+        }
+        seconds += length / speed + 0.4;
+        place = next;
+    }
+    legs
 }
 
 /// Where the sofa stands that somebody sits down on, (x, z) of the sitter's feet before it.
@@ -212,25 +279,40 @@ impl Stage {
     }
 
     fn wander(&self, chance: &mut Seeded) -> Way {
-        let mut place = self.at(-3.5, self.lane);
-        let (mut legs, mut seconds) = (vec![Past(place, SPEED)], 3.0);
-        while seconds < WANDERING {
-            let ((left, right), (near, far)) = FLOOR;
-            let next = (chance.range(left, right), chance.range(near, far));
-            let (length, speed) = ((next.0 - place.0).hypot(next.1 - place.1), chance.range(0.7, 1.7));
-            if length < 1.2 {
-                continue;
-            }
-            let pause = chance.range(0.5, 4.0);
-            if chance.unit() < 0.3 {
-                legs.extend([To(next, speed), Stand(pause)]);
-                seconds += pause + 1.0;
-            } else {
-                legs.push(Past(next, speed));
-            }
-            seconds += length / speed + 0.4;
-            place = next;
-        }
+        let first = self.at(-3.5, self.lane);
+        let ((left, right), (near, far)) = FLOOR;
+        let somewhere = |chance: &mut Seeded| (chance.range(left, right), chance.range(near, far));
+        let mut legs = vec![Past(first, SPEED)];
+        legs.extend(strolling(first, chance, somewhere));
         self.way(self.start(self.lane), DEPARTURE, legs)
+    }
+
+    /// In rows of up to three, at about the same speed; the person is anywhere in the first row.
+    fn group(&self, chance: &mut Seeded, others: usize) -> Vec<(Way, usize)> {
+        let abreast = others.min(2) + 1;
+        let own = chance.below(abreast);
+        let mut places: Vec<usize> = (0..=others).filter(|place| *place != own).collect();
+        places.insert(0, own);
+        let mut member = |(clothes, place): (usize, usize)| {
+            let (row, file) = (place / abreast, place % abreast);
+            let lane =
+                self.lane + APART * (file as f64 - (abreast - 1) as f64 / 2.0) + chance.range(-0.1, 0.1);
+            let (start, behind) = (self.start(lane), 0.9 * row as f64 + chance.range(-0.15, 0.15));
+            let start = (start.0 - self.side * behind, lane);
+            let speed = GROUP_SPEED * chance.range(0.97, 1.03);
+            (self.way(start, DEPARTURE, vec![Past(self.end(lane), speed)]), clothes)
+        };
+        places.into_iter().enumerate().map(&mut member).collect()
+    }
+
+    /// From far to the one side over a place just ahead of the camera to the other side.
+    fn near(&self, chance: &mut Seeded) -> Way {
+        let lane = chance.range(1.9, 2.3);
+        let legs = vec![
+            Past(self.at(-1.6, lane), SPEED),
+            Past(self.at(1.6, lane), SPEED),
+            Past(self.at(5.0, 4.4), SPEED),
+        ];
+        self.way(self.at(-5.6, 4.4), DEPARTURE, legs)
     }
 }

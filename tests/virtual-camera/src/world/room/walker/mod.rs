@@ -45,9 +45,13 @@ use crate::{
 const PERSON: u64 = 0xb0d7;
 const STEP: u64 = 0x57e9;
 
-/// Body and clothes of the subject of a seed.
-fn person(settings: &RoomSettings, subject: Subject) -> (Build, Outfit) {
-    let mut chance = Seeded::new(settings.seed).fork(PERSON).fork(subject as u64);
+/// How many subjects there are. Who comes after them in a room is somebody else of a subject's kind.
+const SUBJECTS: usize = 3;
+
+/// Body and clothes of the subject of a seed, or of somebody of its kind by the number of their clothes.
+fn person(settings: &RoomSettings, subject: Subject, clothes: usize) -> (Build, Outfit) {
+    let seeded = Seeded::new(settings.seed).fork(PERSON).fork(subject as u64);
+    let mut chance = if clothes < SUBJECTS { seeded } else { seeded.fork(clothes as u64) };
     (Build::of(subject, &mut chance), Outfit::of(subject, Style::of(settings.seed).wall, &mut chance))
 }
 
@@ -62,24 +66,28 @@ pub(crate) struct Walker {
 impl Walker {
     /// Everybody in a room, the person to be followed first.
     pub fn all(settings: &RoomSettings) -> Vec<Self> {
-        match settings.action {
+        let mut walkers: Vec<_> = match settings.action {
             Action::Test => vec![Self::of_test(settings)],
-            _ => {
-                let cast = cast::cast(settings);
-                cast.iter().enumerate().map(|(number, role)| Self::in_role(settings, number, role)).collect()
-            }
-        }
+            _ => Self::in_roles(settings, &cast::cast(settings), 0),
+        };
+        let others = cast::others(settings, walkers.len());
+        walkers.extend(Self::in_roles(settings, &others, walkers.len()));
+        walkers
+    }
+
+    fn in_roles(settings: &RoomSettings, roles: &[Role], first: usize) -> Vec<Self> {
+        roles.iter().zip(first..).map(|(role, number)| Self::in_role(settings, number, role)).collect()
     }
 
     /// The person of a test of the thesis.
     fn of_test(settings: &RoomSettings) -> Self {
-        let (build, outfit) = person(settings, settings.subject);
+        let (build, outfit) = person(settings, settings.subject, 0);
         Self::walking(settings, build, outfit, Walk::of_test(settings), 0)
     }
 
     /// Somebody of an action, by their number from 0.
     fn in_role(settings: &RoomSettings, number: usize, role: &Role) -> Self {
-        let (build, outfit) = person(settings, role.subject);
+        let (build, outfit) = person(settings, role.subject, role.clothes);
         // Who wears another's clothes is not their twin.
         let own =
             Build::of(role.subject, &mut Seeded::new(settings.seed).fork(PERSON).fork(100 + number as u64));

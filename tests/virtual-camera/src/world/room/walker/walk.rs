@@ -141,12 +141,14 @@ impl Walk {
         self.at_the_edge
     }
 
-    /// The first view: beside the person's start, their middle somewhat above or below the middle of the picture.
-    pub fn home(&self) -> Pose {
-        let edge = self.at(self.at_the_edge);
+    /// The first view of a world that begins at a time in seconds: beside the person's start, their middle somewhat above or
+    /// below the middle of the picture. Once they have come in, it is between the middle and the edge they came from.
+    pub fn home(&self, begins: f64) -> Pose {
+        let edge = self.at(self.at_the_edge.max(begins));
         let height = (MIDDLE - CAMERA[1]).atan2(edge.x.hypot(edge.z));
         let tilt = height - self.above_deg.to_radians();
-        let beside = edge_of_view(HALF_VIEW_DEG.to_radians(), tilt, height);
+        let half = if begins > self.at_the_edge { HALF_VIEW_DEG / 2.0 } else { HALF_VIEW_DEG };
+        let beside = edge_of_view(half.to_radians(), tilt, height);
         let pan = edge.x.atan2(edge.z) + self.side * beside;
         Pose { pan_deg: pan.to_degrees(), tilt_deg: tilt.to_degrees(), ..Pose::default() }
     }
