@@ -30,6 +30,8 @@ CODEC ?= mjpeg
 DURATION ?= 60
 FOOTAGE ?=
 ARGS ?=
+# A scene or two of every stratum.
+SPOT_CHECK := --open-loop --seed 1-2 --scenes 1
 WORLD ?= footage
 ROOM_TEST ?= 1
 SEED ?= 1
@@ -107,12 +109,13 @@ bench-check: packages-bench
 	CARGO_TARGET_DIR="$(CURDIR)/target" GUNGRAUN_RUNNER="$(CURDIR)/target/tools/bin/gungraun-runner" $(CARGO) bench $(BENCHMARKS) --bench instructions -- --save-summary=json
 	python3 tests/benchmarks/check_instructions.py target/gungraun tests/benchmarks/instructions.csv $(ARGS)
 
-## evaluate: run the thesis' 72 tests in virtual time and leave tables, plots and a page in target/evaluation
-##       (ARGS="--test 1-6 --tracker all --seed 1-3 ..."; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all;
+## evaluate: show two scenes of every stratum to detector and tracker, in some minutes, and leave a table in target/evaluation
+##       (ARGS="--open-loop --seed 1-10": all scenes; ARGS="--compare A B": better, worse or not told apart; ARGS="--test 1-6 --tracker all
+##       --seed 1-3": the thesis' tests in closed loop; ARGS=--help lists the options; results are kept, ARGS=--fresh runs all anew;
 ##       PHOTOS=folder: then the photographs in it, PHOTO_ARGS="--tracker all ...", which leaves its report in target/evaluation/photos)
 evaluate: packages-evaluate
 	$(CARGO) build --release --package evaluation
-	target/release/evaluate $(ARGS)
+	target/release/evaluate $(or $(ARGS),$(SPOT_CHECK))
 	$(if $(PHOTOS),target/release/evaluate --photos "$(PHOTOS)" --out target/evaluation/photos $(PHOTO_ARGS))
 
 ## evaluate-all: the same with every tracker and ten seeds, hours of it; broken off, it goes on where it was

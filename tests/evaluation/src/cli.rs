@@ -10,6 +10,7 @@ use crate::{
     experiment::{Experiment, Scene},
     footage::{SceneError, Whom},
     record::{Codec, Delays, FirstBox, Suite, TestId, TrackerName},
+    strata::options::StrataArgs,
     suite::{hard, photo::PhotosError},
     trackers::missing,
 };
@@ -60,9 +61,14 @@ pub struct Args {
     /// Folder of the results that are kept
     #[arg(long, default_value = "target/evaluation/results")]
     pub results: PathBuf,
-    /// Instead of running tests, say what changed from one report to another, test by test: two folders once given as --out
+    /// Instead of running anything, say of each stratum whether the second of two reports is better, worse or not told apart from
+    /// the first: two folders once given as --out with --open-loop or --closed-loop
     #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["matrix", "test", "gallery", "footage", "still_recording"])]
     pub compare: Vec<PathBuf>,
+    /// Instead of running anything, say how often a report of --replicates 2 or more is told apart from itself, its recordings dealt out
+    /// at random
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["compare", "matrix", "test", "gallery", "footage", "still_recording"])]
+    pub calibrate: Option<PathBuf>,
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
@@ -101,6 +107,9 @@ pub struct Args {
     /// Where one can walk in the panorama (JSON); the file beside it that has its name and ends with .json unless given
     #[arg(long, value_name = "FILE", requires = "photo")]
     pub photo_place: Option<PathBuf>,
+    /// Scenes of the strata
+    #[command(flatten)]
+    pub strata: StrataArgs,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
     pub jobs: usize,
@@ -467,7 +476,7 @@ mod tests {
             ("--test 5-3", "1 to 72"),
             ("--size 640", "WIDTHxHEIGHT"),
             ("--tracker best", "ptztrack, thesis"),
-            ("--codec h264", "mjpeg, mpeg4, raw"),
+            ("--codec h265", "mjpeg, mpeg4, raw"),
             ("--first-box drawn", "detected, given"),
             ("--seed 3-1", "whole numbers"),
             ("--compare a", "2 values"),

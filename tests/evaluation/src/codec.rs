@@ -17,32 +17,51 @@ use crate::{
 /// VAPIX compression that the virtual camera uses unless asked for another.
 const COMPRESSION: u32 = 30;
 
-/// What a narrow line carries: kilobits a second.
+/// What a narrow line carries, and what cameras send where it is wide: kilobits a second.
 const LOW_KBIT_S: u32 = 250;
+const USUAL_KBIT_S: u32 = 2000;
 
 /// The element that makes JPEGs as the virtual camera does.
 pub(crate) fn jpeg_encoder() -> String {
     format!("jpegenc quality={}", 100 - COMPRESSION)
 }
 
+fn h264_encoder(kbit_s: u32) -> String {
+    format!(
+        "x264enc name=encoder tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max=50 \
+         bitrate={kbit_s} ! video/x-h264,profile=constrained-baseline"
+    )
+}
+
 impl Codec {
     /// The elements, as the virtual camera sets them for its own streams. Each gives one picture for one, at once.
     pub(crate) fn description(self) -> String {
+        format!("{} ! {}", self.encoder(), self.decoder())
+    }
+
+    /// From pictures to what the camera sends.
+    pub(crate) fn encoder(self) -> String {
         match self {
-            Self::Mjpeg => format!("{} ! jpegdec", jpeg_encoder()),
-            Self::Mpeg4 => format!(
-                "avenc_mpeg4 name=encoder gop-size=25 pass=quant quantizer={} ! avdec_mpeg4 max-threads=1",
-                2 + COMPRESSION / 10
-            ),
+            Self::Mjpeg => jpeg_encoder(),
+            Self::Mpeg4 => {
+                format!("avenc_mpeg4 name=encoder gop-size=25 pass=quant quantizer={}", 2 + COMPRESSION / 10)
+            }
             Self::Raw => "identity".into(),
-            Self::Mpeg4Low => format!(
-                "avenc_mpeg4 name=encoder gop-size=25 pass=cbr bitrate={} ! avdec_mpeg4 max-threads=1",
-                1000 * LOW_KBIT_S
-            ),
-            Self::H264Low => format!(
-                "x264enc name=encoder tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max=50 \
-                 bitrate={LOW_KBIT_S} ! video/x-h264,profile=constrained-baseline ! avdec_h264 max-threads=1"
-            ),
+            Self::Mpeg4Low => {
+                format!("avenc_mpeg4 name=encoder gop-size=25 pass=cbr bitrate={}", 1000 * LOW_KBIT_S)
+            }
+            Self::H264 => h264_encoder(USUAL_KBIT_S),
+            Self::H264Low => h264_encoder(LOW_KBIT_S),
+        }
+    }
+
+    /// And back.
+    pub(crate) fn decoder(self) -> &'static str {
+        match self {
+            Self::Mjpeg => "jpegdec",
+            Self::Mpeg4 | Self::Mpeg4Low => "avdec_mpeg4 max-threads=1",
+            Self::Raw => "identity",
+            Self::H264 | Self::H264Low => "avdec_h264 max-threads=1",
         }
     }
 
@@ -50,7 +69,7 @@ impl Codec {
     pub(crate) fn attach(self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match self {
             Self::Mjpeg | Self::Raw => Ok(()),
-            Self::Mpeg4 | Self::Mpeg4Low | Self::H264Low => {
+            Self::Mpeg4 | Self::Mpeg4Low | Self::H264 | Self::H264Low => {
                 keep_times(&pipeline.pad("encoder", "sink")?, &pipeline.pad("encoder", "src")?)
             }
         }

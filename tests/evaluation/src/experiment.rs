@@ -61,6 +61,10 @@ pub struct Scene {
     pub path: String,
     /// What there is to see.
     pub place: Place,
+    /// From the start of the world to the first picture.
+    pub begin: Duration,
+    /// For so long before the first picture the camera is on the person already.
+    pub lead: Duration,
     /// From the start of the world to the last picture that counts; a recording as it is has a number for that.
     pub duration: Duration,
     /// Who is to be followed.
@@ -78,6 +82,8 @@ impl Scene {
             title: format!("test {test}"),
             duration: room.duration(),
             place: Place::world(World::Room(room)),
+            begin: Duration::ZERO,
+            lead: Duration::ZERO,
             target: Target::Only,
         })
     }
@@ -106,6 +112,8 @@ pub struct Experiment {
     pub size: (u32, u32),
     /// Number of the world.
     pub seed: u64,
+    /// Which of several recordings of the same scene, from 1: the camera is steered otherwise in each.
+    pub replicate: u32,
     /// How late everything is.
     pub delays: Delays,
     /// Further properties of the servo, as on a `gst-launch-1.0` line.
@@ -118,6 +126,10 @@ pub struct Experiment {
     pub real_time: bool,
     /// Folder of the videos, with everything drawn in (Matroska); none is made unless given.
     pub films: Option<PathBuf>,
+    /// Folder of the recordings of scenes that are shown in open loop.
+    pub recordings: Option<PathBuf>,
+    /// Folder for what an open loop tells as MOTChallenge text; none is written unless given.
+    pub motchallenge: Option<PathBuf>,
 }
 
 impl Experiment {
@@ -129,12 +141,15 @@ impl Experiment {
             codec: Codec::Mjpeg,
             size: (640, 480),
             seed,
+            replicate: 1,
             delays: Delays::default(),
             servo: "",
             first_box: FirstBox::Detected,
             sweep: false,
             real_time: false,
             films: None,
+            recordings: None,
+            motchallenge: None,
         }
     }
 
@@ -154,17 +169,19 @@ impl Experiment {
 
     /// Numbers of all pictures.
     pub(crate) fn pictures(&self, period: Duration) -> impl Iterator<Item = u32> {
-        (0..).take_while(move |number| exposure(*number, period) <= self.scene.duration)
+        (0..)
+            .skip_while(move |number| exposure(*number, period) < self.scene.begin)
+            .take_while(move |number| exposure(*number, period) <= self.scene.duration)
     }
 
     /// Number of the first picture that counts: the first with the person's whole box inside the view of a camera that
     /// was never moved, or with as much of it as ever is, nearly, where the view is too narrow; `None` where the person is
-    /// never there. With nobody to follow all pictures count.
+    /// never there. With nobody to follow, or a camera that is on the person already, all pictures count.
     pub(crate) fn first_counted(&self, camera: &VirtualCamera) -> Option<u32> {
-        if self.scene.target == Target::Nobody {
-            return Some(0);
-        }
         let (period, home) = (camera.frame_period(), camera.home());
+        if self.scene.target == Target::Nobody || !self.scene.lead.is_zero() {
+            return self.pictures(period).next();
+        }
         let inside = |number: u32| {
             let people = camera.ground_truth_from(&home, exposure(number, period), self.size);
             self.scene.split(people).0.map_or(0.0, |person| person.bounds.part_inside(self.size))
@@ -205,13 +222,18 @@ impl Experiment {
         (record, people)
     }
 
+    fn title(&self) -> String {
+        let title = &self.scene.title;
+        if self.replicate > 1 { format!("{title} replicate {}", self.replicate) } else { title.clone() }
+    }
+
     /// What it will be recorded as.
     pub(crate) fn blank(&self) -> Run {
         Run {
             suite: self.scene.suite,
             test: self.scene.test,
             path: self.scene.path.clone(),
-            title: self.scene.title.clone(),
+            title: self.title(),
             tracker: self.tracker,
             provenance: Provenance::of(self.tracker),
             codec: self.codec,

@@ -120,6 +120,8 @@ impl Scene {
             title: format!("{name}, person {person}"),
             path: name.into(),
             place,
+            begin: Duration::ZERO,
+            lead: Duration::ZERO,
             duration: Duration::MAX,
             target: Target::Person(person),
         }

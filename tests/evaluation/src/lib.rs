@@ -24,6 +24,7 @@ mod footage;
 pub mod gallery;
 mod lockstep;
 pub mod metrics;
+pub mod open_loop;
 mod people;
 mod pipeline;
 mod provenance;
@@ -32,8 +33,10 @@ pub mod record;
 pub mod report;
 mod still;
 pub mod store;
+pub mod strata;
 pub mod suite;
 mod trackers;
+pub mod verdict;
 
 pub use batch::run_all;
 pub use experiment::{Experiment, Place, Scene, Target};

@@ -17,7 +17,7 @@ use virtual_camera::{Clock, Picture, Pose, Settings, VirtualCamera};
 use crate::{
     album::Album,
     experiment::{self, Experiment, Place},
-    film,
+    film, open_loop,
     pipeline::{Pipeline, PipelineError, SOURCE},
     realtime,
     record::{Bounds, Estimate, FrameRecord, Run},
@@ -42,6 +42,8 @@ pub(crate) enum RunError {
     Raw,
     #[error("cannot film into {}: {source}", file.display())]
     Film { file: PathBuf, source: std::io::Error },
+    #[error("cannot write {}: {source}", file.display())]
+    Keep { file: PathBuf, source: std::io::Error },
     #[error("the person is never wholly in the first view")]
     Nobody,
 }
@@ -49,10 +51,13 @@ pub(crate) enum RunError {
 /// Runs one experiment from the start of its world to its end. A fault ends it early and is told in the run.
 pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
-    let driven = match &experiment.scene.place {
-        Place::Camera(camera) if experiment.real_time => realtime::drive(experiment, camera, &mut run),
-        Place::Camera(camera) => drive(experiment, camera, &mut run),
-        Place::Recording(recording) => still::drive(experiment, recording, &mut run),
+    let driven = match (&experiment.scene.place, &experiment.recordings) {
+        (Place::Camera(camera), Some(folder)) => open_loop::drive(experiment, camera, folder, &mut run),
+        (Place::Camera(camera), None) if experiment.real_time => {
+            realtime::drive(experiment, camera, &mut run)
+        }
+        (Place::Camera(camera), None) => drive(experiment, camera, &mut run),
+        (Place::Recording(recording), _) => still::drive(experiment, recording, &mut run),
     };
     if let Err(error) = driven {
         run.error = Some(error.to_string());
@@ -64,6 +69,7 @@ fn drive(experiment: &Experiment, camera: &Settings, run: &mut Run) -> Result<()
     let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
     let mut stage = Stage::set(experiment, camera, film.as_deref())?;
     let first = experiment.first_counted(&stage.camera).ok_or(RunError::Nobody)?;
+    open_loop::lead(experiment, camera, &stage.camera)?;
     let period = stage.camera.frame_period();
     run.frame_rate = 1.0 / period.as_secs_f64();
     let mut album = Album::default();

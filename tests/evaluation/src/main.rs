@@ -9,7 +9,19 @@ use std::{
 };
 
 use clap::Parser;
-use evaluation::{cli::Args, gallery, report, store::Store, suite};
+use evaluation::{
+    Experiment,
+    cli::Args,
+    gallery,
+    record::{Run, Suite},
+    report,
+    store::Store,
+    strata::{self, SceneId, SceneRun},
+    suite, verdict,
+};
+
+/// How many comparisons of a report with itself are made.
+const CALIBRATIONS: usize = 200;
 
 fn main() -> ExitCode {
     match evaluate(&Args::parse()) {
@@ -27,8 +39,16 @@ fn main() -> ExitCode {
 fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     evaluation::init()?;
     if let [before, after] = args.compare.as_slice() {
-        tell(io::stdout(), format_args!("{}", report::compare::compare(before, after)?))?;
+        tell(io::stdout(), format_args!("{}", verdict::compare(before, after)?))?;
         return Ok(true);
+    }
+    if let Some(folder) = &args.calibrate {
+        let told = verdict::calibrate(folder, CALIBRATIONS)?;
+        tell(io::stdout(), format_args!("told apart from itself in {told} of {CALIBRATIONS} comparisons"))?;
+        return Ok(true);
+    }
+    if let Some(suite) = args.strata.suite() {
+        return strata(args, suite);
     }
     let gallery = args.gallery()?;
     if !gallery.is_empty() {
@@ -63,6 +83,36 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     let page = args.out.join("index.html");
     tell(io::stdout(), format_args!("{}\nall of it: {}", report.summary, page.display()))?;
     Ok(runs.len() == experiments.len() && runs.iter().all(|run| run.error.is_none()))
+}
+
+/// The same for scenes of the strata.
+fn strata(args: &Args, suite: Suite) -> Result<bool, Box<dyn std::error::Error>> {
+    let seeds = args.seeds();
+    if let Some(notice) = strata::options::notice(&seeds, args.record || args.strata.motchallenge.is_some())?
+    {
+        tell(io::stderr(), format_args!("evaluate: {notice}"))?;
+    }
+    report::make_room(&args.out)?;
+    let (trackers, left_out) = args.trackers();
+    for note in left_out {
+        tell(io::stderr(), format_args!("evaluate: {note}"))?;
+    }
+    let films = args.record.then(|| args.out.join("films"));
+    let asked = args.strata.experiments(suite, &seeds, &trackers);
+    let experiments: Vec<_> =
+        asked.iter().map(|(_, one)| Experiment { films: films.clone(), ..one.clone() }).collect();
+    let store = Store::new(&args.results, args.fresh);
+    let runs = evaluation::run_all(&experiments, args.jobs(), &store, io::stderr());
+    let whole = runs.len() == experiments.len() && runs.iter().all(|run| run.error.is_none());
+    let scene = |((id, experiment), run): ((SceneId, Experiment), Run)| SceneRun {
+        id,
+        replicate: experiment.replicate,
+        run,
+    };
+    let scenes: Vec<_> = asked.into_iter().zip(runs).map(scene).collect();
+    let table = strata::table::write(&scenes, &args.out)?;
+    tell(io::stdout(), format_args!("{table}"))?;
+    Ok(whole)
 }
 
 /// Writes a line. That nobody reads any more, as behind `| head`, is no fault.

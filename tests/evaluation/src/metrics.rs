@@ -13,7 +13,7 @@ mod centred;
 mod identity;
 mod losses;
 
-pub use boxes::{box_precision, success};
+pub use boxes::{box_precision, overlap_with, success};
 pub use centred::{centred_after_s, mean_dgc_centred};
 pub use identity::{identity_kept, identity_switches, is_hidden};
 pub use losses::{Cause, LASTING_S, Loss, holds, losses};

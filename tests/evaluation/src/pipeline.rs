@@ -98,6 +98,11 @@ impl Pipeline {
     /// Makes what `description` says: elements from an `appsrc` named [`SOURCE`] to a sink named [`SINK`], without
     /// a queue between. Pictures are of the format `info`.
     pub fn new(description: &str, info: &gst_video::VideoInfo) -> Result<Self, PipelineError> {
+        Self::of_caps(description, &info.to_caps()?)
+    }
+
+    /// The same for what is of these caps.
+    pub fn of_caps(description: &str, caps: &gst::Caps) -> Result<Self, PipelineError> {
         let bin = gst::parse::launch(description)?
             .downcast::<gst::Pipeline>()
             .map_err(|_| PipelineError::NoElement(SOURCE))?;
@@ -105,7 +110,7 @@ impl Pipeline {
         bin.use_clock(gst::Clock::NONE);
         let source =
             bin.by_name(SOURCE).and_downcast::<gst_app::AppSrc>().ok_or(PipelineError::NoElement(SOURCE))?;
-        source.set_caps(Some(&info.to_caps()?));
+        source.set_caps(Some(caps));
         source.set_format(gst::Format::Time);
         let (sender, events) = channel();
         announce_hunger(&source, sender.clone());
@@ -154,6 +159,18 @@ impl Pipeline {
             .map_err(|_| PipelineError::Posted(self.posted().unwrap_or_else(|| "it has ended".into())))?;
         self.wait(|event| matches!(event, Event::Hungry) && lock(&self.arrival).time == time)?;
         Ok(lock(&self.arrival).target.take())
+    }
+
+    /// Caps of what reaches the sink, once something did.
+    pub fn caps(&self) -> Result<gst::Caps, PipelineError> {
+        self.bin.pad(SINK, "sink")?.current_caps().ok_or(PipelineError::Stalled)
+    }
+
+    /// Sends an event from the sink to all elements before it, as a servo does; to be called between pictures.
+    pub fn send_upstream(&self, event: gst::Event) -> Result<(), PipelineError> {
+        // Who does not know it leaves it alone: that is no fault.
+        self.bin.pad(SINK, "sink")?.push_event(event);
+        Ok(())
     }
 
     /// Ends the stream, and waits until whatever writes a file has written it.

@@ -219,7 +219,7 @@ impl Drop for Stream {
 fn description(watch: &Watch) -> String {
     let (camera, (width, height)) = (&watch.camera, watch.experiment.size);
     let stream = match watch.experiment.codec {
-        Codec::Mpeg4 | Codec::Mpeg4Low | Codec::H264Low => format!(
+        Codec::Mpeg4 | Codec::Mpeg4Low | Codec::H264 | Codec::H264Low => format!(
             "rtspsrc location=\"{}/axis-media/media.amp?videocodec=mpeg4&resolution={width}x{height}\" latency=0 protocols=tcp ! rtpmp4vdepay \
              ! avdec_mpeg4 name={DECODER} max-threads=1",
             camera.rtsp_url()

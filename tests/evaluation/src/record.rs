@@ -113,6 +113,10 @@ named! {
         Hard = "hard",
         /// Recordings of real people.
         Recording = "recording",
+        /// Strata of scenes, recorded once and shown to detector and tracker alone.
+        OpenLoop = "open-loop",
+        /// The same scenes, with a camera that is steered.
+        ClosedLoop = "closed-loop",
     }
 }
 
@@ -127,6 +131,8 @@ named! {
         Raw = "raw",
         /// MPEG-4 part 2 at a low bit rate.
         Mpeg4Low = "mpeg4-low",
+        /// H.264 at a usual bit rate.
+        H264 = "h264",
         /// H.264 at a low bit rate.
         H264Low = "h264-low",
     }

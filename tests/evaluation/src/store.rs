@@ -38,7 +38,10 @@ impl Store {
     /// The kept result, if there is one that was made with what there is now. What cannot be read is not there.
     pub fn get(&self, experiment: &Experiment) -> Option<Run> {
         // A film is only made by running it.
-        let kept = !self.fresh && is_kept(experiment) && experiment.films.is_none();
+        let kept = !self.fresh
+            && is_kept(experiment)
+            && experiment.films.is_none()
+            && experiment.motchallenge.is_none();
         let bytes = fs::read(self.file(experiment)).ok().filter(|_| kept)?;
         let kept: Kept<Run> = postcard::from_bytes(&bytes).ok()?;
         (kept.key == key(experiment)).then_some(kept.run)
@@ -83,7 +86,7 @@ fn key(experiment: &Experiment) -> String {
         },
     };
     let stamps: Vec<_> = files.iter().map(stamp).collect();
-    let experiment = Experiment { films: None, ..experiment.clone() };
+    let experiment = Experiment { films: None, recordings: None, motchallenge: None, ..experiment.clone() };
     format!("{:?}\n{experiment:?}\n{stamps:?}", Provenance::of(experiment.tracker))
 }
 

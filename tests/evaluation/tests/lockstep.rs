@@ -34,6 +34,8 @@ fn scene() -> Scene {
         title: "walk".into(),
         path: "walk".into(),
         place: Place::world(world),
+        begin: Duration::ZERO,
+        lead: Duration::ZERO,
         duration,
         target: Target::Only,
     }

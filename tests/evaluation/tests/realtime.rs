@@ -27,6 +27,8 @@ fn run(codec: Codec) -> Run {
         title: "walk".into(),
         path: "walk".into(),
         place,
+        begin: Duration::ZERO,
+        lead: Duration::ZERO,
         duration,
         target: Target::Only,
     };

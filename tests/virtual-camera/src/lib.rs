@@ -45,6 +45,7 @@ pub use kinematics::{
     ZOOM_RANGE,
 };
 pub use picture::{Picture, Plane};
+pub use seeded::Seeded;
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Kind, Mask, Sighting, Silhouette};

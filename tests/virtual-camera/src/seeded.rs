@@ -4,7 +4,7 @@
 
 /// A stream of numbers (splitmix64, Steele et al. 2014), the same on every machine.
 #[derive(Debug, Clone)]
-pub(crate) struct Seeded(u64);
+pub struct Seeded(u64);
 
 impl Seeded {
     /// The stream of a seed.
@@ -26,6 +26,11 @@ impl Seeded {
     /// From 0 to 1, 1 not included.
     pub fn unit(&mut self) -> f64 {
         (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    /// Nearly normal with mean 0 and standard deviation 1: twelve draws, which add up to the same on every machine.
+    pub fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.unit()).sum::<f64>() - 6.0
     }
 
     /// From `low` to `high`.
@@ -65,6 +70,15 @@ mod tests {
         let root = Seeded::new(7);
         assert_ne!(root.fork(1).bits(), root.fork(2).bits());
         assert_eq!(root.fork(1).bits(), root.fork(1).bits());
+    }
+
+    #[test]
+    fn normal_numbers_have_mean_0_and_deviation_1() {
+        let mut seeded = Seeded::new(1);
+        let drawn: Vec<f64> = (0..10_000).map(|_| seeded.normal()).collect();
+        let mean = drawn.iter().sum::<f64>() / 1e4;
+        let square = drawn.iter().map(|value| value * value).sum::<f64>() / 1e4;
+        assert!(mean.abs() < 0.03 && (square - 1.0).abs() < 0.04, "{mean} {square}");
     }
 
     #[test]

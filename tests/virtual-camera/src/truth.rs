@@ -72,8 +72,9 @@ pub struct GroundTruth {
     pub direction_deg: Option<(f64, f64)>,
 }
 
-/// Which pixels of a picture show somebody.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// Which pixels of a picture show somebody. It is kept as lengths of runs.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(into = "Runs", try_from = "Runs")]
 pub struct Mask {
     /// Pixels a row.
     pub width: usize,
@@ -83,9 +84,47 @@ pub struct Mask {
     pub data: Vec<u8>,
 }
 
+/// A mask as how many pixels are 0, then 255, then 0 and so on, row after row.
+#[derive(Serialize, Deserialize)]
+struct Runs {
+    width: usize,
+    height: usize,
+    lengths: Vec<u32>,
+}
+
+impl From<Mask> for Runs {
+    fn from(Mask { width, height, data }: Mask) -> Self {
+        let (mut lengths, mut value) = (vec![0], 0);
+        for pixel in data {
+            if pixel != value {
+                lengths.push(0);
+                value = pixel;
+            }
+            if let Some(length) = lengths.last_mut() {
+                *length += 1;
+            }
+        }
+        Self { width, height, lengths }
+    }
+}
+
+impl TryFrom<Runs> for Mask {
+    type Error = String;
+
+    fn try_from(Runs { width, height, lengths }: Runs) -> Result<Self, String> {
+        let pixels: u64 = lengths.iter().copied().map(u64::from).sum();
+        if width.checked_mul(height).map(|count| count as u64) != Some(pixels) {
+            return Err(format!("{pixels} pixels in a mask of {width} x {height}"));
+        }
+        let runs = lengths.iter().zip([0, 255].into_iter().cycle());
+        let data = runs.flat_map(|(length, value)| std::iter::repeat_n(value, *length as usize));
+        Ok(Self { width, height, data: data.collect() })
+    }
+}
+
 /// The whole shape of one person in a picture of the view, hidden parts and parts outside of the view included, and how
 /// much of it is seen.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Silhouette {
     /// Left edge of the masks' first column and top edge of their first row, in pixels of the view.
     origin: (f64, f64),
@@ -149,6 +188,20 @@ impl Silhouette {
         if whole > 0 { part as f64 / whole as f64 } else { 0.0 }
     }
 
+    /// What part of the whole silhouette, 0 to 1, would be hidden by `other` if that were nearer.
+    pub fn part_behind(&self, other: &Self) -> f64 {
+        let set = self.whole.data.iter().enumerate().filter(|(_, value)| **value > 127);
+        let place = |index: usize| {
+            let (row, column) = (index / self.whole.width.max(1), index % self.whole.width.max(1));
+            let along = |origin: f64, pixel: f64, index: usize| origin + pixel * (index as f64 + 0.5);
+            (along(self.origin.0, self.pixel.0, column), along(self.origin.1, self.pixel.1, row))
+        };
+        let (all, behind) = set.fold((0u32, 0u32), |(all, behind), (index, _)| {
+            (all + 1, behind + u32::from(other.contains(place(index))))
+        });
+        if all > 0 { f64::from(behind) / f64::from(all) } else { 0.0 }
+    }
+
     /// The whole body.
     pub fn whole(&self) -> &Mask {
         &self.whole
@@ -174,7 +227,7 @@ impl Silhouette {
 }
 
 /// What somebody or something that moves is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub enum Kind {
     /// On two legs.
     #[default]
@@ -184,7 +237,7 @@ pub enum Kind {
 }
 
 /// One person, or vehicle, in a picture: where, and in what shape.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sighting {
     /// Who and where.
     pub truth: GroundTruth,
@@ -230,6 +283,28 @@ mod tests {
         assert!(half_out.contains((-15.0, 63.0)));
         let nothing = Silhouette::of_box(&bounds(5.0, 5.0, 0.0, 0.0), (640, 480));
         assert!(!nothing.contains((6.0, 6.0)));
+    }
+
+    #[test]
+    fn who_is_nearer_hides_what_they_cover() {
+        let bounds = |left, top, width, height| Bounds { left, top, width, height };
+        let shape = |bounds| Silhouette::of_box(&bounds, (640, 480));
+        let (one, other) = (shape(bounds(0.0, 0.0, 32.0, 64.0)), shape(bounds(24.0, 0.0, 64.0, 32.0)));
+        assert!((one.part_behind(&other) - 0.125).abs() < 0.01);
+        assert!((other.part_behind(&one) - 0.125).abs() < 0.01);
+        assert_eq!(one.part_behind(&shape(bounds(100.0, 0.0, 32.0, 64.0))), 0.0);
+        assert_eq!(one.part_behind(&one), 1.0);
+    }
+
+    #[test]
+    fn a_mask_is_kept_as_runs_and_a_broken_one_is_refused() {
+        for data in [vec![0, 0, 255, 255, 0, 255], vec![255; 6], vec![0; 6]] {
+            let mask = Mask { width: 3, height: 2, data };
+            let kept = serde_json::to_string(&mask).unwrap();
+            assert_eq!(serde_json::from_str::<Mask>(&kept).unwrap(), mask, "{kept}");
+        }
+        let broken = r#"{"width":3,"height":2,"lengths":[1,2]}"#;
+        assert!(serde_json::from_str::<Mask>(broken).is_err());
     }
 
     #[test]

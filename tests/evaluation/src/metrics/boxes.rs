@@ -40,7 +40,11 @@ fn is_near(frame: &FrameRecord) -> bool {
 }
 
 fn overlap(frame: &FrameRecord) -> f64 {
-    let Some((a, b)) = boxes(frame) else { return 0.0 };
+    boxes(frame).map_or(0.0, |(a, b)| overlap_with(&a, &b))
+}
+
+/// Intersection over union of two boxes, 0 to 1.
+pub fn overlap_with(a: &Bounds, b: &Bounds) -> f64 {
     let common = |from: (f64, f64), to: (f64, f64)| (from.1.min(to.1) - from.0.max(to.0)).max(0.0);
     let wide = common((a.left, a.left + a.width), (b.left, b.left + b.width));
     let high = common((a.top, a.top + a.height), (b.top, b.top + b.height));

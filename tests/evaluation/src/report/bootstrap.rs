@@ -22,13 +22,6 @@ pub struct Interval {
     pub high: f64,
 }
 
-impl Interval {
-    /// Whether it tells the mean from nothing.
-    pub fn excludes_zero(&self) -> bool {
-        self.low > 0.0 || self.high < 0.0
-    }
-}
-
 /// Of the mean over all `values`, each with its group. `None` of fewer than two groups, which tell nothing. The same values
 /// give the same interval, in whichever order they come.
 pub fn interval<'a>(values: impl IntoIterator<Item = (Group<'a>, f64)>) -> Option<Interval> {

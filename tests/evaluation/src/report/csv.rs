@@ -197,12 +197,14 @@ fn means(runs: &[&Metrics]) -> impl Iterator<Item = String> {
     column::OF_TESTS.iter().map(|column| number(column.mean(runs.iter().copied())))
 }
 
-fn number(value: Option<f64>) -> String {
+/// Of fixed digits; nothing where there is none.
+pub fn number(value: Option<f64>) -> String {
     // Adding zero turns -0 into 0.
     value.map(|value| format!("{:.DECIMALS$}", value + 0.0)).unwrap_or_default()
 }
 
-fn line(cells: impl IntoIterator<Item = impl AsRef<str>>) -> String {
+/// One line of cells.
+pub fn line(cells: impl IntoIterator<Item = impl AsRef<str>>) -> String {
     let cells: Vec<_> = cells.into_iter().map(|cell| quoted(cell.as_ref())).collect();
     cells.join(",") + "\n"
 }

@@ -3,7 +3,8 @@
 //! Runs that nobody ran.
 
 use crate::record::{
-    Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Sighting, Suite, TestId, TrackerName,
+    Bounds, Codec, Coverage, Delays, Estimate, FirstBox, FrameRecord, GroundTruth, Provenance, Run, Sighting,
+    Suite, TargetState, TestId, TrackerName,
 };
 
 /// Test 7 with ours, at ten pictures a second.
@@ -46,9 +47,29 @@ pub(crate) fn frame(size: (u32, u32)) -> FrameRecord {
     }
 }
 
+/// A picture of that size in whose middle somebody is whom the tracker is right about.
+pub(crate) fn tracked(size: (u32, u32)) -> FrameRecord {
+    let (width, height) = (f64::from(size.0), f64::from(size.1));
+    let bounds = Bounds { left: 0.4 * width, top: 0.25 * height, width: 0.2 * width, height: 0.5 * height };
+    let truth = GroundTruth {
+        id: 1,
+        bounds,
+        centroid: bounds.centre(),
+        visible: 1.0,
+        unhidden: 1.0,
+        in_view: 1.0,
+        position_m: None,
+        direction_deg: None,
+    };
+    let estimate =
+        Estimate { state: TargetState::Tracking, centroid: bounds.centre(), bounds, id: 1, features: 0 };
+    let coverage = vec![Coverage { id: 1, hit: true, covered: 1.0 }];
+    FrameRecord { truth: Some(truth), estimate: Some(estimate), coverage, ..frame(size) }
+}
+
 /// As if everybody in it were as wide and high as their box all over.
 pub(crate) fn judged_by_boxes(frame: FrameRecord) -> FrameRecord {
-    let sighting = |truth: &crate::record::GroundTruth| Sighting::of_box(truth.clone(), frame.size);
+    let sighting = |truth: &GroundTruth| Sighting::of_box(truth.clone(), frame.size);
     let people: Vec<_> = frame.truth.iter().chain(&frame.others).map(sighting).collect();
     let estimate = frame.estimate.clone();
     frame.judged(estimate, &people)

@@ -30,8 +30,7 @@ use crate::record::{Run, TestId};
 
 mod bootstrap;
 mod column;
-pub mod compare;
-mod csv;
+pub(crate) mod csv;
 mod definitions;
 mod judged;
 mod page;

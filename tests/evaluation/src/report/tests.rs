@@ -317,34 +317,3 @@ fn seeds_that_nobody_tunes_on_stand_apart_and_rows_are_over_the_same_runs() {
     let all = summary.split("Those that were run on all seeds").nth(1).unwrap();
     assert!(all.lines().nth(4).unwrap().starts_with("| ptztrack |    2 |"), "{all}");
 }
-
-#[test]
-fn what_changed_is_said_test_by_test_with_its_interval() {
-    let (before, after) = (Folder::new("before"), Folder::new("after"));
-    let runs = |worse: bool| -> Vec<_> {
-        let one = |(test, seed)| {
-            let tracked = |index: usize| !(worse && test == 7) || index < 20;
-            let frames = (0..40).map(|index| frame(index, tracked(index))).collect();
-            Run { seed, frames, ..run(test, TrackerName::Ptztrack) }
-        };
-        [(1, 1), (1, 2), (7, 1), (7, 2)].map(one).into()
-    };
-    write(&runs(false), &[], &before.0).unwrap();
-    write(&runs(true), &[], &after.0).unwrap();
-    let changed = compare::compare(&before.0, &after.0).unwrap();
-    assert!(changed.contains("(1 of 2 tests changed)"), "{changed}");
-    // Of 35 that show the person 15 are right.
-    let line = changed.lines().find(|line| line.starts_with("| test 7")).unwrap();
-    assert!(line.contains("-57.1 (-57.1 -57.1)*") && line.contains("+1.00 (+1.00 +1.00)*"), "{line}");
-    assert!(changed.lines().any(|line| line.starts_with("| all") && line.contains("-28.6")), "{changed}");
-    let same = compare::compare(&before.0, &before.0).unwrap();
-    assert!(same.contains("(0 of 2 tests changed)"), "{same}");
-
-    let mut elsewhere = runs(true);
-    elsewhere.iter_mut().for_each(|run| run.provenance.laboratory = "older".into());
-    write(&elsewhere, &[], &after.0).unwrap();
-    let refused = compare::compare(&before.0, &after.0).unwrap_err().to_string();
-    assert!(refused.contains("`l` and `older`"), "{refused}");
-    let none = compare::compare(&before.0.join("none"), &after.0).unwrap_err().to_string();
-    assert!(none.contains("cannot read"), "{none}");
-}

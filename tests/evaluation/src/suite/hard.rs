@@ -133,6 +133,8 @@ impl Trial {
             title: title.into(),
             path: title.into(),
             duration: self.room.duration(),
+            begin: Duration::ZERO,
+            lead: Duration::ZERO,
             place: Place::Camera(Box::new(Settings {
                 world: World::Room(self.room.clone()),
                 ..self.camera.clone()

@@ -7,6 +7,7 @@ use std::{
     ffi::OsStr,
     fmt::Write,
     path::{Path, PathBuf},
+    time::Duration,
 };
 
 use virtual_camera::{PhotoError, PhotoPlace, PhotoSettings, World};
@@ -64,6 +65,8 @@ impl Scene {
             title: format!("{name} way {}", photo.way),
             duration: photo.duration(),
             place: Place::world(World::Photo(Box::new(photo))),
+            begin: Duration::ZERO,
+            lead: Duration::ZERO,
             target: Target::Only,
         };
         Ok((1..=PhotoSettings::WAYS).filter_map(settings).map(scene).collect())

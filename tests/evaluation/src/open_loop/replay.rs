@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Shows a recording to decoder, detector and tracker.
+
+use std::{
+    path::Path,
+    str::FromStr,
+    sync::{Arc, Mutex},
+};
+
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, MotionMeta, Rect};
+use virtual_camera::Settings;
+
+use super::{
+    library,
+    motchallenge::Sequence,
+    recorded::{RecordedPicture, RecordedScene},
+};
+use crate::{
+    experiment::Experiment,
+    film,
+    lockstep::{RunError, clock_time, estimate, info},
+    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE, lock},
+    record::{FrameRecord, Run},
+    trackers::{Cue, Phase, Tracker},
+};
+
+/// Shows the scene of `experiment` to its tracker, from the recording kept in `folder`.
+pub(crate) fn drive(
+    experiment: &Experiment,
+    settings: &Settings,
+    folder: &Path,
+    run: &mut Run,
+) -> Result<(), RunError> {
+    let scene = library::recording(experiment, settings, folder)?;
+    run.frame_rate = 1.0 / scene.period.as_secs_f64();
+    let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
+    let screening = Screening::begin(experiment, &scene, film.as_deref())?;
+    let mut sequence = Sequence::default();
+    for (index, picture) in scene.pictures.iter().enumerate() {
+        let (record, regions) = screening.picture(index, picture)?;
+        sequence.add(&record, picture, &regions);
+        if index >= scene.first {
+            run.frames.push(record);
+        }
+    }
+    if film.is_some() {
+        screening.pipeline.end()?;
+    }
+    match &experiment.motchallenge {
+        Some(folder) => {
+            sequence.write(folder, run).map_err(|source| RunError::Keep { file: folder.clone(), source })
+        }
+        None => Ok(()),
+    }
+}
+
+/// A tracker in front of a recording.
+struct Screening<'a> {
+    experiment: &'a Experiment,
+    scene: &'a RecordedScene,
+    pipeline: Pipeline,
+    tracker: Tracker,
+    /// Moving regions of the picture that passed last.
+    regions: Arc<Mutex<Vec<Rect>>>,
+}
+
+impl<'a> Screening<'a> {
+    fn begin(
+        experiment: &'a Experiment,
+        scene: &'a RecordedScene,
+        film: Option<&Path>,
+    ) -> Result<Self, RunError> {
+        let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
+        let sink = film::beside(&format!("fakesink name={SINK} sync=false async=false"), film);
+        let (decoder, elements) = (experiment.codec.decoder(), tracker.description());
+        let description = format!("appsrc name={SOURCE} ! {decoder} ! {elements} ! {sink}");
+        let caps = gst::Caps::from_str(&scene.caps).map_err(PipelineError::Link)?;
+        let pipeline = Pipeline::of_caps(&description, &caps)?;
+        tracker.attach(pipeline.bin())?;
+        if film.is_some() {
+            film::attach(pipeline.bin(), tracker.cue(), &info(experiment.size, scene.period)?)?;
+        }
+        let regions = collect_regions(&pipeline)?;
+        pipeline.start()?;
+        Ok(Self { experiment, scene, pipeline, tracker, regions })
+    }
+
+    fn picture(&self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Vec<Rect>), RunError> {
+        let (first, size) = (self.scene.first, self.experiment.size);
+        let phase = Phase::of(index >= first, index > first);
+        let cue = Cue { phase, truth: picture.truth.truth.clone(), motion: picture.motion, size };
+        self.tracker.next(self.pipeline.bin(), cue)?;
+        let mut buffer = gst::Buffer::from_slice(picture.encoded.clone());
+        if let Some(buffer) = buffer.get_mut() {
+            buffer.set_pts(clock_time(picture.arrival));
+            buffer.set_dts(clock_time(picture.arrival));
+            buffer.set_duration(clock_time(self.scene.period));
+        }
+        let target = self.pipeline.finish(buffer)?;
+        if let Some(state) = &picture.told {
+            self.pipeline.send_upstream(state.event())?;
+        }
+        let record =
+            picture.truth.clone().judged(target.map(|target| estimate(&target, size)), &picture.people);
+        Ok((record, std::mem::take(&mut *lock(&self.regions))))
+    }
+}
+
+fn collect_regions(pipeline: &Pipeline) -> Result<Arc<Mutex<Vec<Rect>>>, PipelineError> {
+    let regions = Arc::<Mutex<Vec<Rect>>>::default();
+    let seen = regions.clone();
+    pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+        let motion = info.buffer().and_then(|buffer| MotionMeta::of(buffer)).and_then(Result::ok);
+        *lock(&seen) = motion
+            .map(|motion| motion.regions.iter().map(|region| region.bounds).collect())
+            .unwrap_or_default();
+        gst::PadProbeReturn::Ok
+    });
+    Ok(regions)
+}

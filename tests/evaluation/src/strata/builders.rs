@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What each stratum is about: a small change to a person who walks across a room.
+
+use std::time::Duration;
+
+use virtual_camera::{Action, Event, Lighting, Occlusion, Seeded, Subject};
+
+use super::draft::Draft;
+use crate::{experiment::Target, record::FirstBox};
+
+/// Magnification of a camera before which somebody who comes near fills the picture.
+const NEAR_MAGNIFICATION: (f64, f64) = (1.5, 2.2);
+/// The room's magnification at zoom step 9999.
+const MOST_MAGNIFICATION: f64 = 19.885;
+
+pub(super) fn alone(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+    draft.room.action = chance.pick(&[Action::Test, Action::Test, Action::StopAndGo, Action::Run]);
+}
+
+pub(super) fn hidden(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.occlusion = chance.pick(&[Occlusion::Partial, Occlusion::Full, Occlusion::Full]);
+    draft.room.lighting = Lighting::Optimal;
+}
+
+/// Whom to follow is told by a click: anybody else would be as good a choice.
+fn among_others(draft: &mut Draft, action: Action) {
+    draft.room.action = action;
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+    draft.first_box = FirstBox::Given;
+}
+
+pub(super) fn crossing(draft: &mut Draft, chance: &mut Seeded) {
+    among_others(draft, chance.pick(&[Action::Cross, Action::CrossAlike, Action::Overtake]));
+}
+
+pub(super) fn parting(draft: &mut Draft, _chance: &mut Seeded) {
+    among_others(draft, Action::Part);
+}
+
+pub(super) fn dark(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Dim;
+    // Clothed nearly in the colour of the wall.
+    draft.room.subject = Subject::A;
+    draft.camera.imaging.noise_filter = chance.pick(&[0.0, 0.5, 0.8]);
+}
+
+pub(super) fn nobody(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.action = Action::Nobody;
+    draft.target = Target::Nobody;
+    let happens = |chance: &mut Seeded| chance.unit() < 0.6;
+    draft.room.events = Event::ALL.into_iter().map(|(event, _)| event).filter(|_| happens(chance)).collect();
+    // Nothing happens in the first minute and a half of some of them.
+    draft.begin = Duration::from_secs_f64(chance.range(90.0, 300.0));
+}
+
+pub(super) fn near(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.action = Action::Approach;
+    draft.room.occlusion = Occlusion::None;
+    let mut home = draft.room.home();
+    let magnification = chance.range(NEAR_MAGNIFICATION.0, NEAR_MAGNIFICATION.1);
+    home.zoom_step = 1.0 + (magnification - 1.0) / (MOST_MAGNIFICATION - 1.0) * 9998.0;
+    draft.camera.home = Some(home);
+    // They come near some seconds after they came in.
+    draft.begin = Duration::from_secs(3);
+    draft.lead = Duration::from_millis(900);
+}
+
+pub(super) fn turning(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+    draft.begin = Duration::from_secs_f64(chance.range(4.0, 5.0));
+    draft.lead = Duration::from_millis(1500);
+}

@@ -1,0 +1,112 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The part of the command line that asks for scenes of the strata.
+
+use std::{ops::RangeInclusive, path::PathBuf};
+
+use clap::Args;
+
+use super::{NUMBERS, SceneId, Stratum};
+use crate::{
+    experiment::Experiment,
+    record::{Suite, TrackerName},
+};
+
+/// These may be looked into and tuned on.
+pub const TUNING: RangeInclusive<u64> = 1..=10;
+/// These are run once, at the end of a piece of work, and never looked into.
+pub const HELD_OUT: RangeInclusive<u64> = 11..=20;
+
+/// Scenes of the strata.
+#[derive(Debug, Clone, Args)]
+pub struct StrataArgs {
+    /// Show scenes of the strata to detector and tracker alone, from recordings that are made once: seeds 1 to 10 are for tuning,
+    /// 11 to 20 are held out: run them once, at the end, and never look into them
+    #[arg(long, conflicts_with_all = ["test", "suite", "sweep_delay", "matrix", "gallery", "real_time", "recording", "photographs"])]
+    pub open_loop: bool,
+    /// The same scenes with a camera that is steered by what the tracker says
+    #[arg(long, conflicts_with_all = ["open_loop", "test", "suite", "sweep_delay", "matrix", "gallery", "real_time", "recording", "photographs"])]
+    pub closed_loop: bool,
+    /// Only these strata
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub stratum: Vec<Stratum>,
+    /// How many scenes of each stratum and seed, from the first
+    #[arg(long, value_name = "N", default_value_t = NUMBERS)]
+    pub scenes: u32,
+    /// How many recordings of each scene, each by a camera that is steered otherwise
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub replicates: u32,
+    /// Folder of the recordings
+    #[arg(long, value_name = "FOLDER", default_value = "target/evaluation/recordings")]
+    pub recordings: PathBuf,
+    /// Write truth, regions and tracks into this folder too, as MOTChallenge text (open loop only)
+    #[arg(long, value_name = "FOLDER", requires = "open_loop")]
+    pub motchallenge: Option<PathBuf>,
+}
+
+impl StrataArgs {
+    /// Which suite is asked for, if one of these is.
+    pub fn suite(&self) -> Option<Suite> {
+        match (self.open_loop, self.closed_loop) {
+            (true, _) => Some(Suite::OpenLoop),
+            (false, true) => Some(Suite::ClosedLoop),
+            (false, false) => None,
+        }
+    }
+
+    /// Every scene asked for of these seeds with these trackers, and which it is.
+    pub fn experiments(
+        &self,
+        suite: Suite,
+        seeds: &[u64],
+        trackers: &[TrackerName],
+    ) -> Vec<(SceneId, Experiment)> {
+        let mut all = Vec::new();
+        let strata = Stratum::ALL.iter().filter(|one| self.stratum.is_empty() || self.stratum.contains(one));
+        for &stratum in strata {
+            for (&tracker, &seed) in trackers.iter().flat_map(|one| seeds.iter().map(move |seed| (one, seed)))
+            {
+                let numbers =
+                    (1..=self.scenes).flat_map(|number| (1..=self.replicates).map(move |one| (number, one)));
+                all.extend(numbers.map(|(number, replicate)| {
+                    let id = SceneId { stratum, seed, number };
+                    (id, self.experiment(id, replicate, suite, tracker))
+                }));
+            }
+        }
+        all
+    }
+
+    fn experiment(&self, id: SceneId, replicate: u32, suite: Suite, tracker: TrackerName) -> Experiment {
+        let recordings = (suite == Suite::OpenLoop).then(|| self.recordings.clone());
+        let motchallenge = self.motchallenge.clone();
+        Experiment { replicate, recordings, motchallenge, ..id.experiment(suite, tracker) }
+    }
+}
+
+/// What is to be said of these seeds before they are run; `looked_into` is an error for those that are held out.
+///
+/// # Errors
+/// In words, where scenes that are held out would be shown.
+pub fn notice(seeds: &[u64], looked_into: bool) -> Result<Option<&'static str>, &'static str> {
+    match seeds.iter().any(|seed| HELD_OUT.contains(seed)) {
+        true if looked_into => Err("seeds 11 to 20 are held out: no films, no texts of them"),
+        true => Ok(Some(
+            "seeds 11 to 20 are held out: run them once, at the end, and do not tune on what comes out",
+        )),
+        false => Ok(None),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_held_out_is_said_to_be_and_is_not_shown() {
+        assert_eq!(notice(&[1, 10], true), Ok(None));
+        assert!(notice(&[10, 11], false).is_ok_and(|said| said.is_some()));
+        assert!(notice(&[20], true).is_err());
+        assert!(TUNING.end() + 1 == *HELD_OUT.start());
+    }
+}
