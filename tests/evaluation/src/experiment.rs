@@ -7,6 +7,7 @@ use std::{path::PathBuf, time::Duration};
 use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, Sighting, VirtualCamera, World};
 
 use crate::{
+    open_loop::Stage,
     record::{Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Suite, TestId, TrackerName},
     still::Recording,
 };
@@ -128,6 +129,8 @@ pub struct Experiment {
     pub films: Option<PathBuf>,
     /// Folder of the recordings of scenes that are shown in open loop.
     pub recordings: Option<PathBuf>,
+    /// What is replaced by the truth in open loop.
+    pub replaced: Vec<Stage>,
     /// Folder for what an open loop tells as MOTChallenge text; none is written unless given.
     pub motchallenge: Option<PathBuf>,
 }
@@ -149,6 +152,7 @@ impl Experiment {
             real_time: false,
             films: None,
             recordings: None,
+            replaced: Vec::new(),
             motchallenge: None,
         }
     }
@@ -223,8 +227,14 @@ impl Experiment {
     }
 
     fn title(&self) -> String {
-        let title = &self.scene.title;
-        if self.replicate > 1 { format!("{title} replicate {}", self.replicate) } else { title.clone() }
+        let mut title = self.scene.title.clone();
+        if self.replicate > 1 {
+            title += &format!(" replicate {}", self.replicate);
+        }
+        for stage in &self.replaced {
+            title += &format!(" true {stage}");
+        }
+        title
     }
 
     /// What it will be recorded as.

@@ -168,13 +168,50 @@ impl Silhouette {
     }
 
     /// Whether a place of the view, in pixels, lies on the person, hidden there or not.
-    pub fn contains(&self, (x, y): (f64, f64)) -> bool {
+    pub fn contains(&self, place: (f64, f64)) -> bool {
+        self.at(&self.whole, place)
+    }
+
+    fn at(&self, mask: &Mask, (x, y): (f64, f64)) -> bool {
         let column = ((x - self.origin.0) / self.pixel.0).floor();
         let row = ((y - self.origin.1) / self.pixel.1).floor();
         let inside = |index: f64, count: usize| (0.0..count as f64).contains(&index);
-        inside(column, self.whole.width)
-            && inside(row, self.whole.height)
-            && self.whole.data[row as usize * self.whole.width + column as usize] > 127
+        inside(column, mask.width)
+            && inside(row, mask.height)
+            && mask.data[row as usize * mask.width + column as usize] > 127
+    }
+
+    /// Whether something of the person is seen at a place of the view, in pixels.
+    pub fn shows(&self, place: (f64, f64)) -> bool {
+        self.at(&self.visible, place)
+    }
+
+    /// The outline of the whole body, a closed polygon in pixels of the view; nothing of nobody. Gaps between limbs are filled.
+    pub fn outline_of_whole(&self) -> Vec<(f64, f64)> {
+        self.outline(&self.whole)
+    }
+
+    /// The same of what is seen.
+    pub fn outline_of_visible(&self) -> Vec<(f64, f64)> {
+        self.outline(&self.visible)
+    }
+
+    /// Down the left ends of the rows, and up the right ones.
+    fn outline(&self, mask: &Mask) -> Vec<(f64, f64)> {
+        let (mut left, mut right) = (Vec::new(), Vec::new());
+        for (row, line) in mask.data.chunks_exact(mask.width.max(1)).enumerate() {
+            let is_set = |value: &u8| *value > 127;
+            let Some((first, last)) = line.iter().position(is_set).zip(line.iter().rposition(is_set)) else {
+                continue;
+            };
+            let place = |column: usize, row: usize| {
+                (self.origin.0 + self.pixel.0 * column as f64, self.origin.1 + self.pixel.1 * row as f64)
+            };
+            left.extend([place(first, row), place(first, row + 1)]);
+            right.extend([place(last + 1, row), place(last + 1, row + 1)]);
+        }
+        left.extend(right.into_iter().rev());
+        left
     }
 
     /// What part of the whole silhouette, 0 to 1, lies in a box of the view.
@@ -294,6 +331,22 @@ mod tests {
         assert!((other.part_behind(&one) - 0.125).abs() < 0.01);
         assert_eq!(one.part_behind(&shape(bounds(100.0, 0.0, 32.0, 64.0))), 0.0);
         assert_eq!(one.part_behind(&one), 1.0);
+    }
+
+    #[test]
+    fn an_outline_goes_round_what_is_seen() {
+        let shape =
+            Silhouette::of_box(&Bounds { left: -16.0, top: 8.0, width: 32.0, height: 64.0 }, (640, 480));
+        let around = |outline: Vec<(f64, f64)>| Bounds::around(outline).unwrap();
+        assert_eq!(
+            around(shape.outline_of_whole()),
+            Bounds { left: -16.0, top: 8.0, width: 32.0, height: 64.0 }
+        );
+        assert_eq!(
+            around(shape.outline_of_visible()),
+            Bounds { left: 0.0, top: 8.0, width: 16.0, height: 64.0 }
+        );
+        assert!(shape.shows((1.0, 9.0)) && !shape.shows((-1.0, 9.0)) && !shape.shows((1.0, 7.0)));
     }
 
     #[test]

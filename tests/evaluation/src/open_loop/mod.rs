@@ -10,8 +10,10 @@ mod recorded;
 mod recorder;
 mod replay;
 mod steering;
+mod truth;
 
 pub use library::generator;
 pub(crate) use recorder::lead;
 pub(crate) use replay::drive;
 pub use steering::{PointingError, pointing_error};
+pub use truth::Stage;

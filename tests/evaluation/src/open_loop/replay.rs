@@ -16,6 +16,7 @@ use super::{
     library,
     motchallenge::Sequence,
     recorded::{RecordedPicture, RecordedScene},
+    truth::Replacement,
 };
 use crate::{
     experiment::Experiment,
@@ -62,6 +63,7 @@ struct Screening<'a> {
     scene: &'a RecordedScene,
     pipeline: Pipeline,
     tracker: Tracker,
+    replacement: Replacement,
     /// Moving regions of the picture that passed last.
     regions: Arc<Mutex<Vec<Rect>>>,
 }
@@ -79,12 +81,13 @@ impl<'a> Screening<'a> {
         let caps = gst::Caps::from_str(&scene.caps).map_err(PipelineError::Link)?;
         let pipeline = Pipeline::of_caps(&description, &caps)?;
         tracker.attach(pipeline.bin())?;
+        let replacement = Replacement::attach(pipeline.bin(), &experiment.replaced)?;
         if film.is_some() {
             film::attach(pipeline.bin(), tracker.cue(), &info(experiment.size, scene.period)?)?;
         }
         let regions = collect_regions(&pipeline)?;
         pipeline.start()?;
-        Ok(Self { experiment, scene, pipeline, tracker, regions })
+        Ok(Self { experiment, scene, pipeline, tracker, replacement, regions })
     }
 
     fn picture(&self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Vec<Rect>), RunError> {
@@ -92,6 +95,7 @@ impl<'a> Screening<'a> {
         let phase = Phase::of(index >= first, index > first);
         let cue = Cue { phase, truth: picture.truth.truth.clone(), motion: picture.motion, size };
         self.tracker.next(self.pipeline.bin(), cue)?;
+        self.replacement.next(picture);
         let mut buffer = gst::Buffer::from_slice(picture.encoded.clone());
         if let Some(buffer) = buffer.get_mut() {
             buffer.set_pts(clock_time(picture.arrival));
@@ -102,8 +106,8 @@ impl<'a> Screening<'a> {
         if let Some(state) = &picture.told {
             self.pipeline.send_upstream(state.event())?;
         }
-        let record =
-            picture.truth.clone().judged(target.map(|target| estimate(&target, size)), &picture.people);
+        let said = target.map(|target| self.replacement.judged(estimate(&target, size), picture));
+        let record = picture.truth.clone().judged(said, &picture.people);
         Ok((record, std::mem::take(&mut *lock(&self.regions))))
     }
 }

@@ -10,16 +10,19 @@ use std::time::Duration;
 
 use virtual_camera::{Pose, Seeded, SpeedMap};
 
-use crate::record::Run;
+use crate::{
+    metrics,
+    record::{FrameRecord, Run},
+};
 
 /// From one command to the next.
 pub(super) const EVERY: Duration = Duration::from_millis(100);
 /// The camera is to be where it aims after so long.
 pub(super) const HORIZON: Duration = Duration::from_millis(300);
 /// Standard deviation of the error, of pan and of tilt, degrees.
-const SIZE_DEG: (f64, f64) = (1.9, 1.0);
+const SIZE_DEG: (f64, f64) = (0.85, 1.0);
 /// Time after which e⁻¹ of an error is left.
-const MEMORY: Duration = Duration::from_millis(600);
+const MEMORY: Duration = Duration::from_millis(1300);
 /// Slower than this the camera stands still, degrees per second.
 const SLOWEST_DEG_S: f64 = 0.5;
 
@@ -66,21 +69,22 @@ pub struct PointingError {
     pub memory_s: (f64, f64),
 }
 
-/// The time over which correlation is measured, and what belongs to getting the person into the middle at first, seconds.
+/// The time over which correlation is measured, seconds.
 const LAG_S: f64 = 0.2;
-const APPROACH_S: f64 = 2.0;
+/// The person is followed from when d_gc first was less than this: what is before belongs to getting them into the middle.
+const REACHED_DGC: f64 = 0.1;
 
 /// Of all `runs` together; `None` where the person was never followed for long enough.
 pub fn pointing_error<'a>(runs: impl IntoIterator<Item = &'a Run>) -> Option<PointingError> {
     let mut sums = [Correlation::default(); 2];
     for run in runs {
-        let errors: Vec<Option<[f64; 2]>> = run
-            .frames
-            .iter()
+        let is_reached =
+            |frame: &FrameRecord| metrics::d_gc(frame).is_some_and(|distance| distance < REACHED_DGC);
+        let reached = run.frames.iter().skip_while(|frame| !is_reached(frame));
+        let errors: Vec<Option<[f64; 2]>> = reached
             .map(|frame| {
-                let (pan, tilt) = frame.truth.as_ref()?.direction_deg?;
-                let followed = frame.time_s >= APPROACH_S && crate::metrics::holds(frame);
-                followed.then_some([pan - frame.pan_deg, tilt - frame.tilt_deg])
+                let (pan, tilt) = frame.truth.as_ref().filter(|_| metrics::holds(frame))?.direction_deg?;
+                Some([pan - frame.pan_deg, tilt - frame.tilt_deg])
             })
             .collect();
         let lag = (LAG_S * run.frame_rate).round().max(1.0) as usize;

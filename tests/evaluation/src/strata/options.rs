@@ -9,6 +9,7 @@ use clap::Args;
 use super::{NUMBERS, SceneId, Stratum};
 use crate::{
     experiment::Experiment,
+    open_loop::Stage,
     record::{Suite, TrackerName},
 };
 
@@ -39,6 +40,9 @@ pub struct StrataArgs {
     /// Folder of the recordings
     #[arg(long, value_name = "FOLDER", default_value = "target/evaluation/recordings")]
     pub recordings: PathBuf,
+    /// Replace what these stages say by the truth (open loop only): motion, regions, owner, hidden, size
+    #[arg(long, value_name = "STAGE", value_delimiter = ',', requires = "open_loop")]
+    pub replace: Vec<Stage>,
     /// Write truth, regions and tracks into this folder too, as MOTChallenge text (open loop only)
     #[arg(long, value_name = "FOLDER", requires = "open_loop")]
     pub motchallenge: Option<PathBuf>,
@@ -79,8 +83,8 @@ impl StrataArgs {
 
     fn experiment(&self, id: SceneId, replicate: u32, suite: Suite, tracker: TrackerName) -> Experiment {
         let recordings = (suite == Suite::OpenLoop).then(|| self.recordings.clone());
-        let motchallenge = self.motchallenge.clone();
-        Experiment { replicate, recordings, motchallenge, ..id.experiment(suite, tracker) }
+        let (motchallenge, replaced) = (self.motchallenge.clone(), self.replace.clone());
+        Experiment { replicate, recordings, replaced, motchallenge, ..id.experiment(suite, tracker) }
     }
 }
 

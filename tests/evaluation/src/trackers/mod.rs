@@ -148,7 +148,7 @@ pub fn missing(name: TrackerName) -> Option<String> {
 }
 
 /// A box in frame sizes.
-fn normalised(bounds: Bounds, size: (u32, u32)) -> Rect {
+pub(crate) fn normalised(bounds: Bounds, size: (u32, u32)) -> Rect {
     let (width, height) = (f64::from(size.0), f64::from(size.1));
     Rect {
         x: bounds.left / width,
