@@ -225,20 +225,6 @@ impl Silhouette {
         if whole > 0 { part as f64 / whole as f64 } else { 0.0 }
     }
 
-    /// What part of the whole silhouette, 0 to 1, would be hidden by `other` if that were nearer.
-    pub fn part_behind(&self, other: &Self) -> f64 {
-        let set = self.whole.data.iter().enumerate().filter(|(_, value)| **value > 127);
-        let place = |index: usize| {
-            let (row, column) = (index / self.whole.width.max(1), index % self.whole.width.max(1));
-            let along = |origin: f64, pixel: f64, index: usize| origin + pixel * (index as f64 + 0.5);
-            (along(self.origin.0, self.pixel.0, column), along(self.origin.1, self.pixel.1, row))
-        };
-        let (all, behind) = set.fold((0u32, 0u32), |(all, behind), (index, _)| {
-            (all + 1, behind + u32::from(other.contains(place(index))))
-        });
-        if all > 0 { f64::from(behind) / f64::from(all) } else { 0.0 }
-    }
-
     /// The whole body.
     pub fn whole(&self) -> &Mask {
         &self.whole
@@ -320,17 +306,6 @@ mod tests {
         assert!(half_out.contains((-15.0, 63.0)));
         let nothing = Silhouette::of_box(&bounds(5.0, 5.0, 0.0, 0.0), (640, 480));
         assert!(!nothing.contains((6.0, 6.0)));
-    }
-
-    #[test]
-    fn who_is_nearer_hides_what_they_cover() {
-        let bounds = |left, top, width, height| Bounds { left, top, width, height };
-        let shape = |bounds| Silhouette::of_box(&bounds, (640, 480));
-        let (one, other) = (shape(bounds(0.0, 0.0, 32.0, 64.0)), shape(bounds(24.0, 0.0, 64.0, 32.0)));
-        assert!((one.part_behind(&other) - 0.125).abs() < 0.01);
-        assert!((other.part_behind(&one) - 0.125).abs() < 0.01);
-        assert_eq!(one.part_behind(&shape(bounds(100.0, 0.0, 32.0, 64.0))), 0.0);
-        assert_eq!(one.part_behind(&one), 1.0);
     }
 
     #[test]

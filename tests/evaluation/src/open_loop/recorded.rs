@@ -31,40 +31,12 @@ pub(super) struct RecordedPicture {
     pub encoded: Vec<u8>,
     /// Where the camera looked, the person to be followed and everybody else.
     pub truth: FrameRecord,
-    /// Everybody, in what shape.
+    /// Everybody: in what shape, and who hides whom.
     pub people: Vec<Sighting>,
-    /// Who hides whom.
-    pub hidings: Vec<Hiding>,
     /// How the background moved since the picture before, from its pixels to those of this one.
     pub motion: Option<Matrix>,
     /// What upstream was told of the camera after this picture.
     pub told: Option<CameraState>,
-}
-
-/// Somebody is behind somebody else.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub(super) struct Hiding {
-    /// Number of who is behind.
-    pub hidden: u32,
-    /// Number of who is in front.
-    pub by: u32,
-    /// Part of the whole silhouette of who is behind, 0 to 1.
-    pub part: f64,
-}
-
-impl Hiding {
-    /// All among these people, as far as it is known who is nearer.
-    pub fn all(people: &[Sighting]) -> Vec<Self> {
-        let away = |one: &Sighting| one.truth.position_m.map(|[x, _, z]| x.hypot(z));
-        let pairs = people.iter().flat_map(|hidden| people.iter().map(move |by| (hidden, by)));
-        let nearer = pairs.filter(|(hidden, by)| away(hidden) > away(by) && away(by).is_some());
-        let hiding = nearer.map(|(hidden, by)| Self {
-            hidden: hidden.truth.id,
-            by: by.truth.id,
-            part: hidden.silhouette.part_behind(&by.silhouette),
-        });
-        hiding.filter(|hiding| hiding.part > 0.0).collect()
-    }
 }
 
 /// A [`CameraEvent`] that can be kept.

@@ -7,7 +7,7 @@ use std::time::Duration;
 use virtual_camera::{Clock, Pose, Seeded, Settings, VirtualCamera};
 
 use super::{
-    recorded::{CameraState, Hiding, RecordedPicture, RecordedScene},
+    recorded::{CameraState, RecordedPicture, RecordedScene},
     steering::{EVERY, HORIZON, Steering, speed_step},
 };
 use crate::{
@@ -44,8 +44,7 @@ pub(super) fn record(experiment: &Experiment, settings: &Settings) -> Result<Rec
         let pose = camera.pose_at(exposure);
         let motion = looked.replace(pose).map(|before| camera.background_motion(&before, &pose, size));
         let encoded = encoder.encode(&camera.picture(exposure, size)?, arrival)?;
-        let hidings = Hiding::all(&people);
-        pictures.push(RecordedPicture { arrival, encoded, truth, people, hidings, motion, told });
+        pictures.push(RecordedPicture { arrival, encoded, truth, people, motion, told });
     }
     let begin = experiment.pictures(period).next().unwrap_or(0);
     let first = first.saturating_sub(begin) as usize;

@@ -210,15 +210,14 @@ impl Truth {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{record::Silhouette, report::made_up};
+    use crate::{record::GroundTruth, report::made_up};
 
     fn truth() -> Truth {
         let size = (80, 60);
         let person = made_up::tracked(size).truth.unwrap();
         let beside = Bounds { left: 60.0, ..person.bounds };
-        let sighting = |id, bounds: Bounds| Sighting {
-            silhouette: Silhouette::of_box(&bounds, size),
-            truth: crate::record::GroundTruth { id, bounds, centroid: bounds.centre(), ..person.clone() },
+        let sighting = |id, bounds: Bounds| {
+            Sighting::of_box(GroundTruth { id, bounds, centroid: bounds.centre(), ..person.clone() }, size)
         };
         let people = vec![sighting(1, person.bounds), sighting(2, beside)];
         Truth { motion: None, people, target: Some(1), size }

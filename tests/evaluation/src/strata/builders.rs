@@ -9,11 +9,6 @@ use virtual_camera::{Action, Event, Lighting, Occlusion, Seeded, Subject};
 use super::draft::Draft;
 use crate::{experiment::Target, record::FirstBox};
 
-/// Magnification of a camera before which somebody who comes near fills the picture.
-const NEAR_MAGNIFICATION: (f64, f64) = (1.5, 2.2);
-/// The room's magnification at zoom step 9999.
-const MOST_MAGNIFICATION: f64 = 19.885;
-
 pub(super) fn alone(draft: &mut Draft, chance: &mut Seeded) {
     draft.room.occlusion = Occlusion::None;
     draft.room.lighting = Lighting::Optimal;
@@ -41,9 +36,14 @@ pub(super) fn parting(draft: &mut Draft, _chance: &mut Seeded) {
     among_others(draft, Action::Part);
 }
 
+pub(super) fn groups(draft: &mut Draft, chance: &mut Seeded) {
+    among_others(draft, chance.pick(&[Action::Group, Action::Test]));
+    draft.room.others = 2 + chance.below(6);
+}
+
 pub(super) fn dark(draft: &mut Draft, chance: &mut Seeded) {
     draft.room.occlusion = Occlusion::None;
-    draft.room.lighting = Lighting::Dim;
+    draft.room.lighting = chance.pick(&[Lighting::Dim, Lighting::Dim, Lighting::Dark]);
     // Clothed nearly in the colour of the wall.
     draft.room.subject = Subject::A;
     draft.camera.imaging.noise_filter = chance.pick(&[0.0, 0.5, 0.8]);
@@ -58,16 +58,9 @@ pub(super) fn nobody(draft: &mut Draft, chance: &mut Seeded) {
     draft.begin = Duration::from_secs_f64(chance.range(90.0, 300.0));
 }
 
-pub(super) fn near(draft: &mut Draft, chance: &mut Seeded) {
-    draft.room.action = Action::Approach;
+pub(super) fn near(draft: &mut Draft, _chance: &mut Seeded) {
+    draft.room.action = Action::Near;
     draft.room.occlusion = Occlusion::None;
-    let mut home = draft.room.home();
-    let magnification = chance.range(NEAR_MAGNIFICATION.0, NEAR_MAGNIFICATION.1);
-    home.zoom_step = 1.0 + (magnification - 1.0) / (MOST_MAGNIFICATION - 1.0) * 9998.0;
-    draft.camera.home = Some(home);
-    // They come near some seconds after they came in.
-    draft.begin = Duration::from_secs(3);
-    draft.lead = Duration::from_millis(900);
 }
 
 pub(super) fn turning(draft: &mut Draft, chance: &mut Seeded) {

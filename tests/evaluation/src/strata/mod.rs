@@ -34,6 +34,8 @@ named! {
         Crossing = "crossing",
         /// Two who walk side by side and part.
         Parting = "parting",
+        /// Three to eight who walk together, or one among others who wander about.
+        Groups = "groups",
         /// Little light, or clothes like the wall.
         Dark = "dark",
         /// Nobody: whatever is followed is wrong.
@@ -52,6 +54,7 @@ impl Stratum {
             Self::Hidden => builders::hidden,
             Self::Crossing => builders::crossing,
             Self::Parting => builders::parting,
+            Self::Groups => builders::groups,
             Self::Dark => builders::dark,
             Self::Nobody => builders::nobody,
             Self::Near => builders::near,
