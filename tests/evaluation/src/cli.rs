@@ -110,6 +110,9 @@ pub struct Args {
     /// Scenes of the strata
     #[command(flatten)]
     pub strata: StrataArgs,
+    /// Further properties of the servo, as for gst-launch-1.0: "learn=false prediction=average"
+    #[arg(long, value_name = "PROPERTIES", default_value = "")]
+    pub servo: String,
     /// How many runs go on at once
     #[arg(long, default_value_t = 2)]
     pub jobs: usize,
@@ -265,6 +268,7 @@ impl Args {
             delays,
             first_box: self.first_box.unwrap_or(usual),
             real_time: self.real_time,
+            servo: self.servo.clone(),
             films: self.record.then(|| self.out.join("films")),
             ..Experiment::new(scene, tracker, seed)
         }

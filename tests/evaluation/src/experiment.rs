@@ -10,6 +10,7 @@ use crate::{
     open_loop::Stage,
     record::{Codec, Delays, FirstBox, FrameRecord, Provenance, Run, Suite, TestId, TrackerName},
     still::Recording,
+    trackers::Tracker,
 };
 
 /// When picture `number` is taken: in the middle of its time, as the virtual camera does for its own streams, so that no
@@ -117,8 +118,10 @@ pub struct Experiment {
     pub replicate: u32,
     /// How late everything is.
     pub delays: Delays,
+    /// Elements instead of the tracker's usual ones, as on a `gst-launch-1.0` line; one is named `tracker`.
+    pub elements: Option<String>,
     /// Further properties of the servo, as on a `gst-launch-1.0` line.
-    pub servo: &'static str,
+    pub servo: String,
     /// Who draws the first box.
     pub first_box: FirstBox,
     /// Whether it is one of a series over the delay.
@@ -146,7 +149,8 @@ impl Experiment {
             seed,
             replicate: 1,
             delays: Delays::default(),
-            servo: "",
+            elements: None,
+            servo: String::new(),
             first_box: FirstBox::Detected,
             sweep: false,
             real_time: false,
@@ -169,6 +173,11 @@ impl Experiment {
         settings.video.size = Some(self.size);
         settings.kinematics.command_delay = self.delays.command;
         VirtualCamera::start(settings)
+    }
+
+    /// The elements of `tracker`, or those in their place.
+    pub(crate) fn elements(&self, tracker: &Tracker) -> String {
+        self.elements.clone().unwrap_or_else(|| tracker.description())
     }
 
     /// Numbers of all pictures.

@@ -99,8 +99,10 @@ fn strata(args: &Args, suite: Suite) -> Result<bool, Box<dyn std::error::Error>>
     }
     let films = args.record.then(|| args.out.join("films"));
     let asked = args.strata.experiments(suite, &seeds, &trackers);
-    let experiments: Vec<_> =
-        asked.iter().map(|(_, one)| Experiment { films: films.clone(), ..one.clone() }).collect();
+    let experiments: Vec<_> = asked
+        .iter()
+        .map(|(_, one)| Experiment { films: films.clone(), servo: args.servo.clone(), ..one.clone() })
+        .collect();
     let store = Store::new(&args.results, args.fresh);
     let runs = evaluation::run_all(&experiments, args.jobs(), &store, io::stderr());
     let whole = runs.len() == experiments.len() && runs.iter().all(|run| run.error.is_none());

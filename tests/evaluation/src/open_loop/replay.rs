@@ -76,7 +76,7 @@ impl<'a> Screening<'a> {
     ) -> Result<Self, RunError> {
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let sink = film::beside(&format!("fakesink name={SINK} sync=false async=false"), film);
-        let (decoder, elements) = (experiment.codec.decoder(), tracker.description());
+        let (decoder, elements) = (experiment.codec.decoder(), experiment.elements(&tracker));
         let description = format!("appsrc name={SOURCE} ! {decoder} ! {elements} ! {sink}");
         let caps = gst::Caps::from_str(&scene.caps).map_err(PipelineError::Link)?;
         let pipeline = Pipeline::of_caps(&description, &caps)?;

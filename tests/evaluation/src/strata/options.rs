@@ -37,6 +37,10 @@ pub struct StrataArgs {
     /// How many recordings of each scene, each by a camera that is steered otherwise
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub replicates: u32,
+    /// Elements instead of the tracker's usual ones, as for gst-launch-1.0; one is named tracker:
+    /// "bgavgdetect ! lkfeaturetrack name=tracker coast-time=1000000000"
+    #[arg(long, value_name = "ELEMENTS")]
+    pub elements: Option<String>,
     /// Folder of the recordings
     #[arg(long, value_name = "FOLDER", default_value = "target/evaluation/recordings")]
     pub recordings: PathBuf,
@@ -84,7 +88,15 @@ impl StrataArgs {
     fn experiment(&self, id: SceneId, replicate: u32, suite: Suite, tracker: TrackerName) -> Experiment {
         let recordings = (suite == Suite::OpenLoop).then(|| self.recordings.clone());
         let (motchallenge, replaced) = (self.motchallenge.clone(), self.replace.clone());
-        Experiment { replicate, recordings, replaced, motchallenge, ..id.experiment(suite, tracker) }
+        let elements = self.elements.clone();
+        Experiment {
+            elements,
+            replicate,
+            recordings,
+            replaced,
+            motchallenge,
+            ..id.experiment(suite, tracker)
+        }
     }
 }
 

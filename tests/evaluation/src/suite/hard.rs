@@ -142,7 +142,7 @@ impl Trial {
             target,
         };
         let (codec, size, delays, servo) = (self.codec, self.size, self.delays, self.servo);
-        Experiment { codec, size, delays, servo, ..Experiment::new(scene, tracker, seed) }
+        Experiment { codec, size, delays, servo: servo.into(), ..Experiment::new(scene, tracker, seed) }
     }
 }
 
