@@ -17,7 +17,7 @@ use crate::{
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
-    imaging::{self, NoiseFilter, Sway},
+    imaging::{self, Lens, NoiseFilter, Sway},
     kinematics::{Head, Limits, Optics, Pose, within_a_turn},
     picture::Picture,
     rtsp::RtspServer,
@@ -79,6 +79,7 @@ impl Camera {
         // Pictures show the past: at most the video delay and an exposure ago, and somewhat late.
         let memory = settings.video.longest_delay()
             + settings.video.exposure * LONGEST_SHUTTER
+            + settings.imaging.rolling_shutter
             + imaging::MEMORY
             + Duration::from_secs(2);
         let limits = settings.kinematics.limits_in(world.limits());
@@ -300,10 +301,30 @@ impl Camera {
         let duration = self.world.shutter(self.settings.video.exposure, time);
         let closing = self.pose_at(time + duration);
         let mut picture = self.world.render(&Exposure { time, opening, closing, duration }, size)?;
+        if let Some(lens) = self.lens(size, |share| self.pose_at(self.read_at(time, share))) {
+            picture = lens.look(&picture);
+        }
         let imaging = &self.settings.imaging;
         let sway = if imaging.hunting > 0.0 { self.sway(time, &opening) } else { Sway::default() };
         imaging.process(&mut picture, time, &sway, &mut lock(&self.noise_filter));
         Ok(picture)
+    }
+
+    /// When a part of the rows, 0 to 1, of a picture is read whose exposure began at `time`.
+    fn read_at(&self, time: Duration, share: f64) -> Duration {
+        time + self.settings.imaging.rolling_shutter.mul_f64(share)
+    }
+
+    /// What the lens does to a picture whose rows see what is `seen` when a part of them is read; `None` where it is perfect
+    /// and the sensor is read at once.
+    fn lens(&self, size: (u32, u32), seen: impl Fn(f64) -> Pose) -> Option<Lens> {
+        let imaging = &self.settings.imaging;
+        imaging.bends().then(|| {
+            let first = seen(0.0);
+            let magnification = self.world.optics().magnification(first.zoom_step);
+            let distortion = imaging.distortion / (magnification * magnification);
+            Lens::new(self.world.pinhole(first.zoom_step, size), size, distortion, seen)
+        })
     }
 
     /// What is left at `time` of the turns before it.
@@ -314,13 +335,33 @@ impl Camera {
     }
 
     /// Of the picture whose exposure began at `time`: who is in it.
-    pub fn ground_truth(&self, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
-        self.world.truth(&self.opening(time), size)
+    pub fn people(&self, time: Duration, size: (u32, u32)) -> Vec<Sighting> {
+        self.people_seen(&self.opening(time), size, |share| self.pose_at(self.read_at(time, share)))
+    }
+
+    /// Who would be in it if the camera looked along `pose`.
+    fn people_from(&self, pose: &Pose, time: Duration, size: (u32, u32)) -> Vec<Sighting> {
+        self.people_seen(&Exposure::at(time, *pose), size, |_| *pose)
+    }
+
+    fn people_seen(
+        &self,
+        exposure: &Exposure,
+        size: (u32, u32),
+        seen: impl Fn(f64) -> Pose,
+    ) -> Vec<Sighting> {
+        let people = self.world.people(exposure, size);
+        match self.lens(size, seen) {
+            Some(lens) => people.into_iter().map(|person| lens.sighting(person)).collect(),
+            None => people,
+        }
     }
 
     /// Which pixels of it show them.
     pub fn silhouette(&self, time: Duration, size: (u32, u32)) -> Option<Mask> {
-        self.world.silhouette(&self.opening(time), size)
+        let mask = self.world.silhouette(&self.opening(time), size)?;
+        let lens = self.lens(size, |share| self.pose_at(self.read_at(time, share)));
+        Some(lens.map_or_else(|| mask.clone(), |lens| lens.mask(&mask)))
     }
 
     /// Only the moment at which the shutter opens.
@@ -454,12 +495,12 @@ impl VirtualCamera {
     /// Who is in that picture and where, as its exposure begins. People outside of the view are told of as well; a
     /// recording without a ground-truth file shows nobody that is known.
     pub fn ground_truth(&self, exposure: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
-        self.camera.ground_truth(exposure, size)
+        truths(self.people(exposure, size))
     }
 
     /// The same, with the shape of each.
     pub fn people(&self, exposure: Duration, size: (u32, u32)) -> Vec<Sighting> {
-        self.camera.world.people(&self.camera.opening(exposure), size)
+        self.camera.people(exposure, size)
     }
 
     /// Focal length of a view of that size along `pose`, in pixels.
@@ -469,7 +510,7 @@ impl VirtualCamera {
 
     /// Who would be in a picture at any time, the future too, if the camera looked along `pose`.
     pub fn ground_truth_from(&self, pose: &Pose, time: Duration, size: (u32, u32)) -> Vec<GroundTruth> {
-        self.camera.world.truth(&Exposure::at(time, *pose), size)
+        truths(self.camera.people_from(pose, time, size))
     }
 
     /// Which pixels of that picture show a person; `None` in worlds that know boxes at best.
@@ -543,6 +584,10 @@ impl Drop for VirtualCamera {
             let _ = pulse.join();
         }
     }
+}
+
+fn truths(people: Vec<Sighting>) -> Vec<GroundTruth> {
+    people.into_iter().map(|person| person.truth).collect()
 }
 
 /// Whether this does nothing but end a move.

@@ -6,8 +6,8 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, PhotoPlace, PhotoSettings, Pose,
-    PtzApi, RoomSettings, Settings, SpeedMap, Stall, SyntheticSettings, Video, World,
+    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, PhotoPerson, PhotoPlace, PhotoSettings,
+    Place, Pose, PtzApi, RoomSettings, Settings, SpeedMap, Stall, Subject, SyntheticSettings, Video, World,
 };
 
 /// From one stall of the pictures to the next.
@@ -34,13 +34,19 @@ pub struct Options {
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=72))]
     room_test: Option<u32>,
     /// What people in the room do instead of a test: nobody, cross, cross-alike, part, overtake, stop-and-go, sit, approach, run,
-    /// wander, group or near
+    /// wander, group, near; in the yard far or drive too
     #[arg(long, value_name = "ACTION", value_parser = action)]
     action: Option<Action>,
     /// How many more people there are in the room: they walk along in a group, else they wander about
     #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
     others: u8,
-    /// What happens in the room by itself: door, film, sun, switch, draught
+    /// Where the people are: hall, yard, night-yard or infrared-yard
+    #[arg(long, value_name = "PLACE", value_parser = place)]
+    place: Option<Place>,
+    /// How many cars drive by, in a yard
+    #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
+    vehicles: u8,
+    /// What happens by itself: door, film, sun, switch, draught; in a yard clouds, headlights, rain, and draught in its trees
     #[arg(long, value_name = "EVENT", value_delimiter = ',', value_parser = event)]
     events: Vec<Event>,
     /// Let low sun cast people's shadows on the room's floor
@@ -53,9 +59,10 @@ pub struct Options {
     #[arg(long, value_name = "NUMBER")]
     seed: Option<u64>,
     /// Photograph of everything around the camera, an equirectangular panorama
-    #[arg(long, value_name = "FILE", requires = "walker")]
+    #[arg(long, value_name = "FILE")]
     photo: Option<PathBuf>,
-    /// Folder of somebody cut out of film, who walks in the photograph: walker.csv, and the pictures that it lists
+    /// Folder of somebody cut out of film, who walks in the photograph: walker.csv, and the pictures that it lists; somebody is
+    /// drawn unless given
     #[arg(long, value_name = "FOLDER", requires = "photo")]
     walker: Option<PathBuf>,
     /// Where one can walk in the photograph (JSON); the file beside it that has its name and ends with .json unless given
@@ -115,6 +122,21 @@ pub struct Options {
     /// Hold all pictures back for so many milliseconds, every seven seconds
     #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
     video_stall: f64,
+    /// By which part the lens draws in what is one focal length from the middle of the widest view
+    #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = share)]
+    distortion: f64,
+    /// How far the lens is ahead of the axes that the camera turns about, in the room, in centimetres
+    #[arg(long, default_value_t = 0.0, value_name = "CM", value_parser = not_negative)]
+    lens_offset: f64,
+    /// Time from reading the first row of a picture to reading the last, in milliseconds
+    #[arg(long, default_value_t = 0.0, value_name = "MS", value_parser = not_negative)]
+    rolling_shutter: f64,
+    /// Exponent of contrast: above 1 the dark becomes darker
+    #[arg(long, value_name = "EXPONENT", value_parser = exponent)]
+    gamma: Option<f64>,
+    /// How strongly the noise filter flattens blocks in which little is seen, 0 to 1
+    #[arg(long, default_value_t = 0.0, value_name = "PART", value_parser = share)]
+    blocks: f64,
     /// Leave exposure as it is right for a bright room, instead of letting the camera control it
     #[arg(long)]
     fixed_exposure: bool,
@@ -267,6 +289,11 @@ impl TryFrom<Options> for Settings {
                     .then(|| Stall { every: STALL_EVERY, lasts: milliseconds(options.video_stall) }),
             },
             imaging: Imaging {
+                distortion: options.distortion,
+                lens_offset_m: options.lens_offset / 100.0,
+                rolling_shutter: milliseconds(options.rolling_shutter),
+                gamma: options.gamma,
+                blocks: options.blocks,
                 fixed_exposure: options.fixed_exposure,
                 hunting: options.hunting,
                 night: options.night.map(Duration::from_secs_f64),
@@ -286,6 +313,7 @@ impl Options {
     fn world(&self) -> Result<World, String> {
         let for_room = self.room_test.is_some()
             || self.action.is_some()
+            || self.place.is_some()
             || (self.seed.is_some() && self.photo.is_none());
         let name = self.world.unwrap_or(match (&self.footage, &self.photo) {
             (Some(_), _) => WorldName::Footage,
@@ -301,7 +329,8 @@ impl Options {
         }
         if for_room && name != WorldName::Room {
             return Err(
-                "--room-test and --action are for --world room, --seed is for that or --world photo".into()
+                "--room-test, --place and --action are for --world room, --seed is for that or --world photo"
+                    .into(),
             );
         }
         Ok(match name {
@@ -325,16 +354,14 @@ impl Options {
     }
 
     fn photograph(&self) -> Result<PhotoSettings, String> {
-        let (photo, walker) = self
-            .photo
-            .clone()
-            .zip(self.walker.clone())
-            .ok_or("--world photo needs --photo FILE --walker FOLDER")?;
+        let photo = self.photo.clone().ok_or("--world photo needs --photo FILE")?;
         let place = PhotoPlace::of(&photo, self.photo_place.as_deref()).map_err(|error| error.to_string())?;
-        let way =
-            PhotoSettings::way(photo, walker, place, self.photo_way.unwrap_or(1), self.seed.unwrap_or(1));
+        let (number, seed) = (self.photo_way.unwrap_or(1), self.seed.unwrap_or(1));
+        let way = PhotoSettings::way(photo, self.walker.clone().unwrap_or_default(), place, number, seed);
         let way = way.ok_or_else(|| format!("--photo-way is from 1 to {}", PhotoSettings::WAYS))?;
-        Ok(PhotoSettings { repeats: !self.once, ..way })
+        let drawn = PhotoPerson::Drawn([Subject::A, Subject::B, Subject::C][number as usize % 3]);
+        let person = if self.walker.is_some() { way.person.clone() } else { drawn };
+        Ok(PhotoSettings { person, repeats: !self.once, ..way })
     }
 
     fn room(&self) -> Result<RoomSettings, String> {
@@ -343,6 +370,8 @@ impl Options {
         Ok(RoomSettings {
             action: self.action.unwrap_or_default(),
             others: usize::from(self.others),
+            place: self.place.unwrap_or_default(),
+            vehicles: usize::from(self.vehicles),
             events: self.events.clone(),
             shadows: self.cast_shadows,
             reflections: self.reflecting_floor,
@@ -414,6 +443,10 @@ fn action(text: &str) -> Result<Action, String> {
     named(&Action::ALL, text)
 }
 
+fn place(text: &str) -> Result<Place, String> {
+    named(&Place::ALL, text)
+}
+
 fn event(text: &str) -> Result<Event, String> {
     named(&Event::ALL, text)
 }
@@ -428,6 +461,10 @@ fn positive(text: &str) -> Result<f64, String> {
 
 fn share(text: &str) -> Result<f64, String> {
     number(text, 0.0..=1.0)
+}
+
+fn exponent(text: &str) -> Result<f64, String> {
+    number(text, 0.3..=3.0)
 }
 
 fn filter_share(text: &str) -> Result<f64, String> {
@@ -522,7 +559,7 @@ mod tests {
             "--world synthetic --footage a.avi",
             "--world room --footage a.avi",
             "--world photo",
-            "--photo lake.jpg",
+            "--walker w",
             "--photo unknown.jpg --walker w",
             "--photo lake.jpg --walker w --photo-way 13",
             "--world room --photo lake.jpg --walker w",

@@ -51,7 +51,8 @@ pub use status::{Fault, ReceivedCommand, Status};
 pub use truth::{Bounds, GroundTruth, Kind, Mask, Sighting, Silhouette};
 pub use world::{
     Action, Change, Event, FootageError, Lane, Lighting, MotError, Occlusion, People, Person, PhotoError,
-    PhotoPlace, PhotoSettings, RoomSettings, Subject, SyntheticSettings, Waypoint, read_mot,
+    PhotoPerson, PhotoPlace, PhotoSettings, Place, RoomSettings, Subject, SyntheticSettings, Waypoint,
+    read_mot,
 };
 
 /// Why a camera does not start.

@@ -225,6 +225,57 @@ impl Silhouette {
         if whole > 0 { part as f64 / whole as f64 } else { 0.0 }
     }
 
+    /// What part of the whole silhouette, 0 to 1, is visible.
+    pub(crate) fn part_visible(&self) -> f64 {
+        let weight = |mask: &Mask| mask.data.iter().map(|value| u64::from(*value)).sum::<u64>();
+        let whole = weight(&self.whole);
+        if whole > 0 { weight(&self.visible) as f64 / whole as f64 } else { 0.0 }
+    }
+
+    /// Where the whole silhouette touches its box: left, top, right and bottom.
+    pub(crate) fn extremes(&self, bounds: &Bounds) -> [(f64, f64); 4] {
+        let width = self.whole.width.max(1);
+        let set = || (0..self.whole.data.len()).filter(|index| self.whole.data[*index] > 127);
+        let place = |index: usize| {
+            let (column, row) = ((index % width) as f64 + 0.5, (index / width) as f64 + 0.5);
+            (self.origin.0 + column * self.pixel.0, self.origin.1 + row * self.pixel.1)
+        };
+        let or_middle = |index: Option<usize>| index.map_or_else(|| bounds.centre(), place);
+        let (left, right) = (
+            or_middle(set().min_by_key(|index| index % width)),
+            or_middle(set().max_by_key(|index| index % width)),
+        );
+        let (top, bottom) = (or_middle(set().next()), or_middle(set().next_back()));
+        [
+            (bounds.left, left.1),
+            (top.0, bounds.top),
+            (bounds.left + bounds.width, right.1),
+            (bottom.0, bounds.top + bounds.height),
+        ]
+    }
+
+    /// The same in another picture, where it has another box; `back` takes places of that picture to places of this.
+    pub(crate) fn redrawn(&self, bounds: &Bounds, back: impl Fn((f64, f64)) -> (f64, f64)) -> Self {
+        let (wide, high) = self.pixel;
+        let origin = (bounds.left - 2.0 * wide, bounds.top - 2.0 * high);
+        let count = |length: f64, pixel: f64| (length / pixel).ceil() as usize + 4;
+        let (width, height) = (count(bounds.width, wide), count(bounds.height, high));
+        let mut masks = [(); 2].map(|()| Mask { width, height, data: vec![0; width * height] });
+        for index in 0..width * height {
+            let (column, row) = ((index % width) as f64 + 0.5, (index / width) as f64 + 0.5);
+            let (x, y) = back((origin.0 + column * wide, origin.1 + row * high));
+            let (column, row) = (((x - self.origin.0) / wide).floor(), ((y - self.origin.1) / high).floor());
+            let inside = |place: f64, count: usize| (0.0..count as f64).contains(&place);
+            if inside(column, self.whole.width) && inside(row, self.whole.height) {
+                let from = row as usize * self.whole.width + column as usize;
+                masks[0].data[index] = self.whole.data[from];
+                masks[1].data[index] = self.visible.data[from];
+            }
+        }
+        let [whole, visible] = masks;
+        Self { origin, pixel: self.pixel, whole, visible }
+    }
+
     /// The whole body.
     pub fn whole(&self) -> &Mask {
         &self.whole

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use common::{PATIENCE, client, get};
 use virtual_camera::{
-    Action, Bounds, Clock, GroundTruth, Kind, Lighting, Mask, Pose, RoomSettings, Settings, Sighting, Video,
-    VirtualCamera, World,
+    Action, Bounds, Clock, GroundTruth, Imaging, Kind, Lighting, Mask, Place, Pose, RoomSettings, Settings,
+    Sighting, Video, VirtualCamera, World,
 };
 
 const SIZE: (u32, u32) = (320, 240);
@@ -301,4 +301,65 @@ fn every_room_is_bright_enough_to_see_unless_it_is_to_be_dark() {
     }
     assert!((50.0..110.0).contains(&mean(3, Lighting::Dim)));
     assert!(mean(7, Lighting::Dark) < 45.0);
+}
+
+fn yard(action: Action) -> RoomSettings {
+    RoomSettings { place: Place::Yard, action, ..RoomSettings::test(1, 3).unwrap() }
+}
+
+#[test]
+fn who_is_far_away_in_the_yard_is_20_to_40_pixels_high() {
+    let room = yard(Action::Far);
+    let seconds = room.duration().as_secs().min(20);
+    let camera = camera_in(room);
+    let heights: Vec<f64> = (1..seconds)
+        .filter_map(|second| {
+            let seen = camera.ground_truth_from(&camera.home(), Duration::from_secs(second), (640, 480));
+            seen.first().filter(|one| one.visible > 0.6).map(|one| one.bounds.height)
+        })
+        .collect();
+    assert!(heights.len() > 5 && heights.iter().all(|height| (18.0..42.0).contains(height)), "{heights:?}");
+}
+
+#[test]
+fn a_car_is_a_vehicle_and_drives_along_the_street() {
+    let room = RoomSettings { vehicles: 1, ..yard(Action::Drive) };
+    let camera = camera_in(room);
+    let ahead = Pose { tilt_deg: -8.0, ..Pose::default() };
+    let times = (0..30).map(|half| Duration::from_millis(500 * half));
+    let places: Vec<_> = times.map(|time| camera.ground_truth_from(&ahead, time, SIZE)).collect();
+    let of = |id| places.iter().flatten().filter(move |one| one.id == id);
+    // Ahead, where perspective stretches nothing.
+    let ahead = of(1).filter(|one| (110.0..210.0).contains(&one.centroid.0));
+    let shapes: Vec<f64> = ahead.map(|one| one.bounds.width / one.bounds.height).collect();
+    assert!(!shapes.is_empty() && shapes.iter().all(|shape| (1.8..4.0).contains(shape)), "{shapes:?}");
+    let metres: Vec<f64> = of(1).filter_map(|one| one.position_m).map(|place| place[0]).collect();
+    let (least, most) = metres.iter().fold((99.0f64, -99.0f64), |(l, m), x| (l.min(*x), m.max(*x)));
+    assert!(most - least > 5.0 && of(2).count() > 0, "{metres:?}");
+    camera.advance_to(Duration::from_secs(2));
+    assert!(camera.people(Duration::from_secs(2), SIZE).iter().all(|one| one.kind == Kind::Vehicle));
+}
+
+#[test]
+fn the_truth_through_a_real_lens_is_where_its_picture_shows_the_person() {
+    let imaging = Imaging { distortion: 0.12, lens_offset_m: 0.08, ..Imaging::default() };
+    let room = RoomSettings { begins: Duration::from_secs(5), ..RoomSettings::test(2, 3).unwrap() };
+    let video = Video { size: Some(SIZE), ..Video::default() };
+    let world = World::Room(room);
+    let camera = VirtualCamera::start(Settings {
+        world,
+        video,
+        imaging,
+        clock: Clock::Stepped,
+        ..Settings::default()
+    });
+    let camera = camera.unwrap();
+    let truth = truth_at(&camera, Duration::ZERO);
+    let seen = box_of(&camera.silhouette(Duration::ZERO, SIZE).unwrap()).unwrap();
+    let near = |one: f64, other: f64| (one - other).abs() < 2.5;
+    assert!(near(seen.left, truth.bounds.left) && near(seen.top, truth.bounds.top), "{seen:?} {truth:?}");
+    assert!(
+        near(seen.width, truth.bounds.width) && near(seen.height, truth.bounds.height),
+        "{seen:?} {truth:?}"
+    );
 }

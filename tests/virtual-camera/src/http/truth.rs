@@ -39,7 +39,7 @@ pub(super) async fn truth(
     let camera = site.camera.clone();
     let found = tokio::task::spawn_blocking(move || TruthReply {
         size,
-        people: camera.ground_truth(exposure, size),
+        people: camera.people(exposure, size).into_iter().map(|person| person.truth).collect(),
         silhouette: camera.silhouette(exposure, size).map(|mask| runs(&mask)).unwrap_or_default(),
     });
     let json = found.await.ok().and_then(|report| serde_json::to_string(&report).ok()).unwrap_or_default();

@@ -2,7 +2,9 @@
 
 //! What a camera does to its pictures between the sensor and the encoder, and what shakes it.
 
+mod blocks;
 mod hunting;
+mod lens;
 mod noise_filter;
 mod overlay;
 
@@ -14,11 +16,23 @@ use crate::{
 };
 
 pub(crate) use hunting::{MEMORY, Sway};
+pub(crate) use lens::Lens;
 pub(crate) use noise_filter::NoiseFilter;
 
 /// How the camera treats its pictures; the default does nothing to them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Imaging {
+    /// By which part the lens draws in what is one focal length from the middle of the widest view: 0.05 to 0.15 in
+    /// cameras. It falls with the square of the magnification.
+    pub distortion: f64,
+    /// How far the lens is ahead of the axes that the camera turns about, in metres.
+    pub lens_offset_m: f64,
+    /// Time from reading the first row of a picture to reading the last.
+    pub rolling_shutter: Duration,
+    /// Exponent of contrast: above 1 the dark becomes darker.
+    pub gamma: Option<f64>,
+    /// How strongly the noise filter flattens blocks of 8 x 8 pixels in which little but noise is seen, 0 to 1.
+    pub blocks: f64,
     /// Whether exposure is set for a bright room once and for all, instead of by the camera itself as it goes. Recordings
     /// are as they were exposed.
     pub fixed_exposure: bool,
@@ -62,18 +76,39 @@ impl Imaging {
         if self.is_night(time) {
             night(picture);
         }
+        if let Some(gamma) = self.gamma {
+            contrast(gamma, picture);
+        }
         if self.noise_filter > 0.0 {
             filter.apply(self.noise_filter, time, picture);
+        }
+        if self.blocks > 0.0 {
+            blocks::flatten(self.blocks, &mut picture.planes[0]);
         }
         if self.overlay {
             overlay::burn_in(time, picture);
         }
     }
 
+    /// Whether a picture is anything but a pinhole's.
+    pub(crate) fn bends(&self) -> bool {
+        self.distortion != 0.0 || !self.rolling_shutter.is_zero()
+    }
+
     fn is_night(&self, time: Duration) -> bool {
         let period = self.night.map(|period| period.as_nanos().max(1));
         period.is_some_and(|period| time.as_nanos() / period % 2 == 1)
     }
+}
+
+/// Makes dark tones darker where the exponent is above 1, lighter below it.
+fn contrast(exponent: f64, picture: &mut Picture) {
+    let tone = |value: usize| {
+        let part = ((value as f64 - 16.0) / 219.0).max(0.0);
+        (16.0 + 219.0 * part.powf(exponent)).round().min(255.0) as u8
+    };
+    let table: [u8; 256] = std::array::from_fn(tone);
+    picture.planes[0].data.iter_mut().for_each(|pixel| *pixel = table[usize::from(*pixel)]);
 }
 
 /// Grey, as without its infrared filter: cloth is brighter than to the eye, the more so the redder it is.
@@ -114,6 +149,15 @@ mod tests {
         assert_eq!(picture, pattern());
         let pose = Pose { pan_deg: 12.0, ..Pose::default() };
         assert_eq!(imaging.shaken(pose, Duration::from_secs(3)), pose);
+    }
+
+    #[test]
+    fn contrast_keeps_black_and_white_and_moves_what_is_between() {
+        let mut picture = pattern();
+        picture.planes[0].data[..3].copy_from_slice(&[16, 125, 235]);
+        contrast(1.4, &mut picture);
+        assert_eq!((picture.planes[0].data[0], picture.planes[0].data[2]), (16, 235));
+        assert!((90..110).contains(&picture.planes[0].data[1]));
     }
 
     #[test]

@@ -21,17 +21,18 @@ pub use footage::FootageError;
 pub use mot::{MotError, People, read as read_mot};
 use panorama::Panorama;
 pub use panorama::Person;
-pub use photo::{Lane, PhotoError, PhotoPlace, PhotoSettings};
-pub use room::{Action, Change, Event, Lighting, Occlusion, RoomSettings, Subject};
+pub use photo::{Lane, PhotoError, PhotoPerson, PhotoPlace, PhotoSettings};
+pub use room::{Action, Change, Event, Lighting, Occlusion, Place, RoomSettings, Subject};
 pub(crate) use sensor::LONGEST_SHUTTER;
 pub use synthetic::{SyntheticSettings, Waypoint};
+pub(crate) use warp::warp;
 
 use crate::{
     geometry::{self, Matrix, Pinhole},
     kinematics::{Limits, Optics, Pose},
     picture::Picture,
     settings::{self, Settings},
-    truth::{GroundTruth, Mask, Sighting},
+    truth::{Mask, Sighting},
 };
 
 /// One picture's worth of light.
@@ -94,11 +95,6 @@ pub(crate) trait World: Send + Sync {
     fn overview_size(&self) -> (u32, u32);
     /// Where the overview looks, and through which pinhole.
     fn overview_view(&self) -> (Pose, Pinhole);
-
-    /// Who is there as the shutter opens, wherever the camera looks.
-    fn truth(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
-        self.people(exposure, size).into_iter().map(|person| person.truth).collect()
-    }
 
     /// The pinhole of a view of `size`. One relatively taller than the camera's own shows less at its sides, not more
     /// above.

@@ -12,7 +12,7 @@ const SPAN: usize = 16;
 const ONE: f64 = 65536.0;
 
 /// Fills `target` with what `source` shows where `place` takes each of its pixels; the source's edge goes on beyond it.
-pub(super) fn warp(source: &Plane, target: &mut Plane, place: impl Fn(f64, f64) -> (f64, f64)) {
+pub(crate) fn warp(source: &Plane, target: &mut Plane, place: impl Fn(f64, f64) -> (f64, f64)) {
     for (row, line) in target.data.chunks_exact_mut(target.width).enumerate() {
         let mut start = place(0.0, row as f64);
         for (span, pixels) in line.chunks_mut(SPAN).enumerate() {

@@ -62,6 +62,37 @@ impl Equirectangular {
         Ok(Self { planes: [plane(1, 0), plane(2, 1), plane(2, 2)] })
     }
 
+    /// What it shows around a direction, by shares of its width and height: the mean of some pixels there.
+    pub fn mean_at(&self, across: f64, down: f64) -> [f64; 3] {
+        [0, 1, 2].map(|index| {
+            let plane = &self.planes[index];
+            let (width, reach) = (plane.width * 2 / 3, (plane.height / 64).max(1));
+            let (column, row) = ((across * width as f64) as usize, (down * plane.height as f64) as usize);
+            let rows = row.saturating_sub(reach)..(row + reach).min(plane.height);
+            let columns = column..(column + 2 * reach).min(plane.width);
+            let count = (rows.len() * columns.len()).max(1);
+            let line = |row: usize| {
+                plane.data[row * plane.width..][columns.clone()].iter().map(|value| u32::from(*value))
+            };
+            f64::from(rows.flat_map(line).sum::<u32>()) / count as f64
+        })
+    }
+
+    /// A small one, painted by yaw and pitch in degrees.
+    #[cfg(test)]
+    pub fn painted(colour: impl Fn(f64, f64) -> [u8; 3]) -> Self {
+        let plane = |step: usize, part: usize| {
+            let (width, height) = (128 / step, 64 / step);
+            let value = |index: usize| {
+                let (column, row) = (index % (width * 3 / 2) % width, index / (width * 3 / 2));
+                let yaw = (column as f64 + 0.5) / width as f64 * 360.0 - 180.0;
+                colour(yaw, 90.0 - (row as f64 + 0.5) / height as f64 * 180.0)[part]
+            };
+            Plane { width: width * 3 / 2, height, data: (0..width * 3 / 2 * height).map(value).collect() }
+        };
+        Self { planes: [plane(1, 0), plane(2, 1), plane(2, 2)] }
+    }
+
     /// The same with something standing in it.
     pub fn with(&self, obstacle: &Obstacle) -> Self {
         let mut changed = self.clone();

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! A photograph of everything around the camera, with somebody cut out of film walking in it.
+//! A photograph of everything around the camera, with somebody cut out of film, or drawn, walking in it.
 
 mod equirectangular;
+mod film;
+mod light;
 mod obstacle;
 mod place;
 mod settings;
@@ -11,7 +13,7 @@ mod way;
 mod world;
 
 pub use place::{Lane, PhotoPlace};
-pub use settings::{PhotoError, PhotoSettings};
+pub use settings::{PhotoError, PhotoPerson, PhotoSettings};
 pub(crate) use world::Photo;
 
 #[cfg(test)]

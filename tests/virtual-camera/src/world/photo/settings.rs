@@ -8,7 +8,7 @@ use super::{place::PhotoPlace, way::Way};
 use crate::{
     kinematics::Pose,
     seeded::Seeded,
-    world::{Change, Lighting, Occlusion},
+    world::{Change, Lighting, Occlusion, Subject},
 };
 
 /// Why a photograph cannot be a world.
@@ -40,13 +40,22 @@ pub enum PhotoError {
     },
 }
 
+/// Who walks in a panorama.
+#[derive(Debug, Clone, PartialEq)]
+pub enum PhotoPerson {
+    /// Somebody cut out of film: a folder with `walker.csv` and the pictures it lists. They never show their back.
+    Film(PathBuf),
+    /// Somebody drawn as in the room, in the light of the panorama: of the seed's clothes and of this kind.
+    Drawn(Subject),
+}
+
 /// A panorama, and somebody who walks in it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PhotoSettings {
     /// An equirectangular picture, JPEG or WebP, horizon in the middle row.
     pub panorama: PathBuf,
-    /// A folder with `walker.csv` and the pictures it lists.
-    pub walker: PathBuf,
+    /// Who walks.
+    pub person: PhotoPerson,
     /// Where one can walk in it.
     pub place: PhotoPlace,
     /// Number of the way, from 1; see [`Self::WAYS`].
@@ -61,7 +70,7 @@ pub struct PhotoSettings {
     pub speed: Change,
     /// Of walking: along the lane, or there and back.
     pub direction: Change,
-    /// Whether the strongest colour of the clothes is another one.
+    /// Whether the strongest colour of the clothes on film is another one.
     pub other_clothes: bool,
     /// Whether the person walks the same way again after the end of it, for ever.
     pub repeats: bool,
@@ -72,7 +81,7 @@ impl PhotoSettings {
     /// person, steady and at different speeds, there and there and back, bright and dim.
     pub const WAYS: u32 = 12;
 
-    /// Way `number` through a panorama; `None` unless it is from 1 to [`Self::WAYS`].
+    /// Way `number` through a panorama of somebody on film in the folder `walker`; `None` unless it is from 1 to [`Self::WAYS`].
     pub fn way(
         panorama: PathBuf,
         walker: PathBuf,
@@ -85,7 +94,7 @@ impl PhotoSettings {
         let chance = |label: u64| Seeded::new(seed).fork(u64::from(number)).fork(label).bits() % 2 == 1;
         Some(Self {
             panorama,
-            walker,
+            person: PhotoPerson::Film(walker),
             place,
             way: number,
             seed,

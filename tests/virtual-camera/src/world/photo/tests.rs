@@ -8,7 +8,8 @@ use super::*;
 use crate::{
     kinematics::Pose,
     settings::{Settings, World as WorldSettings},
-    world::{Change, Exposure, Lighting, Occlusion, World, open},
+    truth::GroundTruth,
+    world::{Change, Exposure, Lighting, Occlusion, Subject, World, open},
 };
 
 const SIZE: (u32, u32) = (320, 240);
@@ -67,10 +68,14 @@ fn world(photo: PhotoSettings) -> Box<dyn World> {
     open(&Settings { world: WorldSettings::Photo(Box::new(photo)), ..Settings::default() }).unwrap()
 }
 
+fn truth(world: &dyn World, exposure: &Exposure, size: (u32, u32)) -> Vec<GroundTruth> {
+    world.people(exposure, size).into_iter().map(|person| person.truth).collect()
+}
+
 /// An exposure at a time, with the person in the middle.
 fn towards(world: &dyn World, seconds: f64) -> Exposure {
     let time = Duration::from_secs_f64(seconds);
-    let ahead = world.truth(&Exposure::at(time, Pose::default()), SIZE);
+    let ahead = truth(world, &Exposure::at(time, Pose::default()), SIZE);
     let (pan_deg, tilt_deg) = ahead[0].direction_deg.unwrap();
     Exposure::at(time, Pose { pan_deg, tilt_deg, ..Pose::default() })
 }
@@ -82,7 +87,7 @@ fn a_person_stands_where_the_lane_is_and_is_as_large_as_there() {
     let world = world(settings.clone());
     for seconds in [2.5, 3.5] {
         let exposure = towards(&*world, seconds);
-        let truth = &world.truth(&exposure, SIZE)[0];
+        let truth = &truth(&*world, &exposure, SIZE)[0];
         let [x, y, z] = truth.position_m.unwrap();
         let away = 1.5 / 25f64.to_radians().tan();
         assert!((x.hypot(z) - away).abs() < 0.05 && y == 0.0, "{truth:?}");
@@ -104,6 +109,30 @@ fn a_person_stands_where_the_lane_is_and_is_as_large_as_there() {
 }
 
 #[test]
+fn somebody_drawn_stands_there_too_and_the_truth_is_what_is_drawn() {
+    let folder = Folder::new("drawn");
+    let settings = PhotoSettings { person: PhotoPerson::Drawn(Subject::C), ..folder.settings() };
+    let world = world(settings);
+    for seconds in [2.5, 3.5, 6.0] {
+        let exposure = towards(&*world, seconds);
+        let truth = &truth(&*world, &exposure, SIZE)[0];
+        let [x, _, z] = truth.position_m.unwrap();
+        let away = 1.5 / 25f64.to_radians().tan();
+        assert!((x.hypot(z) - away).abs() < 0.05, "{truth:?}");
+        assert!((120.0..160.0).contains(&truth.bounds.height) && truth.visible > 0.99, "{truth:?}");
+        // Where they are the picture differs from that of the beginning, when they are elsewhere.
+        let first = Exposure { time: Duration::from_secs(0), ..exposure };
+        let (now, then) = (world.render(&exposure, SIZE).unwrap(), world.render(&first, SIZE).unwrap());
+        let shape = world.silhouette(&exposure, SIZE).unwrap();
+        let differs = |i: usize| now.planes[0].data[i].abs_diff(then.planes[0].data[i]) > 8;
+        let body: Vec<usize> = (0..320 * 240).filter(|i| shape.data[*i] > 0).collect();
+        assert!(body.len() > 1500, "{}", body.len());
+        let seen = body.iter().filter(|i| differs(**i)).count();
+        assert!(seen * 10 > body.len() * 6, "{seen} of {}", body.len());
+    }
+}
+
+#[test]
 fn an_obstacle_hides_all_of_them_or_the_legs_for_a_while() {
     let folder = Folder::new("occlusion");
     let least = |occlusion: Occlusion| {
@@ -112,7 +141,7 @@ fn an_obstacle_hides_all_of_them_or_the_legs_for_a_while() {
         let world = world(settings);
         let seen = |part: u32| {
             let exposure = towards(&*world, 2.0 + (duration - 2.0) * f64::from(part) / 40.0);
-            world.truth(&exposure, SIZE)[0].unhidden
+            truth(&*world, &exposure, SIZE)[0].unhidden
         };
         let all: Vec<f64> = (0..40).map(seen).collect();
         assert!(all[0] > 0.99, "seen at first: {all:?}");
@@ -149,7 +178,7 @@ fn the_person_comes_in_from_the_side() {
         let (home, world) = (settings.home(), world(settings));
         let in_view = |seconds: f64| {
             let exposure = Exposure::at(Duration::from_secs_f64(seconds), home);
-            world.truth(&exposure, SIZE)[0].in_view
+            truth(&*world, &exposure, SIZE)[0].in_view
         };
         assert!(in_view(0.0) < 0.02, "way {way}");
         assert!((0..60).any(|step| in_view(2.0 + 0.1 * f64::from(step)) > 0.99), "way {way}");
@@ -169,6 +198,6 @@ fn what_cannot_be_read_is_told_of() {
     assert!(told(missing).contains("cannot read /nowhere.jpg"));
     fs::write(folder.0.join("walker.csv"), "heading,foot_x\n1,2\n").unwrap();
     let other = folder.0.join(".");
-    let list = PhotoSettings { walker: other, ..folder.settings() };
+    let list = PhotoSettings { person: PhotoPerson::Film(other), ..folder.settings() };
     assert!(told(list).contains("names no column foot_y"));
 }

@@ -8,7 +8,12 @@ use super::{
     place::{Lane, PhotoPlace},
     settings::PhotoSettings,
 };
-use crate::{geometry, kinematics::Pose, seeded::Seeded, world::Change};
+use crate::{
+    geometry,
+    kinematics::Pose,
+    seeded::Seeded,
+    world::{Change, room::walker as room},
+};
 
 /// How tall the person is, in metres.
 pub(super) const HEIGHT: f64 = 1.75;
@@ -35,6 +40,9 @@ const DEPARTURE: f64 = 1.6;
 const TURNING: f64 = 0.5;
 /// How far somebody may face away from the camera: nobody was filmed from behind.
 const SIDEWAYS_DEG: f64 = 112.0;
+/// Who may show their back looks so far ahead, in seconds, and turns by so many radians a second.
+const AHEAD: f64 = 0.35;
+const TURN: f64 = 4.5;
 /// Steps of the tables: points a lane, and moments a second.
 const POINTS: usize = 400;
 const RATE: f64 = 100.0;
@@ -100,6 +108,31 @@ impl Way {
             heading_deg: between(from.heading_deg, to.heading_deg),
             walked: between(from.walked, to.walked),
         }
+    }
+
+    /// The same for somebody who may show their back: they face where they go, and turn round as people do.
+    pub fn on_foot(&self) -> Vec<room::Moment> {
+        let count = (self.duration() * room::RATE) as usize + 1;
+        let place = |time: f64| {
+            let now = self.at(time.clamp(0.0, self.duration() - 1e-6));
+            (now.x, now.z)
+        };
+        let mut heading = None;
+        let moment = |index: usize| {
+            let time = index as f64 / room::RATE;
+            let ((x, z), (before, after)) = (place(time), (place(time - AHEAD / 4.0), place(time + AHEAD)));
+            let (right, ahead) = (after.0 - before.0, after.1 - before.1);
+            let wanted = right.atan2(ahead);
+            let (next, last) = (place(time + 0.02), place(time - 0.02));
+            let speed = (next.0 - last.0).hypot(next.1 - last.1) / 0.04;
+            let was = *heading.get_or_insert(wanted);
+            let missing = turned(was.to_degrees(), wanted.to_degrees()).to_radians();
+            let moving = right.hypot(ahead) > 0.02;
+            let step = if moving { missing.clamp(-TURN / room::RATE, TURN / room::RATE) } else { 0.0 };
+            heading = Some(was + step);
+            room::Moment { x, z, heading: was + step, speed, turning: step * room::RATE, seated: 0.0 }
+        };
+        (0..count.max(2)).map(moment).collect()
     }
 
     /// The time at which a part of all moments has gone, 0 to 1.

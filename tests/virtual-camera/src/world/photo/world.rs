@@ -6,10 +6,12 @@ use std::{sync::Arc, time::Duration};
 
 use super::{
     equirectangular::{Equirectangular, Rays},
+    film::{Film, Stand},
+    light::surroundings,
     obstacle::Obstacle,
-    settings::PhotoSettings,
-    sprite::{Level, Sprite, Sprites},
-    way::{HEIGHT, Moment, Way},
+    settings::{PhotoPerson, PhotoSettings},
+    sprite::Sprites,
+    way::Way,
 };
 use crate::{
     geometry::Pinhole,
@@ -21,8 +23,12 @@ use crate::{
     world::{
         Exposure, FootageError, World,
         blur::motion_blur,
-        layer::{ASIDE, Layer, MOMENTS, Window},
-        room::view::View,
+        layer::{Layer, MOMENTS},
+        room::{
+            light::{Light, Strength},
+            view::View,
+            walker::{Mover, Walker},
+        },
         sensor::Sensor,
         sighting::{mask, sight},
     },
@@ -40,6 +46,8 @@ const OVERVIEW_FOV_DEG: f64 = 130.0;
 const FARTHEST: f64 = 8.0;
 /// The soft shadow at the feet: half as wide and half as deep, in metres, and how dark.
 const SHADOW: (f64, f64, f64) = (0.38, 0.26, 0.5);
+/// Brightness of somebody drawn in good light, over that of their colours.
+const LEVEL: f64 = 0.85;
 /// Stream of chance of the sensor.
 const SENSOR: u64 = 0xf070;
 
@@ -48,58 +56,17 @@ pub(crate) struct Photo {
     settings: PhotoSettings,
     panorama: Arc<Equirectangular>,
     obstacle: Option<Obstacle>,
-    sprites: Arc<Sprites>,
+    person: Person,
     way: Way,
     sensor: Sensor,
     optics: Optics,
     view_size: (u32, u32),
 }
 
-/// Somebody at one moment: where, and the picture that shows them.
-struct Figure {
-    moment: Moment,
-    sprite: Arc<Sprite>,
-    mirrored: bool,
-    foot: (f64, f64),
-    /// Sine and cosine of the direction they stand in, and how far away.
-    facing: (f64, f64),
-    away: f64,
-    /// Pixels of the picture on a metre.
-    per_metre: f64,
-    eye: f64,
-}
-
-impl Figure {
-    /// The level of the picture for samples that are `step` radians apart.
-    fn level(&self, step: f64) -> Level<'_> {
-        self.sprite.level(step * self.away * self.per_metre)
-    }
-
-    /// What a ray (right, down, ahead) meets of them: an upright board at their feet that faces the camera.
-    #[inline]
-    fn seen(&self, level: Level, [right, down, ahead]: [f64; 3]) -> [u8; 4] {
-        let (sin, cos) = self.facing;
-        let depth = right * sin + ahead * cos;
-        if depth <= 1e-6 {
-            return [0; 4];
-        }
-        let reach = self.away / depth;
-        let across = (right * cos - ahead * sin) * reach * self.per_metre;
-        let up = (self.eye - down * reach) * self.per_metre;
-        let across = if self.mirrored { -across } else { across };
-        level.at(self.foot.0 + across, self.foot.1 - up)
-    }
-
-    /// Corners of the board in a view, generously; none where it is behind.
-    fn bounds(&self, view: &View) -> Option<Bounds> {
-        let (sin, cos) = self.facing;
-        let corners = [(-0.75, -0.12), (0.75, -0.12), (-0.75, 1.1), (0.75, 1.1)].map(|(right, up)| {
-            let (right, up) = (right * 0.8 * HEIGHT / 1.75, up * HEIGHT - self.eye);
-            let seen = view.turned([self.moment.x + right * cos, up, self.moment.z - right * sin]);
-            (seen[2] > 1e-3).then(|| view.project(seen))
-        });
-        Bounds::around(corners.into_iter().collect::<Option<Vec<_>>>()?)
-    }
+/// Who walks in it.
+enum Person {
+    Film(Film),
+    Drawn(Box<Walker>, Light),
 }
 
 impl Photo {
@@ -111,42 +78,47 @@ impl Photo {
             obstacle.as_ref().map_or(panorama.clone(), |obstacle| Arc::new(panorama.with(obstacle)));
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         let seeded = Seeded::new(photo.seed).fork(SENSOR).fork(u64::from(photo.way));
+        let person = match &photo.person {
+            PhotoPerson::Film(folder) => Person::Film(Film::new(Sprites::open(folder)?, photo)),
+            PhotoPerson::Drawn(subject) => {
+                let (irradiance, tint) = surroundings(&panorama, LEVEL * photo.place.shade);
+                let light = Light { surroundings: Some(irradiance), ..Light::even(Strength::OPEN_AIR) };
+                let walker = Walker::going(photo.seed, *subject, way.on_foot(), tint);
+                Person::Drawn(Box::new(walker), light)
+            }
+        };
         let world = Self {
             panorama,
             obstacle,
-            sprites: Sprites::open(&photo.walker)?,
+            person,
             way,
             sensor: Sensor::new(photo.lighting, 1.0, settings.imaging.fixed_exposure, &seeded),
             optics: Optics { wide_fov_deg: photo.place.fov_deg, max_magnification },
             view_size: settings.video.size.unwrap_or(VIEW_SIZE),
             settings: photo.clone(),
         };
-        // A picture that cannot be decoded is told of now.
-        for step in 0..(world.way.duration() * FRAME_RATE as f64) as u32 {
-            world.figure(f64::from(step) / FRAME_RATE as f64)?;
+        if let Person::Film(film) = &world.person {
+            // A picture that cannot be decoded is told of now.
+            for step in 0..(world.way.duration() * FRAME_RATE as f64) as u32 {
+                film.figure(world.stand(f64::from(step) / FRAME_RATE as f64))?;
+            }
         }
         Ok(world)
     }
 
-    fn figure(&self, time: f64) -> Result<Figure, FootageError> {
-        let moment = self.way.at(time);
-        let (index, mirrored) = self.sprites.choose(moment.heading_deg, moment.walked);
-        let row = &self.sprites.rows[index];
-        let away = moment.away();
-        Ok(Figure {
-            moment,
-            facing: (moment.x / away, moment.z / away),
-            away,
-            mirrored,
-            sprite: self.sprites.picture(index, self.settings.other_clothes)?,
-            foot: row.foot,
-            per_metre: row.height_px / HEIGHT,
-            eye: self.settings.place.eye_m,
-        })
+    /// Where the person stands at a time in seconds.
+    fn stand(&self, time: f64) -> Stand {
+        Stand::new(self.way.at(time), self.settings.place.eye_m)
+    }
+
+    /// The same in the way of somebody who is drawn, which is walked once.
+    fn drawn_time(&self, time: f64) -> f64 {
+        if self.settings.repeats { time.rem_euclid(self.way.duration()) } else { time }
     }
 
     fn view(&self, pose: &Pose, size: (u32, u32)) -> View {
-        View::new(pose, self.pinhole(pose.zoom_step, size), size)
+        let lens = [0.0, self.settings.place.eye_m, 0.0];
+        View::new(pose, self.pinhole(pose.zoom_step, size), size).with_lens(lens)
     }
 
     /// The light of an exposure through `view`, which is the camera's as the shutter opens; `seen` is where it looks, and the
@@ -161,14 +133,9 @@ impl Photo {
         let time = exposure.time.as_secs_f64();
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
         self.panorama.look(&exposure.opening, view, &mut canvas);
-        self.shade(&self.figure(time)?, &exposure.opening, view, &mut canvas);
+        self.shade(&self.stand(time), &exposure.opening, view, &mut canvas);
         motion_blur(&mut canvas, sweep.0, sweep.1);
-        let shares: [f64; MOMENTS] = std::array::from_fn(|moment| (moment as f64 + 0.5) / MOMENTS as f64);
-        let mut moments = Vec::with_capacity(MOMENTS);
-        for share in shares {
-            moments.push((self.figure(time + exposure.duration.as_secs_f64() * share)?, seen(share)));
-        }
-        if let Some(layer) = self.layer(&moments, view.size) {
+        if let Some(layer) = self.layer(time, exposure.duration.as_secs_f64(), view, seen)? {
             let close = layer.view(view);
             let mut unhidden = Plane::filled(close.size.0, close.size.1, 255);
             self.hide(&exposure.opening, &close, &mut unhidden);
@@ -177,41 +144,35 @@ impl Photo {
         Ok(canvas)
     }
 
-    /// The person alone, as the mean of some moments.
-    fn layer(&self, moments: &[(Figure, (Pose, View))], size: (usize, usize)) -> Option<Layer> {
-        let corners =
-            moments.iter().filter_map(|(figure, (_, view))| figure.bounds(view)).flat_map(|bounds| {
-                [(bounds.left, bounds.top), (bounds.left + bounds.width, bounds.top + bounds.height)]
-            });
-        let window = Window::around(corners, size)?;
-        let mut layer = Layer::new(window);
-        let mut colours = vec![[0u8; 4]; window.width * window.height];
-        for ((figure, (pose, view)), aside) in moments.iter().zip(ASIDE) {
-            let (rays, level) = (Rays::new(pose, view), figure.level(0.5 / view.pinhole.focal));
-            let shade = |value: u8, zero: f64| {
-                (zero + (f64::from(value) - zero) * self.settings.place.shade).clamp(0.0, 255.0) as u8
-            };
-            for (row, line) in colours.chunks_exact_mut(window.width).enumerate() {
-                let y = (window.top + row) as f64 + aside.1;
-                for (column, colour) in line.iter_mut().enumerate() {
-                    let ray = rays.ray((window.left + column) as f64 + aside.0, y);
-                    let [luma, u, v, there] = figure.seen(level, ray);
-                    *colour = if there == 0 {
-                        [0; 4]
-                    } else {
-                        [shade(luma, 16.0), shade(u, 128.0), shade(v, 128.0), 1]
-                    };
+    /// The person alone, as the mean of some moments of an exposure that begins at `time` and lasts `duration` seconds.
+    fn layer(
+        &self,
+        time: f64,
+        duration: f64,
+        view: &View,
+        seen: impl Fn(f64) -> (Pose, View),
+    ) -> Result<Option<Layer>, FootageError> {
+        let share = |moment: usize| (moment as f64 + 0.5) / MOMENTS as f64;
+        match &self.person {
+            Person::Film(film) => {
+                let mut moments = Vec::with_capacity(MOMENTS);
+                for moment in 0..MOMENTS {
+                    let figure = film.figure(self.stand(time + duration * share(moment)))?;
+                    moments.push((figure, seen(share(moment))));
                 }
+                Ok(film.layer(&moments, view.size))
             }
-            layer.add(&colours);
+            Person::Drawn(walker, light) => {
+                let views = std::array::from_fn(|moment| seen(share(moment)).1);
+                Ok(walker.layer(self.drawn_time(time), duration, &views, light))
+            }
         }
-        Some(layer)
     }
 
     /// Darkens the floor at somebody's feet.
-    fn shade(&self, figure: &Figure, pose: &Pose, view: &View, canvas: &mut Picture) {
-        let Some(bounds) = figure.bounds(view) else { return };
-        let (rays, (sin, cos)) = (Rays::new(pose, view), figure.facing);
+    fn shade(&self, stand: &Stand, pose: &Pose, view: &View, canvas: &mut Picture) {
+        let Some(bounds) = stand.bounds(view) else { return };
+        let (rays, (sin, cos)) = (Rays::new(pose, view), stand.facing);
         let plane = &mut canvas.planes[0];
         let rows = |place: f64| place.clamp(0.0, view.size.1 as f64) as usize;
         let from = rows(bounds.top + bounds.height * 0.7);
@@ -222,8 +183,8 @@ impl Photo {
                 if down <= 1e-6 {
                     continue;
                 }
-                let reach = figure.eye / down;
-                let (x, z) = (right * reach - figure.moment.x, ahead * reach - figure.moment.z);
+                let reach = stand.eye / down;
+                let (x, z) = (right * reach - stand.moment.x, ahead * reach - stand.moment.z);
                 let (across, along) = ((x * cos - z * sin) / SHADOW.0, (x * sin + z * cos) / SHADOW.1);
                 let inside = (1.0 - across * across - along * along).max(0.0);
                 let (yaw, pitch) = rays.direction(column as f64, row as f64);
@@ -255,51 +216,51 @@ impl Photo {
         }
     }
 
-    /// All of somebody through a view, whatever hides them.
-    fn whole(&self, figure: &Figure, pose: &Pose, view: &View) -> Plane {
-        let (rays, level) = (Rays::new(pose, view), figure.level(1.0 / view.pinhole.focal));
-        let mut whole = Plane::filled(view.size.0, view.size.1, 0);
-        for (row, line) in whole.data.chunks_exact_mut(view.size.0.max(1)).enumerate() {
-            for (column, pixel) in line.iter_mut().enumerate() {
-                let [.., there] = figure.seen(level, rays.ray(column as f64, row as f64));
-                *pixel = 255 * there;
+    /// All of the person at a time through a view, whatever hides them.
+    fn whole(&self, time: f64, pose: &Pose, view: &View) -> Plane {
+        match &self.person {
+            // All pictures were decoded when the world was opened.
+            Person::Film(film) => film.figure(self.stand(time)).map_or_else(
+                |_| Plane::filled(view.size.0, view.size.1, 0),
+                |figure| figure.whole(pose, view),
+            ),
+            Person::Drawn(walker, _) => {
+                let mut whole = Plane::filled(view.size.0, view.size.1, 0);
+                walker.silhouette(self.drawn_time(time), view, &mut whole);
+                whole
             }
         }
-        whole
     }
 
-    /// What shows of somebody through a view: all of them, and what nothing hides.
-    fn shapes(&self, figure: &Figure, pose: &Pose, view: &View) -> [Plane; 2] {
-        let whole = self.whole(figure, pose, view);
+    /// What shows of the person at a time through a view: all of them, and what nothing hides.
+    fn shapes(&self, time: f64, pose: &Pose, view: &View) -> [Plane; 2] {
+        let whole = self.whole(time, pose, view);
         let mut unhidden = whole.clone();
         self.hide(pose, view, &mut unhidden);
         [whole, unhidden]
     }
 
+    /// The box around the person in a view, inside of it or not.
+    fn bounds(&self, time: f64, pose: &Pose, view: &View) -> Option<Bounds> {
+        match &self.person {
+            Person::Film(film) => film.figure(self.stand(time)).ok()?.bounds(pose, view),
+            Person::Drawn(walker, _) => {
+                let [left, top, right, bottom] = walker.bounds(self.drawn_time(time), view)?;
+                Some(Bounds { left, top, width: right - left, height: bottom - top })
+            }
+        }
+    }
+
     /// The person in a view, inside of it or not; `None` unless they are ahead of the camera, or where they are so far to
     /// the side that the plane of the picture hardly meets them.
     fn person(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Sighting> {
-        // All pictures were decoded when the world was opened.
-        let figure = self.figure(exposure.time.as_secs_f64()).ok()?;
-        let (pose, view) = (&exposure.opening, self.view(&exposure.opening, size));
+        let (time, pose) = (exposure.time.as_secs_f64(), &exposure.opening);
+        let (stand, view) = (self.stand(time), self.view(pose, size));
         let widest = FARTHEST * f64::from(size.0.max(size.1));
-        let around = figure.bounds(&view).filter(|around| around.width.max(around.height) < widest)?;
-        let place = [figure.moment.x, 0.0, figure.moment.z];
-        // Where in that the person really is.
-        let corner = |place: f64| place.floor();
-        let (left, top) = (corner(around.left), corner(around.top));
-        let pinhole = Pinhole {
-            centre_x: view.pinhole.centre_x - left,
-            centre_y: view.pinhole.centre_y - top,
-            ..view.pinhole
-        };
-        let close = view.through(pinhole, (around.width as usize + 2, around.height as usize + 2));
-        let whole = self.whole(&figure, pose, &close);
-        let lit = (0..whole.data.len()).filter(|&index| whole.data[index] > 0);
-        let pixels =
-            lit.map(|index| ((index % whole.width) as f64 + left, (index / whole.width) as f64 + top));
-        let bounds = Bounds::around(pixels.flat_map(|(x, y)| [(x, y), (x + 1.0, y + 1.0)]))?;
-        Some(sight(1, place, bounds, (pose, &view), size, |close| self.shapes(&figure, pose, close)))
+        stand.bounds(&view).filter(|around| around.width.max(around.height) < widest)?;
+        let place = [stand.moment.x, 0.0, stand.moment.z];
+        let bounds = self.bounds(time, pose, &view)?;
+        Some(sight(1, place, bounds, (pose, &view), size, |close| self.shapes(time, pose, close)))
     }
 }
 
@@ -344,8 +305,8 @@ impl World for Photo {
     }
 
     fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask> {
-        let figure = self.figure(exposure.time.as_secs_f64()).ok()?;
-        let [_, unhidden] = self.shapes(&figure, &exposure.opening, &self.view(&exposure.opening, size));
+        let (time, view) = (exposure.time.as_secs_f64(), self.view(&exposure.opening, size));
+        let [_, unhidden] = self.shapes(time, &exposure.opening, &view);
         Some(mask(unhidden))
     }
 

@@ -2,7 +2,7 @@
 
 //! What people do in the room, besides what the thesis' tests ask of one.
 
-/// Who walks where. All but [`Self::Test`] and [`Self::Nobody`] begin as a test does: after two seconds the person to be
+/// Who walks where. All but [`Self::Test`] and [`Self::Nobody`] begin as a test does: after two seconds or so the person to be
 /// followed, number 1, comes in at the side of the first view.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Action {
@@ -33,11 +33,15 @@ pub enum Action {
     Group,
     /// Passes so close to the camera that they fill the picture.
     Near,
+    /// Walks to and fro far away: out of doors only.
+    Far,
+    /// Nobody walks: number 1 is a car that drives along the street, stops and drives on. Out of doors only.
+    Drive,
 }
 
 impl Action {
     /// Every one, with its name for command lines and tables.
-    pub const ALL: [(Self, &'static str); 13] = [
+    pub const ALL: [(Self, &'static str); 15] = [
         (Self::Test, "test"),
         (Self::Nobody, "nobody"),
         (Self::Cross, "cross"),
@@ -51,6 +55,8 @@ impl Action {
         (Self::Wander, "wander"),
         (Self::Group, "group"),
         (Self::Near, "near"),
+        (Self::Far, "far"),
+        (Self::Drive, "drive"),
     ];
 
     /// A number for streams of chance; the way of a thesis test has those of the tests.

@@ -7,8 +7,8 @@ use super::{
     light::Light,
     raster::cover,
     settings::RoomSettings,
-    view::{Canvas, Vector, View},
-    walker::{BodyPose, Walker},
+    view::{self, Canvas, Vector, View},
+    walker::Mover,
 };
 use crate::{picture::Plane, seeded::Seeded, world::sensor::soften};
 
@@ -20,9 +20,6 @@ const SUNNY: f64 = 0.75;
 /// Slats of the blind that let stripes of sun through.
 const STRIPES: u32 = 9;
 
-/// Somebody as they stand.
-type Person<'a> = (&'a Walker, &'a BodyPose);
-
 /// What of all that a room has.
 pub(super) struct Effects {
     seeded: Seeded,
@@ -33,31 +30,51 @@ pub(super) struct Effects {
     reflections: bool,
 }
 
+/// Stream of chance.
+const EFFECTS: u64 = 0xeffe;
+
+/// Along which the low sun of a seed shines: shadows fall to the side and towards the camera.
+fn sunbeam(seed: u64) -> Vector {
+    let mut chance = Seeded::new(seed).fork(EFFECTS).fork(1);
+    let (around, down) = (chance.range(0.5, 1.0) * chance.pick(&[-1.0, 1.0]), chance.range(0.62, 0.85));
+    [around, -down, -0.35]
+}
+
+/// The direction to that sun, of length 1.
+pub(super) fn towards_sun(seed: u64) -> Vector {
+    let beam = sunbeam(seed);
+    view::scale(beam, -1.0 / view::dot(beam, beam).sqrt())
+}
+
 impl Effects {
     pub fn new(settings: &RoomSettings) -> Self {
-        let seeded = Seeded::new(settings.seed).fork(0xeffe);
-        let mut chance = seeded.fork(1);
-        // Shadows fall to the side and towards the camera.
-        let (around, down) = (chance.range(0.5, 1.0) * chance.pick(&[-1.0, 1.0]), chance.range(0.62, 0.85));
+        let seeded = Seeded::new(settings.seed).fork(EFFECTS);
         Self {
             sun: settings.events.contains(&Event::Sun),
             switch: settings.events.contains(&Event::Switch),
-            shadows: settings.shadows.then(|| [around, -down, -0.35]),
+            shadows: settings.shadows.then(|| sunbeam(settings.seed)),
             reflections: settings.reflections,
             seeded,
         }
     }
 
     /// Draws what lies on the floor, before anything stands on it.
-    pub fn on_floor(&self, people: &[Person], time: f64, view: &View, light: &Light, canvas: &mut Canvas) {
+    pub fn on_floor(
+        &self,
+        movers: &[Box<dyn Mover>],
+        time: f64,
+        view: &View,
+        light: &Light,
+        canvas: &mut Canvas,
+    ) {
         if self.sun {
             self.sun(time, view, canvas);
         }
         if self.reflections {
-            reflect(people, view, light, canvas);
+            reflect(movers, time, view, light, canvas);
         }
         if let Some(direction) = self.shadows {
-            shade(people, direction, view, canvas);
+            shade(movers, time, direction, view, canvas);
         }
     }
 
@@ -113,9 +130,9 @@ fn brighten(polygon: &[(f64, f64)], strength: f64, view: &View, luma: &mut Plane
     });
 }
 
-fn shade(people: &[Person], direction: Vector, view: &View, canvas: &mut Canvas) {
+fn shade(movers: &[Box<dyn Mover>], time: f64, direction: Vector, view: &View, canvas: &mut Canvas) {
     let mut mask = Plane::filled(view.size.0, view.size.1, 0);
-    people.iter().for_each(|(walker, pose)| walker.cast_shadow(pose, direction, view, &mut mask));
+    movers.iter().for_each(|mover| mover.cast_shadow(time, direction, view, &mut mask));
     (0..3).for_each(|_| soften(&mut mask));
     for (pixel, &shaded) in
         canvas.planes[0].data.iter_mut().zip(&mask.data).filter(|(_, shaded)| **shaded > 0)
@@ -125,9 +142,9 @@ fn shade(people: &[Person], direction: Vector, view: &View, canvas: &mut Canvas)
     }
 }
 
-fn reflect(people: &[Person], view: &View, light: &Light, canvas: &mut Canvas) {
+fn reflect(movers: &[Box<dyn Mover>], time: f64, view: &View, light: &Light, canvas: &mut Canvas) {
     let mut mirrored = canvas.clone();
-    for layer in people.iter().filter_map(|(walker, pose)| walker.reflection(pose, view, light)) {
+    for layer in movers.iter().filter_map(|mover| mover.reflection(time, view, light)) {
         let (width, height) = layer.view(view).size;
         layer.over(&mut mirrored, Plane::filled(width, height, 255), (0.0, 0.0));
     }

@@ -17,18 +17,27 @@ pub enum Event {
     Sun,
     /// The light is switched off and on.
     Switch,
-    /// A plant moves in the draught.
+    /// A plant moves in the draught; out of doors all trees in the wind.
     Draught,
+    /// Clouds' shadows drift over the ground, out of doors.
+    Clouds,
+    /// Headlights of a car out of sight sweep by, out of doors.
+    Headlights,
+    /// It rains, out of doors.
+    Rain,
 }
 
 impl Event {
     /// Every one, with its name for command lines.
-    pub const ALL: [(Self, &'static str); 5] = [
+    pub const ALL: [(Self, &'static str); 8] = [
         (Self::Door, "door"),
         (Self::Film, "film"),
         (Self::Sun, "sun"),
         (Self::Switch, "switch"),
         (Self::Draught, "draught"),
+        (Self::Clouds, "clouds"),
+        (Self::Headlights, "headlights"),
+        (Self::Rain, "rain"),
     ];
 }
 

@@ -10,10 +10,11 @@ mod raster;
 mod scene;
 mod settings;
 pub(crate) mod view;
-mod walker;
+pub(in crate::world) mod walker;
+mod weather;
 mod world;
 
 pub use action::Action;
 pub use event::Event;
-pub use settings::{Change, Lighting, Occlusion, RoomSettings, Subject};
+pub use settings::{Change, Lighting, Occlusion, Place, RoomSettings, Subject};
 pub(crate) use world::Room;

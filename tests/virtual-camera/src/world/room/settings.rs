@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Which test the room plays: the thesis' 72 and the seeds they are rerun with.
+//! What a room shows: the thesis' 72 tests and the seeds they are rerun with, and much else.
 
 use std::time::Duration;
 
@@ -33,6 +33,30 @@ pub enum Occlusion {
     Full,
 }
 
+/// Where the people are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Place {
+    /// In a hall, with things along its walls.
+    #[default]
+    Hall,
+    /// In a yard before a street, under the sky: one sees as far as to the houses 60 m away.
+    Yard,
+    /// The same under street lamps.
+    NightYard,
+    /// The same as an infrared camera with a lamp of its own sees it by night.
+    InfraredYard,
+}
+
+impl Place {
+    /// Every one, with its name for command lines and tables.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Hall, "hall"),
+        (Self::Yard, "yard"),
+        (Self::NightYard, "night-yard"),
+        (Self::InfraredYard, "infrared-yard"),
+    ];
+}
+
 /// Whether something stays as it is all the way.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Change {
@@ -58,6 +82,8 @@ pub enum Subject {
 pub struct RoomSettings {
     /// Of the room, the clothes, the gait and the way; 1 is the reference world.
     pub seed: u64,
+    /// Where all that is.
+    pub place: Place,
     /// How much light there is.
     pub lighting: Lighting,
     /// What hides the person on the way.
@@ -72,6 +98,8 @@ pub struct RoomSettings {
     pub action: Action,
     /// How many more people there are: they walk along in a group, else they wander about before and behind the person.
     pub others: usize,
+    /// How many cars drive by on the street, out of doors: the first at once, the next some seconds later.
+    pub vehicles: usize,
     /// How far the action has come when the world begins. Later than two seconds, the person is in the first view already.
     pub begins: Duration,
     /// What happens besides.
@@ -89,6 +117,7 @@ impl Default for RoomSettings {
     fn default() -> Self {
         Self {
             seed: 1,
+            place: Place::Hall,
             lighting: Lighting::Optimal,
             occlusion: Occlusion::None,
             speed: Change::Fixed,
@@ -96,6 +125,7 @@ impl Default for RoomSettings {
             subject: Subject::A,
             action: Action::Test,
             others: 0,
+            vehicles: 0,
             begins: Duration::ZERO,
             events: Vec::new(),
             shadows: false,
@@ -117,13 +147,7 @@ impl RoomSettings {
             occlusion: [Occlusion::None, Occlusion::Partial, Occlusion::Full][index / 6 % 3],
             speed: change(index / 18),
             direction: change(index / 36),
-            action: Action::Test,
-            others: 0,
-            begins: Duration::ZERO,
-            events: Vec::new(),
-            shadows: false,
-            reflections: false,
-            repeats: false,
+            ..Self::default()
         })
     }
 

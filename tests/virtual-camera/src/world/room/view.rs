@@ -30,12 +30,30 @@ pub(crate) struct View {
     pub size: (usize, usize),
     /// From the camera's axes to the room's, y down in both.
     rotation: Matrix,
+    /// Where the lens is.
+    lens: Vector,
 }
 
 impl View {
     /// What a camera that looks along `pose` sees through `pinhole`.
     pub fn new(pose: &Pose, pinhole: Pinhole, size: (u32, u32)) -> Self {
-        Self { pinhole, size: (size.0 as usize, size.1 as usize), rotation: rotation(pose) }
+        Self { pinhole, size: (size.0 as usize, size.1 as usize), rotation: rotation(pose), lens: CAMERA }
+    }
+
+    /// The same through a lens that is so many metres ahead of the axes that the camera turns about.
+    pub fn ahead(self, offset_m: f64) -> Self {
+        let [right, down, ahead] = self.rotation.map(|line| line[2] * offset_m);
+        Self { lens: add(CAMERA, [right, -down, ahead]), ..self }
+    }
+
+    /// The same through a lens somewhere else.
+    pub fn with_lens(self, lens: Vector) -> Self {
+        Self { lens, ..self }
+    }
+
+    /// Where the lens is.
+    pub fn lens(&self) -> Vector {
+        self.lens
     }
 
     /// The same view on the chroma planes.
@@ -56,9 +74,17 @@ impl View {
             .map(|axis| self.rotation[0][axis] * x - self.rotation[1][axis] * y + self.rotation[2][axis] * z)
     }
 
+    /// The direction of the world that a pixel shows, of depth 1 in the axes of the camera.
+    pub fn ray(&self, x: f64, y: f64) -> Vector {
+        let Pinhole { focal, centre_x, centre_y } = self.pinhole;
+        let seen = [(x - centre_x) / focal, (y - centre_y) / focal, 1.0];
+        let [right, down, ahead] = self.rotation.map(|line| dot(line, seen));
+        [right, -down, ahead]
+    }
+
     /// A place of the world in the axes of the camera; the last is its depth.
     pub fn seen(&self, point: Vector) -> Vector {
-        self.turned(subtract(point, CAMERA))
+        self.turned(subtract(point, self.lens))
     }
 
     /// The pixel that shows what lies there in the camera's axes, which must be ahead (depth above 0).
@@ -117,9 +143,14 @@ mod tests {
         near(ahead.pixel([1.0, 2.5, 5.0]), 319.5 + focal / 5.0, 239.5);
         near(ahead.pixel([0.0, 1.5, 5.0]), 319.5, 239.5 + focal / 5.0);
         near(view(90.0, 0.0).pixel([5.0, 2.5, 0.0]), 319.5, 239.5);
+        let aside = view(30.0, -20.0);
+        near(aside.pixel(add(CAMERA, scale(aside.ray(100.0, 400.0), 7.0))), 100.0, 400.0);
         let floor = -(2.5f64 / 6.0).atan().to_degrees();
         near(view(0.0, floor).pixel([0.0, 0.0, 6.0]), 319.5, 239.5);
         assert!(ahead.pixel([0.0, 2.5, -1.0]).is_none());
+        // A lens before its axes is nearer to what is ahead, and moves sideways as it turns.
+        near(view(0.0, 0.0).ahead(0.1).pixel([1.0, 2.5, 5.1]), 319.5 + focal / 5.0, 239.5);
+        near(view(90.0, 0.0).ahead(0.1).pixel([5.1, 2.5, -1.0]), 319.5 + focal / 5.0, 239.5);
     }
 
     proptest! {

@@ -5,12 +5,13 @@
 use std::{sync::Arc, time::Duration};
 
 use super::{
-    effects::Effects,
+    effects::{self, Effects},
     light::Strength,
     scene::{Plan, Scene, Style},
-    settings::RoomSettings,
-    view::View,
-    walker::{BodyPose, Walker, obstacles},
+    settings::{Place, RoomSettings},
+    view::{Vector, View},
+    walker::{Mover, movers, obstacles},
+    weather::Weather,
 };
 use crate::{
     geometry::Pinhole,
@@ -45,43 +46,60 @@ const SENSOR: u64 = 0x5e25;
 /// A room with people in it.
 pub(crate) struct Room {
     scene: Arc<Scene>,
-    /// The person to be followed first.
-    walkers: Vec<Walker>,
+    /// Who is to be followed first.
+    movers: Vec<Box<dyn Mover>>,
     effects: Effects,
+    weather: Weather,
     sensor: Sensor,
     /// How far everything has come when the world begins.
     begins: Duration,
+    /// How far the lens is ahead of the axes that the camera turns about, in metres.
+    lens_offset_m: f64,
     optics: Optics,
     view_size: (u32, u32),
+}
+
+/// Whether there is the light of a few lamps at most.
+fn is_night(room: &RoomSettings) -> bool {
+    match room.place {
+        Place::Hall => Style::of(room.seed).night,
+        Place::Yard => false,
+        Place::NightYard | Place::InfraredYard => true,
+    }
 }
 
 /// Somebody at a moment.
 struct Body<'a> {
     /// From 1; 1 is to be followed.
     id: u32,
-    walker: &'a Walker,
-    pose: BodyPose,
+    mover: &'a dyn Mover,
+    /// Where on the floor.
+    place: Vector,
 }
 
 impl Room {
     pub fn new(room: &RoomSettings, settings: &Settings) -> Self {
         let seeded = Seeded::new(room.seed);
-        let walkers = Walker::all(room);
+        let (movers, sun) = (movers(room), effects::towards_sun(room.seed));
         let plan = Plan {
             seed: room.seed,
-            obstacles: obstacles(&walkers, room),
+            place: room.place,
+            sun,
+            obstacles: obstacles(room),
             events: room.events.clone(),
-            trodden: walkers.iter().flat_map(|walker| walker.walk().off_the_way()).collect(),
+            trodden: movers.iter().flat_map(|mover| mover.walk().off_the_way()).collect(),
         };
         let max_magnification = settings.kinematics.max_magnification.unwrap_or(MAX_MAGNIFICATION);
         Self {
             scene: Scene::of(plan),
-            walkers,
+            movers,
             effects: Effects::new(room),
+            weather: Weather::new(room),
             begins: room.begins,
+            lens_offset_m: settings.imaging.lens_offset_m,
             sensor: Sensor::new(
                 room.lighting,
-                if Style::of(room.seed).night { Strength::NIGHT_PAINTED } else { 1.0 },
+                if is_night(room) { Strength::NIGHT_PAINTED } else { 1.0 },
                 settings.imaging.fixed_exposure,
                 &seeded.fork(SENSOR).fork(u64::from(room.number())),
             ),
@@ -98,15 +116,16 @@ impl Room {
     /// Everybody at a time, the farthest from the camera first.
     fn bodies_at<'a>(&'a self, time: Duration) -> Vec<Body<'a>> {
         let seconds = self.seconds(time);
-        let body = |(id, walker): (u32, &'a Walker)| Body { id, walker, pose: walker.pose_at(seconds) };
-        let mut bodies: Vec<_> = (1..).zip(&self.walkers).map(body).collect();
-        let away = |body: &Body| body.pose.place[0].hypot(body.pose.place[2]);
+        let body = |(id, mover): (u32, &'a dyn Mover)| Body { id, mover, place: mover.place(seconds) };
+        let movers = self.movers.iter().map(|mover| mover.as_ref());
+        let mut bodies: Vec<_> = (1..).zip(movers).map(body).collect();
+        let away = |body: &Body| body.place[0].hypot(body.place[2]);
         bodies.sort_by(|one, other| away(other).total_cmp(&away(one)));
         bodies
     }
 
     fn view(&self, pose: &Pose, size: (u32, u32)) -> View {
-        View::new(pose, self.pinhole(pose.zoom_step, size), size)
+        View::new(pose, self.pinhole(pose.zoom_step, size), size).ahead(self.lens_offset_m)
     }
 
     /// The light of an exposure on a picture through `view`, which is the camera's as the shutter opens; `seen` says what the
@@ -122,23 +141,23 @@ impl Room {
         let bodies = self.bodies_at(exposure.time);
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
         self.scene.draw_shell(view, &mut canvas);
-        bodies.iter().for_each(|body| body.walker.draw_shadow(&body.pose, view, &mut canvas));
-        let people: Vec<_> = bodies.iter().map(|body| (body.walker, &body.pose)).collect();
-        self.effects.on_floor(&people, time, view, &self.scene.light, &mut canvas);
+        bodies.iter().for_each(|body| body.mover.draw_shadow(time, view, &mut canvas));
+        self.effects.on_floor(&self.movers, time, view, &self.scene.light, &mut canvas);
         self.scene.draw_pieces(time, view, &mut canvas);
         motion_blur(&mut canvas, sweep.0, sweep.1);
         let views = std::array::from_fn(|moment| seen((moment as f64 + 0.5) / MOMENTS as f64));
         // Who is nearer is laid over who is farther away.
-        for Body { walker, pose, .. } in &bodies {
-            let layer = walker.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light);
+        for Body { mover, place, .. } in &bodies {
+            let layer = mover.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light);
             if let Some(layer) = layer {
                 let close = layer.view(view);
                 let mut unhidden = Plane::filled(close.size.0, close.size.1, 255);
-                self.scene.hide(pose.place, time, &close, &mut unhidden);
+                self.scene.hide(*place, time, &close, &mut unhidden);
                 layer.over(&mut canvas, unhidden, sweep);
             }
         }
         self.effects.switch(time, &mut canvas);
+        self.weather.apply(time, view, &mut canvas);
         canvas.planes.iter_mut().for_each(soften);
         canvas
     }
@@ -148,14 +167,14 @@ impl Room {
     fn shape(&self, bodies: &[Body], time: Duration, view: &View) -> ([Plane; 2], Vec<u32>) {
         let mut shapes = bodies.iter().map(|body| {
             let mut shape = Plane::filled(view.size.0, view.size.1, 0);
-            body.walker.silhouette(&body.pose, view, &mut shape);
+            body.mover.silhouette(self.seconds(time), view, &mut shape);
             (body.id, shape)
         });
         let whole =
             shapes.next().map_or_else(|| Plane::filled(view.size.0, view.size.1, 0), |(_, whole)| whole);
         let (mut unhidden, mut hidden_by) = (whole.clone(), Vec::new());
         if let Some(body) = bodies.first() {
-            self.scene.hide(body.pose.place, self.seconds(time), view, &mut unhidden);
+            self.scene.hide(body.place, self.seconds(time), view, &mut unhidden);
         }
         for (id, nearer) in shapes {
             if whole.data.iter().zip(&nearer.data).any(|(whole, nearer)| *whole > 0 && *nearer > 0) {
@@ -172,7 +191,7 @@ impl Room {
     /// is ahead of the camera.
     fn person(&self, bodies: &[Body], time: Duration, pose: &Pose, size: (u32, u32)) -> Option<Sighting> {
         let (body, view) = (bodies.first()?, self.view(pose, size));
-        let [left, top, right, bottom] = body.walker.bounds(&body.pose, &view)?;
+        let [left, top, right, bottom] = body.mover.bounds(self.seconds(time), &view)?;
         let bounds = Bounds { left, top, width: right - left, height: bottom - top };
         let mut hidden_by = Vec::new();
         let shapes = |close: &View| {
@@ -180,8 +199,8 @@ impl Room {
             hidden_by = hiding;
             shapes
         };
-        let sighting = sight(body.id, body.pose.place, bounds, (pose, &view), size, shapes);
-        Some(Sighting { hidden_by, ..sighting })
+        let sighting = sight(body.id, body.place, bounds, (pose, &view), size, shapes);
+        Some(Sighting { kind: body.mover.kind(), hidden_by, ..sighting })
     }
 }
 

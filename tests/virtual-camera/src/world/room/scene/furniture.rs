@@ -221,7 +221,12 @@ impl Painter {
 }
 
 /// A leaf somewhere in the crown of a plant: a pointed piece that droops outwards.
-fn leaf(foot: Vector, (width, height): (f64, f64), green: &Arc<Material>, seeded: &mut Seeded) -> Surface {
+pub(super) fn leaf(
+    foot: Vector,
+    (width, height): (f64, f64),
+    green: &Arc<Material>,
+    seeded: &mut Seeded,
+) -> Surface {
     let (around, rise) = (seeded.range(0.0, std::f64::consts::TAU), seeded.range(-0.2, 1.2));
     let out = [around.cos() * rise.cos(), rise.sin(), around.sin() * rise.cos()];
     let reach = seeded.range(0.05, 0.3) * width;

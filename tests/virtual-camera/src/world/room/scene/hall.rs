@@ -41,7 +41,7 @@ impl Hall {
         let lamps = if style.night { Vec::new() } else { [0.14, 0.38, 0.62, 0.86].to_vec() };
         let lamps =
             lamps.iter().flat_map(|share| rows.map(|z| [left + share * (right - left), height - 0.01, z]));
-        let light = Light { lamps: lamps.collect(), windows: Vec::new(), strength };
+        let light = Light { lamps: lamps.collect(), ..Light::even(strength) };
         Self { left, right, front, back, height, style, light }
     }
 

@@ -2,29 +2,39 @@
 
 //! Light baked into the room: lamps and windows, and the darkness of corners and beneath things.
 
-use super::{furniture::Piece, hall::Hall, solid::Solid};
+use super::{furniture::Piece, solid::Solid};
 use crate::world::room::{
+    light::Light,
     raster::{LightMap, Surface},
     view::{Vector, dot},
 };
 
-/// Metres between places at which the light is computed.
+/// Metres between places at which the light is computed; a large surface has no more than so many along it.
 const STEP: f64 = 0.15;
+const STEPS: f64 = 240.0;
+
+/// What bounds a place: the direction into it, and where along that it is.
+pub(super) type Plane = (Vector, f64);
 
 /// Lights all surfaces.
-pub(super) fn light(hall: &Hall, shell: &mut [Surface], pieces: &mut [Piece]) {
+pub(super) fn light(light: &Light, planes: &[Plane], shell: &mut [Surface], pieces: &mut [Piece]) {
     let solids: Vec<Solid> = pieces.iter().map(|piece| piece.solid).collect();
     for surface in shell {
-        surface.light = bake(hall, surface, &solids, None);
+        surface.light = bake((light, planes), surface, &solids, None);
     }
     for (index, piece) in pieces.iter_mut().enumerate() {
         for surface in &mut piece.surfaces {
-            surface.light = bake(hall, surface, &solids, Some(index));
+            surface.light = bake((light, planes), surface, &solids, Some(index));
         }
     }
 }
 
-fn bake(hall: &Hall, surface: &Surface, solids: &[Solid], own: Option<usize>) -> LightMap {
+fn bake(
+    (light, planes): (&Light, &[Plane]),
+    surface: &Surface,
+    solids: &[Solid],
+    own: Option<usize>,
+) -> LightMap {
     let size = surface.outline.iter().fold((0.05f64, 0.05f64), |(w, h), &(u, v)| (w.max(u), h.max(v)));
     let normal = surface.normal();
     let (middle, radius) = (surface.point(size.0 / 2.0, size.1 / 2.0), size.0.hypot(size.1) / 2.0);
@@ -32,15 +42,16 @@ fn bake(hall: &Hall, surface: &Surface, solids: &[Solid], own: Option<usize>) ->
         .filter(|&i| Some(i) != own && solids[i].distance(middle) < radius + 1.0)
         .map(|i| &solids[i])
         .collect();
-    LightMap::new(size, STEP, |u, v| {
+    let step = STEP.max(size.0.max(size.1) / STEPS);
+    LightMap::new(size, step, |u, v| {
         let point = surface.point(u, v);
-        hall.light.at(point, normal) * corners(hall, point, normal) * beneath(&near, point)
+        light.at(point, normal) * corners(planes, point, normal) * beneath(&near, point)
     })
 }
 
 /// Walls, floor and ceiling take light from each other where they meet.
-fn corners(hall: &Hall, point: Vector, normal: Vector) -> f64 {
-    hall.planes()
+fn corners(planes: &[Plane], point: Vector, normal: Vector) -> f64 {
+    planes
         .iter()
         .filter(|(out, _)| dot(*out, normal) < 0.9)
         .map(|&(out, distance)| 1.0 - 0.25 * (-(dot(out, point) - distance).max(0.0) / 0.28).exp())

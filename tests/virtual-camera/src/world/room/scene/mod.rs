@@ -7,6 +7,7 @@ mod hall;
 mod lighting;
 mod look;
 mod moving;
+mod open_air;
 mod paint;
 mod solid;
 mod standing;
@@ -14,6 +15,7 @@ mod stuff;
 mod style;
 mod things;
 mod walls;
+mod yard;
 
 use std::{
     borrow::Cow,
@@ -27,11 +29,13 @@ use moving::Moving;
 pub(super) use solid::Solid;
 use stuff::Painter;
 pub(super) use style::Style;
+use yard::Yard;
 
 use super::{
     event::Event,
     light::Light,
     raster::{Surface, cover},
+    settings::Place,
     view::{Canvas, Vector, View},
 };
 use crate::{picture::Plane, seeded::Seeded, sync::lock};
@@ -66,6 +70,10 @@ pub(super) struct Scene {
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Plan {
     pub seed: u64,
+    /// What kind of place it is.
+    pub place: Place,
+    /// Where the sun is, if it is a place that it shines on: a direction of length 1.
+    pub sun: Vector,
     /// Stand on the floor where their boxes are; what they are is up to the seed.
     pub obstacles: Vec<(Obstacle, Solid)>,
     /// What the scene must have for them is there.
@@ -91,25 +99,57 @@ impl Scene {
         scene
     }
 
-    fn new(Plan { seed, obstacles, events, trodden }: &Plan) -> Self {
-        let seed = *seed;
-        let (seeded, style) = (Seeded::new(seed), Style::of(seed));
+    fn new(plan: &Plan) -> Self {
+        match plan.place {
+            Place::Hall => Self::in_hall(plan),
+            Place::Yard | Place::NightYard | Place::InfraredYard => Self::in_yard(plan),
+        }
+    }
+
+    fn in_hall(Plan { seed, obstacles, events, trodden, .. }: &Plan) -> Self {
+        let (seeded, style) = (Seeded::new(*seed), Style::of(*seed));
         let painter = Painter::new(seeded.fork(1));
         let mut hall = Hall::new(style, &mut seeded.fork(2));
-        let (mut shell, mut pieces) = hall.furnish(trodden, &painter, &mut seeded.fork(3));
+        let (shell, mut pieces) = hall.furnish(trodden, &painter, &mut seeded.fork(3));
         let mut choice = seeded.fork(4);
         for &(kind, solid) in obstacles {
             pieces.extend(hall.obstacle(kind, solid, &painter, &mut choice));
         }
-        let things = events.iter().flat_map(|event| moving::things(*event, &painter, &seeded.fork(5)));
-        let (own, movings): (Vec<_>, Vec<_>) = things.unzip();
-        let solids: Vec<Solid> = own.iter().map(|piece| piece.solid).collect();
-        pieces.extend(own);
+        let mut things: Vec<_> = pieces.into_iter().map(|piece| (piece, None)).collect();
+        things.extend(events.iter().flat_map(|event| moving::things(*event, &painter, &seeded.fork(5))));
+        let planes = hall.planes();
+        Self::lit(hall.light, &planes, shell, things)
+    }
+
+    fn in_yard(Plan { seed, place, sun, obstacles, events, .. }: &Plan) -> Self {
+        let seeded = Seeded::new(*seed).fork(0x7a2d);
+        let painter = Painter::new(seeded.fork(1));
+        let yard = Yard::new(*place, *sun, &mut seeded.fork(2));
+        let windy = events.contains(&Event::Draught);
+        let (shell, mut things) = yard.furnish(windy, &painter, &mut seeded.fork(3));
+        let mut choice = seeded.fork(4);
+        for &(kind, solid) in obstacles {
+            let pieces = yard.obstacle(kind, solid, &painter, &mut choice);
+            things.extend(pieces.into_iter().map(|piece| (piece, None)));
+        }
+        let planes = yard.planes();
+        Self::lit(yard.light, &planes, shell, things)
+    }
+
+    /// All of it in the order of drawing, and in this light.
+    fn lit(
+        light: Light,
+        planes: &[lighting::Plane],
+        mut shell: Vec<Surface>,
+        things: Vec<(Piece, Option<Moving>)>,
+    ) -> Self {
+        let (pieces, movings): (Vec<_>, Vec<_>) = things.into_iter().unzip();
+        let solids: Vec<Solid> = pieces.iter().map(|piece| piece.solid).collect();
         let mut pieces = in_order(pieces);
-        lighting::light(&hall, &mut shell, &mut pieces);
+        lighting::light(&light, planes, &mut shell, &mut pieces);
         let place = |solid: &Solid| pieces.iter().position(|piece| piece.solid == *solid);
         let moving = solids.iter().zip(movings).filter_map(|(solid, moving)| Some((place(solid)?, moving?)));
-        Self { moving: moving.collect(), shell, pieces, light: hall.light }
+        Self { moving: moving.collect(), shell, pieces, light }
     }
 
     /// Draws walls, floor and ceiling, and what hangs there.

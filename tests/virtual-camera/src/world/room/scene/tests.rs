@@ -24,7 +24,8 @@ fn scene(seed: u64, obstacles: &[(Obstacle, Solid)]) -> Scene {
 }
 
 fn plan(seed: u64, obstacles: &[(Obstacle, Solid)], events: &[Event]) -> Plan {
-    Plan { seed, obstacles: obstacles.to_vec(), events: events.to_vec(), trodden: Vec::new() }
+    let (obstacles, events) = (obstacles.to_vec(), events.to_vec());
+    Plan { seed, place: Place::Hall, sun: [0.0, 1.0, 0.0], obstacles, events, trodden: Vec::new() }
 }
 
 fn spread(plane: &Plane) -> f64 {

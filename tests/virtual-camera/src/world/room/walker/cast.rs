@@ -12,7 +12,7 @@ use super::{
     route::{Leg, Leg::*, Way},
     walk::ENTRY_DEG,
 };
-use crate::seeded::Seeded;
+use crate::{seeded::Seeded, truth::Kind};
 
 /// Metres per second of ordinary walking, of somebody slow, of somebody in a hurry, and of running.
 const SPEED: f64 = 1.4;
@@ -33,6 +33,9 @@ const GROUP_SPEED: f64 = 1.25;
 const BEFORE: (f64, f64) = (3.7, 4.5);
 const BEHIND: (f64, f64) = (6.4, 7.2);
 const WIDTH: (f64, f64) = (-5.5, 5.5);
+/// Where vehicles drive to the right and to the left, ahead of the camera, and from how far to either side, in metres.
+const LANES: (f64, f64) = (10.6, 13.6);
+const STREET: f64 = 32.0;
 /// Their stream of chance.
 const OTHERS: u64 = 0x07e5;
 
@@ -42,6 +45,7 @@ pub(super) struct Role {
     pub subject: Subject,
     /// Whose clothes they wear: their number, from 0. The first three are the subjects' own.
     pub clothes: usize,
+    pub kind: Kind,
     pub way: Way,
 }
 
@@ -63,27 +67,49 @@ pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
         Action::Wander => alone(stage.wander(&mut chance)),
         Action::Group => stage.group(&mut chance, settings.others),
         Action::Near => alone(stage.near(&mut chance)),
+        Action::Far => alone(stage.far(&mut chance)),
+        Action::Drive => alone(stage.drive(&mut chance)),
     };
+    let first = if settings.action == Action::Drive { Kind::Vehicle } else { Kind::Person };
     let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
     let subjects: Vec<_> = std::iter::once(settings.subject).chain(others).collect();
-    let role = |(way, clothes): (Way, usize)| Role { subject: subjects[clothes % 3], clothes, way };
+    let role =
+        |(way, clothes): (Way, usize)| Role { subject: subjects[clothes % 3], clothes, kind: first, way };
     ways.into_iter().map(role).collect()
 }
 
-/// Those who wander about besides, `before` them being the people of the action itself.
+/// Those who move about besides, people first, `before` of the action itself being numbered before them.
 pub(super) fn others(settings: &RoomSettings, before: usize) -> Vec<Role> {
-    if settings.action == Action::Group {
-        return Vec::new();
-    }
     let seeded = Seeded::new(settings.seed).fork(0xca57).fork(OTHERS);
-    let other = |number: usize| {
+    let person = |number: usize| {
         let mut chance = seeded.fork(number as u64);
         let subject = chance.pick(&[Subject::B, Subject::C]);
         // Two behind the person's way for each before it, where they may hide them.
         let band = if number % 3 == 2 { BEFORE } else { BEHIND };
-        Role { subject, clothes: before + number, way: about(band, &mut chance) }
+        let way = about(band, &mut chance);
+        Role { subject, clothes: before + number, kind: Kind::Person, way }
     };
-    (0..settings.others).map(other).collect()
+    let vehicle = |number: usize| {
+        let mut chance = seeded.fork(100 + number as u64);
+        let way = passing(number, &mut chance);
+        Role { subject: Subject::A, clothes: 0, kind: Kind::Vehicle, way }
+    };
+    let people = if settings.action == Action::Group { 0 } else { settings.others };
+    (0..people).map(person).chain((0..settings.vehicles).map(vehicle)).collect()
+}
+
+/// A vehicle that drives along the street, one after the other and by turns on either side of it.
+fn passing(number: usize, chance: &mut Seeded) -> Way {
+    let side = if number.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let lane = if side > 0.0 { LANES.0 } else { LANES.1 };
+    let (start, end) = ((-side * STREET, lane), (side * STREET, lane));
+    Way {
+        start,
+        heading: side * PI / 2.0,
+        departure: chance.range(0.0, 3.0) + 3.0 * number as f64,
+        above_deg: 0.0,
+        legs: vec![Past(end, chance.range(6.0, 11.0))],
+    }
 }
 
 /// Somebody who is there from the beginning and walks about in a part of the floor, so far ahead of the camera.
@@ -314,5 +340,29 @@ impl Stage {
             Past(self.at(5.0, 4.4), SPEED),
         ];
         self.way(self.at(-5.6, 4.4), DEPARTURE, legs)
+    }
+
+    /// To and fro where people are 20 to 40 pixels high in a picture of 640 x 480.
+    fn far(&self, chance: &mut Seeded) -> Way {
+        let (lane, back) = (chance.range(29.0, 46.0), chance.range(-3.0, 3.0));
+        let reach = 0.28 * lane;
+        let legs = vec![
+            Past(self.at(reach, lane), SPEED),
+            Past(self.at(reach, lane + back), SPEED),
+            Past(self.at(-reach, lane + back), SPEED),
+        ];
+        self.way(self.at(-reach, lane), DEPARTURE, legs)
+    }
+
+    /// Along the street, with a stop on the way.
+    fn drive(&self, chance: &mut Seeded) -> Way {
+        let lane = if self.side > 0.0 { LANES.0 } else { LANES.1 };
+        let speed = chance.range(3.0, 6.0);
+        let legs = vec![
+            To(self.at(chance.range(-1.0, 3.0), lane), speed),
+            Stand(chance.range(0.5, 2.0)),
+            Past(self.at(STREET, lane), speed),
+        ];
+        self.way(self.at(-13.0, lane), DEPARTURE, legs)
     }
 }

@@ -45,7 +45,7 @@ pub(crate) struct Cloth {
 
 impl Cloth {
     /// A tile painted by a function of the place in it, both coordinates from 0 to 1.
-    fn painted(side: usize, weave: f32, paint: impl Fn(f64, f64) -> Colour) -> Self {
+    pub fn painted(side: usize, weave: f32, paint: impl Fn(f64, f64) -> Colour) -> Self {
         let at = |index: usize| (index as f64 + 0.5) / side as f64;
         let byte = |value: f64| (value + 0.5).clamp(1.0, 254.0) as u8;
         let finest: Vec<[u8; 4]> = (0..side * side)
@@ -72,6 +72,16 @@ impl Cloth {
             levels.push(halved);
         }
         Self { side, levels, weave }
+    }
+
+    /// The same in light of a tint: both chroma values of grey less 128. Dark cloth takes less of it.
+    fn tinted(mut self, tint: [f64; 2]) -> Self {
+        for [y, u, v, _] in self.levels.iter_mut().flatten() {
+            let part = (f64::from(*y) - 16.0) / 110.0;
+            let moved = |value: u8, by: f64| (f64::from(value) + by * part).clamp(1.0, 254.0) as u8;
+            (*u, *v) = (moved(*u, tint[0]), moved(*v, tint[1]));
+        }
+        self
     }
 
     /// The level whose texels are about as wide as a sample, its texels a row and its texels a metre.
@@ -138,6 +148,13 @@ impl Outfit {
             long_hair,
             hair_volume: 0.004 + 0.004 * long,
         }
+    }
+}
+
+impl Outfit {
+    /// The same in light of a tint: both chroma values of grey less 128.
+    pub fn tinted(self, tint: [f64; 2]) -> Self {
+        Self { cloths: self.cloths.map(|cloth| cloth.tinted(tint)), ..self }
     }
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! The people who walk through the room: their ways, their gait, their bodies and clothes, and how they are drawn.
+//! The people and vehicles that move through the room: their ways, their gait, their bodies and clothes, and how they are
+//! drawn.
 
 mod body;
 mod cast;
@@ -9,37 +10,35 @@ mod figure;
 mod fill;
 mod gait;
 mod mesh;
+mod mover;
 mod obstruction;
 mod paint;
 mod pattern;
 mod route;
+mod vehicle;
 mod walk;
 mod wardrobe;
 
-pub(crate) use gait::BodyPose;
+pub(in crate::world) use mover::Mover;
 pub(super) use obstruction::obstacles;
 pub(crate) use walk::Walk;
+pub(in crate::world) use walk::{Moment, RATE};
 
 use self::{
     cast::Role,
-    clothes::Outfit,
+    clothes::{Cloth, Outfit},
     figure::Build,
-    gait::Gait,
+    gait::{BodyPose, Gait},
     mesh::{Detail, SkinPatch},
-    paint::Moment,
+    vehicle::Vehicle,
 };
 use super::{
     action::Action,
-    light::Light,
     scene::Style,
     settings::{RoomSettings, Subject},
     view::{Canvas, Vector, View, add, scale},
 };
-use crate::{
-    picture::Plane,
-    seeded::Seeded,
-    world::layer::{Layer, MOMENTS},
-};
+use crate::{seeded::Seeded, truth::Kind};
 
 /// Streams of chance: who somebody is depends on the seed and the subject alone, how they step off on the way too.
 const PERSON: u64 = 0xb0d7;
@@ -55,8 +54,29 @@ fn person(settings: &RoomSettings, subject: Subject, clothes: usize) -> (Build, 
     (Build::of(subject, &mut chance), Outfit::of(subject, Style::of(settings.seed).wall, &mut chance))
 }
 
+/// Everybody and everything that moves in a room by itself, who is to be followed first.
+pub(super) fn movers(settings: &RoomSettings) -> Vec<Box<dyn Mover>> {
+    let mut movers: Vec<Box<dyn Mover>> = match settings.action {
+        Action::Test => vec![Box::new(Walker::of_test(settings))],
+        _ => in_roles(settings, &cast::cast(settings), 0),
+    };
+    let others = cast::others(settings, movers.len());
+    movers.extend(in_roles(settings, &others, movers.len()));
+    movers
+}
+
+fn in_roles(settings: &RoomSettings, roles: &[Role], first: usize) -> Vec<Box<dyn Mover>> {
+    let mover = |(role, number): (&Role, usize)| -> Box<dyn Mover> {
+        match role.kind {
+            Kind::Person => Box::new(Walker::in_role(settings, number, role)),
+            Kind::Vehicle => Box::new(Vehicle::new(settings, number, &role.way)),
+        }
+    };
+    roles.iter().zip(first..).map(mover).collect()
+}
+
 /// One person on their way.
-pub(crate) struct Walker {
+pub(in crate::world) struct Walker {
     build: Build,
     outfit: Outfit,
     gait: Gait,
@@ -64,21 +84,6 @@ pub(crate) struct Walker {
 }
 
 impl Walker {
-    /// Everybody in a room, the person to be followed first.
-    pub fn all(settings: &RoomSettings) -> Vec<Self> {
-        let mut walkers: Vec<_> = match settings.action {
-            Action::Test => vec![Self::of_test(settings)],
-            _ => Self::in_roles(settings, &cast::cast(settings), 0),
-        };
-        let others = cast::others(settings, walkers.len());
-        walkers.extend(Self::in_roles(settings, &others, walkers.len()));
-        walkers
-    }
-
-    fn in_roles(settings: &RoomSettings, roles: &[Role], first: usize) -> Vec<Self> {
-        roles.iter().zip(first..).map(|(role, number)| Self::in_role(settings, number, role)).collect()
-    }
-
     /// The person of a test of the thesis.
     fn of_test(settings: &RoomSettings) -> Self {
         let (build, outfit) = person(settings, settings.subject, 0);
@@ -100,84 +105,56 @@ impl Walker {
         Self { gait: Gait::new(walk, build.clone(), phase), build, outfit, repeats: settings.repeats }
     }
 
-    /// The way of the person, once.
-    pub fn walk(&self) -> &Walk {
-        self.gait.walk()
+    /// Somebody of a seed and a subject's kind who goes by these moments, [`RATE`] of them a second, once; their clothes in
+    /// light of this tint, both chroma values of grey less 128.
+    pub(in crate::world) fn going(seed: u64, subject: Subject, moments: Vec<Moment>, tint: [f64; 2]) -> Self {
+        let settings = RoomSettings { seed, subject, ..RoomSettings::default() };
+        let (build, outfit) = person(&settings, subject, 0);
+        let walker = Self::walking(&settings, build, outfit, Walk::by(moments), 0);
+        Self { outfit: walker.outfit.tinted(tint), ..walker }
     }
 
-    /// How the person stands at a time in seconds since the world's start.
+    /// How the person stands at a time in seconds since the action began.
     pub fn pose_at(&self, time: f64) -> BodyPose {
         self.gait.pose(if self.repeats { time.rem_euclid(self.walk().duration()) } else { time })
     }
+}
 
-    /// The whole body, as far as it is in the picture, during an exposure that begins at `time` in seconds; `views` are
-    /// the camera's at as many moments, evenly spread over the exposure's `duration`.
-    pub fn layer(&self, time: f64, duration: f64, views: &[View; MOMENTS], light: &Light) -> Option<Layer> {
-        let mut number = 0.0;
-        let moments = views.each_ref().map(|view| {
-            number += 1.0;
-            let pose = self.pose_at(time + duration * (number - 0.5) / MOMENTS as f64);
-            Moment { patches: self.patches(&pose, view), view: view.clone() }
-        });
-        paint::paint(&moments, &self.outfit.cloths, light)
+impl Mover for Walker {
+    fn kind(&self) -> Kind {
+        Kind::Person
     }
 
-    /// Darkens the floor below the body: softly all around, more where a foot stands.
-    pub fn draw_shadow(&self, pose: &BodyPose, view: &View, canvas: &mut Canvas) {
+    fn walk(&self) -> &Walk {
+        self.gait.walk()
+    }
+
+    fn place(&self, time: f64) -> Vector {
+        self.pose_at(time).place
+    }
+
+    fn patches(&self, time: f64, view: &View) -> Vec<SkinPatch> {
+        let pose = self.pose_at(time);
+        let depth = view.seen(pose.pelvis)[2].max(1.0);
+        // Corners of limbs must not show close up.
+        let close = view.pinhole.focal / depth > 700.0;
+        let detail = if close { Detail { corners: 28, steps: 5 } } else { Detail { corners: 12, steps: 2 } };
+        body::patches(&pose, &self.build, &self.outfit, detail)
+    }
+
+    fn cloths(&self) -> &[Cloth] {
+        &self.outfit.cloths
+    }
+
+    /// Softly all around, more where a foot stands.
+    fn draw_shadow(&self, time: f64, view: &View, canvas: &mut Canvas) {
+        let pose = self.pose_at(time);
         paint::shadow(pose.place, 0.75, 0.30, view, canvas);
         for leg in &pose.legs {
             let lift = (leg.ankle[1] - self.build.ankle_height).max(0.0);
             let [x, _, z] = add(leg.ankle, scale(leg.foot.ahead, 0.05));
             paint::shadow([x, 0.0, z], 0.20 + lift, 0.45 / (1.0 + 8.0 * lift), view, canvas);
         }
-    }
-
-    /// Sets every pixel of `mask`, of the view's size, on which the body throws its shadow on the floor, light falling along
-    /// `direction`, to 255.
-    pub fn cast_shadow(&self, pose: &BodyPose, direction: Vector, view: &View, mask: &mut Plane) {
-        let on_floor = |place: Vector| {
-            let [x, _, z] = add(place, scale(direction, -place[1] / direction[1]));
-            ([x, 0.0, z], [0.0, 1.0, 0.0])
-        };
-        let patches =
-            self.patches(pose, view).into_iter().map(|patch| patch.moved(|place, _| on_floor(place)));
-        paint::mark(&patches.collect::<Vec<_>>(), view, mask);
-    }
-
-    /// The body as a floor like a mirror shows it.
-    pub fn reflection(&self, pose: &BodyPose, view: &View, light: &Light) -> Option<Layer> {
-        let below = |[x, y, z]: Vector| [x, -y, z];
-        let mirrored = |patch: SkinPatch| patch.moved(|place, normal| (below(place), below(normal)));
-        let moments: [Moment; MOMENTS] = std::array::from_fn(|_| Moment {
-            patches: self.patches(pose, view).into_iter().map(mirrored).collect(),
-            view: view.clone(),
-        });
-        paint::paint(&moments, &self.outfit.cloths, light)
-    }
-
-    /// Sets every pixel of `mask`, of the view's size, that shows the body to 255.
-    pub fn silhouette(&self, pose: &BodyPose, view: &View, mask: &mut Plane) {
-        paint::mark(&self.patches(pose, view), view, mask);
-    }
-
-    /// Left, top, right and bottom of the body in pixels of the view, inside of it or not, edges of pixels at whole
-    /// numbers; `None` unless all of it is ahead.
-    pub fn bounds(&self, pose: &BodyPose, view: &View) -> Option<[f64; 4]> {
-        let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        for vertex in self.patches(pose, view).iter().flat_map(|patch| &patch.vertices) {
-            let ((x, y), _) = view.pixel(vertex.place)?;
-            let (x, y) = (x + 0.5, y + 0.5);
-            bounds = [bounds[0].min(x), bounds[1].min(y), bounds[2].max(x), bounds[3].max(y)];
-        }
-        Some(bounds)
-    }
-
-    fn patches(&self, pose: &BodyPose, view: &View) -> Vec<SkinPatch> {
-        let depth = view.seen(pose.pelvis)[2].max(1.0);
-        // Corners of limbs must not show close up.
-        let close = view.pinhole.focal / depth > 700.0;
-        let detail = if close { Detail { corners: 28, steps: 5 } } else { Detail { corners: 12, steps: 2 } };
-        body::patches(pose, &self.build, &self.outfit, detail)
     }
 }
 

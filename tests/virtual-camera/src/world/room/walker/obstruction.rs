@@ -11,6 +11,7 @@ use super::{
     },
     Walker, body, cast,
     mesh::Detail,
+    mover::Mover,
 };
 use crate::seeded::Seeded;
 
@@ -24,10 +25,10 @@ const STEP: f64 = 0.02;
 /// How far from the camera it stands, as a part of the person's distance.
 const NEARNESS: f64 = 0.76;
 
-/// What must stand in the room for what people do in it, `walkers` being all of them.
-pub(in super::super) fn obstacles(walkers: &[Walker], settings: &RoomSettings) -> Vec<(Obstacle, Solid)> {
-    match (settings.action, walkers.first()) {
-        (Action::Test, Some(walker)) => obstacle(walker, settings).into_iter().collect(),
+/// What must stand in the room for what people do in it.
+pub(in super::super) fn obstacles(settings: &RoomSettings) -> Vec<(Obstacle, Solid)> {
+    match settings.action {
+        Action::Test => obstacle(&Walker::of_test(settings), settings).into_iter().collect(),
         _ => cast::seat(settings).map(sofa).into_iter().collect(),
     }
 }

@@ -5,7 +5,7 @@
 use super::{
     super::{
         light::Light,
-        view::{CAMERA, Canvas, Vector, View, dot, scale, subtract},
+        view::{Canvas, Vector, View, dot, scale, subtract},
     },
     clothes::Cloth,
     fill::{CARRIED, Corner, triangle},
@@ -45,7 +45,7 @@ fn facing(
         .collect();
     let towards = |index: usize| {
         let vertex = &patch.vertices[index];
-        dot(vertex.normal, subtract(CAMERA, vertex.place)) > 0.0
+        dot(vertex.normal, subtract(view.lens(), vertex.place)) > 0.0
     };
     let columns = patch.columns;
     let mut triangles = Vec::with_capacity(patch.vertices.len());
@@ -110,7 +110,12 @@ fn sample(
         let texture = Texture { texels, side, weave: (cloths[patch.material].weave * 256.0) as i32 };
         let corners = |vertex: &Vertex, pixel, depth: f64| {
             let [u, v] = vertex.cloth.map(|metres| (metres * texels_per_metre) as f32);
-            corner(window, pixel, aside, [(1.0 / depth) as f32, u, v, shade(vertex, light) as f32])
+            corner(
+                window,
+                pixel,
+                aside,
+                [(1.0 / depth) as f32, u, v, shade(vertex, view.lens(), light) as f32],
+            )
         };
         for corners in facing(patch, view, corners) {
             triangle(corners, window.size(), |start, end, carried, step| {
@@ -154,9 +159,9 @@ fn fill(
     }
 }
 
-/// How bright a place on the skin is.
-fn shade(vertex: &Vertex, light: &Light) -> f64 {
-    let way = subtract(CAMERA, vertex.place);
+/// How bright a place on the skin is, seen from the lens.
+fn shade(vertex: &Vertex, lens: Vector, light: &Light) -> f64 {
+    let way = subtract(lens, vertex.place);
     let facing = dot(vertex.normal, scale(way, 1.0 / dot(way, way).sqrt()));
     if facing < -0.5 {
         return 0.0; // Seen by nobody.

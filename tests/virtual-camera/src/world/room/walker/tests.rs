@@ -4,8 +4,9 @@ use super::*;
 use crate::{
     geometry::Pinhole,
     kinematics::Pose,
+    picture::Plane,
     world::room::{
-        light::Strength,
+        light::{Light, Strength},
         settings::{Change, Lighting, Occlusion, Subject},
         view::{CAMERA, Vector, dot, subtract},
     },
@@ -49,7 +50,7 @@ fn draw(walker: &Walker, time: f64, view: &View, canvas: &mut Canvas) {
 }
 
 fn lamps() -> Light {
-    Light { lamps: vec![[-3.0, 3.2, 4.0], [3.0, 3.2, 4.0]], windows: Vec::new(), strength: Strength::DAY }
+    Light { lamps: vec![[-3.0, 3.2, 4.0], [3.0, 3.2, 4.0]], ..Light::even(Strength::DAY) }
 }
 
 #[test]
@@ -166,7 +167,7 @@ fn the_person_comes_into_the_first_view_at_two_seconds() {
         let walker = Walker::of_test(&settings);
         let view = looking(&settings.home(), 55.0, (640, 480));
         let part = |time: f64| {
-            let [left, top, right, bottom] = walker.bounds(&walker.pose_at(time), &view).unwrap();
+            let [left, top, right, bottom] = walker.bounds(time, &view).unwrap();
             assert!(top > 0.0 && bottom < 480.0, "{settings:?}");
             ((right.min(640.0) - left.max(0.0)) / (right - left)).max(0.0)
         };
@@ -174,7 +175,7 @@ fn the_person_comes_into_the_first_view_at_two_seconds() {
         let whole = (0..200).map(|frame| f64::from(frame) * FRAME).find(|&time| part(time) > 0.999).unwrap();
         assert!((1.6..2.4).contains(&first), "{settings:?} {first}");
         assert!(whole > first && whole < first + 1.0, "{settings:?} {whole}");
-        let [left, _, right, _] = walker.bounds(&walker.pose_at(0.0), &view).unwrap();
+        let [left, _, right, _] = walker.bounds(0.0, &view).unwrap();
         let beside = 640.0 * 3.0 / 55.0;
         assert!(right < -beside || left > 640.0 + beside, "{settings:?} {left} {right}");
     }
@@ -232,13 +233,13 @@ fn a_silhouette_is_as_high_as_the_person_is() {
         let pose = walker.pose_at(6.0);
         let view = towards(pose.place, 40.0, (640, 480));
         let mut mask = Plane::filled(640, 480, 0);
-        walker.silhouette(&pose, &view, &mut mask);
+        walker.silhouette(6.0, &view, &mut mask);
         let rows: Vec<usize> =
             (0..480).filter(|row| mask.data[row * 640..(row + 1) * 640].contains(&255)).collect();
         let up = |height: f64| view.pixel(add(pose.place, [0.0, height, 0.0])).unwrap().0.1;
         let (drawn, expected) = (rows.len() as f64, up(0.0) - up(walker.build.height));
         assert!((drawn / expected - 1.0).abs() < 0.08, "{subject:?} {drawn} {expected}");
-        let [_, top, _, bottom] = walker.bounds(&pose, &view).unwrap();
+        let [_, top, _, bottom] = walker.bounds(6.0, &view).unwrap();
         assert!((top - rows[0] as f64).abs() < 1.5 && (bottom - top - drawn).abs() < 2.0);
     }
     let heights = [1, 2, 3].map(|number| walker(number, 1).build.height);
@@ -251,7 +252,7 @@ fn what_is_drawn_is_the_silhouette() {
     let pose = walker.pose_at(6.3);
     let view = towards(pose.place, 30.0, (320, 240));
     let mut mask = Plane::filled(320, 240, 0);
-    walker.silhouette(&pose, &view, &mut mask);
+    walker.silhouette(6.3, &view, &mut mask);
     let mut canvas = Canvas::grey(320, 240, 255);
     draw(&walker, 6.3, &view, &mut canvas);
     let differ =
@@ -259,7 +260,7 @@ fn what_is_drawn_is_the_silhouette() {
     let body = mask.data.iter().filter(|pixel| **pixel == 255).count();
     // At the edge a pixel may be half covered.
     assert!(body > 2000 && differ * 8 < body, "{differ} of {body}");
-    walker.draw_shadow(&pose, &view, &mut canvas);
+    walker.draw_shadow(6.3, &view, &mut canvas);
 }
 
 #[test]

@@ -29,7 +29,7 @@ const DEPARTURE: f64 = 0.8;
 /// How far the way has gone when the person's middle passes the edge of the first view, in metres.
 const TO_THE_EDGE: f64 = 1.7;
 /// Steps of the table a second.
-pub(super) const RATE: f64 = 250.0;
+pub(in crate::world) const RATE: f64 = 250.0;
 /// Height of the middle of a person, in metres.
 const MIDDLE: f64 = 0.87;
 /// No test's way is nearer to the camera, in metres.
@@ -85,6 +85,12 @@ impl Walk {
         let far = |moment: &Moment| (moment.x - way.start.0).hypot(moment.z - way.start.1) < TO_THE_EDGE;
         let at_the_edge = moments.partition_point(far) as f64 / RATE;
         Self { moments, duration, side: -way.start.0.signum(), at_the_edge, above_deg: way.above_deg }
+    }
+
+    /// A way by its moments, [`RATE`] of them a second; two at least.
+    pub(super) fn by(moments: Vec<Moment>) -> Self {
+        let duration = (moments.len() - 1) as f64 / RATE;
+        Self { moments, duration, side: 1.0, at_the_edge: 0.0, above_deg: 0.0 }
     }
 
     /// The way of a test of the thesis.

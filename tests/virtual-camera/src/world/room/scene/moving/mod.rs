@@ -4,7 +4,7 @@
 
 mod door;
 mod film;
-mod plant;
+pub(super) mod plant;
 
 use super::{furniture::Piece, solid::Solid, stuff::Painter};
 use crate::{
@@ -37,7 +37,7 @@ pub(super) fn things(event: Event, painter: &Painter, seeded: &Seeded) -> Vec<(P
         Event::Door => door::things(painter, &seeded),
         Event::Film => film::things(painter, &seeded),
         Event::Draught => plant::things(painter, &seeded),
-        Event::Sun | Event::Switch => Vec::new(),
+        Event::Sun | Event::Switch | Event::Clouds | Event::Headlights | Event::Rain => Vec::new(),
     }
 }
 

@@ -27,10 +27,14 @@ pub(super) fn things(painter: &Painter, seeded: &Seeded) -> Vec<(Piece, Option<M
     let at = facing(chance.range(13.0, 19.0), chance.range(6.2, 7.2), [0.95, chance.range(1.4, 1.8), 0.95]);
     let pieces = painter.plant(at, &mut chance);
     let phase = chance.range(0.0, 6.0);
-    pieces.into_iter().map(|piece| (piece, Some(Moving::Plant(Plant { phase })))).collect()
+    pieces.into_iter().map(|piece| (piece, Some(Moving::Plant(Plant::new(phase))))).collect()
 }
 
 impl Plant {
+    pub fn new(phase: f64) -> Self {
+        Self { phase }
+    }
+
     pub fn surfaces(&self, resting: &[Surface], time: f64) -> Vec<Surface> {
         // The draught comes and goes.
         let gust = 0.35 + 0.65 * (0.5 + 0.5 * (0.23 * time + self.phase).sin()).powi(2);
