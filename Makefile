@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all soak deny fuzz install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all soak deny fuzz prove install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -131,14 +131,23 @@ soak: packages-test
 	$(CARGO) build --workspace --lib --bins
 	scripts/with-plugins debug target/debug/soak --duration $(DURATION) --seed $(SEED)
 
-## deny: check licences and origin of every dependency
+## deny: check licences and origin of every dependency, and whether any has a known vulnerability
 deny: packages-build
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
-	$(CARGO) deny check licenses bans sources
+	$(CARGO) deny check advisories licenses bans sources
 
 ## fuzz: feed INPUTS=10000000 inputs to each parser of what cameras say, with a nightly compiler
 fuzz: packages-build
 	@scripts/fuzz $(INPUTS)
+
+## prove: check what this project promises, hours of it, and leave the results in docs/proven.md (CHECKS="death strangers": these
+##       only, scripts/prove --list lists them; DURATION=600 s of soak, INPUTS=10000000 for each parser)
+prove: export DURATION := 600
+prove: packages-test
+	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
+	@scripts/install-packages systemd
+	$(CARGO) build --workspace --all-targets
+	INPUTS=$(INPUTS) scripts/prove $(CHECKS)
 
 ## install: copy what `make build` has built, the plugins to a GStreamer plugin folder, the watchdog to `libexec` in it
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)

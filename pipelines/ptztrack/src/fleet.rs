@@ -5,25 +5,30 @@ use std::sync::{Arc, Mutex};
 
 use ptztrack_contract::lock::lock;
 
-use crate::camera::{Camera, Known};
+use crate::camera::{Camera, Control, Known};
 use crate::config::CameraSettings;
+use crate::control_file::ControlFile;
 use crate::log::Log;
 
 /// All cameras, by name.
 #[derive(Debug)]
 pub struct Fleet {
     cameras: Mutex<BTreeMap<String, Camera>>,
+    had: ControlFile,
     log: Arc<Log>,
 }
 
 impl Fleet {
     pub fn new(log: Arc<Log>) -> Self {
-        Self { cameras: Mutex::default(), log }
+        Self { cameras: Mutex::default(), had: ControlFile::new(), log }
     }
 
     /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits
     /// until the others have ended.
     pub fn apply(&self, wanted: Vec<CameraSettings>) {
+        // Who has a camera has it whatever becomes of its entry.
+        let mut had = self.had.load();
+        had.extend(self.control());
         let mut cameras = lock(&self.cameras);
         let stays = |camera: &Camera| !camera.is_over() && wanted.contains(&camera.settings);
         let (stay, go): (BTreeMap<_, _>, BTreeMap<_, _>) =
@@ -37,10 +42,22 @@ impl Fleet {
                 continue;
             }
             let name = settings.name.clone();
-            match Camera::start(settings, self.log.clone()) {
+            let control = had.get(&name).copied().unwrap_or_default();
+            match Camera::start(settings, control, self.log.clone()) {
                 Ok(camera) => drop(cameras.insert(name, camera)),
                 Err(err) => self.log.error("not-started", format!("{name} cannot be started: {err}")),
             }
+        }
+    }
+
+    fn control(&self) -> BTreeMap<String, Control> {
+        self.known().iter().map(|known| (known.name.clone(), known.control())).collect()
+    }
+
+    /// Keeps who has which camera, for after a restart.
+    pub fn keep_control(&self) {
+        if let Err(err) = self.had.keep(self.control()) {
+            self.log.error("not-kept", format!("who has which camera is forgotten at a restart: {err}"));
         }
     }
 

@@ -5,6 +5,7 @@
 mod camera;
 mod cli;
 mod config;
+mod control_file;
 mod event;
 mod fleet;
 mod http;
@@ -18,7 +19,7 @@ use std::sync::Arc;
 
 use clap::{CommandFactory, Parser};
 use cli::{Options, Serving, Task};
-use config::{Config, Http};
+use config::{Config, Http, NotLoaded};
 use log::Log;
 use service::Origin;
 
@@ -50,9 +51,12 @@ impl From<String> for Failure {
     }
 }
 
-impl Failure {
-    fn mistaken(reason: String) -> Self {
-        Self { reason, status: MISTAKEN_CONFIGURATION.into() }
+impl From<NotLoaded> for Failure {
+    fn from(failure: NotLoaded) -> Self {
+        match failure {
+            NotLoaded::Mistaken(reason) => Self { reason, status: MISTAKEN_CONFIGURATION.into() },
+            NotLoaded::Unreadable(reason) => reason.into(),
+        }
     }
 }
 
@@ -76,7 +80,7 @@ fn run(options: Options) -> Result<(), Failure> {
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Task::Check { file } => {
-            let config = Config::load(&file).map_err(Failure::mistaken)?;
+            let config = Config::load(&file)?;
             config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
@@ -91,8 +95,18 @@ fn run(options: Options) -> Result<(), Failure> {
     }
 }
 
+/// As many open files as the system lets us have: by default a process is content with 1024, at some twenty for each camera.
+fn allow_descriptors() {
+    let limit = rustix::process::getrlimit(rustix::process::Resource::Nofile);
+    // Where it is refused, the default must do.
+    let _ = rustix::process::setrlimit(
+        rustix::process::Resource::Nofile,
+        rustix::process::Rlimit { current: limit.maximum, ..limit },
+    );
+}
+
 fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failure> {
-    let mut config = origin.read().map_err(Failure::mistaken)?;
+    let mut config = origin.read()?;
     if let Some(listen) = serving.http {
         let (hosts, credentials) =
             config.http.map_or((Vec::new(), None), |http| (http.hosts, http.credentials));
@@ -100,6 +114,7 @@ fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failur
         http.check()?;
         config.http = Some(http);
     }
+    allow_descriptors();
     // Libraries below GStreamer, GIO for one, count on somebody who runs the default main context.
     std::thread::Builder::new()
         .name("main-context".to_owned())

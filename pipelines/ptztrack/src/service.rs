@@ -9,14 +9,20 @@ use std::time::Duration;
 
 use sd_notify::NotifyState;
 use tokio::signal::unix::{Signal, SignalKind, signal};
+use tokio::task::JoinHandle;
 use tokio::time::{Interval, interval};
 
-use crate::config::{Config, Http};
+use crate::config::{Config, Http, NotLoaded};
 use crate::fleet::Fleet;
 use crate::http;
 use crate::log::Log;
 use crate::mqtt::Publisher;
 use crate::shard::Shard;
+
+/// Between two tries to have the page's address.
+const LISTEN_AGAIN: Duration = Duration::from_secs(5);
+/// Between two looks for a password that could not be read.
+const LOOK_AGAIN: Duration = Duration::from_secs(10);
 
 /// Where the cameras come from, and come from again on SIGHUP.
 pub enum Origin {
@@ -35,7 +41,7 @@ impl Origin {
 
     /// # Errors
     /// What is wrong with the file.
-    pub fn read(&self) -> Result<Config, String> {
+    pub fn read(&self) -> Result<Config, NotLoaded> {
         match self {
             Self::File { path, shard, watchdog } => {
                 let mut config = Config::load(path)?;
@@ -62,8 +68,8 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     let mut hangup = signal(SignalKind::hangup()).map_err(said)?;
 
     let fleet = Arc::new(Fleet::new(log.clone()));
-    if let Some(http) = &config.http {
-        serve(http, &fleet, &log).await?;
+    if let Some(http) = config.http.clone() {
+        tokio::spawn(serve(http, fleet.clone(), log.clone()));
     }
     let publisher =
         config.mqtt.as_ref().map(|mqtt| Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone()));
@@ -71,15 +77,23 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
     let mut second = interval(Duration::from_secs(1));
+    let mut passwords = interval(LOOK_AGAIN);
+    let mut keeping = None;
     let mut current = config;
     loop {
         tokio::select! {
             () = end(&mut terminate, &mut interrupt) => break,
             _ = hangup.recv() => current = read_again(&origin, current, &fleet, &log).await,
+            _ = passwords.tick() => if current.cameras.iter().any(|camera| camera.no_password.is_some())
+                && origin.read().is_ok_and(|config| config.cameras != current.cameras)
+            {
+                current = read_again(&origin, current, &fleet, &log).await;
+            },
             () = tick(&mut alive) => if fleet.stuck().is_empty() {
                 notify(&[NotifyState::Watchdog]);
             },
             _ = second.tick() => {
+                keep_control(&fleet, &mut keeping);
                 if log.has_terminal() {
                     log.show_status(fleet.known().iter().map(|known| format!("{}: {}", known.name, known.in_words())).collect());
                 }
@@ -100,12 +114,34 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     Ok(())
 }
 
-async fn serve(http: &Http, fleet: &Arc<Fleet>, log: &Log) -> Result<(), String> {
-    let address = http::serve(http, fleet.clone())
-        .await
-        .map_err(|err| format!("cannot listen on {}: {err}", http.listen))?;
-    log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
-    Ok(())
+/// Nobody is followed the worse for a page that is not there: it is tried again.
+async fn serve(http: Http, fleet: Arc<Fleet>, log: Arc<Log>) {
+    let mut told = false;
+    let listener = loop {
+        match http::listen(&http).await {
+            Ok(listener) => break listener,
+            Err(err) if !std::mem::replace(&mut told, true) => {
+                log.error(
+                    "not-listening",
+                    format!("cannot listen on {}: {err}; it is tried again", http.listen),
+                );
+            }
+            Err(_) => {}
+        }
+        tokio::time::sleep(LISTEN_AGAIN).await;
+    };
+    if let Ok(address) = listener.local_addr() {
+        log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
+    }
+    http::serve(listener, &http, fleet).await;
+}
+
+/// Where a disk hangs, it waits for itself and for nobody else.
+fn keep_control(fleet: &Arc<Fleet>, keeping: &mut Option<JoinHandle<()>>) {
+    if keeping.as_ref().is_none_or(JoinHandle::is_finished) {
+        let fleet = fleet.clone();
+        *keeping = Some(tokio::task::spawn_blocking(move || fleet.keep_control()));
+    }
 }
 
 async fn apply(fleet: &Arc<Fleet>, config: Config) {
@@ -130,8 +166,8 @@ async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &
             apply(fleet, config.clone()).await;
             config
         }
-        Err(reason) => {
-            log.error("not-read", format!("everything stays as it was: {reason}"));
+        Err(failure) => {
+            log.error("not-read", format!("everything stays as it was: {}", failure.reason()));
             current
         }
     }

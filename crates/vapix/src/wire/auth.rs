@@ -3,7 +3,7 @@
 //! Basic and Digest authentication (RFC 7617; RFC 2069, 2617, 7616).
 
 use base64::prelude::{BASE64_STANDARD, Engine};
-use digest_auth::{AuthContext, WwwAuthenticateHeader};
+use digest_auth::{AuthContext, HttpMethod, WwwAuthenticateHeader};
 use reqwest::header::{HeaderMap, HeaderValue, WWW_AUTHENTICATE};
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +36,7 @@ pub struct Credentials {
 /// Answers the camera's challenges, and keeps the last one: every later request is signed without
 /// being asked, which saves a round trip for each command.
 #[derive(Debug)]
-pub(super) struct Authenticator {
+pub struct Authenticator {
     credentials: Option<Credentials>,
     allowed: Authentication,
     challenge: Option<Challenge>,
@@ -52,6 +52,7 @@ enum Challenge {
 }
 
 impl Authenticator {
+    /// Nobody has asked yet.
     pub fn new(credentials: Option<Credentials>, allowed: Authentication) -> Self {
         Self { credentials, allowed, challenge: None, knows_digest: false }
     }
@@ -61,6 +62,7 @@ impl Authenticator {
         (self.credentials, self.challenge) = (credentials, None);
     }
 
+    /// Who we are.
     pub fn user(&self) -> &str {
         self.credentials.as_ref().map_or("", |credentials| &credentials.user)
     }
@@ -71,7 +73,16 @@ impl Authenticator {
     }
 
     /// The `Authorization` of a GET of exactly this path and query; `None` before the first challenge.
-    pub fn authorization(&mut self, target: &str) -> Result<Option<HeaderValue>, Error> {
+    pub(super) fn authorization(&mut self, target: &str) -> Result<Option<HeaderValue>, Error> {
+        self.authorization_of("GET", target)
+    }
+
+    /// The `Authorization` of a request with this method for exactly this path and query, or in RTSP this address; `None`
+    /// before the first challenge.
+    ///
+    /// # Errors
+    /// [`Error::UnsupportedAuthentication`] where the challenge cannot be answered.
+    pub fn authorization_of(&mut self, method: &str, target: &str) -> Result<Option<HeaderValue>, Error> {
         let (Some(credentials), Some(challenge)) = (&self.credentials, &mut self.challenge) else {
             return Ok(None);
         };
@@ -79,7 +90,13 @@ impl Authenticator {
         let text = match challenge {
             Challenge::Basic => basic(&credentials.user, password),
             Challenge::Digest(challenge) => challenge
-                .respond(&AuthContext::new(credentials.user.as_str(), password, target))
+                .respond(&AuthContext::new_with_method(
+                    credentials.user.as_str(),
+                    password,
+                    target,
+                    None::<&[u8]>,
+                    HttpMethod::from(method),
+                ))
                 .map_err(|err| Error::UnsupportedAuthentication(err.to_string()))?
                 .to_string(),
         };
@@ -203,7 +220,6 @@ fn split_unquoted(text: &str) -> Vec<&str> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use digest_auth::HttpMethod;
     use proptest::prelude::*;
 
     fn authenticator(user: &str, password: &str) -> Authenticator {

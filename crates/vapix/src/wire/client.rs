@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use bytes::Bytes;
 use reqwest::header::{AUTHORIZATION, HeaderMap, LOCATION};
 use reqwest::{Response, StatusCode, Url, redirect};
 use serde::{Deserialize, Serialize};
@@ -194,6 +195,18 @@ impl Client {
         if accepted { Ok(None) } else { QueuePlace::parse(&answer.body).map(Some) }
     }
 
+    /// Asks for something without end, as MJPEG is; the answer must begin within this time, and from then on something must
+    /// come within the timeout of an answer.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn open(&mut self, target: &str, longest: Duration) -> Result<Stream, Error> {
+        let mut broken = None;
+        let opened = self.attempts(target, Repeat::WhereBroken, &mut broken);
+        let response = tokio::time::timeout(longest, opened).await.unwrap_or(Err(Error::Timeout(longest)))?;
+        Ok(Stream { response, longest: self.settings.timeout })
+    }
+
     async fn query(&mut self, what: &str) -> Result<String, Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&query={what}", self.settings.camera);
         let answer = self.get(&target, Repeat::WhereBroken).await?;
@@ -213,7 +226,12 @@ impl Client {
         }
         let longest = self.settings.timeout;
         let mut broken = None;
-        let answer = tokio::time::timeout(longest, self.attempts(target, repeat, &mut broken)).await;
+        let whole = async {
+            let response = self.attempts(target, repeat, &mut broken).await?;
+            let status = response.status();
+            Ok(CompleteResponse { status, body: self.body(response).await? })
+        };
+        let answer = tokio::time::timeout(longest, whole).await;
         match answer.unwrap_or(Err(Error::Timeout(longest))) {
             // However the second attempt failed, the camera may have acted on the first.
             Err(err) if !err.may_have_acted() => Err(broken.unwrap_or(err)),
@@ -227,7 +245,7 @@ impl Client {
         target: &str,
         repeat: Repeat,
         broken: &mut Option<Error>,
-    ) -> Result<CompleteResponse, Error> {
+    ) -> Result<Response, Error> {
         // Whether the signature answers a challenge of this very exchange.
         let mut signed_fresh = false;
         for _ in 0..MAX_ATTEMPTS {
@@ -256,8 +274,7 @@ impl Client {
                 self.follow(&response)?;
             } else if status.is_success() {
                 self.accepted |= self.authenticator.is_signing();
-                let body = self.body(response).await?;
-                return Ok(CompleteResponse { status, body });
+                return Ok(response);
             } else {
                 let reason = status.canonical_reason().unwrap_or("");
                 return Err(Error::Status { status: status.as_u16(), reason });
@@ -318,13 +335,34 @@ impl Client {
     }
 
     fn failure(&self, err: &reqwest::Error) -> Error {
-        if err.is_timeout() {
-            Error::Timeout(self.settings.timeout)
-        } else if err.is_connect() {
-            Error::Unreachable(innermost(err))
-        } else {
-            Error::Broken(innermost(err))
-        }
+        failure(err, self.settings.timeout)
+    }
+}
+
+/// What a camera sends without end.
+#[derive(Debug)]
+pub struct Stream {
+    response: Response,
+    longest: Duration,
+}
+
+impl Stream {
+    /// What comes next; `None` at the end.
+    ///
+    /// # Errors
+    /// [`Error::Timeout`] or [`Error::Broken`].
+    pub async fn next(&mut self) -> Result<Option<Bytes>, Error> {
+        self.response.chunk().await.map_err(|err| failure(&err, self.longest))
+    }
+}
+
+fn failure(err: &reqwest::Error, longest: Duration) -> Error {
+    if err.is_timeout() {
+        Error::Timeout(longest)
+    } else if err.is_connect() {
+        Error::Unreachable(innermost(err))
+    } else {
+        Error::Broken(innermost(err))
     }
 }
 
@@ -344,7 +382,7 @@ fn http_client(settings: &ClientSettings, idle: usize) -> Result<reqwest::Client
         .http1_only()
         .pool_max_idle_per_host(idle)
         .connect_timeout(settings.timeout)
-        .timeout(settings.timeout)
+        .read_timeout(settings.timeout)
         .tcp_nodelay(true)
         .build()
         .map_err(|err| Error::Tls(innermost(&err)))

@@ -23,8 +23,8 @@ mod text;
 mod tls;
 
 pub use attributes::Attributes;
-pub use auth::{Authentication, Credentials, answer_to_challenge};
-pub use client::{Client, ClientSettings, Identity};
+pub use auth::{Authentication, Authenticator, Credentials, answer_to_challenge};
+pub use client::{Client, ClientSettings, Identity, Stream};
 pub use command::Command;
 pub use cookies::answer_to_cookie;
 pub use error::Error;

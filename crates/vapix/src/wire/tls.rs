@@ -30,8 +30,11 @@ pub enum Trust {
 impl Trust {
     /// The configuration for a camera that is spoken to over TLS (`https`), or not.
     ///
+    /// # Errors
+    /// [`Error::Tls`] where the file of certificates, or the system's, cannot be used.
+    ///
     /// The provider is named here: a process-wide default would not be a plugin's to set.
-    pub(super) fn client_config(&self, https: bool) -> Result<ClientConfig, Error> {
+    pub fn client_config(&self, https: bool) -> Result<ClientConfig, Error> {
         let provider = Arc::new(rustls::crypto::ring::default_provider());
         let builder = ClientConfig::builder_with_provider(provider.clone())
             .with_safe_default_protocol_versions()

@@ -1,16 +1,17 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::sync::Mutex;
-use std::sync::atomic::{AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use ptztrack_contract::lock::lock;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
 use super::pipeline::Elements;
 use super::stopwatch::Stopwatch;
+use super::video::Ended;
 
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
@@ -37,6 +38,10 @@ pub struct Known {
     last_picture: AtomicU64,
     last_heartbeat: AtomicU64,
     pub steering: Mutex<Steering>,
+    /// Somebody else moves the camera, as was told last.
+    pub operator: AtomicBool,
+    /// What ended the pictures, where that is known better than an element can say.
+    pub ended: Ended,
     /// How many look at the picture.
     pub looking: AtomicUsize,
     /// The last picture for who looks, as JPEG.
@@ -69,6 +74,20 @@ pub enum Steering {
     GoHome(Instant),
     /// It is somebody else's, who asked for it.
     HandedOver,
+    /// Somebody else was moving it when the last pipeline ended; until then it is left alone.
+    Operator(Instant),
+}
+
+/// What is known of who has a camera, and outlives pipelines and the program.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Control {
+    /// Nobody but us.
+    #[default]
+    Ours,
+    HandedOver,
+    /// Somebody else moves it.
+    Operator,
 }
 
 impl Known {
@@ -86,10 +105,40 @@ impl Known {
             last_picture: AtomicU64::default(),
             last_heartbeat: AtomicU64::default(),
             steering: Mutex::default(),
+            operator: AtomicBool::default(),
+            ended: Ended::default(),
             looking: AtomicUsize::default(),
             view: watch::Sender::new(Bytes::new()),
             times: Stopwatch::all(),
         }
+    }
+
+    /// Who has the camera, for who comes after us.
+    pub fn control(&self) -> Control {
+        match *lock(&self.steering) {
+            Steering::HandedOver => Control::HandedOver,
+            Steering::Operator(_) => Control::Operator,
+            _ if self.operator.load(Ordering::Relaxed) => Control::Operator,
+            _ => Control::Ours,
+        }
+    }
+
+    /// Who had the camera before us.
+    pub fn take_control(&self, control: Control) {
+        match control {
+            Control::Ours => {}
+            Control::HandedOver => *lock(&self.steering) = Steering::HandedOver,
+            Control::Operator => self.operator.store(true, Ordering::Relaxed),
+        }
+    }
+
+    /// How the next pipeline is to begin: who is moving the camera has it for as long as they would have had in the last one.
+    pub fn steering_at_start(&self, operator_has_it: Duration) -> Steering {
+        let mut steering = lock(&self.steering);
+        if *steering == Steering::Follow && self.operator.swap(false, Ordering::Relaxed) {
+            *steering = Steering::Operator(Instant::now() + operator_has_it);
+        }
+        *steering
     }
 
     /// A picture went all the way.
@@ -164,6 +213,7 @@ impl Known {
         let camera = match (*lock(&self.steering), camera.as_deref()) {
             (Steering::HandedOver, _) => "the camera is handed over",
             (Steering::GoHome(_), _) => "the camera goes home",
+            (Steering::Operator(_), _) => "an operator has the camera",
             (_, Some("at-rest")) => "the camera rests",
             (_, Some("moving")) => "the camera turns",
             (_, Some("taken-over")) => "an operator has the camera",
@@ -178,6 +228,21 @@ impl Known {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn who_has_a_camera_has_it_beyond_a_pipeline() {
+        let known = Known::new("door");
+        assert_eq!(known.steering_at_start(Duration::from_secs(5)), Steering::Follow);
+        known.operator.store(true, Ordering::Relaxed);
+        assert_eq!(known.control(), Control::Operator);
+        assert!(matches!(known.steering_at_start(Duration::from_secs(5)), Steering::Operator(_)));
+        let next = Known::new("door");
+        next.take_control(known.control());
+        assert_eq!(next.control(), Control::Operator);
+        *lock(&known.steering) = Steering::HandedOver;
+        next.take_control(known.control());
+        assert_eq!(next.steering_at_start(Duration::ZERO), Steering::HandedOver);
+    }
 
     /// The connection breaks while a picture is on its way through the tracker.
     #[test]

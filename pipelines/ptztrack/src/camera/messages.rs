@@ -34,7 +34,8 @@ impl Listener {
                     // It is given up, and that is told elsewhere.
                     return;
                 }
-                self.picture_gone(error.message().to_owned());
+                let known_better = lock(&self.known.ended).as_ref().map(|failure| failure.reason.clone());
+                self.picture_gone(known_better.unwrap_or_else(|| error.message().to_owned()));
             }
             MessageView::Eos(_) => self.ends(),
             MessageView::Warning(warning) => {
@@ -121,7 +122,11 @@ impl Listener {
                 lock(&self.known.state).trouble = None;
                 self.trouble(Level::Info, &event, detail, "");
             }
-            CameraChange::TakenOver | CameraChange::Resumed => self.tell(Level::Info, &event, &detail),
+            CameraChange::TakenOver | CameraChange::Resumed => {
+                let taken_over = camera.change == CameraChange::TakenOver;
+                self.known.operator.store(taken_over, Ordering::Relaxed);
+                self.tell(Level::Info, &event, &detail);
+            }
         }
     }
 

@@ -6,7 +6,9 @@ mod known;
 mod messages;
 mod pipeline;
 mod recording;
+mod refusals;
 mod stopwatch;
+mod video;
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -16,12 +18,16 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
-pub use known::{Known, Steering};
+pub use known::{Control, Known, Steering};
 use messages::Listener;
+use pipeline::NotBuilt;
 use pipeline_supervisor::Supervisor;
 use ptztrack_contract::lock::lock;
+use recording::Recorder;
+use refusals::Refusals;
 pub use stopwatch::Stopwatch;
 use tokio::sync::watch;
+use video::Failure;
 
 use crate::config::CameraSettings;
 use crate::event::{Event, Level};
@@ -45,12 +51,13 @@ pub struct Camera {
 }
 
 impl Camera {
-    /// Starts it.
+    /// Starts it, with who had it before.
     ///
     /// # Errors
     /// Where the system has no thread left.
-    pub fn start(settings: CameraSettings, log: Arc<Log>) -> std::io::Result<Self> {
+    pub fn start(settings: CameraSettings, control: Control, log: Arc<Log>) -> std::io::Result<Self> {
         let known = Arc::new(Known::new(&settings.name));
+        known.take_control(control);
         let context = glib::MainContext::new();
         let supervisor = Supervisor::new(&context);
         let run = {
@@ -97,23 +104,49 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             }
         }
     });
+    let (recorder, recordings) = settings
+        .recording
+        .as_ref()
+        .map(|recording| Recorder::new(recording, settings.codec, &settings.name, log.clone()))
+        .unzip();
     let waits = listener.clone();
+    let mut refusals = Refusals::default();
     let build = || {
         // The one before may have gone without a word.
         waits.borrow().ends();
         if let Some(reason) = settings.lacks() {
             return Err(reason.into());
         }
-        if let Err(reason) = pipeline::check_address(settings) {
-            lock(&known.elements).take();
-            waits.borrow_mut().out_of_reach(reason);
-            return Ok(None);
+        // What ended the last one counts here, too.
+        let ended = lock(&known.ended).take();
+        let built = match (&settings.no_password, ended.filter(|ended| ended.refused)) {
+            (Some(reason), _) => Err(NotBuilt::Video(Failure::new(reason))),
+            (_, Some(refused)) => Err(NotBuilt::Video(refused)),
+            _ if refusals.are_waited_for() => return Ok(None),
+            _ => pipeline::build(settings, known, recorder.clone()),
+        };
+        match built {
+            Ok(pipeline) => {
+                known.begins();
+                known.rebuilt.fetch_add(1, Ordering::Relaxed);
+                return Ok(Some(pipeline));
+            }
+            Err(NotBuilt::Pipeline(err)) => return Err(err),
+            Err(NotBuilt::Video(failure)) => {
+                lock(&known.elements).take();
+                if failure.refused && !refusals.wait(known.processed.load(Ordering::Relaxed)) {
+                    return Err(failure.reason.into());
+                }
+                waits.borrow_mut().out_of_reach(failure.reason);
+            }
         }
-        known.begins();
-        known.rebuilt.fetch_add(1, Ordering::Relaxed);
-        pipeline::build(settings, known).map(Some)
+        Ok(None)
     };
     let result = supervisor.run(build, move |message| listener.borrow_mut().hear(message));
+    drop(recorder);
+    if let Some(recordings) = recordings {
+        recordings.wait();
+    }
     timer.abort();
     lock(&known.elements).take();
     let mut state = lock(&known.state);
@@ -121,7 +154,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     if let Err(err) = result {
         let reason = match err.downcast_ref::<glib::Error>() {
             Some(err) if err.matches(gst::ResourceError::NotAuthorized) => {
-                "it refuses user and password".to_owned()
+                "the camera refuses user and password".to_owned()
             }
             _ => err.to_string(),
         };
@@ -142,12 +175,17 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     let elements = lock(&known.elements).clone();
     let Some(elements) = elements else { return };
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
-    let sent_home = *lock(&known.steering);
-    if let Steering::GoHome(since) = sent_home {
-        let there = since.elapsed() > SETS_OUT && elements.at_rest();
-        if there || since.elapsed() > LONGEST_WAY_HOME {
-            known.steer(Steering::Follow);
+    let steering = *lock(&known.steering);
+    let over = match steering {
+        Steering::GoHome(since) => {
+            let there = since.elapsed() > SETS_OUT && elements.at_rest();
+            there || since.elapsed() > LONGEST_WAY_HOME
         }
+        Steering::Operator(until) => until <= Instant::now(),
+        Steering::Follow | Steering::HandedOver => false,
+    };
+    if over {
+        known.steer(Steering::Follow);
     }
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());

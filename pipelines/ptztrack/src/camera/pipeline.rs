@@ -10,12 +10,12 @@ use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
-use pipeline_supervisor::reach;
 use ptztrack_contract::lock::lock;
 use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::known::{Known, Steering};
-use super::recording;
+use super::recording::{self, Recorder};
+use super::video::{self, Failure, Video};
 use crate::config::{CameraSettings, Codec, Credentials};
 
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
@@ -39,21 +39,24 @@ const VIEW_EVERY: Duration = Duration::from_millis(200);
 /// Closed while the camera is somebody else's; the stream's end passes all the same.
 const STEER: &str = "valve name=steer drop-mode=forward-sticky-events";
 
+/// Copies of what is recorded, for a pipeline of its own: whatever becomes of that, nobody is followed the worse for it.
+const TAP: &str = "appsink name=tap sync=false async=false enable-last-sample=false";
+
 /// The pipeline, as `gst-launch-1.0` takes it; addresses and passwords are not in it.
 pub fn description(camera: &CameraSettings) -> String {
     if let Some(pipeline) = &camera.pipeline {
         return pipeline.clone();
     }
     let recording = camera.recording.as_ref();
-    let encoded = recording.filter(|recording| !recording.overlay).map(|_| recording::branch(camera.codec));
-    let mut text = source(camera.codec, encoded.as_deref());
+    let mut text = source(camera.codec, recording.is_some_and(|recording| !recording.overlay));
     write_all(&mut text, &format!(" ! {NEWEST} name=newest ! bgavgdetect ! {TRACKER} ! tee name=followed "));
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {STEER} ! vapixptzsink "));
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
     if recording.is_some_and(|recording| recording.overlay) {
+        let encoder = recording::ENCODER;
         write_all(
             &mut text,
-            &format!("followed. ! queue ! ptzoverlay ! videoconvert ! {} ", recording::ENCODED),
+            &format!("followed. ! {NEWEST} ! ptzoverlay ! videoconvert ! {encoder} ! {TAP} "),
         );
     }
     if camera.show {
@@ -65,18 +68,19 @@ pub fn description(camera: &CameraSettings) -> String {
     text
 }
 
-/// Pictures of the camera; `encoded` takes them as they come too.
-fn source(codec: Codec, encoded: Option<&str>) -> String {
+/// Pictures of the camera; `tapped`: they are recorded as they come.
+fn source(codec: Codec, tapped: bool) -> String {
     let tap =
-        encoded.map(|branch| format!(" ! tee name=encoded encoded. ! queue ! {branch} encoded. ! queue"));
-    let tap = tap.unwrap_or_default();
+        if tapped { format!(" ! tee name=encoded encoded. ! {TAP} encoded. ! queue") } else { String::new() };
     let rtsp = |depay: &str, decoder: &str| {
         format!("rtspsrc name=source latency=0 protocols=tcp ! {depay} name=received{tap} ! {decoder}")
     };
     match codec {
-        Codec::Mjpeg => format!(
-            "souphttpsrc name=source is-live=true do-timestamp=true timeout=1 retries=0 ! multipartdemux{tap} ! jpegdec"
-        ),
+        Codec::Mjpeg => {
+            format!(
+                "appsrc name=source is-live=true do-timestamp=true format=time ! multipartdemux{tap} ! jpegdec"
+            )
+        }
         Codec::Mpeg4 => rtsp("rtpmp4vdepay", "avdec_mpeg4"),
         Codec::H264 => rtsp("rtph264depay", "avdec_h264"),
     }
@@ -87,52 +91,44 @@ fn write_all(text: &mut String, more: &str) {
     let _ = text.write_str(more);
 }
 
-/// Where the pictures of a camera are.
-fn location(camera: &CameraSettings) -> String {
-    let size = camera.size.map(|(width, height)| format!("resolution={width}x{height}"));
-    let rate = camera.rate.map(|rate| format!("fps={rate}"));
-    let (path, first) = match camera.codec {
-        Codec::Mjpeg => {
-            (format!("{}/axis-cgi/mjpg/video.cgi", camera.address), Some("compression=30".to_owned()))
-        }
-        Codec::Mpeg4 => {
-            (format!("{}/axis-media/media.amp", camera.rtsp), Some("videocodec=mpeg4".to_owned()))
-        }
-        Codec::H264 => (format!("{}/axis-media/media.amp", camera.rtsp), Some("videocodec=h264".to_owned())),
-    };
-    let query: Vec<String> = [first, size, rate].into_iter().flatten().collect();
-    format!("{path}?{}", query.join("&"))
+/// Why there is no pipeline.
+pub enum NotBuilt {
+    /// There are no pictures to be had.
+    Video(Failure),
+    /// GStreamer cannot make it.
+    Pipeline(Box<dyn Error>),
 }
 
-/// Whether who has the pictures accepts a connection.
-///
-/// # Errors
-/// Why not.
-pub fn check_address(camera: &CameraSettings) -> Result<(), String> {
-    // A pipeline of one's own may have its pictures from elsewhere.
-    if camera.pipeline.is_some() {
-        return Ok(());
-    }
-    match camera.codec {
-        Codec::Mjpeg => reach::check_http(&camera.address, std::env::var("http_proxy").ok()),
-        Codec::Mpeg4 | Codec::H264 => reach::check(&camera.rtsp),
+impl From<Failure> for NotBuilt {
+    fn from(failure: Failure) -> Self {
+        Self::Video(failure)
     }
 }
 
-/// Builds it, with everything that watches it.
+/// Builds it, with everything that watches it, once there is a way to the camera's pictures.
 ///
 /// # Errors
-/// Where GStreamer lacks an element, or a pipeline of one's own is none.
-pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipeline, Box<dyn Error>> {
-    let pipeline = gst::parse::launch(&description(camera))?
-        .downcast::<gst::Pipeline>()
-        .map_err(|_| "a pipeline has more than one element")?;
+/// Where there is none, where GStreamer lacks an element, or a pipeline of one's own is none.
+pub fn build(
+    camera: &CameraSettings,
+    known: &Arc<Known>,
+    recorder: Option<Recorder>,
+) -> Result<gst::Pipeline, NotBuilt> {
+    let open = || Video::open(camera, known.ended.clone());
+    let video = camera.pipeline.is_none().then(open).transpose()?;
+    let pipeline = parse(camera).map_err(NotBuilt::Pipeline)?;
     for element in pipeline.iterate_recurse().into_iter().flatten() {
         configure(&element, camera);
         known.times.iter().for_each(|stopwatch| stopwatch.watch(&element));
     }
-    if let Some(recording) = &camera.recording {
-        recording::configure(&pipeline, recording, &camera.name);
+    if let Some(source) = pipeline.by_name("source") {
+        // Of a pipeline of one's own it is not known before.
+        let fed = of_factory(&pipeline, "appsrc").is_some() || of_factory(&pipeline, "rtspsrc").is_some();
+        let video = if video.is_none() && fed { Some(open()?) } else { video };
+        connect(&source, camera, video);
+    }
+    if let Some((recorder, tap)) = recorder.zip(of_name::<gst_app::AppSink>(&pipeline, "tap")) {
+        recorder.record(&tap);
     }
     if camera.pipeline.is_none() {
         end_in_silence(&pipeline);
@@ -142,9 +138,14 @@ pub fn build(camera: &CameraSettings, known: &Arc<Known>) -> Result<gst::Pipelin
     elements.show_to(known);
     elements.hide_target();
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
-    elements.steer(*lock(&known.steering));
+    elements.steer(known.steering_at_start(elements.override_timeout()));
     *lock(&known.elements) = Some(elements);
     Ok(pipeline)
+}
+
+fn parse(camera: &CameraSettings) -> Result<gst::Pipeline, Box<dyn Error>> {
+    let pipeline = gst::parse::launch(&description(camera))?;
+    Ok(pipeline.downcast::<gst::Pipeline>().map_err(|_| "a pipeline has more than one element")?)
 }
 
 /// Address, password and properties.
@@ -153,15 +154,38 @@ fn configure(element: &gst::Element, camera: &CameraSettings) {
     if factory.name() == "vapixptzsink" {
         element.set_property("location", &camera.address);
         log_in(element, camera.credentials.as_ref(), ["user", "password"]);
-    } else if element.name() == "source" && element.has_property_with_type("location", glib::Type::STRING) {
-        element.set_property("location", location(camera));
-        if element.has_property_with_type("user-id", glib::Type::STRING) {
-            log_in(element, camera.credentials.as_ref(), ["user-id", "user-pw"]);
-        }
     }
     for property in camera.properties.iter().filter(|property| factory.name() == property.element) {
         property.set(element);
     }
+}
+
+/// Gives the pictures to the pipeline, by whatever its source is.
+fn connect(source: &gst::Element, camera: &CameraSettings, video: Option<Video>) {
+    match (source.downcast_ref::<gst_app::AppSrc>(), video) {
+        (Some(source), Some(Video::Http(hand_over))) => {
+            source.set_block(true);
+            // Before it runs, it takes nothing.
+            let hand_over = move |source: &gst_app::AppSrc, _| drop(hand_over.try_send(source.clone()));
+            source.set_callbacks(gst_app::AppSrcCallbacks::builder().need_data(hand_over).build());
+        }
+        (None, Some(Video::Rtsp(location))) => source.set_property("location", location),
+        // Of a pipeline of one's own, for which the password was allowed to be seen.
+        (None, None) if source.has_property_with_type("location", glib::Type::STRING) => {
+            source.set_property("location", format!("{}{}", camera.address, video::target(camera)));
+            if source.has_property_with_type("user-id", glib::Type::STRING) {
+                log_in(source, camera.credentials.as_ref(), ["user-id", "user-pw"]);
+            }
+            if source.has_property_with_type("automatic-redirect", glib::Type::BOOL) {
+                source.set_property("automatic-redirect", false);
+            }
+        }
+        _ => {}
+    }
+}
+
+fn of_name<T: IsA<gst::Element>>(pipeline: &gst::Pipeline, name: &str) -> Option<T> {
+    pipeline.by_name(name)?.downcast().ok()
 }
 
 fn log_in(element: &gst::Element, credentials: Option<&Credentials>, [user, password]: [&str; 2]) {
@@ -347,10 +371,17 @@ impl Elements {
         let (Some(servo), Some(steer)) = (&self.servo, &self.steer) else { return };
         let goes_home = matches!(steering, Steering::GoHome(_));
         self.goes_home.store(goes_home, Ordering::Relaxed);
-        steer.set_property("drop", steering == Steering::HandedOver);
-        let home = self.home.as_ref().filter(|_| steering != Steering::HandedOver);
+        let somebody_elses = matches!(steering, Steering::HandedOver | Steering::Operator(_));
+        steer.set_property("drop", somebody_elses);
+        let home = self.home.as_ref().filter(|_| !somebody_elses);
         servo.set_property("home", home);
         servo.set_property("home-timeout", if goes_home { 0 } else { self.home_timeout });
+    }
+
+    /// How long a camera is left to who has moved it.
+    fn override_timeout(&self) -> Duration {
+        let of = |servo: &gst::Element| servo.property::<u64>("override-timeout");
+        Duration::from_nanos(self.servo.as_ref().map_or(0, of))
     }
 
     /// Whether the camera rests.

@@ -3,6 +3,9 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use gst::prelude::*;
+use vapix::wire::{Authentication, Trust};
+
 use super::credentials::{self, Credentials};
 use super::properties::{self, ELEMENTS, Property};
 use super::table::{Read, Table, whole};
@@ -19,7 +22,7 @@ pub struct CameraSettings {
     pub name: String,
     /// `http://` or `https://`, no path.
     pub address: String,
-    /// `rtsp://`, no path.
+    /// `rtsp://` or `rtsps://`, no path.
     pub rtsp: String,
     pub codec: Codec,
     /// Width and height in pixels; the camera's own where it is not said.
@@ -27,6 +30,8 @@ pub struct CameraSettings {
     /// Pictures per second; the camera's own where it is not said.
     pub rate: Option<u32>,
     pub credentials: Option<Credentials>,
+    /// Why the password cannot be had yet.
+    pub no_password: Option<String>,
     pub properties: Vec<Property>,
     pub recording: Option<Recording>,
     /// A pipeline of one's own instead of ours, as `gst-launch-1.0` takes it.
@@ -83,7 +88,11 @@ impl CameraSettings {
         let host = host(address).ok_or_else(|| format!("`{address}` is not {ADDRESS}"))?;
         Ok(Self {
             address: address.to_owned(),
-            rtsp: format!("rtsp://{host}:554"),
+            // Who asks for the one to be encrypted does not want the other in clear.
+            rtsp: match address.starts_with("https") {
+                true => format!("rtsps://{host}:{RTSPS_PORT}"),
+                false => format!("rtsp://{host}:{RTSP_PORT}"),
+            },
             ..Self::without_address(name)
         })
     }
@@ -116,6 +125,25 @@ impl CameraSettings {
         Some(format!("GStreamer has no element {element}; on Debian it is in the package {package}"))
     }
 
+    /// How it may be proved who we are, and whose certificates are believed: as `vapixptzsink` is told, for pictures too.
+    pub fn security(&self) -> (Authentication, Trust) {
+        let of = |name| {
+            let is = |property: &&Property| property.element == "vapixptzsink" && property.name == name;
+            // The last one counts.
+            self.properties.iter().rfind(is).map(|property| property.value.trim_matches('"'))
+        };
+        let authentication = match of("auth") {
+            Some("basic") => Authentication::Basic,
+            _ => Authentication::Auto,
+        };
+        let trust = match (of("insecure"), of("ca-file")) {
+            (Some("true"), _) => Trust::Anyone,
+            (_, Some(file)) => Trust::Authority(file.into()),
+            _ => Trust::System,
+        };
+        (authentication, trust)
+    }
+
     pub(super) fn read(name: String, mut table: Table) -> Option<Self> {
         if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
             table.wrong(format!("camera `{name}`: a name has letters, digits, `-` and `_` only"));
@@ -126,10 +154,10 @@ impl CameraSettings {
         // The rest is read all the same, so that every mistake is found at once.
         let mut camera = camera.unwrap_or_else(|| Self::without_address(&name));
         let of_rtsp = |value: &toml::de::DeValue| {
-            value.as_str().filter(|text| text.starts_with("rtsp://")).map(str::to_owned)
+            value.as_str().filter(|text| rtsp_host(text).is_some()).map(str::to_owned)
         };
-        if let Some(rtsp) = table.get_with("rtsp", "an address such as \"rtsp://192.168.0.90:554\"", of_rtsp)
-        {
+        let what = "an address such as \"rtsp://192.168.0.90:554\", or with rtsps:// and port 322";
+        if let Some(rtsp) = table.get_with("rtsp", what, of_rtsp) {
             camera.rtsp = rtsp.trim_end_matches('/').to_owned();
         }
         camera.codec = table.get("codec").unwrap_or(Codec::Mjpeg);
@@ -138,20 +166,41 @@ impl CameraSettings {
         camera.rate = table.get_with("rate", "pictures per second, a whole number from 1 to 60", |value| {
             whole(value).and_then(|rate| u32::try_from(rate).ok()).filter(|rate| (1..=60).contains(rate))
         });
-        camera.credentials = credentials::read(&mut table);
+        match credentials::read_as_far(&mut table) {
+            Ok(credentials) => camera.credentials = credentials,
+            Err(reason) => camera.no_password = Some(reason),
+        }
         camera.recording = table.table("recording").and_then(Recording::read);
         camera.properties = zones(&mut table);
+        camera.properties.extend(security(&mut table));
         for element in ELEMENTS {
             camera
                 .properties
                 .extend(table.table(element).iter().flat_map(|table| properties::read(element, table)));
         }
         camera.pipeline = pipeline(&mut table);
+        if camera.credentials.is_some() && camera.gives_password_to_souphttpsrc() {
+            table.wrong(
+                "`souphttpsrc` sends the password in clear to whoever answers in the camera's place: let `source` be an \
+                 `appsrc name=source is-live=true do-timestamp=true format=time`, which gets the same, or allow it by \
+                 `auth = \"basic\"`",
+            );
+        }
         if camera.pipeline.is_some() && camera.recording.is_some() {
             table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
         }
         table.no_more();
         Some(camera)
+    }
+
+    fn gives_password_to_souphttpsrc(&self) -> bool {
+        let is_soup = |text: &String| {
+            let source = gst::parse::launch(text)
+                .ok()
+                .and_then(|made| made.downcast::<gst::Bin>().ok()?.by_name("source"));
+            source.and_then(|source| source.factory()).is_some_and(|factory| factory.name() == "souphttpsrc")
+        };
+        self.security().0 != Authentication::Basic && self.pipeline.as_ref().is_some_and(is_soup)
     }
 
     fn without_address(name: &str) -> Self {
@@ -163,6 +212,7 @@ impl CameraSettings {
             size: None,
             rate: None,
             credentials: None,
+            no_password: None,
             properties: Vec::new(),
             recording: None,
             pipeline: None,
@@ -170,6 +220,10 @@ impl CameraSettings {
         }
     }
 }
+
+/// RFC 7826, section 4.2; IANA.
+const RTSP_PORT: u16 = 554;
+const RTSPS_PORT: u16 = 322;
 
 const ADDRESS: &str = "an address such as http://192.168.0.90";
 
@@ -182,6 +236,22 @@ fn host(address: &str) -> Option<&str> {
     };
     let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
     rest.get(..end).filter(|host| !host.is_empty() && !rest.contains(wrong))
+}
+
+/// Host and port of an address of RTSP, and whether it is by TLS.
+pub fn rtsp_host(address: &str) -> Option<(String, u16, bool)> {
+    let (rest, tls) = match address.strip_prefix("rtsp://") {
+        Some(rest) => (rest, false),
+        None => (address.strip_prefix("rtsps://")?, true),
+    };
+    let rest = rest.trim_end_matches('/');
+    let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
+    let colon = rest.rfind(':').filter(|colon| rest.rfind(']').is_none_or(|end| end < *colon));
+    let (host, port) = match colon {
+        Some(colon) => (rest.get(..colon)?, rest.get(colon + 1..)?.parse().ok()?),
+        None => (rest, if tls { RTSPS_PORT } else { RTSP_PORT }),
+    };
+    (!host.is_empty() && !rest.contains(wrong)).then(|| (host.to_owned(), port, tls))
 }
 
 /// Width and height, from `640x480`.
@@ -198,6 +268,23 @@ fn zones(table: &mut Table) -> Vec<Property> {
         let Some(value) = table.value(key) else { continue };
         let Some(zones) = table.get::<Vec<String>>(key) else { continue };
         match properties::of("bgavgdetect", key, &zones.join(";")) {
+            Ok(property) => found.push(property),
+            Err(reason) => table.source.wrong(value.span(), reason),
+        }
+    }
+    found
+}
+
+/// What `vapixptzsink` and the pictures are to believe, among its properties.
+fn security(table: &mut Table) -> Vec<Property> {
+    let mut found = Vec::new();
+    for key in ["auth", "ca-file", "insecure"] {
+        let Some(value) = table.value(key) else { continue };
+        let text = match value.get_ref() {
+            toml::de::DeValue::Boolean(yes) => yes.to_string(),
+            other => other.as_str().unwrap_or_default().to_owned(),
+        };
+        match properties::of("vapixptzsink", key, &text) {
             Ok(property) => found.push(property),
             Err(reason) => table.source.wrong(value.span(), reason),
         }

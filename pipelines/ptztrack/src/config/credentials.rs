@@ -42,30 +42,37 @@ pub struct Credentials {
     pub password: Secret,
 }
 
-/// The user and the password of a table, which must have both or neither.
+/// The user and the password of a table, which must have both or neither; that it cannot be had is a mistake.
 pub fn read(table: &mut Table) -> Option<Credentials> {
+    read_as_far(table).unwrap_or_else(|reason| {
+        table.wrong(reason);
+        None
+    })
+}
+
+/// The same, where it may be had later.
+///
+/// # Errors
+/// Why the password cannot be had.
+pub fn read_as_far(table: &mut Table) -> Result<Option<Credentials>, String> {
     let user: Option<String> = table.get("user");
     let password = password(table);
-    match (user, password) {
-        (Some(user), Ok(Some(password))) => Some(Credentials { user, password }),
-        (Some(_), Ok(None)) => {
+    Ok(match (user, password) {
+        (Some(user), Some(password)) => Some(Credentials { user, password: password? }),
+        (Some(_), None) => {
             table.wrong("`user` needs one of `password-file`, `password-environment`, `password-credential`");
             None
         }
-        (None, Ok(Some(_))) => {
+        (None, Some(_)) => {
             table.wrong("a password needs `user`");
             None
         }
-        (None, Ok(None)) => None,
-        (_, Err(reason)) => {
-            table.wrong(reason);
-            None
-        }
-    }
+        (None, None) => None,
+    })
 }
 
 /// The password of a table, from where the file says it is.
-fn password(table: &mut Table) -> Result<Option<Secret>, String> {
+fn password(table: &mut Table) -> Option<Result<Secret, String>> {
     if let Some(value) = table.value("password") {
         let text = "a password does not belong into this file: `password-file`, `password-environment` or \
             `password-credential` say where it is";
@@ -79,12 +86,10 @@ fn password(table: &mut Table) -> Result<Option<Secret>, String> {
     let mut given = [file, environment, credential].into_iter().flatten();
     let first = given.next();
     if given.next().is_some() {
-        return Err(
-            "there can be one only of `password-file`, `password-environment`, `password-credential`"
-                .to_owned(),
-        );
+        table
+            .wrong("there can be one only of `password-file`, `password-environment`, `password-credential`");
     }
-    first.transpose().map_err(|reason| format!("no password: {reason}"))
+    first.map(|password| password.map_err(|reason| format!("no password: {reason}")))
 }
 
 /// `LoadCredential=NAME:...` in a unit of systemd; or a file in the folder that the package's unit loads as `passwords`.

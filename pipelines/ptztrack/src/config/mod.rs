@@ -16,7 +16,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-pub use camera::{CameraSettings, Codec, Recording, size};
+pub use camera::{CameraSettings, Codec, Recording, rtsp_host, size};
 pub use credentials::{Credentials, Secret};
 pub use mqtt::Mqtt;
 pub use problem::Problems;
@@ -33,6 +33,23 @@ pub struct Config {
     pub mqtt: Option<Mqtt>,
 }
 
+/// Why a file is of no use, in words.
+#[derive(Debug)]
+pub enum NotLoaded {
+    /// It may be readable later.
+    Unreadable(String),
+    /// It is not as it should be.
+    Mistaken(String),
+}
+
+impl NotLoaded {
+    pub fn reason(self) -> String {
+        match self {
+            Self::Unreadable(reason) | Self::Mistaken(reason) => reason,
+        }
+    }
+}
+
 /// The page, `/metrics` and `/healthz`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Http {
@@ -46,10 +63,11 @@ impl Config {
     /// Reads a file.
     ///
     /// # Errors
-    /// What is wrong with it, in words.
-    pub fn load(path: &Path) -> Result<Self, String> {
-        let text = std::fs::read_to_string(path).map_err(|err| format!("{}: {err}", path.display()))?;
-        Self::parse(&text).map_err(|problems| format!("{}:\n{problems}", path.display()))
+    /// What is wrong with it.
+    pub fn load(path: &Path) -> Result<Self, NotLoaded> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|err| NotLoaded::Unreadable(format!("{}: {err}", path.display())))?;
+        Self::parse(&text).map_err(|problems| NotLoaded::Mistaken(format!("{}:\n{problems}", path.display())))
     }
 
     /// Reads the text of a file. GStreamer has to be initialised, as it is asked for the properties of elements.
@@ -72,7 +90,10 @@ impl Config {
     /// # Errors
     /// Those lines.
     pub fn check_machine(&self) -> Result<(), String> {
-        let lack = |camera: &CameraSettings| Some(format!("camera `{}`: {}", camera.name, camera.lacks()?));
+        let lack = |camera: &CameraSettings| {
+            let reason = camera.no_password.clone().or_else(|| camera.lacks())?;
+            Some(format!("camera `{}`: {reason}", camera.name))
+        };
         let lacks: Vec<String> = self.cameras.iter().filter_map(lack).collect();
         if lacks.is_empty() { Ok(()) } else { Err(lacks.join("\n")) }
     }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::*;
+use vapix::wire::{Authentication, Trust};
 
 fn parse(text: &str) -> Result<Config, String> {
     gst::init().unwrap();
@@ -69,8 +70,9 @@ fn passwords_come_from_a_file_and_are_never_printed() {
     let config = config.unwrap();
     assert_eq!(config.cameras[0].credentials.as_ref().unwrap().password.reveal(), "xyzzy");
     assert!(!format!("{config:?}").contains("xyzzy"));
-    let wrong = parse(&text).unwrap_err();
-    assert!(wrong.starts_with("line 1: no password: ") && wrong.contains("No such file"), "{wrong}");
+    // It may be there later: the other cameras do not wait for it.
+    let wrong = parse(&text).unwrap().check_machine().unwrap_err();
+    assert!(wrong.starts_with("camera `a`: no password: ") && wrong.contains("No such file"), "{wrong}");
 }
 
 #[test]
@@ -123,6 +125,47 @@ fn a_recording_is_kept_for_so_long_or_so_much() {
     let recording = parse(recording).unwrap().cameras[0].recording.clone().unwrap();
     assert_eq!(recording.keep_bytes, Some(2_000_000_000));
     assert_eq!((recording.keep, recording.segment), (None, Duration::from_secs(600)));
+}
+
+#[test]
+fn pictures_are_as_safe_as_control() {
+    let camera = |text: &str| parse(&format!("[camera.a]\n{text}")).unwrap().cameras[0].clone();
+    let (plain, secure) = (camera("address = \"http://a\""), camera("address = \"https://a:8443\""));
+    assert_eq!((plain.rtsp.as_str(), secure.rtsp.as_str()), ("rtsp://a:554", "rtsps://a:322"));
+    assert_eq!(plain.security(), (Authentication::Auto, Trust::System));
+    let told = camera("address = \"https://a\"\nauth = \"basic\"\nca-file = \"/ca.pem\"");
+    assert_eq!(told.security(), (Authentication::Basic, Trust::Authority("/ca.pem".into())));
+    let of_servo = camera("address = \"https://a\"\n[camera.a.vapixptzsink]\ninsecure = true");
+    assert_eq!(of_servo.security(), (Authentication::Auto, Trust::Anyone));
+    for (address, parts) in [
+        ("rtsp://a", Some(("a", 554, false))),
+        ("rtsps://[2001:db8::1]", Some(("[2001:db8::1]", 322, true))),
+        ("rtsps://a:7", Some(("a", 7, true))),
+        ("rtsp://a/path", None),
+        ("http://a", None),
+        ("rtsp://", None),
+    ] {
+        assert_eq!(
+            rtsp_host(address),
+            parts.map(|(host, port, tls)| (host.to_owned(), port, tls)),
+            "{address}"
+        );
+    }
+}
+
+#[test]
+fn a_source_that_tells_anybody_the_password_is_refused() {
+    std::fs::write(std::env::temp_dir().join("ptztrack-soup-password"), "x").unwrap();
+    let text = |more: &str, source: &str| {
+        format!(
+            "[camera.a]\naddress = \"http://a\"\nuser = \"u\"\npassword-file = {:?}\n{more}pipeline = \"{source} name=source ! fakesink\"\n",
+            std::env::temp_dir().join("ptztrack-soup-password")
+        )
+    };
+    let wrong = parse(&text("", "souphttpsrc")).unwrap_err();
+    assert!(wrong.contains("`souphttpsrc` sends the password in clear"), "{wrong}");
+    parse(&text("auth = \"basic\"\n", "souphttpsrc")).unwrap();
+    parse(&text("", "appsrc")).unwrap();
 }
 
 /// A pipeline is tried by GStreamer itself.

@@ -6,23 +6,26 @@ mod access;
 mod metrics;
 
 use std::convert::Infallible;
-use std::net::{IpAddr, SocketAddr};
+use std::net::IpAddr;
 use std::sync::Arc;
 use std::time::Duration;
 
 use access::Access;
-use axum::Router;
 use axum::body::{Body, Bytes};
-use axum::extract::connect_info::Connected;
-use axum::extract::{Path, Query, State};
+use axum::extract::{ConnectInfo, Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::serve::IncomingStream;
+use axum::{Extension, Router};
 use futures_util::stream;
+use hyper::server::conn::http1;
+use hyper_util::rt::{TokioIo, TokioTimer};
+use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
 use serde_json::json;
+use socket2::SockRef;
 use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
 
 use crate::camera::{Known, Look, Steering};
 use crate::config::Http;
@@ -32,6 +35,15 @@ use ptztrack_contract::lock::lock;
 /// Who asks for a picture waits for it this long.
 const LONGEST_WAIT: Duration = Duration::from_secs(2);
 
+/// Connections at once: some for each browser that looks at a wall of cameras.
+const MOST_CONNECTIONS: usize = 128;
+/// Who connects says what they want within this time, and again before each further request.
+const LONGEST_HEAD: Duration = Duration::from_secs(10);
+/// Who has not taken what was sent for so long is gone.
+const LONGEST_STALL: Duration = Duration::from_secs(30);
+/// After no connection could be taken.
+const ACCEPT_AGAIN: Duration = Duration::from_millis(200);
+
 /// Between two pictures of a stream.
 const BOUNDARY: &str = "ptztrack-picture";
 
@@ -39,28 +51,46 @@ const BOUNDARY: &str = "ptztrack-picture";
 #[derive(Debug, Clone, Copy)]
 pub struct Local(IpAddr);
 
-impl Connected<IncomingStream<'_, TcpListener>> for Local {
-    fn connect_info(stream: IncomingStream<'_, TcpListener>) -> Self {
-        Self(stream.io().local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip()))
-    }
-}
-
-/// Serves until the process ends; the address is where.
+/// Where it is to be asked.
 ///
 /// # Errors
 /// Where the address cannot be had.
-pub async fn serve(http: &Http, fleet: Arc<Fleet>) -> std::io::Result<SocketAddr> {
-    let listener = TcpListener::bind(http.listen).await?;
-    let address = listener.local_addr()?;
-    let service = router(http, fleet).into_make_service_with_connect_info::<Local>();
-    tokio::spawn(async { axum::serve(listener, service).await });
-    Ok(address)
+pub async fn listen(http: &Http) -> std::io::Result<TcpListener> {
+    TcpListener::bind(http.listen).await
+}
+
+/// Serves until the process ends. Whoever connects before they have said who they are costs a little for a short time: no more
+/// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor.
+pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>) {
+    let router = router(http, fleet);
+    let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
+    // It is never closed.
+    while let Ok(place) = places.clone().acquire_owned().await {
+        let Ok((stream, _)) = listener.accept().await else {
+            // Out of descriptors, for instance: there may be some later.
+            tokio::time::sleep(ACCEPT_AGAIN).await;
+            continue;
+        };
+        let ip = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip());
+        // Who takes nothing of what was sent is gone; where that cannot be asked for, the system has its own limit.
+        let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(LONGEST_STALL));
+        let service = router.clone().layer(Extension(ConnectInfo(Local(ip))));
+        let connection = http1::Builder::new()
+            .timer(TokioTimer::new())
+            .header_read_timeout(LONGEST_HEAD)
+            .serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        tokio::spawn(async move {
+            // How it ended is a matter of who connected.
+            let _ = connection.await;
+            drop(place);
+        });
+    }
 }
 
 fn router(http: &Http, fleet: Arc<Fleet>) -> Router {
     let access = Arc::new(Access::new(http));
     Router::new()
-        .route("/", get(|| async { Html(include_str!("page.html")) }))
+        .route("/", get(page))
         .route("/metrics", get(metrics::answer))
         .route("/cameras", get(cameras))
         .route("/cameras/{name}/picture", get(picture))
@@ -70,6 +100,11 @@ fn router(http: &Http, fleet: Arc<Fleet>) -> Router {
         // Asked for by whoever starts programs anew, under any name; it tells nothing of the cameras' pictures.
         .route("/healthz", get(healthz))
         .with_state(fleet)
+}
+
+/// In no page of somebody else, who could have a click mean what it does not seem to.
+async fn page() -> impl IntoResponse {
+    ([(header::CONTENT_SECURITY_POLICY, "frame-ancestors 'none'")], Html(include_str!("page.html")))
 }
 
 /// Well while every camera's thread does its work: whether the cameras are there is another matter, and no new start of this

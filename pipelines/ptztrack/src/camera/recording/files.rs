@@ -1,0 +1,151 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What is recorded, and how long it is kept.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use gst::prelude::*;
+
+use crate::config::Recording;
+
+/// This share of a disk is left to others: one in so many.
+const FREE_SHARE: u64 = 20;
+
+/// Names the files by the time at which they begin, and deletes old ones whenever another begins.
+pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str) {
+    let Some(sink) = pipeline.by_name("recording") else { return };
+    sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
+    let (recording, camera) = (recording.clone(), camera.to_owned());
+    sink.connect("format-location", false, move |_| {
+        // Where a folder cannot be written, the element says so.
+        let _ = fs::create_dir_all(&recording.folder);
+        delete_old(&recording, &camera);
+        let now = glib::DateTime::now_utc().and_then(|now| now.format("%Y%m%dT%H%M%S%f"));
+        // To the millisecond: a pipeline that is started anew must not write over what it recorded just before.
+        let now = now.map(|now| now.chars().take(18).collect::<String>()).unwrap_or_default();
+        Some(recording.folder.join(format!("{camera}-{now}.mkv")).to_value())
+    });
+}
+
+/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest.
+pub fn make_room(recording: &Recording, camera: &str) {
+    let mut files = files(&recording.folder, camera);
+    files.sort_by(|a, b| b.path.cmp(&a.path));
+    while files.len() > 1 && is_short(&recording.folder) {
+        let oldest = files.pop();
+        if oldest.is_none_or(|oldest| fs::remove_file(oldest.path).is_err()) {
+            return;
+        }
+    }
+}
+
+fn is_short(folder: &Path) -> bool {
+    rustix::fs::statvfs(folder).is_ok_and(|disk| disk.f_bavail < disk.f_blocks / FREE_SHARE)
+}
+
+/// Whether something was written not long ago.
+pub fn newest_grew(recording: &Recording, camera: &str, within: Duration) -> bool {
+    files(&recording.folder, camera).iter().any(|file| file.bytes > 0 && file.age < within)
+}
+
+/// One file of a recording.
+#[derive(Debug)]
+struct Kept {
+    path: PathBuf,
+    bytes: u64,
+    /// Since it was last written to, by the clock.
+    age: Duration,
+    /// How long it was written to; a clock that jumps meanwhile makes it no longer than a file may be.
+    lasts: Duration,
+}
+
+/// A file that cannot be deleted is tried again when the next begins.
+fn delete_old(recording: &Recording, camera: &str) {
+    for file in too_much(files(&recording.folder, camera), recording) {
+        let _ = fs::remove_file(file);
+    }
+}
+
+/// The files of this camera.
+fn files(folder: &Path, camera: &str) -> Vec<Kept> {
+    let now = SystemTime::now();
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let kept = |entry: fs::DirEntry| {
+        let name = entry.file_name().into_string().ok()?;
+        let time = name.strip_prefix(camera)?.strip_prefix('-')?.strip_suffix(".mkv")?;
+        // Not those of a camera called door-2.
+        time.starts_with(|c: char| c.is_ascii_digit()).then_some(())?;
+        (!time.contains('-')).then_some(())?;
+        let meta = entry.metadata().ok()?;
+        let age = now.duration_since(meta.modified().ok()?).unwrap_or_default();
+        let written =
+            meta.created().ok().and_then(|created| meta.modified().ok()?.duration_since(created).ok());
+        Some(Kept { path: entry.path(), bytes: meta.len(), age, lasts: written.unwrap_or(Duration::MAX) })
+    };
+    entries.filter_map(kept).collect()
+}
+
+/// What is more than is kept: the oldest, by their names. How long they last is counted, not how old they are by a clock, which
+/// may jump.
+fn too_much(mut files: Vec<Kept>, recording: &Recording) -> Vec<PathBuf> {
+    files.sort_by(|a, b| b.path.cmp(&a.path));
+    let (mut bytes, mut newer) = (0, Duration::ZERO);
+    let mut goes = |file: &Kept| {
+        bytes += file.bytes;
+        let recorded = newer;
+        newer += file.lasts.min(recording.segment);
+        recording.keep.is_some_and(|keep| recorded >= keep)
+            || recording.keep_bytes.is_some_and(|most| bytes > most)
+    };
+    files.into_iter().filter(|file| goes(file)).map(|file| file.path).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn kept(path: &str, bytes: u64) -> Kept {
+        Kept {
+            path: path.into(),
+            bytes,
+            age: Duration::from_secs(1_000_000),
+            lasts: Duration::from_secs(1_000_000),
+        }
+    }
+
+    #[test]
+    fn the_oldest_go_where_there_is_too_much_whatever_the_clock_says() {
+        let files = || vec![kept("door-3", 40), kept("door-1", 30), kept("door-2", 50)];
+        let recording = |keep_s: Option<u64>, keep_bytes| Recording {
+            folder: "/r".into(),
+            segment: Duration::from_secs(600),
+            keep: keep_s.map(Duration::from_secs),
+            keep_bytes,
+            overlay: false,
+        };
+        let names = |keep, bytes| {
+            let gone = too_much(files(), &recording(keep, bytes));
+            gone.iter().map(|path| path.display().to_string()).collect::<Vec<_>>()
+        };
+        assert_eq!(names(None, Some(100)), ["door-1"]);
+        assert_eq!(names(Some(1200), None), ["door-1"]);
+        assert_eq!(names(Some(600), None), ["door-2", "door-1"]);
+        assert!(names(Some(3600), Some(1000)).is_empty());
+    }
+
+    #[test]
+    fn only_files_of_this_camera_are_looked_at() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-files-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        for name in ["door-20260101T000000000.mkv", "door-2-20260101T000000000.mkv", "door.mkv", "notes.txt"]
+        {
+            fs::write(folder.join(name), "x").unwrap();
+        }
+        let found = files(&folder, "door");
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(found.len(), 1, "{found:?}");
+        assert!(found[0].path.ends_with("door-20260101T000000000.mkv"));
+    }
+}

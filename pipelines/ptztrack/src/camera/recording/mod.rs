@@ -1,0 +1,226 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What is recorded, in a pipeline and a thread of its own: a disk that is full, slow, broken or hangs costs the recording and
+//! nothing else. Copies reach it over an `appsrc` that takes them at once, and drops them where they are not written.
+//!
+//! ```text
+//! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ parser ─ splitmuxsink
+//! ```
+
+mod files;
+
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::Duration;
+
+use gst::prelude::*;
+use ptztrack_contract::lock::lock;
+
+use crate::config::{Codec, Recording};
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// The overlay, encoded, as it is recorded.
+pub const ENCODER: &str = "x264enc tune=zerolatency speed-preset=superfast key-int-max=30";
+
+/// So much waits for a disk that is slow for a moment, in bytes.
+const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
+
+/// Between two tries; twice as long each time.
+const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+
+/// How often it is seen whether there is room on the disk.
+const LOOK: Duration = Duration::from_secs(5);
+
+/// The end of a file is waited for this long.
+const LONGEST_END: Duration = Duration::from_secs(10);
+
+/// Records one camera, of each of its pipelines in turn.
+#[derive(Debug, Clone)]
+pub struct Recorder {
+    settings: Recording,
+    codec: Codec,
+    camera: String,
+    log: Arc<Log>,
+    /// Held by everybody who still writes.
+    _writing: Sender<()>,
+    trouble: Arc<Mutex<bool>>,
+}
+
+/// Hears when nobody writes any more.
+#[derive(Debug)]
+pub struct Recordings(Receiver<()>);
+
+/// Where copies go while there is somebody to write them.
+#[derive(Debug, Default)]
+struct Feed(Mutex<FeedState>);
+
+#[derive(Debug, Default)]
+struct FeedState {
+    source: Option<gst_app::AppSrc>,
+    /// It begins with a picture that needs no other.
+    begun: bool,
+    ended: bool,
+}
+
+impl Recorder {
+    /// For one camera; nothing is written yet.
+    pub fn new(settings: &Recording, codec: Codec, camera: &str, log: Arc<Log>) -> (Self, Recordings) {
+        let (writing, written) = channel();
+        let codec = if settings.overlay { Codec::H264 } else { codec };
+        let (settings, camera) = (settings.clone(), camera.to_owned());
+        (
+            Self { settings, codec, camera, log, _writing: writing, trouble: Arc::default() },
+            Recordings(written),
+        )
+    }
+
+    /// Records what comes to this sink, until its stream ends or it is no more.
+    pub fn record(self, tap: &gst_app::AppSink) {
+        let feed = Arc::new(Feed::default());
+        let ends = feed.clone();
+        // Ends the stream too where the pipeline is dropped without an end.
+        let taps = Tap(feed.clone());
+        let copy = move |sink: &gst_app::AppSink| {
+            let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
+            taps.0.copy(&sample);
+            Ok(gst::FlowSuccess::Ok)
+        };
+        let callbacks = gst_app::AppSinkCallbacks::builder().new_sample(copy).eos(move |_| ends.end());
+        tap.set_callbacks(callbacks.build());
+        let name = format!("{}-record", self.camera);
+        let log = self.log.clone();
+        let camera = self.camera.clone();
+        if let Err(err) = thread::Builder::new().name(name).spawn(move || self.run(&feed)) {
+            let detail = format!("nothing is recorded: {err}");
+            log.tell(&Event::new(Level::Error, Some(&camera), "recording-failed", &detail));
+        }
+    }
+
+    /// In its own thread: writes, and begins anew where that fails.
+    fn run(&self, feed: &Feed) {
+        let mut pause = SHORTEST_PAUSE;
+        loop {
+            let failure = match self.write(feed) {
+                Ok(()) => return,
+                Err(failure) => failure,
+            };
+            feed.stop();
+            if feed.has_ended() {
+                return;
+            }
+            if !std::mem::replace(&mut *lock(&self.trouble), true) {
+                let detail =
+                    format!("nothing is recorded: {failure}; the camera is followed, and it is tried again");
+                self.tell(Level::Warning, "recording-failed", &detail);
+            }
+            thread::sleep(pause);
+            pause = (pause * 2).min(LONGEST_PAUSE);
+        }
+    }
+
+    /// Until the end of the stream.
+    fn write(&self, feed: &Feed) -> Result<(), String> {
+        files::make_room(&self.settings, &self.camera);
+        let said = |err: glib::Error| err.message().to_owned();
+        let parser = match self.codec {
+            Codec::Mjpeg => "jpegparse",
+            Codec::Mpeg4 => "mpeg4videoparse",
+            Codec::H264 => "h264parse",
+        };
+        let description = format!(
+            "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
+             ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
+        );
+        let pipeline = gst::parse::launch(&description).map_err(said)?;
+        let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
+        files::configure(&pipeline, &self.settings, &self.camera);
+        let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
+        let bus = pipeline.bus().ok_or("a pipeline without a bus")?;
+        // Where it fails, a message has the reason.
+        let _ = pipeline.set_state(gst::State::Playing);
+        feed.start(source.ok_or("no source")?);
+        let result = loop {
+            let wait = gst::ClockTime::from_nseconds(u64::try_from(LOOK.as_nanos()).unwrap_or(u64::MAX));
+            let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+            match bus.timed_pop_filtered(wait, &kinds) {
+                None => {
+                    files::make_room(&self.settings, &self.camera);
+                    if files::newest_grew(&self.settings, &self.camera, LOOK * 2)
+                        && std::mem::take(&mut *lock(&self.trouble))
+                    {
+                        self.tell(Level::Info, "recording", "it is recorded again");
+                    }
+                }
+                Some(message) => match message.view() {
+                    gst::MessageView::Error(error) => break Err(error.error().message().to_owned()),
+                    _ => break Ok(()),
+                },
+            }
+        };
+        let _ = pipeline.set_state(gst::State::Null);
+        result
+    }
+
+    fn tell(&self, level: Level, event: &str, detail: &str) {
+        self.log.tell(&Event::new(level, Some(&self.camera), event, detail));
+    }
+}
+
+impl Recordings {
+    /// Waits until all files are whole; not for ever, as a disk may hang.
+    pub fn wait(self) {
+        // Nothing is ever sent: it ends with the last who could.
+        let _ = self.0.recv_timeout(LONGEST_END);
+    }
+}
+
+impl Feed {
+    /// Leaves a copy for whoever writes; waits for nothing.
+    fn copy(&self, sample: &gst::Sample) {
+        let mut state = lock(&self.0);
+        let Some(source) = state.source.clone() else { return };
+        let delta =
+            sample.buffer().is_none_or(|buffer| buffer.flags().contains(gst::BufferFlags::DELTA_UNIT));
+        if state.begun || !delta {
+            state.begun = true;
+            // Where it is over, its own thread says so.
+            let _ = source.push_sample(sample);
+        }
+    }
+
+    fn start(&self, source: gst_app::AppSrc) {
+        let mut state = lock(&self.0);
+        if state.ended {
+            let _ = source.end_of_stream();
+        }
+        (state.source, state.begun) = (Some(source), false);
+    }
+
+    fn stop(&self) {
+        lock(&self.0).source = None;
+    }
+
+    fn end(&self) {
+        let mut state = lock(&self.0);
+        state.ended = true;
+        if let Some(source) = &state.source {
+            let _ = source.end_of_stream();
+        }
+    }
+
+    fn has_ended(&self) -> bool {
+        lock(&self.0).ended
+    }
+}
+
+/// Ends its feed when it is dropped.
+struct Tap(Arc<Feed>);
+
+impl Drop for Tap {
+    fn drop(&mut self) {
+        self.0.end();
+    }
+}

@@ -1,0 +1,239 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! RTSP, between an `rtspsrc` on this machine and the camera: `rtspsrc` knows no password, and what it asks for is signed here.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::mpsc::SyncSender;
+
+use axum::http::{HeaderMap, HeaderValue, header};
+use ptztrack_contract::lock::lock;
+use rustls::pki_types::ServerName;
+use tokio::io::{
+    AsyncBufReadExt, AsyncRead, AsyncWrite, AsyncWriteExt, BufReader, ReadHalf, WriteHalf, split,
+};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::Mutex;
+use tokio::time::timeout;
+use tokio_rustls::TlsConnector;
+use vapix::wire::{Authenticator, ClientSettings, Error};
+
+use super::rtsp_message::{Item, Message};
+use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
+use crate::config::rtsp_host;
+
+/// Of an address that somebody else wrote.
+const LONGEST_SHOWN: usize = 200;
+
+/// A connection, in clear or not.
+trait Connection: AsyncRead + AsyncWrite + Send + Unpin {}
+impl<T: AsyncRead + AsyncWrite + Send + Unpin> Connection for T {}
+
+/// Connects to the camera, reports where `rtspsrc` finds it, and carries what both say until either ends.
+pub async fn carry(
+    settings: &ClientSettings,
+    camera: &str,
+    target: &str,
+    report: &SyncSender<Result<Video, Failure>>,
+    ended: &Ended,
+) {
+    let opened = async {
+        let (connection, over_tls) = connect(settings, camera).await?;
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.map_err(Failure::new)?;
+        let address = listener.local_addr().map_err(Failure::new)?;
+        let own = format!("rtsp://{address}/{}", word().map_err(Failure::new)?);
+        Ok((connection, over_tls, listener, own))
+    };
+    let (connection, over_tls, listener, own) = match opened.await {
+        Ok(opened) => opened,
+        // Who waited for it may have given up.
+        Err(failure) => return drop(report.try_send(Err(failure))),
+    };
+    if report.try_send(Ok(Video::Rtsp(format!("{own}{target}")))).is_err() {
+        return;
+    }
+    let Ok(Ok(source)) = timeout(LONGEST_START, accept(&listener, &own)).await else { return };
+    drop(listener);
+    let (from_camera, to_camera) = split(connection);
+    let (from_source, mut to_source) = split(source);
+    let asking = Asking {
+        camera: camera.trim_end_matches('/').to_owned(),
+        own,
+        over_tls,
+        login: Authenticator::new(settings.credentials.clone(), settings.authentication),
+        last: None,
+        signed_fresh: false,
+        to_camera,
+    };
+    let asking = Arc::new(Mutex::new(asking));
+    let result = tokio::select! {
+        result = ask(BufReader::new(from_source), &asking) => result,
+        result = answer(BufReader::new(from_camera), &mut to_source, &asking) => result,
+    };
+    if let Err(failure) = result {
+        *lock(ended) = Some(failure);
+    }
+}
+
+/// 128 random bits: others on this machine must not find the camera behind the open door.
+fn word() -> io::Result<String> {
+    let mut bytes = [0; 16];
+    io::Read::read_exact(&mut std::fs::File::open("/dev/urandom")?, &mut bytes)?;
+    Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
+}
+
+async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Connection>, bool), Failure> {
+    let (host, port, over_tls) =
+        rtsp_host(camera).ok_or_else(|| Failure::new(format!("{camera} names no host")))?;
+    let bare = host.trim_matches(['[', ']']);
+    let said = |err: io::Error| Failure::new(format!("{host}, port {port}: {err}"));
+    let late = |_| said(io::ErrorKind::TimedOut.into());
+    let tcp =
+        timeout(LONGEST_SILENCE, TcpStream::connect((bare, port))).await.map_err(late)?.map_err(said)?;
+    tcp.set_nodelay(true).map_err(said)?;
+    if !over_tls {
+        return Ok((Box::new(tcp), false));
+    }
+    let connector = TlsConnector::from(Arc::new(settings.trust.client_config(true)?));
+    let name = ServerName::try_from(bare.to_owned()).map_err(Failure::new)?;
+    let tls = timeout(LONGEST_START, connector.connect(name, tcp)).await.map_err(late)?.map_err(said)?;
+    Ok((Box::new(tls), true))
+}
+
+/// The first connection that knows the word; whoever else of this machine connects is sent away.
+async fn accept(listener: &TcpListener, own: &str) -> io::Result<TcpStream> {
+    loop {
+        let (stream, _) = listener.accept().await?;
+        let mut first = [0; 256];
+        let asks = async {
+            // Before the first line is whole, nothing is to be said of it.
+            loop {
+                let bytes = stream.peek(&mut first).await?;
+                let text = String::from_utf8_lossy(&first[..bytes]).into_owned();
+                if bytes == 0 || bytes == first.len() || text.contains('\n') {
+                    return io::Result::Ok(
+                        text.split(' ').nth(1).is_some_and(|address| address.starts_with(own)),
+                    );
+                }
+                tokio::time::sleep(std::time::Duration::from_millis(5)).await;
+            }
+        };
+        if matches!(timeout(LONGEST_SILENCE, asks).await, Ok(Ok(true))) {
+            return Ok(stream);
+        }
+    }
+}
+
+/// Whoever asks the camera.
+struct Asking {
+    /// Address of the camera, as it is to be asked.
+    camera: String,
+    /// What `rtspsrc` takes for that.
+    own: String,
+    over_tls: bool,
+    login: Authenticator,
+    /// The request that waits for its answer, unsigned.
+    last: Option<Message>,
+    /// Its signature answers a challenge to itself.
+    signed_fresh: bool,
+    to_camera: WriteHalf<Box<dyn Connection>>,
+}
+
+impl Asking {
+    async fn send(&mut self, request: &Message) -> Result<(), Failure> {
+        let mut request = request.clone();
+        let (method, address) = request.request().unwrap_or_default();
+        if let Some(value) = self.login.authorization_of(method, address)? {
+            let value = value.to_str().map_err(Failure::new)?.to_owned();
+            request.headers.push(("Authorization".to_owned(), value));
+        }
+        self.to_camera.write_all(&request.to_bytes()).await.map_err(Failure::new)
+    }
+
+    /// Answers a challenge to the request that waits; whether it could.
+    async fn challenged(&mut self, response: &Message) -> Result<(), Failure> {
+        let Some(last) = self.last.clone() else { return Err(Failure::new("a challenge to nothing")) };
+        let offers =
+            response.headers_of("www-authenticate").filter_map(|offer| HeaderValue::from_str(offer).ok());
+        let offers: HeaderMap = offers.map(|offer| (header::WWW_AUTHENTICATE, offer)).collect();
+        let stale = self.login.challenged(&offers, self.over_tls)?;
+        if std::mem::replace(&mut self.signed_fresh, true) && !stale {
+            return Err(Error::BadCredentials { user: self.login.user().to_owned() }.into());
+        }
+        self.send(&last).await
+    }
+}
+
+/// From `rtspsrc` to the camera.
+async fn ask(mut source: BufReader<ReadHalf<TcpStream>>, asking: &Mutex<Asking>) -> Result<(), Failure> {
+    while let Some(item) = Item::read(&mut source).await.map_err(Failure::new)? {
+        let mut asking = asking.lock().await;
+        match item {
+            Item::Message(mut message) if message.request().is_some() => {
+                message.start = message.start.replacen(&asking.own, &asking.camera, 1);
+                asking.send(&message).await?;
+                (asking.last, asking.signed_fresh) = (Some(message), false);
+            }
+            other => asking.to_camera.write_all(&other.to_bytes()).await.map_err(Failure::new)?,
+        }
+    }
+    Ok(())
+}
+
+/// From the camera to `rtspsrc`.
+async fn answer(
+    mut camera: BufReader<ReadHalf<Box<dyn Connection>>>,
+    source: &mut WriteHalf<TcpStream>,
+    asking: &Mutex<Asking>,
+) -> Result<(), Failure> {
+    while !camera.fill_buf().await.map_err(Failure::new)?.is_empty() {
+        let Some(item) = Item::read(&mut camera).await.map_err(Failure::new)? else { break };
+        match &item {
+            Item::Message(message) if message.status() == Some(401) => {
+                asking.lock().await.challenged(message).await?;
+                continue;
+            }
+            Item::Message(message) if message.status().is_some_and(|status| (300..400).contains(&status)) => {
+                let to = message.header("location").unwrap_or_default().chars().take(LONGEST_SHOWN).collect();
+                return Err(Error::Redirected(to).into());
+            }
+            _ => {}
+        }
+        source.write_all(&item.to_bytes()).await.map_err(Failure::new)?;
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::AsyncReadExt;
+
+    use super::*;
+
+    /// A connection within this machine that begins like this.
+    async fn visitor(address: std::net::SocketAddr, first: &str) -> TcpStream {
+        let mut stream = TcpStream::connect(address).await.unwrap();
+        stream
+            .write_all(format!("OPTIONS {first}/axis-media/media.amp RTSP/1.0\r\nCSeq: 1\r\n\r\n").as_bytes())
+            .await
+            .unwrap();
+        stream
+    }
+
+    #[tokio::test]
+    async fn the_door_is_for_who_knows_the_word() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let own = format!("rtsp://{address}/{}", word().unwrap());
+        assert_ne!(word().unwrap(), word().unwrap());
+        let accepted = tokio::spawn({
+            let own = own.clone();
+            async move { accept(&listener, &own).await }
+        });
+        let mut stranger = visitor(address, &format!("rtsp://{address}")).await;
+        // Closed, or reset, as what it said was not read.
+        assert_eq!(stranger.read(&mut [0]).await.unwrap_or(0), 0);
+        let friend = visitor(address, &own).await;
+        assert_eq!(accepted.await.unwrap().unwrap().peer_addr().unwrap(), friend.local_addr().unwrap());
+    }
+}
