@@ -2,11 +2,9 @@
 
 //! GStreamer sink that steers an Axis pan-tilt-zoom camera after the tracked target.
 //!
-//! [`vapixptzsink`] is the element (thesis 3.6). What it computes is in the crate [`servo`], how it speaks with the camera
-//! in [`vapix`]; the control loop joins both.
+//! [`vapixptzsink`] is the element (thesis 3.6). What it computes is in the crate `ptztrack-servo`, what it says to the
+//! camera in [`session`] and [`vapix`]; [`sink`] is what it has in common with sinks of other protocols.
 
-mod control_loop;
-use ptztrack_contract::lock;
 pub mod vapixptzsink;
 
 /// What GStreamer asks of a plugin; private, as nobody calls it from Rust.

@@ -431,3 +431,21 @@ fn a_stop_is_handed_over_to_who_comes_next() {
     let queries = told.iter().take_while(|command| command.query.contains("query=")).count();
     assert!(queries < 2, "{told:?}");
 }
+
+/// Whoever stands there meanwhile.
+#[test]
+fn it_goes_home_or_stays_at_a_word_and_follows_again() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("home", "-8,1"));
+    stage.run(1.0, &aside());
+    stage.rig.sink.set_property_from_str("steering", "home");
+    stage.run(10.0, &aside());
+    let home = stage.camera.status();
+    assert!((home.pan_deg + 8.0).abs() < 0.01 && !home.moving, "{home:?}: {:?}", stage.moves());
+    stage.rig.sink.set_property_from_str("steering", "off");
+    let before = stage.moves().len();
+    stage.run(4.0, &aside());
+    assert_eq!(stage.moves().len(), before, "{:?}", stage.moves());
+    stage.rig.sink.set_property_from_str("steering", "follow");
+    stage.run(1.0, &aside());
+    assert!(stage.moves().last().unwrap().contains("continuous"), "{:?}", stage.moves());
+}

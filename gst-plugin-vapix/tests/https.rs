@@ -12,9 +12,9 @@ use std::time::Duration;
 
 use certificates::{certificate, server_config};
 use rustls::{ServerConnection, StreamOwned};
-use vapix::wire::{
-    Authentication, Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust,
-};
+use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::{Client as _, Command, Error, Request};
+use vapix::Client;
 
 /// Answers every request on a connection with the same bytes; the request lines and credentials go to `seen`.
 fn serve(stream: impl Read + Write, answer: &str, seen: &std::sync::mpsc::Sender<String>) {
@@ -63,7 +63,7 @@ fn try_client(location: &str, trust: Trust) -> Result<Client, Error> {
     let timeout = Duration::from_secs(10);
     Client::new(ClientSettings {
         location,
-        camera: 1,
+        channel: "1".to_owned(),
         credentials: Some(credentials),
         authentication: Authentication::Auto,
         timeout,
@@ -73,7 +73,7 @@ fn try_client(location: &str, trust: Trust) -> Result<Client, Error> {
 
 fn halt(client: &mut Client) -> Result<(), Error> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    runtime.block_on(client.send(&Command::Halt))
+    runtime.block_on(client.exchange(&Request::Command(Command::Halt))).map(drop)
 }
 
 const ACCEPTED: &str = "HTTP/1.1 204 No Content\r\n\r\n";

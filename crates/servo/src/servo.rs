@@ -9,7 +9,9 @@ use std::time::Duration;
 use crate::control::{
     Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, PointToPoint, ZoomDrive,
 };
-use crate::estimation::{Estimates, Measurement, SelfCalibration, TargetEstimator, Visibility};
+use crate::estimation::{
+    AxisEstimator, Estimates, Measurement, Mounting, SelfCalibration, TargetEstimator, Visibility,
+};
 use crate::model::{
     CameraModel, Capabilities, CommandHistory, Delays, Lens, PanTilt, SpeedMap, View, magnified,
 };
@@ -22,6 +24,9 @@ pub struct Servo {
     settings: ServoSettings,
     camera: CameraModel,
     calibration: SelfCalibration,
+    axes: AxisEstimator,
+    /// An axis was found to turn the picture the other way, and nobody was told yet.
+    found_inverted: bool,
     estimator: TargetEstimator,
     controller: Controller,
     limits: LimitEnforcer,
@@ -55,6 +60,8 @@ impl Servo {
         Self {
             camera: CameraModel::new(settings.speed_map()),
             calibration: SelfCalibration::new(settings.latency),
+            axes: AxisEstimator::default(),
+            found_inverted: false,
             estimator: TargetEstimator::new(settings.prediction),
             controller: Controller::default(),
             limits: LimitEnforcer::default(),
@@ -100,7 +107,7 @@ impl Servo {
         actuator: &ActuatorStatus,
         now: Duration,
     ) -> Option<f64> {
-        let measurement = self.settings.mounting.along_axes(measurement);
+        let measurement = self.mounting().along_axes(measurement);
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => measurement.taken_at.min(now),
             (Visibility::Predicted, Some(target)) => target.last_seen,
@@ -111,7 +118,11 @@ impl Servo {
             }
         };
         self.home.not_alone();
-        self.calibrate(&measurement, actuator, now);
+        if self.calibrate(&measurement, actuator, now) {
+            // What was seen so far was seen the wrong way round.
+            self.lose();
+            return None;
+        }
         self.measure_height(&measurement, actuator.mode);
         let view = self.view(&measurement);
         self.estimator.see(&measurement, &view, &self.camera.history, &self.delays());
@@ -121,14 +132,36 @@ impl Servo {
         oscillates.then(|| self.controller.oscillation.gain_scale())
     }
 
-    /// Learns of the camera what the picture shows, if nothing else moves it.
-    fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Duration) {
+    /// How the picture lies to the camera's axes, as far as is known by now.
+    pub(super) fn mounting(&self) -> Mounting {
+        self.axes.mounting(self.settings.mounting)
+    }
+
+    /// Whether an axis was found to turn the picture the other way since this was last asked.
+    pub fn take_found_inverted(&mut self) -> bool {
+        mem::take(&mut self.found_inverted)
+    }
+
+    /// Learns of the camera what the picture shows, if nothing else moves it. Returns whether an axis is now taken to turn
+    /// the picture the other way.
+    fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Duration) -> bool {
         let zooms = self.zoom.moves(measurement.taken_at, &self.calibration.delays(), now);
-        if self.settings.learn && actuator.access == Access::Ours && !zooms {
-            let maps = [&self.assumed_speeds(), &self.camera.speed_map];
-            self.calibration.see(measurement, &self.view(measurement), &self.camera.history, maps);
-            self.revise();
+        if !self.settings.learn || actuator.access != Access::Ours || zooms {
+            return false;
         }
+        let maps = [&self.assumed_speeds(), &self.camera.speed_map];
+        let view = self.view(measurement);
+        let turn = self.calibration.see(measurement, &view, &self.camera.history, maps);
+        let fov_deg = view.horizontal_fov_deg;
+        let inverted = self.settings.learn_axes
+            && turn.is_some_and(|turn| self.axes.see(&turn, &self.camera.history, fov_deg));
+        if inverted {
+            self.found_inverted = true;
+            self.calibration = SelfCalibration::new(self.settings.latency);
+            self.assume_speeds();
+        }
+        self.revise();
+        inverted
     }
 
     /// Finds how tall the target is, to zoom by.

@@ -41,6 +41,8 @@ pub struct ServoSettings {
     pub target_height: Option<f64>,
     /// Whether latency, field of view and speed map are learned; the settings above are where that begins.
     pub learn: bool,
+    /// Whether it is learned too which way each axis turns the picture; slow until that is known.
+    pub learn_axes: bool,
     /// Where the camera waits for a target; `None`: where the last one left it.
     pub home: Option<Home>,
     /// It goes there when nobody was there for this long, ...
@@ -77,6 +79,7 @@ impl Default for ServoSettings {
             limits: SoftLimits::default(),
             target_height: None,
             learn: true,
+            learn_axes: false,
             home: None,
             home_timeout: Duration::from_secs(10),
             home_at_start: false,

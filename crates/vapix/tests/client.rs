@@ -8,9 +8,9 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
-use vapix::wire::{
-    Authentication, Client, ClientSettings, Command, Credentials, Error, Location, Secret, Trust,
-};
+use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::{Client as _, Command, Error, Request};
+use vapix::Client;
 
 const RIGHT: Command = Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false };
 const CENTRE: Command = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: None };
@@ -40,7 +40,7 @@ fn client(address: SocketAddr) -> Client {
 fn settings(address: SocketAddr) -> ClientSettings {
     ClientSettings {
         location: Location::parse(&format!("http://{address}")).unwrap().0,
-        camera: 1,
+        channel: "1".to_owned(),
         credentials: None,
         authentication: Authentication::Auto,
         timeout: Duration::from_secs(60),
@@ -70,7 +70,7 @@ fn send(client: &mut Client, commands: &[Command]) -> Vec<Result<(), Error>> {
     runtime.block_on(async {
         let mut answers = Vec::new();
         for command in commands {
-            answers.push(client.send(command).await);
+            answers.push(client.exchange(&Request::Command(*command)).await.map(drop));
         }
         answers
     })

@@ -12,8 +12,10 @@ use std::process::{Command as Process, ExitStatus};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use vapix::watchdog::{Lease, Standing, StopOrder, Watchdog, WatchdogAddress};
-use vapix::wire::{Client, ClientSettings, Command, Credentials, Identity, Location, Secret, Trust};
+use session::http::{Authentication, ClientSettings, Credentials, Identity, Location, Secret, Trust};
+use session::watchdog::{Lease, Standing, StopOrder, Watchdog, WatchdogAddress};
+use session::{Client as _, Command, Request};
+use vapix::Client;
 use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
 /// Only a failure takes this long.
@@ -68,7 +70,7 @@ impl Application {
     /// Moves, as an application does that plays by the rules.
     async fn moving(mut self) -> Self {
         self.hold(true).await;
-        self.client.send(&RIGHT).await.unwrap();
+        self.client.exchange(&Request::Command(RIGHT)).await.unwrap();
         self.hold(false).await;
         assert!(self.camera.wait_for(PATIENCE, |status| status.moving));
         self
@@ -94,9 +96,9 @@ fn client(camera: &VirtualCamera) -> Client {
     let credentials = Credentials { user: "root".to_owned(), password: Secret::new(PASSWORD) };
     Client::new(ClientSettings {
         location: Location::parse(&camera.url()).unwrap().0,
-        camera: 1,
+        channel: "1".to_owned(),
         credentials: Some(credentials),
-        authentication: vapix::wire::Authentication::default(),
+        authentication: Authentication::default(),
         timeout: Duration::from_millis(500),
         trust: Trust::System,
     })
@@ -243,10 +245,10 @@ async fn a_restarted_application_takes_over_from_the_old_watchdog() {
     }
     ends(&old);
     // A stop that the old one sent in its last moment may still be on its way. The camera takes what comes in turn.
-    assert!(restarted.client.send(&RIGHT).await.is_err());
+    assert!(restarted.client.exchange(&Request::Command(RIGHT)).await.is_err());
     restarted.camera.set_fault(Fault::None);
     restarted.hold(true).await;
-    while restarted.client.send(&RIGHT).await.is_err() {
+    while restarted.client.exchange(&Request::Command(RIGHT)).await.is_err() {
         restarted.hold(true).await;
     }
     restarted.hold(false).await;

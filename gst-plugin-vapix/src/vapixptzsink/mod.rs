@@ -74,7 +74,8 @@
 //! ## Home
 //! After `home-timeout` without a target the camera goes to `home`, if that is set: `pan,tilt` or `pan,tilt,zoom`, the
 //! name of a preset, or `start`, where it looked when it connected. With `home-at-start` it also goes there on start-up.
-//! `home` is kept within the limits, unless it is a preset.
+//! `home` is kept within the limits, unless it is a preset. `steering=home` sends it there at once, whoever is there;
+//! `steering=off` stops it and leaves it to others, until `steering=follow`.
 //!
 //! ## Operators
 //! An operator comes first. When the camera's position contradicts the commands, or its control queue says that it is
@@ -103,20 +104,7 @@
 
 use glib::prelude::*;
 
-mod camera_task;
-mod clock;
-mod events;
 mod imp;
-mod measure;
-mod messages;
-mod outbox;
-mod picture;
-mod properties;
-mod setters;
-mod settings;
-mod statistics;
-mod stream;
-mod watchdog;
 
 /// How the camera is moved.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
@@ -153,6 +141,22 @@ pub enum Authentication {
     Basic,
 }
 
+/// To what the camera is steered.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
+#[enum_type(name = "GstVapixPtzSinkSteering")]
+pub enum Steering {
+    /// After the target.
+    #[default]
+    #[enum_value(name = "After the target", nick = "follow")]
+    Follow,
+    /// Home.
+    #[enum_value(name = "To `home`, whoever is there", nick = "home")]
+    Home,
+    /// Not at all.
+    #[enum_value(name = "Not at all: the camera is stopped, and left to others", nick = "off")]
+    Off,
+}
+
 /// How the target's motion is carried forward.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, glib::Enum)]
 #[enum_type(name = "GstVapixPtzSinkPrediction")]
@@ -179,29 +183,12 @@ pub enum SpeedCurve {
     Cubic,
 }
 
-/// An enumeration of GObject's and the servo's of the same values.
-macro_rules! same_values {
-    ($($name:ident = $other:path { $($value:ident),+ })+) => {$(
-        impl From<$name> for $other {
-            fn from(value: $name) -> Self {
-                match value { $($name::$value => Self::$value),+ }
-            }
-        }
-
-        impl From<$other> for $name {
-            fn from(value: $other) -> Self {
-                type Other = $other;
-                match value { $(Other::$value => Self::$value),+ }
-            }
-        }
-    )+};
-}
-
-same_values! {
-    Authentication = vapix::wire::Authentication { Auto, Basic }
+sink::same_values! {
+    Authentication = session::http::Authentication { Auto, Basic }
     Mode = servo::Mode { Velocity, Absolute, Centre }
     Prediction = servo::Prediction { Average, Lead }
     SpeedCurve = servo::SpeedCurve { Linear, Cubic }
+    Steering = sink::Steering { Follow, Home, Off }
 }
 
 glib::wrapper! {

@@ -65,11 +65,12 @@ pub struct Rig {
 }
 
 impl Rig {
-    /// A sink for the camera at `location`, not yet playing. The watchdog process has its own tests: these need none to be
+    /// A sink for the camera at `location`, by the protocol that is spoken there, not yet playing. The watchdog process has its own tests: these need none to be
     /// built.
     pub fn ready(location: &str) -> Self {
         init();
-        let sink = gst::ElementFactory::make("vapixptzsink")
+        let sink = if location.contains("/onvif/") { "onvifptzsink" } else { "vapixptzsink" };
+        let sink = gst::ElementFactory::make(sink)
             .property("location", location)
             .property("dead-man", false)
             .build()

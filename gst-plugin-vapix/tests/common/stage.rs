@@ -85,14 +85,15 @@ impl Stage {
     }
 
     pub fn before(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let rig = set(Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS)).play();
+        let rig =
+            set(Rig::ready(&location(&camera)).with("lockstep", true).with("timeout", PATIENT_NS)).play();
         let now = camera.status().time;
         Self { camera, rig, now, heard: Vec::new(), stepped: true, shown_as: Box::new(|meta| meta) }
     }
 
     /// Time passes as everybody's, and pictures come when they come.
     pub fn by_the_clock(camera: VirtualCamera, set: impl FnOnce(Rig) -> Rig) -> Self {
-        let rig = set(Rig::ready(&camera.url())).play();
+        let rig = set(Rig::ready(&location(&camera))).play();
         let now = camera.status().time;
         Self { camera, rig, now, heard: Vec::new(), stepped: false, shown_as: Box::new(|meta| meta) }
     }
@@ -191,6 +192,11 @@ impl Stage {
     pub fn times(&self, wanted: &Heard) -> usize {
         self.heard.iter().filter(|heard| *heard == wanted).count()
     }
+}
+
+/// Where a camera is spoken to: by ONVIF, if it speaks that.
+fn location(camera: &VirtualCamera) -> String {
+    camera.onvif_url().unwrap_or_else(|| camera.url())
 }
 
 fn frames(seconds: f64) -> u32 {

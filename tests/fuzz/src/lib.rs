@@ -5,9 +5,10 @@
 #![allow(missing_docs)]
 
 use servo::TableRow;
-use vapix::wire::{
-    Attributes, Credentials, Parameters, QueuePlace, Secret, answer_to_challenge, answer_to_cookie,
-    parse_limits, parse_move_speed, parse_position, parse_presets,
+use session::http::{Credentials, Secret, answer_to_challenge, answer_to_cookie};
+use vapix::{
+    parse_attributes, parse_limits, parse_move_speed, parse_parameters, parse_position, parse_presets,
+    parse_queue_place,
 };
 
 /// A target: takes anything, says whether it was understood, and never panics.
@@ -50,7 +51,7 @@ pub fn limits(bytes: &[u8]) -> bool {
 }
 
 pub fn attributes(bytes: &[u8]) -> bool {
-    let Ok(attributes) = Attributes::parse(&text(bytes)) else { return false };
+    let Ok(attributes) = parse_attributes(&text(bytes)) else { return false };
     for table in [&attributes.speeds, &attributes.zooms] {
         let grows = |pair: &[_]| matches!(pair, [a, b] if grow(a, b));
         assert!(table.windows(2).all(grows), "{table:?}");
@@ -67,11 +68,11 @@ pub fn move_speed(bytes: &[u8]) -> bool {
 }
 
 pub fn parameters(bytes: &[u8]) -> bool {
-    Parameters::parse(&text(bytes), 1).is_ok()
+    parse_parameters(&text(bytes), "1").is_ok()
 }
 
 pub fn queue(bytes: &[u8]) -> bool {
-    let Ok(place) = QueuePlace::parse(&text(bytes)) else { return false };
+    let Ok(place) = parse_queue_place(&text(bytes)) else { return false };
     assert!((5..=3600).contains(&place.poll_every.as_secs()), "{place:?}");
     true
 }

@@ -101,35 +101,31 @@ impl SelfCalibration {
     }
 
     /// Takes a picture, seen with `view`, and what was commanded, counted by the map that is `believed` by now; `assumed`
-    /// was the one before anything was learned.
+    /// was the one before anything was learned. Returns the turn, where the background shows one.
     pub fn see(
         &mut self,
         measurement: &Measurement,
         view: &View,
         history: &CommandHistory,
         [assumed, believed]: [&SpeedMap; 2],
-    ) {
+    ) -> Option<ObservedRotation> {
         let before = self.before.replace(measurement.taken_at);
         if measurement.visibility != Visibility::Seen {
-            return;
+            return None;
         }
         // Where the background is not seen, the target tells at least when the camera begins to turn.
         let shown = measurement.ego_velocity.unwrap_or(measurement.velocity);
-        let Some(turn) = before.and_then(|before| ObservedRotation::of(shown, measurement, view, before))
-        else {
-            return;
-        };
+        let turn = before.and_then(|before| ObservedRotation::of(shown, measurement, view, before))?;
         let fov_deg = view.horizontal_fov_deg;
         self.latency.see(&turn, history, fov_deg);
-        if measurement.ego_velocity.is_none() {
-            return;
-        }
+        measurement.ego_velocity?;
         let delays = self.delays();
         let wrong = self.speeds.see(&turn, &delays, history, Maps { assumed, believed }, fov_deg);
         self.latency.doubt(wrong);
         let factor = self.field_factor();
         self.field.see(&turn, &delays);
         self.speeds.rescale((self.field_factor() / factor).ln());
+        Some(turn)
     }
 
     /// What holds at any time.

@@ -8,12 +8,14 @@
 //! ```text
 //! rotation seen in the picture ─┬─ against positions told ── field of view   (how many degrees a picture is wide)
 //!                               ├─ against commands ──────── latency         (when they agree best)
-//!                               └─ against speed steps ───── speed map       (degrees per second of a step)
+//!                               ├─ against speed steps ───── speed map       (degrees per second of a step)
+//!                               └─ against signs ─────────── axes            (which way each turns the picture)
 //! ```
 //! Each is learned by itself and bounded, and starts from what the camera told or the user set. Only a
 //! position gives degrees: without one the field of view stays as it is, and the speed map fits to it, so
 //! that a command still does in the picture what it is meant to.
 
+mod axes;
 mod calibration;
 mod field_of_view;
 mod latency;
@@ -25,6 +27,7 @@ mod speed_map;
 mod target;
 mod zoom;
 
+pub use axes::AxisEstimator;
 use calibration::ObservedRotation;
 pub use calibration::{Estimates, SelfCalibration};
 use field_of_view::FieldOfViewEstimator;

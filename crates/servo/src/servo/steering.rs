@@ -30,6 +30,7 @@ impl Servo {
         let offset = self.estimator.offset(now, history, &delays);
         let wanted = self.controller.rate(&offset, history.rate_at(now), &law);
         let position = self.limits.position(history, delays.command, now);
+        let wanted = if self.settings.learn_axes { self.axes.cautious(wanted) } else { wanted };
         let rate = self.limited(wanted, position, (delays.sum() + actuator.interval).as_secs_f64());
         let (pan, tilt) = self.controller.quantise(rate, &self.camera.speed_map);
         let zoom = self.zoom_speed(measurement, now);
@@ -117,7 +118,7 @@ impl Servo {
         match actuator.mode {
             // What is wrong with the field of view made the angle of the place, and makes a place of it again.
             Mode::Centre => {
-                let place = self.settings.mounting.mirrored(view.point_within(turn));
+                let place = self.mounting().mirrored(view.point_within(turn));
                 centre(place, measurement.size, jump.map(|jump| jump.factor))
             }
             _ => position.map_or(Actuation::Continue, |position| {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use gst::prelude::*;
-use vapix::wire::{Authentication, Trust};
+use session::http::{Authentication, Trust};
 
 use super::credentials::{self, Credentials};
 use super::properties::{self, ELEMENTS, Property};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::*;
-use vapix::wire::{Authentication, Trust};
+use session::http::{Authentication, Trust};
 
 fn parse(text: &str) -> Result<Config, String> {
     gst::init().unwrap();

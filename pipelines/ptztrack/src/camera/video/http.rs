@@ -4,7 +4,7 @@
 
 use std::sync::mpsc::{SyncSender, sync_channel};
 
-use vapix::wire::{Client, ClientSettings, Stream};
+use session::http::{ClientSettings, HttpClient, Stream};
 
 use super::{Failure, LONGEST_START, Video};
 
@@ -41,7 +41,7 @@ pub async fn carry(settings: ClientSettings, target: &str, report: &SyncSender<R
 
 async fn open(settings: ClientSettings, target: &str) -> Result<Stream, Failure> {
     let location = settings.location.clone();
-    let opened = async { Client::new(settings)?.open(target, LONGEST_START).await };
+    let opened = async { HttpClient::in_place_of(settings.into())?.open(target, LONGEST_START).await };
     opened.await.map_err(|err| {
         let failure = Failure::from(err);
         Failure { reason: format!("{location}: {}", failure.reason), ..failure }

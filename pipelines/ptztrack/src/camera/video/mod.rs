@@ -5,7 +5,7 @@
 //! goes by: by Digest, or over verified TLS, and nowhere but at its own address.
 //!
 //! ```text
-//! MJPEG:  camera ─ vapix::wire::Client ─ appsrc
+//! MJPEG:  camera ─ session::http::HttpClient ─ appsrc
 //! RTSP:   camera ─ relay ─ 127.0.0.1 ─ rtspsrc
 //! ```
 
@@ -19,7 +19,8 @@ use std::thread;
 use std::time::Duration;
 
 use gst_app::AppSrc;
-use vapix::wire::{ClientSettings, Credentials, Error, Location, Secret};
+use session::Error;
+use session::http::{ClientSettings, Credentials, Location, Secret};
 
 use crate::config::{CameraSettings, Codec};
 
@@ -98,7 +99,7 @@ fn client_settings(camera: &CameraSettings) -> Result<ClientSettings, Failure> {
     let credentials = camera.credentials.as_ref();
     Ok(ClientSettings {
         location: Location::parse(&camera.address)?.0,
-        camera: 1,
+        channel: "1".to_owned(),
         credentials: credentials.map(|credentials| Credentials {
             user: credentials.user.clone(),
             password: Secret::new(credentials.password.reveal()),

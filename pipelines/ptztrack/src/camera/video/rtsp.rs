@@ -9,6 +9,8 @@ use std::sync::mpsc::SyncSender;
 use axum::http::{HeaderMap, HeaderValue, header};
 use ptztrack_contract::lock::lock;
 use rustls::pki_types::ServerName;
+use session::Error;
+use session::http::{Authenticator, ClientSettings};
 use tokio::io::{
     AsyncBufReadExt, AsyncRead, AsyncWrite, AsyncWriteExt, BufReader, ReadHalf, WriteHalf, split,
 };
@@ -16,7 +18,6 @@ use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Mutex;
 use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
-use vapix::wire::{Authenticator, ClientSettings, Error};
 
 use super::rtsp_message::{Item, Message};
 use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
@@ -143,7 +144,7 @@ impl Asking {
     async fn send(&mut self, request: &Message) -> Result<(), Failure> {
         let mut request = request.clone();
         let (method, address) = request.request().unwrap_or_default();
-        if let Some(value) = self.login.authorization_of(method, address)? {
+        if let Some(value) = self.login.authorization(method, address)? {
             let value = value.to_str().map_err(Failure::new)?.to_owned();
             request.headers.push(("Authorization".to_owned(), value));
         }

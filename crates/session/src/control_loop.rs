@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The whole loop but the network: measurement, estimation, control, session.
+
+use std::time::Duration;
+
+use servo::{Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, ServoSettings};
+
+use crate::session::Session;
+use crate::{Command, Error, Next, Protocol, Request, Response, SessionEvent};
+
+/// A servo and the session it speaks by. Has no clock and sends nothing itself: both are the caller's.
+#[derive(Debug)]
+pub struct ControlLoop {
+    servo: Servo,
+    session: Session,
+    /// Measurements that came while a request was in flight, and were followed by newer ones in that time.
+    overtaken: u64,
+    at_limit: bool,
+    events: Vec<LoopEvent>,
+}
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub enum LoopEvent {
+    /// Between us and the camera.
+    Session(SessionEvent),
+    /// The target lies beyond the camera's range.
+    AtLimit,
+    /// An axis turns the picture the other way than was set: it is steered accordingly from now on.
+    AxisInverted,
+    /// The camera swung to and fro about the target: from now on only this part of the gain is used.
+    Oscillating(f64),
+}
+
+/// The camera as it is known.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Status {
+    /// It answers and does as it is told.
+    pub connected: bool,
+    /// It may be moving on our behalf.
+    pub moving: bool,
+    /// Somebody else moves it.
+    pub taken_over: bool,
+    /// Where it last said it looks.
+    pub position: Position,
+    /// What it was last told, degrees per second.
+    pub rate: PanTilt,
+    /// Horizontal field of view in degrees, where it is set, told or learned.
+    pub fov_deg: Option<f64>,
+    /// How far it can look and zoom, by its own word.
+    pub limits: HardLimits,
+    /// How it is moved, where it is.
+    pub mode: Option<Mode>,
+}
+
+impl ControlLoop {
+    /// Knows nothing of the camera yet.
+    pub fn new(settings: ServoSettings, protocol: &Protocol) -> Self {
+        let session = Session::new(settings.mode, protocol);
+        Self { servo: Servo::new(settings), session, overtaken: 0, at_limit: false, events: Vec::new() }
+    }
+
+    /// Takes new settings.
+    pub fn configure(&mut self, settings: ServoSettings) {
+        let before = self.servo.settings().clone();
+        self.servo.configure(settings);
+        self.session.reconfigured(&before, &self.servo);
+    }
+
+    /// Takes the newest picture of the target.
+    pub fn measure(&mut self, measurement: Measurement, now: Duration) {
+        let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y));
+        self.session.see_background(shown, measurement.taken_at, now);
+        let actuator = self.session.actuator(&self.servo, now);
+        let overtakes = self.servo.is_behind();
+        let gain_scale = self.servo.measure(measurement, &actuator, now);
+        self.overtaken += u64::from(overtakes && self.servo.holds_target());
+        self.events.extend(gain_scale.map(LoopEvent::Oscillating));
+        self.events.extend(self.servo.take_found_inverted().then_some(LoopEvent::AxisInverted));
+    }
+
+    /// Forgets the target; the camera is to be stopped, whatever it does.
+    pub fn release(&mut self) {
+        self.servo.release();
+    }
+
+    /// What to send now, if anything.
+    pub fn next_request(&mut self, now: Duration) -> Next {
+        let next = self.session.next_request(&mut self.servo, now);
+        let at_limit = self.servo.at_limit();
+        if at_limit && !self.at_limit {
+            self.events.push(LoopEvent::AtLimit);
+        }
+        self.at_limit = at_limit;
+        next
+    }
+
+    /// Something is being sent.
+    pub fn sending(&mut self, request: &Request, now: Duration) {
+        self.session.sending(request, now);
+    }
+
+    /// The camera answered what was sent then, or did not.
+    pub fn on_response(
+        &mut self,
+        request: &Request,
+        response: Result<Response, Error>,
+        sent: Duration,
+        now: Duration,
+    ) {
+        self.session.on_response(request, response, &mut self.servo, (sent, now));
+    }
+
+    /// The answer is waited for no longer.
+    pub fn abandoned(&mut self, request: &Request, now: Duration) {
+        self.session.abandoned(request, &mut self.servo, now);
+    }
+
+    /// Whether there is something to do that a stop need not hurry for.
+    pub fn has_errand(&self, now: Duration) -> bool {
+        self.session.has_errand(&self.servo, now)
+    }
+
+    /// When the target will not have been seen for too long, where there is one.
+    pub fn stale_at(&self) -> Option<Duration> {
+        self.servo.stale_at()
+    }
+
+    /// Measurements that were overtaken before they could be steered by.
+    pub fn overtaken(&self) -> u64 {
+        self.overtaken
+    }
+
+    /// The servo, for what concerns it alone.
+    pub fn servo(&self) -> &Servo {
+        &self.servo
+    }
+
+    /// The session, for what concerns it alone.
+    pub fn session(&self) -> &Session {
+        &self.session
+    }
+
+    /// The session, for what concerns it alone.
+    pub fn session_mut(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// What ends the last move.
+    pub fn stop(&self) -> Command {
+        self.session.stop()
+    }
+
+    /// What happened since the last call.
+    pub fn take_events(&mut self) -> Vec<LoopEvent> {
+        self.events.extend(self.session.take_events().into_iter().map(LoopEvent::Session));
+        std::mem::take(&mut self.events)
+    }
+
+    /// The camera as it was learned.
+    pub fn estimates(&self) -> Estimates {
+        self.servo.estimates()
+    }
+
+    /// The camera as it is known.
+    pub fn status(&self, now: Duration) -> Status {
+        let (servo, session) = (&self.servo, &self.session);
+        let camera = servo.camera();
+        Status {
+            connected: session.is_connected(),
+            moving: !session.is_at_rest(),
+            taken_over: session.is_taken_over(now),
+            position: camera.position,
+            limits: camera.capabilities.limits,
+            rate: camera.history.rate_at(now),
+            fov_deg: servo.known_fov_deg(),
+            mode: Some(session.actuator(servo, now).mode),
+        }
+    }
+}

@@ -1,0 +1,256 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::mem;
+use std::time::Duration;
+
+use crate::Error;
+
+/// What became of the connection to the camera.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ConnectionChange {
+    /// It answers (again).
+    Connected,
+    /// It does not answer.
+    Disconnected(Error),
+    /// It answers, and refuses.
+    Refused(Error),
+}
+
+/// Judges the camera's answers: one report when a fault begins, one when it is over, and longer
+/// pauses in between. Faults that come and go are not reported each time.
+#[derive(Debug, Default)]
+pub struct Connection {
+    connected: bool,
+    fault: Option<Fault>,
+    /// When which kind was last reported.
+    told: Vec<(FaultKind, Duration)>,
+    pause: Duration,
+    retry_at: Duration,
+}
+
+#[derive(Debug)]
+struct Fault {
+    kind: FaultKind,
+    /// Met by a command: that queries are answered does not mend it.
+    of_command: bool,
+    /// The kinds of this fault already reported: a camera that reboots shows several, in any order.
+    reported: Vec<FaultKind>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FaultKind {
+    Silent,
+    Refusing,
+    /// Refusing, and to be asked rarely.
+    Forbidden,
+    /// Refusing, and to be asked nothing more.
+    LockedOut,
+}
+
+impl FaultKind {
+    fn of(err: &Error) -> Self {
+        match err {
+            err if err.is_final() => Self::LockedOut,
+            Error::NotPermitted { .. } => Self::Forbidden,
+            err if err.is_refusal() => Self::Refusing,
+            _ => Self::Silent,
+        }
+    }
+}
+
+impl Connection {
+    /// A single lost packet costs one or two commands at the usual rate; doubled with each failure.
+    const FIRST_PAUSE: Duration = Duration::from_millis(125);
+
+    /// Short enough for control to be back within two seconds of the camera's return.
+    const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+
+    /// What is not permitted is tried again no sooner than this: each time may count as a wrong login.
+    pub const RARELY: Duration = Duration::from_secs(60);
+
+    /// A fault that comes again within this time is reported only if it lasts longer.
+    const QUIET: Duration = Duration::from_secs(10);
+
+    /// What holds at any time.
+    pub fn check_invariants(&self) {
+        assert!(self.pause <= Self::LONGEST_PAUSE, "{self:?}");
+        assert!(self.fault.is_some() || self.retry_at.is_zero(), "a pause without a fault: {self:?}");
+    }
+
+    /// Nothing may be sent before.
+    pub fn retry_at(&self) -> Duration {
+        self.retry_at
+    }
+
+    /// Whether nothing may be sent until a setting changes.
+    pub fn halted(&self) -> bool {
+        self.fault.as_ref().is_some_and(|fault| fault.kind == FaultKind::LockedOut)
+    }
+
+    /// Whether the camera answers and does as it is told.
+    pub fn connected(&self) -> bool {
+        self.connected && self.fault.is_none()
+    }
+
+    /// Whether something is wrong.
+    pub fn faulty(&self) -> bool {
+        self.fault.is_some()
+    }
+
+    /// Something was answered as it should be. `idle`: no command is waiting, so that a query may
+    /// mend what a command met.
+    pub fn succeeded(&mut self, of_command: bool, idle: bool) -> Option<ConnectionChange> {
+        let mended = match &self.fault {
+            Some(fault) => of_command || !fault.of_command || (idle && fault.kind == FaultKind::Silent),
+            None => !self.connected,
+        };
+        if !mended {
+            return None;
+        }
+        let news = self.fault.as_ref().is_none_or(|fault| !fault.reported.is_empty());
+        *self = Self { connected: true, told: mem::take(&mut self.told), ..Self::default() };
+        news.then_some(ConnectionChange::Connected)
+    }
+
+    /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
+    pub fn failed(&mut self, err: &Error, of_command: bool, now: Duration) -> Option<ConnectionChange> {
+        self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
+        // Who has waited in vain has paused already; else silence would last longer than the camera's.
+        let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
+        let kind = FaultKind::of(err);
+        // But once: a server that restarts between challenge and answer refuses alike.
+        let again = self.fault.as_ref().is_some_and(|fault| fault.kind == kind);
+        let rarely = again && kind == FaultKind::Forbidden;
+        self.retry_at = now + if rarely { Self::RARELY } else { self.pause.saturating_sub(waited) };
+        let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
+        fault.kind = kind;
+        fault.of_command |= of_command;
+        let just_told = self.told.iter().any(|(told, at)| *told == kind && now < *at + Self::QUIET);
+        if just_told || fault.reported.contains(&kind) {
+            return None;
+        }
+        fault.reported.push(kind);
+        self.told.retain(|(told, _)| *told != kind);
+        self.told.push((kind, now));
+        Some(match kind {
+            FaultKind::Silent => ConnectionChange::Disconnected(err.clone()),
+            FaultKind::Refusing | FaultKind::Forbidden | FaultKind::LockedOut => {
+                ConnectionChange::Refused(err.clone())
+            }
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn broken() -> Error {
+        Error::Broken("reset".to_owned())
+    }
+
+    fn refused() -> Error {
+        Error::Camera("no".to_owned())
+    }
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    #[test]
+    fn a_fault_is_reported_once_and_so_is_its_end() {
+        let mut connection = Connection::default();
+        assert_eq!(connection.succeeded(false, true), Some(ConnectionChange::Connected));
+        assert_eq!(connection.succeeded(false, true), None);
+        assert_eq!(connection.failed(&broken(), true, ms(0)), Some(ConnectionChange::Disconnected(broken())));
+        assert_eq!(connection.failed(&Error::Timeout(ms(1)), true, ms(1)), None);
+        assert!(!connection.connected());
+        assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
+        let later = ms(60_000);
+        assert_eq!(connection.failed(&broken(), true, later), Some(ConnectionChange::Disconnected(broken())));
+    }
+
+    #[test]
+    fn a_link_that_comes_and_goes_is_no_flood_and_no_secret() {
+        let mut connection = Connection::default();
+        let mut reports = 0;
+        for second in 0..30 {
+            reports += usize::from(connection.failed(&broken(), true, ms(second * 1000)).is_some());
+            assert!(!connection.connected());
+            reports += usize::from(connection.succeeded(true, false).is_some());
+            assert!(connection.connected());
+        }
+        assert_eq!(reports, 6, "three times lost and found");
+        assert_eq!(connection.failed(&broken(), true, ms(29_500)), None);
+        assert!(connection.failed(&broken(), true, ms(30_500)).is_some(), "it lasts");
+    }
+
+    #[test]
+    fn pauses_grow_to_a_second() {
+        let mut connection = Connection::default();
+        let mut pauses = Vec::new();
+        for _ in 0..6 {
+            connection.failed(&broken(), true, ms(0));
+            pauses.push(connection.retry_at().as_millis());
+        }
+        assert_eq!(pauses, [125, 250, 500, 1000, 1000, 1000]);
+        connection.succeeded(true, false);
+        assert_eq!(connection.retry_at(), Duration::ZERO);
+    }
+
+    #[test]
+    fn a_wait_in_vain_was_pause_enough() {
+        let mut connection = Connection::default();
+        for _ in 0..6 {
+            connection.failed(&Error::Timeout(ms(2000)), true, ms(5000));
+            assert_eq!(connection.retry_at(), ms(5000));
+        }
+        connection.failed(&Error::Timeout(ms(100)), true, ms(5000));
+        assert_eq!(connection.retry_at(), ms(5900));
+    }
+
+    #[test]
+    fn what_is_not_permitted_is_tried_once_more_and_then_rarely() {
+        let mut connection = Connection::default();
+        connection.succeeded(false, true);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(
+            connection.failed(&forbidden, true, ms(0)),
+            Some(ConnectionChange::Refused(forbidden.clone()))
+        );
+        assert_eq!(connection.retry_at(), Connection::FIRST_PAUSE);
+        for time in [ms(125), ms(60_125), ms(120_125)] {
+            assert_eq!(connection.failed(&forbidden, true, time), None);
+            assert_eq!(connection.retry_at(), time + Connection::RARELY);
+        }
+        assert!(!connection.halted());
+        assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
+        assert_eq!(connection.retry_at(), Duration::ZERO);
+    }
+
+    #[test]
+    fn answered_queries_do_not_mend_a_refused_command() {
+        let mut connection = Connection::default();
+        connection.failed(&refused(), true, ms(0));
+        assert_eq!(connection.succeeded(false, true), None);
+        assert_eq!(connection.failed(&refused(), true, ms(1)), None);
+        assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
+    }
+
+    #[test]
+    fn with_nothing_to_command_a_query_shows_that_the_camera_is_back() {
+        let mut connection = Connection::default();
+        connection.failed(&broken(), true, ms(0));
+        assert_eq!(connection.succeeded(false, false), None);
+        assert_eq!(connection.succeeded(false, true), Some(ConnectionChange::Connected));
+    }
+
+    #[test]
+    fn wrong_credentials_halt_and_are_reported_beside_an_outage() {
+        let mut connection = Connection::default();
+        connection.failed(&broken(), false, ms(0));
+        let wrong = Error::BadCredentials { user: "root".to_owned() };
+        assert_eq!(connection.failed(&wrong, false, ms(1)), Some(ConnectionChange::Refused(wrong)));
+        assert!(connection.halted());
+    }
+}

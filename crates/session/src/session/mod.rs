@@ -1,0 +1,224 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The session with one camera: who may move it, what to ask and say next, what its answers mean. Sees no picture: what
+//! the camera is to do it is told by the [`Servo`].
+//!
+//! ```text
+//! Actuation ─ Session ─ next_request ─▶ Request ─▶ (client) ─▶ Response ─ on_response ─ Session ─▶ Servo
+//! ```
+
+mod arbitration;
+mod connection;
+mod control_queue;
+mod description;
+mod discovery;
+mod mode_support;
+mod operator;
+mod requests;
+mod responses;
+mod scheduler;
+mod stop_confirmation;
+
+pub use arbitration::ControlOwner;
+pub use connection::ConnectionChange;
+
+use std::mem;
+use std::time::Duration;
+
+use arbitration::Arbitration;
+use connection::Connection;
+use description::Description;
+use discovery::Discovery;
+use mode_support::ModeSupport;
+use scheduler::Scheduler;
+use servo::{Access, ActuatorStatus, Mode, Servo, ServoSettings};
+use stop_confirmation::{StopConfirmation, StopFinding};
+
+use crate::{Command, Protocol, SessionEvent};
+
+/// A camera that did not answer a move is not expected to act on it later than this.
+pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
+
+/// Speaks with one camera for a servo: says what to send, hears what is answered. Sends nothing itself, and has no
+/// clock: both are the caller's.
+#[derive(Debug)]
+pub struct Session {
+    connection: Connection,
+    discovery: Discovery,
+    description: Description,
+    scheduler: Scheduler,
+    arbitration: Arbitration,
+    modes: ModeSupport,
+    /// Of a camera whose yes to a stop is not to be trusted.
+    stop_confirmation: Option<StopConfirmation>,
+    /// When to ask next where the camera looks.
+    next_poll: Duration,
+    /// When the camera last answered a question, or did not.
+    asked_at: Duration,
+    /// It was told that the limits cannot be kept.
+    limits_unkept: bool,
+    events: Vec<SessionEvent>,
+}
+
+impl Session {
+    /// Knows nothing of the camera yet, which is to be moved like this and speaks this protocol.
+    pub fn new(mode: Mode, protocol: &Protocol) -> Self {
+        Self {
+            connection: Connection::default(),
+            discovery: Discovery::new(protocol.questions),
+            description: Description::default(),
+            scheduler: Scheduler::new(protocol.keep_alive),
+            arbitration: Arbitration::new(protocol.has_control_queue),
+            modes: ModeSupport::new(mode),
+            stop_confirmation: protocol.confirms_stops.then(StopConfirmation::default),
+            next_poll: Duration::ZERO,
+            asked_at: Duration::ZERO,
+            limits_unkept: false,
+            events: Vec::new(),
+        }
+    }
+
+    /// The servo has taken new settings in place of these.
+    pub fn reconfigured(&mut self, before: &ServoSettings, servo: &Servo) {
+        let now = servo.settings();
+        if now.mode != before.mode {
+            self.modes.want(now.mode);
+        }
+        if now.limits != before.limits {
+            self.judge_limits(servo);
+        }
+    }
+
+    /// The camera may be asked anew: who we are has changed.
+    pub fn credentials_changed(&mut self) {
+        self.connection = Connection::default();
+        self.discovery.renew();
+        self.arbitration.queue.permitted();
+        self.next_poll = Duration::ZERO;
+    }
+
+    /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.
+    pub fn parting_stop(&self) -> Option<Command> {
+        let is_heard = !self.connection.halted() && !self.arbitration.queue.is_deaf();
+        (is_heard && !self.is_at_rest()).then_some(self.stop())
+    }
+
+    /// A predecessor left the camera in a move that this ends.
+    pub fn inherit(&mut self, stop: Command, now: Duration) {
+        self.scheduler.inherited(stop, now);
+    }
+
+    /// What ends the last move.
+    pub fn stop(&self) -> Command {
+        self.scheduler.stop()
+    }
+
+    /// It is the end: with the stop, what is ours is given back.
+    pub fn leave(&mut self) {
+        self.arbitration.queue.leave();
+    }
+
+    /// A picture shows the background to move so many fields of view a second, or does not tell: whether a camera that said
+    /// yes to a stop has stopped. Nothing else of a picture matters here.
+    pub fn see_background(&mut self, fields_s: Option<f64>, taken_at: Duration, now: Duration) {
+        let is_ours = self.is_at_rest() && !self.is_taken_over(now);
+        let Some(confirmation) = self.stop_confirmation.as_mut().filter(|_| is_ours) else { return };
+        let finding = confirmation.see(fields_s, taken_at);
+        if finding == StopFinding::RepeatInVain {
+            self.events.push(SessionEvent::StopInVain);
+        }
+        if finding != StopFinding::Fine {
+            self.scheduler.found_moving(self.scheduler.stop());
+        }
+    }
+
+    /// A stop that no picture tells of is repeated.
+    fn repeat_unseen_stop(&mut self, now: Duration) {
+        let is_at_rest = self.is_at_rest();
+        let due = |confirmation: &&mut StopConfirmation| confirmation.unseen_at().is_some_and(|at| at <= now);
+        if let Some(confirmation) = self.stop_confirmation.as_mut().filter(due).filter(|_| is_at_rest) {
+            confirmation.repeat_unseen();
+            self.scheduler.found_moving(self.scheduler.stop());
+        }
+    }
+
+    /// What the servo is to know of the camera.
+    pub fn actuator(&self, servo: &Servo, now: Duration) -> ActuatorStatus {
+        ActuatorStatus {
+            access: self.access(now),
+            mode: self.mode(servo, now),
+            may_move: self.scheduler.may_move(),
+            in_doubt: self.scheduler.in_doubt(),
+            interval: min_interval(servo).max(self.scheduler.round_trip()),
+        }
+    }
+
+    fn access(&self, now: Duration) -> Access {
+        if self.arbitration.owner(now).is_some() {
+            Access::Others
+        } else if self.arbitration.is_ours(now) {
+            Access::Ours
+        } else {
+            Access::Undecided
+        }
+    }
+
+    /// How to move the camera: as is set, if it takes that.
+    fn mode(&self, servo: &Servo, now: Duration) -> Mode {
+        self.modes.choose(servo.settings().mode, servo.camera().pan_tilt().is_some(), now)
+    }
+
+    /// Whether the camera does not move on our behalf, as far as can be known.
+    pub fn is_at_rest(&self) -> bool {
+        !self.scheduler.may_move()
+    }
+
+    /// Whether it rests for good: nothing that went unanswered can set it going any more.
+    pub fn stays_at_rest(&self) -> bool {
+        self.is_at_rest() && !self.scheduler.in_doubt()
+    }
+
+    /// Whether it may yet act on a move that went unanswered.
+    pub fn in_doubt(&self) -> bool {
+        self.scheduler.in_doubt()
+    }
+
+    /// Whether the camera counts on hearing from us.
+    pub fn is_queued(&self) -> bool {
+        self.arbitration.queue.is_in()
+    }
+
+    /// Whether the camera answers and does as it is told.
+    pub fn is_connected(&self) -> bool {
+        self.connection.connected()
+    }
+
+    /// Whether somebody else moves the camera.
+    pub fn is_taken_over(&self, now: Duration) -> bool {
+        self.arbitration.owner(now).is_some()
+    }
+
+    /// Whether nothing may be sent until a setting changes.
+    pub fn halted(&self) -> bool {
+        self.connection.halted()
+    }
+
+    /// What holds whatever the camera and its users do; asked after every step where debug assertions are on.
+    pub fn check_invariants(&self) {
+        self.connection.check_invariants();
+        self.discovery.check_invariants();
+        self.scheduler.check_invariants();
+        self.arbitration.check_invariants();
+        self.modes.check_invariants();
+    }
+
+    /// What happened since the last call.
+    pub fn take_events(&mut self) -> Vec<SessionEvent> {
+        mem::take(&mut self.events)
+    }
+}
+
+/// From one command to the next, at least.
+fn min_interval(servo: &Servo) -> Duration {
+    Duration::from_secs_f64(1.0 / servo.settings().max_rate_hz)
+}

@@ -1,0 +1,141 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::time::Duration;
+
+/// Whether a camera that was told to stop, and said yes, is seen to do so: some say yes and turn on.
+#[derive(Debug, Default)]
+pub struct StopConfirmation {
+    /// When it last said yes, until it was seen at rest.
+    since: Option<Duration>,
+    /// Pictures in a row that showed it to turn since.
+    turning: u32,
+    /// How often it was told again.
+    repeated: u32,
+}
+
+/// What is to be done about a stop.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StopFinding {
+    /// Nothing.
+    Fine,
+    /// The camera is to be told again.
+    Repeat,
+    /// The same, and somebody is to know that it was told often enough.
+    RepeatInVain,
+}
+
+impl StopConfirmation {
+    /// By then a stop shows in the picture, whatever the latency is.
+    const SHOWN_AFTER: Duration = Duration::from_millis(1200);
+
+    /// A stop that no picture tells of by then is repeated, once.
+    const UNSEEN_AFTER: Duration = Duration::from_secs(3);
+
+    /// Pictures that have to agree.
+    const PICTURES: u32 = 5;
+
+    /// What a background at rest seems to move in a second, in fields of view.
+    const NOISE_FIELDS_S: f64 = 0.02;
+
+    /// After so many stops in vain somebody is to know; and after twice as many it may be somebody else who moves it.
+    const IN_VAIN: u32 = 3;
+
+    /// The camera accepted a stop.
+    pub fn stopped(&mut self, now: Duration) {
+        if self.repeated < 2 * Self::IN_VAIN {
+            (self.since, self.turning) = (Some(now), 0);
+        }
+    }
+
+    /// It is being moved.
+    pub fn moved(&mut self) {
+        *self = Self::default();
+    }
+
+    /// A picture shows the background to move so many fields of view a second, or does not tell.
+    pub fn see(&mut self, fields_s: Option<f64>, taken_at: Duration) -> StopFinding {
+        let Some((since, fields_s)) = self.since.zip(fields_s) else { return StopFinding::Fine };
+        if taken_at < since + Self::SHOWN_AFTER {
+            return StopFinding::Fine;
+        }
+        if fields_s <= Self::NOISE_FIELDS_S {
+            *self = Self::default();
+            return StopFinding::Fine;
+        }
+        self.turning += 1;
+        if self.turning < Self::PICTURES {
+            return StopFinding::Fine;
+        }
+        (self.since, self.repeated) = (None, self.repeated + 1);
+        if self.repeated == Self::IN_VAIN { StopFinding::RepeatInVain } else { StopFinding::Repeat }
+    }
+
+    /// When the stop is to be repeated if no picture tells of it by then.
+    pub fn unseen_at(&self) -> Option<Duration> {
+        self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + Self::UNSEEN_AFTER)
+    }
+
+    /// It is being repeated for that.
+    pub fn repeat_unseen(&mut self) {
+        (self.since, self.repeated) = (None, 1);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    /// What comes of pictures from then on that all show this.
+    fn pictures(confirmation: &mut StopConfirmation, from: u64, fields_s: f64) -> Vec<StopFinding> {
+        (0..6).map(|picture| confirmation.see(Some(fields_s), ms(from + 40 * picture))).collect()
+    }
+
+    #[test]
+    fn a_camera_seen_at_rest_is_told_once() {
+        let mut confirmation = StopConfirmation::default();
+        confirmation.stopped(ms(1000));
+        assert!(
+            !pictures(&mut confirmation, 1100, 0.5).contains(&StopFinding::Repeat),
+            "it is still old news"
+        );
+        pictures(&mut confirmation, 2300, 0.01);
+        assert!(
+            !pictures(&mut confirmation, 3000, 0.5).contains(&StopFinding::Repeat),
+            "somebody else moves it"
+        );
+        assert_eq!(confirmation.unseen_at(), None);
+    }
+
+    #[test]
+    fn one_that_turns_on_is_told_again_but_not_for_ever() {
+        let mut confirmation = StopConfirmation::default();
+        let mut told = Vec::new();
+        for round in 0..20 {
+            let at = 10_000 * round;
+            confirmation.stopped(ms(at));
+            told.extend(
+                pictures(&mut confirmation, at + 1300, 0.3).into_iter().filter(|it| *it != StopFinding::Fine),
+            );
+        }
+        assert_eq!(told.len(), 6);
+        assert_eq!(told.iter().position(|it| *it == StopFinding::RepeatInVain), Some(2));
+        confirmation.moved();
+        confirmation.stopped(ms(1_000_000));
+        assert!(pictures(&mut confirmation, 1_001_300, 0.3).contains(&StopFinding::Repeat));
+    }
+
+    #[test]
+    fn a_stop_that_no_picture_tells_of_is_repeated_once() {
+        let mut confirmation = StopConfirmation::default();
+        confirmation.stopped(ms(1000));
+        assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Fine);
+        assert_eq!(confirmation.unseen_at(), Some(ms(4000)));
+        confirmation.repeat_unseen();
+        confirmation.stopped(ms(4000));
+        assert_eq!(confirmation.unseen_at(), None);
+    }
+}

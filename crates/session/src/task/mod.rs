@@ -1,0 +1,434 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
+
+mod clock;
+mod dead_man;
+mod mailbox;
+mod outbox;
+mod state;
+mod statistics;
+
+use std::cell::Cell;
+use std::pin::pin;
+use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::{Arc, Mutex, Weak};
+use std::time::{Duration, Instant};
+
+use once_cell::sync::OnceCell;
+use tokio::runtime::{Builder, Runtime};
+
+pub use self::clock::Clock;
+pub use self::dead_man::DeadManState;
+pub use self::mailbox::Mailbox;
+pub use self::outbox::Outbox;
+pub use self::statistics::Statistics;
+
+use self::dead_man::DeadMan;
+use self::state::TaskState;
+
+use crate::http::{ClientSettings, Credentials, Location};
+use crate::watchdog::{StopOrder, Unavailable, Watchdog};
+use crate::{Client, Command, ControlLoop, Error, LoopEvent, Next, Request, Status};
+use ptztrack_contract::lock::lock;
+use servo::ServoSettings;
+
+/// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
+pub const STOP_GRACE: Duration = Duration::from_millis(500);
+
+/// At the end the camera's yes to its stop is waited for this long.
+pub const FINISH_BUDGET: Duration = Duration::from_secs(2);
+
+/// A stop that was not confirmed by then goes on being tried for this long, with nobody waiting: the network may
+/// come back.
+pub const LAST_RETRIES: Duration = Duration::from_secs(60);
+
+/// Something the element tells the world.
+#[derive(Debug)]
+pub enum Event {
+    /// An exchange is over.
+    Exchanged {
+        /// What was sent.
+        request: Request,
+        /// Why it was in vain, where it was.
+        failure: Option<Error>,
+        /// From sending it to the answer, or to its end.
+        round_trip: Duration,
+    },
+    /// The control loop has something to say.
+    Loop(LoopEvent),
+    /// The camera is known to be otherwise than before.
+    Status(Status),
+    /// The end has come, and the camera has not confirmed its stop in time.
+    GaveUp {
+        /// Whether nothing more may be sent either.
+        halted: bool,
+    },
+    /// A camera that moves goes on where this process dies: there is no watchdog.
+    NoWatchdog(Unavailable),
+    /// The camera cannot be spoken to as others can, and what that means.
+    Warning(String),
+    /// The camera task itself broke.
+    Died(String),
+    /// Nothing is left to be done at this time; this one waits until that, and all before it, is told.
+    Settled(Arc<SyncSender<()>>),
+}
+
+thread_local! {
+    static IS_OURS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Waits for the camera task to answer; but not in the plugin's own thread, where nobody would: what is
+/// posted from there may make an application change the state, or drop the last reference, right there.
+pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
+    !IS_OURS.get() && answer.recv_timeout(longest).is_ok()
+}
+
+/// Threads that talk to cameras.
+const WORKERS: usize = 2;
+
+/// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
+const LAST_RETRIES_PAUSE: Duration = Duration::from_secs(1);
+
+/// A running camera task; dropping it stops the camera and ends the camera task, and waits for that within bounds.
+#[derive(Debug)]
+pub struct CameraTask {
+    camera: (Location, String),
+    mailbox: Arc<Mailbox>,
+    statistics: Arc<Mutex<Statistics>>,
+    /// When the camera was last asked to rest, while it is to.
+    paused_at: Mutex<Option<Instant>>,
+}
+
+/// What is left of a camera task that was dropped: it may outlive its time in order to stop the camera.
+#[derive(Debug)]
+pub struct Predecessor {
+    camera: (Location, String),
+    mailbox: Weak<Mailbox>,
+    statistics: Arc<Mutex<Statistics>>,
+}
+
+impl CameraTask {
+    /// Starts; connecting happens in the background. `observer` is called from the camera task's thread.
+    ///
+    /// # Errors
+    /// What keeps the client or the runtime from being made, in words.
+    pub fn start<C: Client>(
+        client: ClientSettings,
+        servo: ServoSettings,
+        clock: Clock,
+        watchdog: Option<Arc<Watchdog>>,
+        observer: impl Fn(Event) + Clone + Send + Sync + 'static,
+    ) -> Result<Self, String> {
+        let camera = (client.location.clone(), client.channel.clone());
+        let settings = Arc::new(Mutex::new(client.clone()));
+        let client = C::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
+        let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
+        let mailbox = Arc::new(Mailbox::new(clock));
+        let control = ControlLoop::new(servo, &C::PROTOCOL);
+        let (status, estimates, stop) =
+            (control.status(Duration::ZERO), Some(control.estimates()), Some(control.stop()));
+        let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
+        let statistics = Arc::new(Mutex::new(statistics));
+        let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
+        let task = Task {
+            client,
+            settings: settings.clone(),
+            dead_man: DeadMan::new(watchdog),
+            state,
+            former: None,
+            move_waits: false,
+        };
+        let running = runtime.spawn(task.run());
+        let task = Self { camera, mailbox, statistics, paused_at: Mutex::default() };
+        let predecessor = task.predecessor();
+        let mailbox = task.mailbox.clone();
+        runtime.spawn(async move {
+            if let Err(err) = running.await {
+                mailbox.close();
+                observer(Event::Died(err.to_string()));
+                let settings = lock(&settings).clone();
+                predecessor.stop::<C>(settings, &mailbox).await;
+            }
+        });
+        Ok(task)
+    }
+
+    /// Where to leave things for it.
+    pub fn mailbox(&self) -> &Mailbox {
+        &self.mailbox
+    }
+
+    /// Has the camera stopped, and moved no more; waits for nothing.
+    pub fn pause(&self) {
+        self.mailbox.accept_measurements(false);
+        *lock(&self.paused_at) = Some(Instant::now());
+        // Waited for when the task is dropped.
+        drop(self.mailbox.rest());
+    }
+
+    /// The camera may be moved.
+    pub fn play(&self) {
+        *lock(&self.paused_at) = None;
+        self.mailbox.accept_measurements(true);
+    }
+
+    /// What will be left of it.
+    pub fn predecessor(&self) -> Predecessor {
+        Predecessor {
+            camera: self.camera.clone(),
+            mailbox: Arc::downgrade(&self.mailbox),
+            statistics: self.statistics.clone(),
+        }
+    }
+
+    /// Sees to the camera in place of one that was dropped, if it is the same camera; returns whether it is.
+    pub fn succeed(&self, predecessor: &Predecessor) -> bool {
+        if predecessor.camera != self.camera {
+            return false;
+        }
+        if let Some(mailbox) = predecessor.mailbox.upgrade() {
+            mailbox.quit();
+        }
+        if let Some(stop) = predecessor.unconfirmed_stop() {
+            self.mailbox.inherit(stop);
+        }
+        true
+    }
+
+    /// The numbers so far.
+    pub fn statistics(&self) -> Statistics {
+        lock(&self.statistics).clone()
+    }
+}
+
+impl Predecessor {
+    /// Whether there is nothing left to do.
+    pub fn is_void(&self) -> bool {
+        self.unconfirmed_stop().is_none() && self.mailbox.strong_count() == 0
+    }
+
+    fn unconfirmed_stop(&self) -> Option<Command> {
+        let statistics = lock(&self.statistics);
+        statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
+    }
+
+    /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
+    async fn stop<C: Client>(&self, settings: ClientSettings, mailbox: &Mailbox) {
+        let Ok(mut client) = C::new(settings) else { return };
+        let stop = {
+            let mut statistics = lock(&self.statistics);
+            // For whoever comes next, until it is known better.
+            statistics.status.moving = true;
+            statistics.stop.unwrap_or(Command::Stop)
+        };
+        let tries = async {
+            while !mailbox.take().quit {
+                match client.exchange(&Request::Command(stop)).await {
+                    Ok(_) => {
+                        lock(&self.statistics).status.moving = false;
+                        break;
+                    }
+                    Err(err) if err.is_final() => break,
+                    Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
+                }
+            }
+        };
+        // Whoever cannot be stopped by then is not to be by us.
+        let _ = tokio::time::timeout(LAST_RETRIES, tries).await;
+    }
+}
+
+impl Drop for CameraTask {
+    fn drop(&mut self) {
+        // Of many that were paused together each has waited while the first one was waited for.
+        let waited = lock(&self.paused_at).map_or(Duration::ZERO, |since| since.elapsed());
+        let left = FINISH_BUDGET.saturating_sub(waited);
+        // Whether the camera came to rest the camera task itself reports, and when that time is over.
+        wait_for(&self.mailbox.finish(left), left + STOP_GRACE);
+    }
+}
+
+/// The plugin's own threads, for all elements, made when first needed; several, so that one that is kept busy delays no
+/// other camera's stop. Never waited for with
+/// `block_on`: the caller may be inside an application's own runtime.
+pub fn runtime() -> Result<&'static Runtime, std::io::Error> {
+    static RUNTIME: OnceCell<Runtime> = OnceCell::new();
+    RUNTIME.get_or_try_init(|| {
+        let mut builder = Builder::new_multi_thread();
+        builder.worker_threads(WORKERS).thread_name("ptz-camera").on_thread_start(|| IS_OURS.set(true));
+        builder.enable_all().build()
+    })
+}
+
+struct Task<C, O> {
+    client: C,
+    /// For whoever must finish what the task has begun.
+    settings: Arc<Mutex<ClientSettings>>,
+    dead_man: DeadMan,
+    state: TaskState<O>,
+    /// Who we were when the camera last moved, where it has not confirmed a stop since.
+    former: Option<Option<Credentials>>,
+    /// A move waits until it is known whether the watchdog would end it.
+    move_waits: bool,
+}
+
+impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
+    async fn run(mut self) {
+        let missing = self.dead_man.check();
+        self.state.tell_dead_man(self.dead_man.state(), missing);
+        loop {
+            self.state.take_mail();
+            self.state.check_deadline();
+            if self.state.credentials.is_some() {
+                self.change_credentials().await;
+            }
+            self.fall_back();
+            self.keep_lease();
+            self.state.publish();
+            if self.state.is_over() {
+                break;
+            }
+            let now = self.state.mailbox.now();
+            match self.state.control.next_request(now) {
+                Next::Do(request) if self.awaits_lease(&request) => {
+                    self.wait(self.state.control.stale_at()).await;
+                }
+                Next::Do(request) => {
+                    self.perform(request).await;
+                    self.state.warn(self.client.take_warning());
+                }
+                Next::Wait(until) => {
+                    self.state.tell_settled();
+                    self.wait(until).await;
+                }
+            }
+        }
+        self.state.give_up();
+    }
+
+    /// Until something comes up, or this time.
+    async fn wait(&self, until: Option<Duration>) {
+        let until = until.into_iter().chain(self.state.deadline).min();
+        tokio::select! {
+            () = self.state.mailbox.arrived() => {}
+            () = self.state.mailbox.sleep_until(until) => {}
+            () = self.dead_man.due() => {}
+        }
+    }
+
+    /// For as long as the camera may move on our behalf, or is to, the watchdog is to stop it where we cannot.
+    fn keep_lease(&mut self) {
+        let Self { client, dead_man, state, move_waits, .. } = self;
+        let in_doubt = state.control.session().in_doubt();
+        if !std::mem::take(move_waits) {
+            if !state.is_ours_to_stop() {
+                dead_man.release();
+            } else if dead_man.is_outdated(in_doubt) {
+                let (identity, command) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, command, in_doubt });
+            }
+        }
+        state.keep_dead_man(dead_man);
+    }
+
+    /// Whether this would set a camera going that nobody is known to stop yet. One that moves is not left to itself for that.
+    fn awaits_lease(&mut self, request: &Request) -> bool {
+        let Self { client, dead_man, state, move_waits, .. } = self;
+        if is_move(request) && state.control.session().is_at_rest() {
+            if dead_man.is_outdated(true) {
+                let (identity, command) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, command, in_doubt: true });
+            }
+            state.keep_dead_man(dead_man);
+            *move_waits = dead_man.is_awaited();
+        }
+        *move_waits
+    }
+
+    /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
+    /// may it answer.
+    async fn change_credentials(&mut self) {
+        if let Some(stop) = self.state.control.session().parting_stop() {
+            self.perform(Request::Command(stop)).await;
+            // A password often follows on the user's heels.
+            self.state.take_mail();
+        }
+        if let Some(credentials) = self.state.credentials.take() {
+            self.former.get_or_insert(lock(&self.settings).credentials.clone());
+            self.become_known_as(credentials);
+        }
+    }
+
+    /// Where the camera refuses us, but moves at our word: then we are again who it knew.
+    fn fall_back(&mut self) {
+        let session = self.state.control.session();
+        if session.stays_at_rest() {
+            self.former = None;
+        } else if session.halted()
+            && let Some(former) = self.former.take()
+        {
+            self.become_known_as(former);
+        }
+    }
+
+    fn become_known_as(&mut self, credentials: Option<Credentials>) {
+        lock(&self.settings).credentials.clone_from(&credentials);
+        self.client.set_credentials(credentials);
+        self.state.control.session_mut().credentials_changed();
+    }
+
+    /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
+    async fn perform(&mut self, request: Request) {
+        let Self { client, dead_man, state, .. } = self;
+        let mailbox = state.mailbox.clone();
+        let sent = mailbox.now();
+        state.control.sending(&request, sent);
+        let stop = state.control.stop();
+        lock(&state.statistics).stop = Some(stop);
+        if is_move(&request) {
+            dead_man.hold(StopOrder { identity: client.identity(), command: stop, in_doubt: true });
+            state.keep_dead_man(dead_man);
+        }
+        let mut exchange = pin!(client.exchange(&request));
+        let mut give_up_at = None;
+        loop {
+            let now = mailbox.now();
+            give_up_at = state.give_up_at(&request, give_up_at, now);
+            if state.is_in_vain(&request, now) || give_up_at.is_some_and(|at| at <= now) {
+                return state.abandoned(&request, sent);
+            }
+            let stale_at = state.control.stale_at().filter(|at| *at > now);
+            let until = [give_up_at, stale_at, state.deadline].into_iter().flatten().min();
+            tokio::select! {
+                biased;
+                answer = &mut exchange => return state.answered(&request, answer, sent),
+                () = mailbox.arrived() => state.take_mail(),
+                () = mailbox.sleep_until(until) => {}
+                () = dead_man.due() => state.keep_dead_man(dead_man),
+            }
+        }
+    }
+}
+
+fn is_move(request: &Request) -> bool {
+    matches!(request, Request::Command(command) if !command.is_stop())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Whoever comes next stops the camera again.
+    #[test]
+    fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
+        let camera = (Location::parse("http://192.168.0.90").unwrap().0, String::new());
+        for may_yet_move in [true, false] {
+            let stop = Some(Command::Halt);
+            let statistics = Arc::new(Mutex::new(Statistics { stop, may_yet_move, ..Statistics::default() }));
+            let predecessor = Predecessor { camera: camera.clone(), mailbox: Weak::new(), statistics };
+            assert_eq!(predecessor.unconfirmed_stop().is_some(), may_yet_move);
+            assert_eq!(predecessor.is_void(), !may_yet_move);
+        }
+    }
+}

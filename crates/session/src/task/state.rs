@@ -1,0 +1,406 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What the camera's task does between two exchanges: takes what came in, keeps count, reports changes.
+
+use std::mem;
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use super::dead_man::DeadMan;
+use super::mailbox::{Mail, Mailbox};
+use super::{DeadManState, Event, LAST_RETRIES, STOP_GRACE, Statistics};
+use crate::http::Credentials;
+use crate::watchdog::Unavailable;
+use crate::{ControlLoop, Error, Request, Response, Status};
+use ptztrack_contract::lock::lock;
+
+/// Everything but the client, which is lent out while a request is in flight.
+pub struct TaskState<O> {
+    pub control: ControlLoop,
+    pub mailbox: Arc<Mailbox>,
+    pub statistics: Arc<Mutex<Statistics>>,
+    observer: O,
+    last_status: Status,
+    pub credentials: Option<Option<Credentials>>,
+    waiting: Vec<SyncSender<()>>,
+    settling: Vec<Arc<SyncSender<()>>>,
+    /// The end, once it has been asked for.
+    pub deadline: Option<Duration>,
+    /// Nobody waits any more.
+    gave_up: bool,
+}
+
+impl<O: Fn(Event)> TaskState<O> {
+    /// Nothing has come in yet.
+    pub fn new(
+        control: ControlLoop,
+        mailbox: Arc<Mailbox>,
+        statistics: Arc<Mutex<Statistics>>,
+        observer: O,
+    ) -> Self {
+        Self {
+            control,
+            mailbox,
+            statistics,
+            observer,
+            last_status: Status::default(),
+            credentials: None,
+            waiting: Vec::new(),
+            settling: Vec::new(),
+            deadline: None,
+            gave_up: false,
+        }
+    }
+
+    /// Whether the end has come: at rest for good, out of time, or with no right to speak.
+    pub fn is_over(&self) -> bool {
+        self.deadline.is_some_and(|deadline| {
+            let done = self.control.session().stays_at_rest() && !self.control.session().is_queued();
+            done || self.control.session().halted() || deadline <= self.mailbox.now()
+        })
+    }
+
+    /// When the time for a confirmed stop is over, nobody waits for it any more; it is retried for a while.
+    pub fn check_deadline(&mut self) {
+        let now = self.mailbox.now();
+        if !self.gave_up && self.deadline.is_some_and(|deadline| deadline <= now) {
+            self.give_up();
+            self.deadline = Some(now + LAST_RETRIES);
+        }
+    }
+
+    pub fn give_up(&mut self) {
+        if !mem::replace(&mut self.gave_up, true) && !self.control.session().is_at_rest() {
+            (self.observer)(Event::GaveUp { halted: self.control.session().halted() });
+        }
+        self.waiting.clear();
+    }
+
+    pub fn take_mail(&mut self) {
+        let Mail { credentials, servo, orphan, rest, measurement, waiting, settling, finish, quit } =
+            self.mailbox.take();
+        let now = self.mailbox.now();
+        self.credentials = credentials.or(self.credentials.take());
+        if let Some(servo) = servo {
+            self.control.configure(servo);
+        }
+        if let Some(stop) = orphan {
+            self.control.session_mut().inherit(stop, now);
+        }
+        if rest {
+            self.control.release();
+        }
+        if let Some(within) = finish {
+            self.deadline.get_or_insert(now + within);
+            self.control.session_mut().leave();
+        }
+        if quit {
+            (self.deadline, self.gave_up) = (Some(now), true);
+        }
+        if let Some(measurement) = measurement.filter(|_| self.deadline.is_none()) {
+            self.control.measure(measurement, now);
+        }
+        self.waiting.extend(waiting);
+        self.settling.extend(settling);
+    }
+
+    /// Whether a camera that moves does so at our word, and would hear our stop.
+    pub fn is_ours_to_stop(&self) -> bool {
+        let session = self.control.session();
+        !session.stays_at_rest() && !session.halted() && !session.is_taken_over(self.mailbox.now())
+    }
+
+    /// Has the watchdog go on, where it is to stop the camera, and tells how it stands with it.
+    pub fn keep_dead_man(&self, dead_man: &mut DeadMan) {
+        let missing = dead_man.keep();
+        self.tell_dead_man(dead_man.state(), missing);
+    }
+
+    /// How it stands with the watchdog, and whether it is missing since just now.
+    pub fn tell_dead_man(&self, dead_man: DeadManState, missing: Option<Unavailable>) {
+        lock(&self.statistics).dead_man = dead_man;
+        if let Some(missing) = missing {
+            (self.observer)(Event::NoWatchdog(missing));
+        }
+    }
+
+    /// Has the user told what the camera cannot do.
+    pub fn warn(&self, warning: Option<String>) {
+        if let Some(warning) = warning {
+            (self.observer)(Event::Warning(warning));
+        }
+    }
+
+    /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
+    pub fn is_in_vain(&mut self, request: &Request, now: Duration) -> bool {
+        match request {
+            Request::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
+            Request::Query(_) => {
+                self.tell_rest();
+                self.is_over()
+            }
+        }
+    }
+
+    /// When to abandon what is in flight for a stop that waits behind it, after what was said of that before: a stop
+    /// that is not due any more hurries nobody.
+    pub fn give_up_at(&self, request: &Request, before: Option<Duration>, now: Duration) -> Option<Duration> {
+        self.stop_waits_behind(request, now).then(|| before.unwrap_or(now + STOP_GRACE))
+    }
+
+    /// Whether something else than a stop is in flight while a stop is what the camera needs.
+    fn stop_waits_behind(&self, request: &Request, now: Duration) -> bool {
+        let may_move = match request {
+            Request::Command(command) => !command.is_stop(),
+            Request::Query(_) => !self.control.session().is_at_rest(),
+        };
+        may_move && !self.control.has_errand(now)
+    }
+
+    pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Duration) {
+        let now = self.mailbox.now();
+        self.count(request, answer.as_ref().err().cloned(), now.saturating_sub(sent));
+        self.control.on_response(request, answer, sent, now);
+    }
+
+    pub fn abandoned(&mut self, request: &Request, sent: Duration) {
+        let now = self.mailbox.now();
+        let waited = now.saturating_sub(sent);
+        self.count(request, Some(Error::Timeout(waited)), waited);
+        self.control.abandoned(request, now);
+    }
+
+    fn count(&self, request: &Request, failure: Option<Error>, round_trip: Duration) {
+        {
+            let mut statistics = lock(&self.statistics);
+            if let Some(err) = &failure {
+                statistics.last_error = Some(err.to_string());
+            }
+            match (request, &failure) {
+                (Request::Query(_), _) => {}
+                (Request::Command(_), Some(_)) => statistics.failed += 1,
+                (Request::Command(_), None) => statistics.succeeded(round_trip),
+            }
+        }
+        (self.observer)(Event::Exchanged { request: *request, failure, round_trip });
+    }
+
+    /// Tells what has changed: reports and status; and those who wait for rest.
+    pub fn publish(&mut self) {
+        let status = self.control.status(self.mailbox.now());
+        let (estimates, stop) = (Some(self.control.estimates()), Some(self.control.stop()));
+        let (may_yet_move, halted) =
+            (!self.control.session().stays_at_rest(), self.control.session().halted());
+        let coalesced = self.control.overtaken() + self.mailbox.overtaken();
+        {
+            let mut statistics = lock(&self.statistics);
+            (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
+            (statistics.may_yet_move, statistics.halted) = (may_yet_move, halted);
+            statistics.coalesced = coalesced;
+        }
+        for event in self.control.take_events() {
+            (self.observer)(Event::Loop(event));
+        }
+        if status != self.last_status {
+            self.last_status = status;
+            (self.observer)(Event::Status(status));
+        }
+        self.tell_rest();
+        if cfg!(debug_assertions) {
+            self.check_invariants();
+        }
+    }
+
+    /// What holds whenever everything was told; asked then where debug assertions are on.
+    pub fn check_invariants(&self) {
+        let rests = self.control.session().is_at_rest();
+        assert!(self.waiting.is_empty() || !rests, "somebody waits for a rest that has come");
+        assert!(!self.gave_up || self.deadline.is_some(), "given up before the end was asked for");
+    }
+
+    /// Nothing is to be done at this time that has not been done.
+    pub fn tell_settled(&mut self) {
+        for settling in self.settling.drain(..) {
+            (self.observer)(Event::Settled(settling));
+        }
+    }
+
+    fn tell_rest(&mut self) {
+        if self.control.session().is_at_rest() {
+            // Who waits no longer is not there to be told.
+            for waiting in self.waiting.drain(..) {
+                let _ = waiting.try_send(());
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::task::{Clock, FINISH_BUDGET};
+    use crate::{Command, Next, Protocol, Query};
+    use proptest::prelude::*;
+    use servo::{Measurement, Position, ServoSettings, Visibility};
+    use std::sync::mpsc::{Receiver, TryRecvError};
+
+    const MOVE: Request = Request::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
+
+    fn ms(ms: u64) -> Duration {
+        Duration::from_millis(ms)
+    }
+
+    const PROTOCOL: Protocol = Protocol {
+        questions: &[Query::Position, Query::Limits],
+        keep_alive: Duration::from_secs(2),
+        confirms_stops: false,
+        has_control_queue: true,
+    };
+
+    fn timeout() -> Result<Response, Error> {
+        Err(Error::Timeout(ms(1)))
+    }
+
+    /// What the world was told.
+    type Told = Receiver<Event>;
+
+    /// A task at one second of its time.
+    fn state() -> (TaskState<impl Fn(Event)>, Told) {
+        let (events, told) = std::sync::mpsc::channel();
+        let mailbox = Arc::new(Mailbox::new(Clock::held()));
+        mailbox.hold_at(ms(1000));
+        let control = ControlLoop::new(ServoSettings::default(), &PROTOCOL);
+        (TaskState::new(control, mailbox, Arc::default(), move |event| drop(events.send(event))), told)
+    }
+
+    impl<O: Fn(Event)> TaskState<O> {
+        fn see(&mut self, visibility: Visibility) {
+            self.mailbox.see(Measurement { visibility, ..Measurement::at(0.9, 0.5, self.mailbox.now()) });
+            self.take_mail();
+        }
+
+        /// Does what is due at this time; returns the commands.
+        fn serve_at(
+            &mut self,
+            at: Duration,
+            answer: impl Fn(&Command) -> Result<Response, Error>,
+        ) -> Vec<Command> {
+            self.mailbox.hold_at(at);
+            self.take_mail();
+            self.check_deadline();
+            let mut sent = Vec::new();
+            let now = self.mailbox.now();
+            while let Next::Do(request) = self.control.next_request(now) {
+                let answer = match &request {
+                    Request::Command(command) => {
+                        sent.push(*command);
+                        answer(command)
+                    }
+                    Request::Query(Query::Position) => Ok(Response::Position(Position::default())),
+                    Request::Query(_) => Err(Error::Camera("none".to_owned())),
+                };
+                self.control.sending(&request, now);
+                self.answered(&request, answer, now);
+            }
+            self.publish();
+            sent
+        }
+
+        /// A move goes unanswered, the end comes, and with it a stop; returns who waits for that.
+        fn end_in_doubt(&mut self) -> Receiver<()> {
+            self.see(Visibility::Seen);
+            self.serve_at(ms(1000), |_| timeout());
+            let rest = self.mailbox.finish(FINISH_BUDGET);
+            assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [Command::Halt]);
+            assert!(self.control.session().is_at_rest());
+            rest
+        }
+    }
+
+    fn gave_up(told: &Told) -> bool {
+        told.try_iter().any(|event| matches!(event, Event::GaveUp { .. }))
+    }
+
+    #[test]
+    fn at_the_end_too_an_unanswered_move_is_stopped_twice_and_nobody_waits_for_that() {
+        let (mut state, told) = state();
+        let rest = state.end_in_doubt();
+        assert_eq!(rest.try_recv(), Ok(()));
+        assert!(!state.is_over() && lock(&state.statistics).may_yet_move);
+        assert_eq!(state.serve_at(ms(5000), |_| Ok(Response::Accepted)), []);
+        assert!(!state.is_over());
+        assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [Command::Halt]);
+        assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
+        assert!(!gave_up(&told));
+    }
+
+    #[test]
+    fn a_second_stop_that_is_not_confirmed_is_not_tried_for_ever() {
+        let (mut state, told) = state();
+        state.end_in_doubt();
+        let mut now = ms(5000);
+        while now < ms(2000) + FINISH_BUDGET + LAST_RETRIES {
+            state.serve_at(now, |_| timeout());
+            assert!(!state.is_over());
+            now += ms(1000);
+        }
+        state.serve_at(now + ms(5000), |_| timeout());
+        assert!(state.is_over() && !gave_up(&told));
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// Whatever is left in the mailbox, in whatever order, and however the camera answers.
+        #[test]
+        fn nobody_waits_for_ever(
+            events in prop::collection::vec((0u8..10, any::<bool>(), 1u64..3000), 1..40),
+        ) {
+            let (mut state, _told) = state();
+            let (mut now, mut waiting) = (ms(1000), Vec::new());
+            for (event, answers, wait) in events {
+                match event {
+                    0 | 1 => state.see(Visibility::Seen),
+                    2 => state.see(Visibility::Gone),
+                    3 => waiting.push(state.mailbox.rest()),
+                    4 => state.mailbox.accept_measurements(false),
+                    5 => state.mailbox.accept_measurements(true),
+                    6 => state.mailbox.inherit(Command::Stop),
+                    7 => state.mailbox.configure(ServoSettings { max_rate_hz: 5.0, ..ServoSettings::default() }),
+                    8 => state.mailbox.set_credentials(None),
+                    _ => waiting.push(state.mailbox.finish(FINISH_BUDGET)),
+                }
+                state.mailbox.check_invariants();
+                now += ms(wait);
+                state.serve_at(now, |_| if answers { Ok(Response::Accepted) } else { timeout() });
+                if state.is_over() {
+                    break;
+                }
+            }
+            waiting.push(state.mailbox.finish(FINISH_BUDGET));
+            for _ in 0..70 {
+                now += ms(1000);
+                state.serve_at(now, |_| timeout());
+            }
+            prop_assert!(state.is_over());
+            state.give_up();
+            state.check_invariants();
+            prop_assert!(waiting.iter().all(|heard| heard.try_recv() != Err(TryRecvError::Empty)));
+        }
+    }
+
+    #[test]
+    fn only_a_stop_that_still_waits_has_a_move_abandoned() {
+        let (mut state, _) = state();
+        state.see(Visibility::Seen);
+        assert_eq!(state.give_up_at(&MOVE, None, ms(1000)), None);
+        state.see(Visibility::Gone);
+        let at = state.give_up_at(&MOVE, None, ms(1000));
+        assert_eq!(at, Some(ms(1000) + STOP_GRACE));
+        assert_eq!(state.give_up_at(&MOVE, at, ms(1400)), at);
+        state.see(Visibility::Seen);
+        assert_eq!(state.give_up_at(&MOVE, at, ms(1450)), None);
+        assert_eq!(state.give_up_at(&Request::Command(Command::Halt), None, ms(1450)), None);
+    }
+}

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::time::Duration;
+
+use tokio::sync::watch;
+use tokio::time::{Instant, sleep, sleep_until, timeout};
+
+use super::camera_lock::CameraLock;
+use super::protocol::StopOrder;
+use super::{Armed, LAST_TRIES};
+use crate::session::DOUBT;
+use crate::{Client, Command, Request};
+
+/// From one try to stop a camera to the next.
+const PAUSE: Duration = Duration::from_millis(500);
+
+/// A lease as it was last heard of.
+#[derive(Debug, Clone)]
+pub struct Held {
+    pub stop: StopOrder,
+    pub until: Instant,
+}
+
+/// What is known of a lease; `None`: the camera rests. It closes with the application's socket.
+pub type LeaseReceiver = watch::Receiver<Option<Held>>;
+
+/// How seeing to a camera has ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum End {
+    /// The lease was given back.
+    Released,
+    /// The lease ran out, and the camera was stopped.
+    RanOut,
+    /// The application is gone, and the camera was stopped.
+    Gone,
+    /// Another watchdog sees to the camera.
+    TakenOver,
+}
+
+/// Sees to one lease until the application is gone and the camera rests.
+pub async fn guard<C: Client>(mut lease: LeaseReceiver, armed: &Armed) {
+    loop {
+        let current = lease.borrow_and_update().clone();
+        let end = match current {
+            Some(held) => {
+                let _armed = armed.begin();
+                let lock = CameraLock::take(&held.stop.identity.settings).await;
+                tokio::select! {
+                    end = watch_over::<C>(&mut lease) => end,
+                    successor = lock.taken() => {
+                        drop(lock);
+                        drop(successor);
+                        End::TakenOver
+                    }
+                }
+            }
+            None => End::Released,
+        };
+        let heard = match end {
+            End::Gone => return,
+            End::Released | End::RanOut => lease.changed().await.is_ok(),
+            // What the application still says of this move is not for us any more.
+            End::TakenOver => lease.wait_for(Option::is_none).await.is_ok(),
+        };
+        if !heard {
+            return;
+        }
+    }
+}
+
+async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
+    loop {
+        let Some(held) = lease.borrow_and_update().clone() else { return End::Released };
+        let heard = tokio::select! {
+            heard = lease.changed() => heard.is_ok(),
+            () = sleep_until(held.until) => {
+                tokio::select! {
+                    // Who was only late goes on.
+                    heard = lease.changed() => heard.is_ok(),
+                    () = stop::<C>(&held.stop) => return End::RanOut,
+                }
+            }
+        };
+        if !heard {
+            stop::<C>(&held.stop).await;
+            return End::Gone;
+        }
+    }
+}
+
+/// Stops the camera until it says yes; and again where it may act on a move after that.
+async fn stop<C: Client>(order: &StopOrder) {
+    let tries = async {
+        let mut client = C::in_place_of(order.identity.clone()).ok()?;
+        let begin = Instant::now();
+        until_accepted(&mut client, &order.command).await?;
+        if order.in_doubt {
+            sleep_until(begin + DOUBT).await;
+            until_accepted(&mut client, &order.command).await?;
+        }
+        Some(())
+    };
+    // Whoever cannot be stopped by then is not to be by us.
+    let _ = timeout(LAST_TRIES, tries).await;
+}
+
+/// `None`: the camera refuses user or password, and asking again could lock the account.
+async fn until_accepted(client: &mut impl Client, stop: &Command) -> Option<()> {
+    loop {
+        match client.exchange(&Request::Command(*stop)).await {
+            Ok(_) => return Some(()),
+            Err(err) if err.is_final() => return None,
+            Err(_) => sleep(PAUSE).await,
+        }
+    }
+}

@@ -1,0 +1,125 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What an application tells its watchdog, and what that answers. It says all there is to say each time: a watchdog that was started anew, or took
+//! over, needs to know nothing of before.
+
+use serde::{Deserialize, Serialize};
+
+use crate::Command;
+use crate::http::Identity;
+
+/// One line.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Message {
+    /// A camera may move from now on, or still does: the lease begins, or is renewed.
+    Hold {
+        /// Of all leases of this application.
+        lease: u64,
+        /// What is to be done when it ends.
+        stop: Box<StopOrder>,
+    },
+    /// The camera rests, or is no longer ours to stop.
+    Release {
+        /// Which lease.
+        lease: u64,
+    },
+}
+
+/// What the watchdog says to each [`Message`], once it has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Answer {
+    /// The camera will be stopped when this lease ends.
+    Held {
+        /// Which lease.
+        lease: u64,
+    },
+    /// The camera will be left alone.
+    Released {
+        /// Which lease.
+        lease: u64,
+    },
+}
+
+/// How a camera is stopped.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StopOrder {
+    /// By whom the camera is to think that it is stopped.
+    pub identity: Identity,
+    /// The words that end its move.
+    pub command: Command,
+    /// A move is under way that the camera has not answered: it may act on it after a stop.
+    pub in_doubt: bool,
+}
+
+impl Message {
+    /// With the end of the line.
+    ///
+    /// # Errors
+    /// Where a value has no JSON form, which none of these lacks but a path that is not UTF-8.
+    pub fn to_line(&self) -> Result<Vec<u8>, serde_json::Error> {
+        to_line(self)
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn of_line(line: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(line)
+    }
+}
+
+impl Answer {
+    /// With the end of the line.
+    ///
+    /// # Errors
+    /// Never: a number has a JSON form.
+    pub fn to_line(self) -> Result<Vec<u8>, serde_json::Error> {
+        to_line(&self)
+    }
+
+    /// Reads a line.
+    ///
+    /// # Errors
+    /// What is wrong with it.
+    pub fn of_line(line: &[u8]) -> Result<Self, serde_json::Error> {
+        serde_json::from_slice(line)
+    }
+}
+
+fn to_line(value: &impl Serialize) -> Result<Vec<u8>, serde_json::Error> {
+    let mut line = serde_json::to_vec(value)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+    use std::time::Duration;
+
+    #[test]
+    fn a_line_says_all_and_its_debug_form_keeps_the_password() {
+        let settings = ClientSettings {
+            location: Location::parse("https://camera:8443").unwrap().0,
+            channel: "2".to_owned(),
+            credentials: Some(Credentials { user: "root".to_owned(), password: Secret::new("geheim") }),
+            authentication: Authentication::default(),
+            timeout: Duration::from_millis(1500),
+            trust: Trust::Anyone,
+        };
+        let identity = settings.into();
+        let stop = StopOrder { identity, command: Command::REST, in_doubt: true };
+        let message = Message::Hold { lease: 7, stop: Box::new(stop) };
+        let line = message.to_line().unwrap();
+        assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
+        assert_eq!(Message::of_line(&line).unwrap(), message);
+        assert!(!format!("{message:?}").contains("geheim"));
+        assert!(Message::of_line(b"{}").is_err());
+        let answer = Answer::Held { lease: 7 };
+        assert_eq!(Answer::of_line(&answer.to_line().unwrap()).unwrap(), answer);
+    }
+}

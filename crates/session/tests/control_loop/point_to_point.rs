@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Where the camera looks, told or not, and what follows from that for limits and home.
+
+use super::*;
+use servo::{Home, Mounting, SoftLimits};
+
+/// A camera at this pan; `None`: it will not tell.
+fn looking(pan_deg: Option<f64>) -> impl Fn(&Request) -> Option<Result<Response, Error>> {
+    move |request| {
+        let position =
+            pan_deg.map(|pan| Position { pan_deg: Some(pan), tilt_deg: Some(0.0), zoom_steps: Some(1.0) });
+        let answer = position.map(Response::Position).ok_or_else(|| Error::Camera("not now".to_owned()));
+        (*request == Request::Query(Query::Position)).then_some(answer)
+    }
+}
+
+fn within(min: f64, max: f64) -> ServoSettings {
+    let limits = SoftLimits { pan_deg: Range { min, max }, ..SoftLimits::default() };
+    ServoSettings { limits, ..ServoSettings::default() }
+}
+
+pub fn met(settings: ServoSettings, pan_deg: Option<f64>) -> Rig {
+    let mut rig = Rig { control: control_loop(settings), now: ms(1000), sent: Vec::new() };
+    rig.run_jobs(looking(pan_deg));
+    rig
+}
+
+#[test]
+fn limits_are_kept_while_the_camera_does_not_tell_for_once_and_it_is_asked_again_soon() {
+    let mut rig = met(within(-30.0, 30.0), Some(30.0));
+    rig.now += ms(5000);
+    rig.see(0.9, 0.5);
+    let asked = std::cell::Cell::new(0);
+    for _ in 0..40 {
+        rig.run_jobs(|request| {
+            asked.set(asked.get() + u32::from(*request == Request::Query(Query::Position)));
+            looking(None)(request)
+        });
+        rig.now += ms(50);
+        rig.see(0.9, 0.5);
+    }
+    assert_eq!(rig.sent, [], "it looks at its end");
+    assert!((2..=4).contains(&asked.get()), "{}", asked.get());
+}
+
+#[test]
+fn limits_that_cannot_be_kept_are_told_once() {
+    for (settings, pan, times) in [
+        (within(-30.0, 30.0), None, 1),
+        (within(-30.0, 30.0), Some(0.0), 0),
+        (ServoSettings::default(), None, 0),
+    ] {
+        let mut rig = met(settings, pan);
+        for _ in 0..100 {
+            rig.now += ms(1000);
+            rig.run_jobs(looking(pan));
+        }
+        let told = rig
+            .reports()
+            .into_iter()
+            .filter(|report| *report == LoopEvent::Session(SessionEvent::LimitsUnkept))
+            .count();
+        assert_eq!(told, times, "{pan:?}");
+    }
+    let mut rig = met(ServoSettings::default(), None);
+    rig.control.configure(within(-30.0, 30.0));
+    assert!(rig.reports().contains(&LoopEvent::Session(SessionEvent::LimitsUnkept)), "set later");
+}
+
+#[test]
+fn a_zoom_is_ended_before_the_camera_goes_home() {
+    let there = Position { pan_deg: Some(9.0), tilt_deg: Some(0.0), zoom_steps: None };
+    let settings = ServoSettings {
+        home: Some(Home::Position(there)),
+        home_timeout: Duration::ZERO,
+        ..ServoSettings::default()
+    };
+    let mut rig = Rig::new(settings);
+    let zoom = Request::Command(Command::Velocity { pan: 0, tilt: 0, zoom: Some(20), free: false });
+    rig.control.sending(&zoom, rig.now);
+    rig.control.on_response(&zoom, Ok(Response::Accepted), rig.now, rig.now);
+    rig.control
+        .measure(Measurement { visibility: Visibility::Gone, ..Measurement::at(0.5, 0.5, rig.now) }, rig.now);
+    let mut sent = rig.after(ms(100));
+    sent.extend(rig.after(ms(100)));
+    assert!(matches!(sent[..], [Command::REST, Command::Absolute { pan_deg: 9.0, .. }]), "{sent:?}");
+}
+
+/// The camera counts in its own picture, which is the one that arrives: an axis that is inverted within it inverts that too.
+#[test]
+fn whichever_axis_is_inverted_the_camera_centres_the_place_that_is_seen() {
+    for (invert_pan, invert_tilt) in [(false, false), (true, false), (false, true), (true, true)] {
+        let mounting = Mounting { invert_pan, invert_tilt, ..Mounting::default() };
+        let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, mounting, ..ServoSettings::default() });
+        rig.see(0.9, 0.2);
+        let sent = rig.after(ms(0));
+        let [Command::Centre { x, y, width: 640, height: 480, .. }] = sent[..] else { panic!("{sent:?}") };
+        assert!(x.abs_diff(576) <= 1 && y.abs_diff(96) <= 1, "{mounting:?}: {x}, {y}");
+    }
+}

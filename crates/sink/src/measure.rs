@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! From a buffer to a measurement, or to a warning why there is none.
+
+use std::time::Duration;
+
+use gst::prelude::*;
+use gst::subclass::prelude::*;
+use ptztrack_contract::lock::lock;
+use ptztrack_contract::{BufferMeta, TargetMeta};
+use servo::{Measurement, Visibility};
+
+use crate::plumbing::{Plumbing, PtzSink};
+use crate::settings::Steering;
+use crate::stream::Fault;
+
+/// From buffers to measurements.
+pub trait Measuring: PtzSink {
+    /// Leaves a measurement of the target that a buffer brings for the camera task.
+    fn measure(&self, buffer: &gst::BufferRef) {
+        let target = TargetMeta::of(buffer);
+        self.miss_meta(target.is_some());
+        match target {
+            Some(Ok(target)) => self.see(&target, buffer),
+            Some(Err(err)) => self.warn(Fault::UnreadableMeta, || {
+                format!(
+                    "a target meta cannot be read ({err}); check that all plugins are of the same version"
+                )
+            }),
+            None => {}
+        }
+    }
+
+    fn see(&self, target: &TargetMeta, buffer: &gst::BufferRef) {
+        let Some(picture) = lock(&self.core().stream).picture else { return };
+        if !picture.shows(target) || buffer.meta::<gst_video::VideoCropMeta>().is_some() {
+            return self.warn(Fault::OtherPicture, || {
+                format!("the picture has been cropped, or its shape changed, since the target was found in it: the camera cannot be steered by it. Put `{}` in front of the element that does that, or have it done before the tracker", Self::PARTICULARS.name)
+            });
+        }
+        let age = self.age(target, buffer.pts());
+        let (stale_timeout, steering) = {
+            let settings = lock(&self.core().settings);
+            (settings.servo.stale_timeout, settings.steering)
+        };
+        if age > stale_timeout {
+            return self.warn(Fault::OldPictures, || {
+                format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
+            });
+        }
+        if steering == Steering::Off {
+            return;
+        }
+        self.with_task(|task| {
+            let mailbox = task.mailbox();
+            mailbox.see(Measurement {
+                // On the way home it does not matter who is there.
+                visibility: if steering == Steering::Home { Visibility::Gone } else { target.state.into() },
+                id: target.id,
+                centroid: target.centroid,
+                bounds: target.bounds,
+                velocity: target.velocity,
+                ego_velocity: target.ego_velocity,
+                size: picture.size,
+                aspect: picture.aspect,
+                taken_at: mailbox.now().saturating_sub(age),
+            });
+        });
+    }
+
+    /// How long ago the picture was taken, as far as its timestamp tells.
+    fn age(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) -> Duration {
+        if lock(&self.core().stream).lockstep {
+            return Duration::ZERO;
+        }
+        let captured = target.capture_time.or_else(|| self.running_time(pts));
+        let Some((now, captured)) = self.obj().current_running_time().zip(captured) else {
+            return Duration::ZERO;
+        };
+        let nanoseconds = |time: gst::ClockTime| i64::try_from(time.nseconds()).unwrap_or(i64::MAX);
+        let arrived = self.time();
+        lock(&self.core().stream).age.of(nanoseconds(captured), nanoseconds(now), arrived)
+    }
+
+    /// Warns where no buffer has had a target meta for long.
+    fn miss_meta(&self, has_meta: bool) {
+        let now = self.time();
+        if lock(&self.core().stream).lacks_meta(has_meta, now) {
+            self.warn(Fault::NoMeta, || {
+                "no buffer has had a PtzTargetMeta for a second: there is no target to follow. Put `lkfeaturetrack` in front, with no element in between that drops metas".to_owned()
+            });
+        }
+    }
+
+    /// Warns once a stream.
+    fn warn(&self, fault: Fault, text: impl FnOnce() -> String) {
+        if lock(&self.core().stream).is_news(fault) {
+            gst::element_imp_warning!(self, gst::StreamError::Format, ("{}", text()));
+        }
+    }
+}
+
+impl<S: PtzSink> Measuring for S {}

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What is kept of the stream from buffer to buffer.
+
+use std::mem;
+use std::time::Duration;
+
+use crate::picture::Picture;
+
+/// What is kept of the stream from buffer to buffer.
+#[derive(Debug, Default)]
+pub struct Stream {
+    /// As the caps have it.
+    pub picture: Option<Picture>,
+    /// Whether time is the stream's.
+    pub lockstep: bool,
+    /// How old pictures are.
+    pub age: PictureAge,
+    meta_wait: MetaWait,
+    warned: Vec<Fault>,
+}
+
+/// What the user is warned of, once a stream.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Fault {
+    /// A target meta cannot be read.
+    UnreadableMeta,
+    /// No buffer has had a target meta so far.
+    NoMeta,
+    /// The picture has another shape than the one the target was found in, or is to be cropped.
+    OtherPicture,
+    /// Pictures are older than `stale-timeout`.
+    OldPictures,
+}
+
+/// Whether a target meta is waited for.
+#[derive(Debug, Default)]
+enum MetaWait {
+    #[default]
+    NoBuffer,
+    /// The first buffer came then.
+    Since(Duration),
+    Over,
+}
+
+impl Stream {
+    /// Nothing came yet.
+    pub fn new(lockstep: bool) -> Self {
+        Self { lockstep, ..Self::default() }
+    }
+
+    /// Buffers without a target meta for so long have no tracker upstream: those put one on each, target or not.
+    const META_WAIT: Duration = Duration::from_secs(1);
+
+    /// Whether this is to be told: it was not yet.
+    pub fn is_news(&mut self, fault: Fault) -> bool {
+        let known = self.warned.contains(&fault);
+        if !known {
+            self.warned.push(fault);
+        }
+        !known
+    }
+
+    /// A buffer came, with a target meta or without. Returns whether none has had one for long.
+    pub fn lacks_meta(&mut self, has_meta: bool, now: Duration) -> bool {
+        self.meta_wait = match mem::take(&mut self.meta_wait) {
+            _ if has_meta => MetaWait::Over,
+            MetaWait::NoBuffer => MetaWait::Since(now),
+            waits => waits,
+        };
+        matches!(self.meta_wait, MetaWait::Since(since) if now >= since + Self::META_WAIT)
+    }
+}
+
+/// How old a picture is when it arrives, against the youngest so far: what all of them are late by is part of the latency,
+/// or of timestamps that are wrong. What is queued up during a stall is known to be old.
+#[derive(Debug, Default)]
+pub struct PictureAge {
+    /// The least that a picture's timestamp was behind the clock so far, in nanoseconds.
+    least: i64,
+    /// By how much the last one was, and when it came; `None` before the first.
+    last: Option<(i64, Duration)>,
+}
+
+impl PictureAge {
+    /// By so much the clock of a source may be slow: more than any quartz is, and little enough that a stall of a second
+    /// shows for an hour.
+    const DRIFT: f64 = 2e-4;
+
+    /// How old the picture is that was captured at one running time and arrives at another, both in nanoseconds, and at a
+    /// time of a clock that nobody sets.
+    pub fn of(&mut self, captured: i64, now: i64, arrived: Duration) -> Duration {
+        let behind = now.saturating_sub(captured);
+        self.least = match self.last {
+            Some((last, at)) => {
+                let elapsed = arrived.saturating_sub(at).as_nanos() as i64;
+                // Nothing grows older by more than the time that has passed: the rest is a clock that was set.
+                let set = behind.saturating_sub(last).saturating_sub(elapsed).max(0);
+                // Saturates.
+                let drift = (elapsed as f64 * Self::DRIFT) as i64;
+                behind.min(self.least.saturating_add(drift).saturating_add(set))
+            }
+            None => behind,
+        };
+        self.last = Some((behind, arrived));
+        Duration::from_nanos(u64::try_from(behind.saturating_sub(self.least)).unwrap_or(0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    /// In milliseconds; the clock that nobody sets is the first of them.
+    fn age(pictures: &mut PictureAge, [arrived, now, captured]: [i64; 3]) -> i64 {
+        const MS: i64 = 1_000_000;
+        let arrived = Duration::from_millis(arrived as u64);
+        pictures.of(captured * MS, now * MS, arrived).as_millis() as i64
+    }
+
+    #[test]
+    fn a_picture_is_as_old_as_it_is_later_than_others() {
+        let mut pictures = PictureAge::default();
+        for (at, captured, later) in [(1060, 1000, 0), (1140, 1000, 80), (1140, 1120, 0), (1220, 1120, 80)] {
+            let late = age(&mut pictures, [at, at, captured]);
+            assert!((later - 1..=later).contains(&late), "{at}: {late}");
+        }
+    }
+
+    #[test]
+    fn after_a_stall_pictures_are_old_whatever_their_clock_shows() {
+        for offset in [-3_600_000, -500, 0, 3_600_000] {
+            let mut pictures = PictureAge::default();
+            for at in (1000..10_000).step_by(40) {
+                assert_eq!(age(&mut pictures, [at, at, at - 50 + offset]), 0, "{offset}");
+            }
+            for (at, captured) in [(13_000, 9990), (13_001, 10_030), (13_040, 10_070)] {
+                let late = age(&mut pictures, [at, at, captured + offset]);
+                assert!((2900..=3000).contains(&late), "{offset}: {late}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_clock_that_is_set_makes_no_picture_old() {
+        const HOUR: i64 = 3_600_000;
+        let mut pictures = PictureAge::default();
+        let mut at = 0;
+        for (clock, source) in [(0, 0), (HOUR, 0), (0, 0), (0, HOUR), (0, 0), (HOUR, HOUR)] {
+            for _ in 0..50 {
+                at += 40;
+                let late = age(&mut pictures, [at, at + clock, at - 50 + source]);
+                assert!(late < 50, "{clock}, {source}: {late}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_slow_clock_makes_no_picture_old() {
+        let mut pictures = PictureAge::default();
+        // 100 millionths, for a day.
+        for second in (0..86_400).step_by(10) {
+            let (now, captured) = (second * 1000, second * 1000 - second / 10);
+            assert!(age(&mut pictures, [now, now, captured]) < 10, "after {second} s");
+        }
+    }
+
+    #[test]
+    fn meta_is_missed_once_a_second_has_passed_without_any() {
+        let ms = Duration::from_millis;
+        let mut stream = Stream::default();
+        assert!(![1000, 1500, 1999].map(|at| stream.lacks_meta(false, ms(at))).contains(&true));
+        assert!(stream.lacks_meta(false, ms(2000)));
+        assert!(stream.is_news(Fault::NoMeta) && !stream.is_news(Fault::NoMeta));
+        assert!(!stream.lacks_meta(true, ms(2100)) && !stream.lacks_meta(false, ms(9000)));
+    }
+
+    proptest! {
+        #[test]
+        fn any_timestamps_give_an_age(pictures in prop::collection::vec(any::<(i64, i64, u32)>(), 1..20)) {
+            let mut age = PictureAge::default();
+            for (captured, now, arrived) in pictures {
+                age.of(captured, now, Duration::from_millis(arrived.into()));
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The task that talks to a camera, over real HTTP.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+use std::sync::mpsc::RecvTimeoutError;
+use std::sync::{Arc, Mutex};
+use std::time::Duration;
+
+use ptztrack_contract::lock::lock;
+use servo::{Measurement, ServoSettings};
+use session::http::{Authentication, ClientSettings, Location, Trust};
+use session::task::{CameraTask, Clock, DeadManState, Event, FINISH_BUDGET};
+use session::watchdog::{Armed, Watchdog, WatchdogAddress, serve};
+use session::{LoopEvent, SessionEvent};
+use tokio::runtime::Builder;
+use vapix::Client;
+use virtual_camera::VirtualCamera;
+
+const PATIENCE: Duration = Duration::from_secs(20);
+
+fn start(camera: &VirtualCamera, observer: impl Fn(Event) + Clone + Send + Sync + 'static) -> CameraTask {
+    start_with(camera, None, observer)
+}
+
+fn start_with(
+    camera: &VirtualCamera,
+    watchdog: Option<Arc<Watchdog>>,
+    observer: impl Fn(Event) + Clone + Send + Sync + 'static,
+) -> CameraTask {
+    let (location, _) = Location::parse(&camera.url()).unwrap();
+    let client = ClientSettings {
+        location,
+        channel: "1".to_owned(),
+        credentials: None,
+        authentication: Authentication::default(),
+        timeout: Duration::from_secs(2),
+        trust: Trust::System,
+    };
+    CameraTask::start::<Client>(client, ServoSettings::default(), Clock::running(), watchdog, observer)
+        .unwrap()
+}
+
+fn see(task: &CameraTask) {
+    task.mailbox().see(Measurement::at(0.9, 0.5, task.mailbox().now()));
+}
+
+fn camera() -> VirtualCamera {
+    VirtualCamera::start(virtual_camera::Settings::default()).unwrap()
+}
+
+/// As an element does that is disposed of without having been brought to NULL.
+#[test]
+fn dropped_it_stops_the_camera() {
+    let camera = camera();
+    let task = start(&camera, |_| {});
+    see(&task);
+    assert!(camera.wait_for(PATIENCE, |status| status.moving));
+    drop(task);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
+
+#[test]
+fn it_can_be_dropped_in_its_own_thread() {
+    let camera = camera();
+    let task = Arc::new(Mutex::new(None));
+    let (events, seen) = std::sync::mpsc::channel();
+    let held = task.clone();
+    let started = start(&camera, move |event| {
+        if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
+            drop(lock(&held).take());
+        }
+        let _ = events.send(format!("{event:?}"));
+    });
+    let mut held = lock(&task);
+    see(held.insert(started));
+    drop(held);
+    // Until the task, and with it the observer, is gone.
+    let seen: Vec<_> = std::iter::from_fn(|| seen.recv_timeout(PATIENCE).ok()).collect();
+    assert!(seen.iter().any(|event| event.contains("Stopped")), "{seen:?}");
+    assert!(!seen.iter().any(|event| event.contains("GaveUp") || event.contains("Died")), "{seen:?}");
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+}
+
+/// A watchdog in this process: to the camera's task it makes no difference.
+fn watchdog() -> (Arc<Watchdog>, std::path::PathBuf) {
+    static ARMED: Armed = Armed::new(|_| {});
+    let socket = std::env::temp_dir().join(format!("vapix-watchdog-test-{}", std::process::id()));
+    let _ = std::fs::remove_file(&socket);
+    let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+    std::thread::spawn(move || {
+        let runtime = Builder::new_current_thread().enable_all().build().unwrap();
+        let (application, _) = listener.accept().unwrap();
+        application.set_nonblocking(true).unwrap();
+        runtime.block_on(async {
+            serve::<Client>(tokio::net::UnixStream::from_std(application).unwrap(), &ARMED).await;
+        });
+    });
+    (Watchdog::new(WatchdogAddress::Socket(socket.clone())), socket)
+}
+
+/// The process lives, and the socket with it: only the lease runs out.
+#[test]
+fn one_that_hangs_has_its_camera_stopped_by_the_watchdog() {
+    let camera = camera();
+    let (watchdog, socket) = watchdog();
+    let (release, hold) = std::sync::mpsc::sync_channel::<()>(0);
+    let hold = Arc::new(Mutex::new(hold));
+    let task = start_with(&camera, Some(watchdog), move |event| {
+        if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
+            let _ = lock(&hold).recv();
+        }
+    });
+    see(&task);
+    assert!(camera.wait_for(PATIENCE, |status| status.moving));
+    assert_eq!(task.statistics().dead_man, DeadManState::Armed);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    drop(release);
+    drop(task);
+    std::fs::remove_file(socket).unwrap();
+}
+
+/// Neither the camera goes on, nor does anybody wait for ever.
+#[test]
+fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
+    let camera = camera();
+    let (died, death) = std::sync::mpsc::channel();
+    let task = start(&camera, move |event| match event {
+        Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => panic!("provoked"),
+        Event::Died(_) => died.send(()).unwrap(),
+        _ => {}
+    });
+    let (settled, _waker) = task.mailbox().settled();
+    see(&task);
+    death.recv_timeout(PATIENCE).unwrap();
+    let is_stop = |query: &str| query.ends_with("continuouspantiltmove=0,0");
+    let mut seen = 0;
+    while !camera.commands().iter().any(|command| is_stop(&command.query)) {
+        assert!(camera.wait_for(PATIENCE, |status| status.commands > seen));
+        seen = camera.status().commands;
+    }
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+    assert_ne!(settled.recv_timeout(PATIENCE), Err(RecvTimeoutError::Timeout));
+    assert_eq!(task.mailbox().settled().0.recv_timeout(PATIENCE), Err(RecvTimeoutError::Disconnected));
+    assert_eq!(
+        task.mailbox().finish(FINISH_BUDGET).recv_timeout(PATIENCE),
+        Err(RecvTimeoutError::Disconnected)
+    );
+}
