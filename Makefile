@@ -22,9 +22,9 @@ CARGO ?= cargo
 # Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
 TEST_TIMEOUT ?= 25m
 
-# Both plugins; the watchdog, a program of crate `ptztrack-vapix`; what `pipelines/` are run with; and the program `ptztrack`.
-PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package ptztrack-vapix --package pipeline-supervisor \
-	--package ptztrack
+# The plugins; the watchdogs, programs of the crates `ptztrack-vapix` and `ptztrack-onvif`; what `pipelines/` are run with; and the program `ptztrack`.
+PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package gst-plugin-onvifptz --package ptztrack-vapix \
+	--package ptztrack-onvif --package pipeline-supervisor --package ptztrack
 
 CODEC ?= mjpeg
 DURATION ?= 60

@@ -13,6 +13,7 @@ pub fn init() {
     ONCE.call_once(|| {
         gst::init().unwrap();
         gstptztrack::plugin_register_static().unwrap();
+        gstonvifptz::plugin_register_static().unwrap();
         gstvapix::plugin_register_static().unwrap();
     });
 }

@@ -8,7 +8,7 @@ use std::process::Command;
 
 use end_to_end::following::{pipeline, python, rust, script};
 use end_to_end::{GstLaunch, PATIENCE, pictures_in, plugin_folder, scene, tool};
-use virtual_camera::VirtualCamera;
+use virtual_camera::{OnvifSettings, Settings, VirtualCamera};
 
 /// A command that finds the camera by the pipelines' environment variables.
 fn against(camera: &VirtualCamera, mut command: Command) -> Command {
@@ -54,6 +54,18 @@ fn mpeg4_over_rtsp() {
 #[test]
 fn h264_over_rtsp() {
     follows("h264-rtsp.sh");
+}
+
+#[test]
+fn onvif_over_rtsp() {
+    let onvif = Some(OnvifSettings::default());
+    let camera = VirtualCamera::start(Settings { onvif, ..scene::walking_person() }).unwrap();
+    let stream = format!("{}/axis-media/media.amp?videocodec=h264", camera.rtsp_url());
+    let mut command = against(&camera, script("onvif-rtsp.sh"));
+    command.env("STREAM", stream);
+    let output = follows_until_interrupted(&camera, command);
+    assert!(output.contains("ptztrack-target, change=(string)acquired"), "{output}");
+    assert!(camera.commands().iter().any(|command| command.query.contains("ContinuousMove")));
 }
 
 #[test]

@@ -10,7 +10,7 @@ use std::fmt::Write;
 use gst::glib;
 use gst::prelude::*;
 
-const ELEMENTS: [&str; 4] = ["bgavgdetect", "lkfeaturetrack", "ptzoverlay", "vapixptzsink"];
+const ELEMENTS: [&str; 5] = ["bgavgdetect", "lkfeaturetrack", "ptzoverlay", "onvifptzsink", "vapixptzsink"];
 const FILE: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/public-surface.txt");
 
 #[test]

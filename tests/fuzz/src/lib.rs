@@ -4,8 +4,9 @@
 //! them; a test of the crate vapix runs all of them over the seeds in `corpus`.
 #![allow(missing_docs)]
 
+use onvif::{Abilities, Answer, parse_abilities};
 use servo::TableRow;
-use session::http::{Credentials, Secret, answer_to_challenge, answer_to_cookie};
+use session::http::{CompleteResponse, Credentials, Secret, answer_to_challenge, answer_to_cookie};
 use vapix::{
     parse_attributes, parse_limits, parse_move_speed, parse_parameters, parse_position, parse_presets,
     parse_queue_place,
@@ -14,7 +15,7 @@ use vapix::{
 /// A target: takes anything, says whether it was understood, and never panics.
 pub type Target = fn(&[u8]) -> bool;
 
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 10] = [
     ("challenge", challenge),
     ("position", position),
     ("limits", limits),
@@ -24,6 +25,7 @@ pub const TARGETS: [(&str, Target); 9] = [
     ("queue", queue),
     ("presets", presets),
     ("cookies", cookies),
+    ("onvif", onvif),
 ];
 
 /// As the client reads a body.
@@ -88,4 +90,21 @@ pub fn cookies(bytes: &[u8]) -> bool {
     let Some(cookie) = answer_to_cookie(text(bytes).trim_end()) else { return false };
     assert!(cookie.find('=').is_some_and(|end| end > 0) && !cookie.contains(';'), "{cookie}");
     true
+}
+
+/// Any answer of ONVIF's may come in place of any other.
+pub fn onvif(bytes: &[u8]) -> bool {
+    let answer = CompleteResponse { status: 200, body: text(bytes).into_owned() };
+    let Ok(Answer::Body(body)) = onvif::read_answer(&answer) else { return false };
+    let abilities = parse_abilities(&body);
+    let told = onvif::parse_position(&body, &abilities);
+    let position = told.unwrap_or_default();
+    let places = [position.pan_deg, position.tilt_deg, position.zoom_steps];
+    assert!(places.into_iter().flatten().all(f64::is_finite), "{position:?}");
+    abilities != Abilities::default()
+        || told.is_some()
+        || onvif::parse_date(&body).is_some()
+        || onvif::parse_services(&body).is_some()
+        || !onvif::parse_profiles(&body).is_empty()
+        || onvif::parse_presets(&body).is_some()
 }

@@ -18,7 +18,7 @@ use crate::{
     geometry::Matrix,
     http::HttpServer,
     imaging::{self, Lens, NoiseFilter, Sway},
-    kinematics::{Head, Limits, Optics, Pose, within_a_turn},
+    kinematics::{Head, Limits, Motion, Optics, Pose, within_a_turn},
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
@@ -183,6 +183,28 @@ impl Camera {
     /// Runs `param.cgi`.
     pub fn param(&self, args: &Args, _cookie: Option<&str>) -> CgiResponse {
         self.update(|state| state.device.param(args))
+    }
+
+    /// Has the head do this now; continuous moves end by themselves after `lasts`.
+    pub fn drive(&self, motions: &[Motion], lasts: Option<Duration>) {
+        self.update(|state| {
+            let now = self.now();
+            let head = &mut state.device.head;
+            for motion in motions {
+                head.command(now, *motion);
+            }
+            head.end_at(lasts.map(|lasts| now + lasts));
+        });
+    }
+
+    /// The presets, by their numbers.
+    pub fn presets(&self) -> Vec<(String, Pose)> {
+        lock(&self.state).device.presets().to_vec()
+    }
+
+    /// How far it turns.
+    pub fn limits(&self) -> Limits {
+        lock(&self.state).device.turn_limits()
     }
 
     /// Notes a request to `ptz.cgi` and how it was answered.
@@ -420,6 +442,11 @@ impl VirtualCamera {
     /// `http://127.0.0.1:port`, without a slash at its end.
     pub fn url(&self) -> String {
         format!("http://{}", self.http_address())
+    }
+
+    /// The address of its ONVIF device service, if it speaks ONVIF.
+    pub fn onvif_url(&self) -> Option<String> {
+        self.camera.settings.onvif.as_ref().map(|_| format!("{}{}", self.url(), crate::onvif::DEVICE_SERVICE))
     }
 
     /// Where RTSP is served.

@@ -6,8 +6,9 @@ use std::{path::PathBuf, time::Duration};
 
 use clap::{Parser, ValueEnum};
 use virtual_camera::{
-    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, PhotoPerson, PhotoPlace, PhotoSettings,
-    Place, Pose, PtzApi, RoomSettings, Settings, SpeedMap, Stall, Subject, SyntheticSettings, Video, World,
+    Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, OnvifSettings, PhotoPerson, PhotoPlace,
+    PhotoSettings, Place, Pose, PtzApi, Quirk, RoomSettings, Settings, SpeedMap, Stall, Subject,
+    SyntheticSettings, Video, World,
 };
 
 /// From one stall of the pictures to the next.
@@ -207,6 +208,13 @@ pub struct Options {
     #[arg(long, value_name = "STEP", value_parser = not_negative)]
     zoom: Option<f64>,
 
+    /// Speak ONVIF as well, as cameras of most makes do: full velocity is the speed of step 100, and speed is in proportion
+    #[arg(long, conflicts_with = "speed_map")]
+    onvif: bool,
+    /// Differ from the ONVIF specification as some camera does (docs/onvif.md lists them); can be given again
+    #[arg(long, value_enum, value_name = "QUIRK", value_delimiter = ',', requires = "onvif")]
+    onvif_quirk: Vec<Quirk>,
+
     /// Write position, speeds, footage frame and commands to this CSV file, 50 lines a second
     #[arg(long, value_name = "FILE")]
     pub log: Option<PathBuf>,
@@ -301,6 +309,7 @@ impl TryFrom<Options> for Settings {
                 vibration_deg: options.vibration,
                 noise_filter: options.noise_filter,
             },
+            onvif: options.onvif.then(|| OnvifSettings::with(&options.onvif_quirk)),
             presets: options.presets,
             user: options.user,
             password: options.password,
@@ -404,6 +413,10 @@ impl Options {
             ..Kinematics::default()
         };
         kinematics.proportional_speed.enabled = !self.no_proportional_speed;
+        if self.onvif {
+            kinematics.speed_map = SpeedMap::Linear { max_deg_s };
+            kinematics.proportional_speed.enabled = false;
+        }
         kinematics
     }
 }

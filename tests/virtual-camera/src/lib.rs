@@ -23,6 +23,7 @@ mod geometry;
 mod http;
 mod imaging;
 mod kinematics;
+mod onvif;
 mod pace;
 mod picture;
 mod rtsp;
@@ -44,6 +45,7 @@ pub use kinematics::{
     Head, Kinematics, Limits, Motion, Optics, Pose, ProportionalRule, ProportionalSpeed, Snapshot, SpeedMap,
     ZOOM_RANGE,
 };
+pub use onvif::{OnvifSettings, Quirk, quirk_table};
 pub use picture::{Picture, Plane};
 pub use seeded::Seeded;
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};

@@ -7,6 +7,7 @@ use std::{fmt, path::PathBuf, time::Duration};
 use crate::{
     imaging::Imaging,
     kinematics::{Kinematics, Pose},
+    onvif::OnvifSettings,
     seeded::Seeded,
     world::{PhotoSettings, RoomSettings, SyntheticSettings},
 };
@@ -257,6 +258,8 @@ pub struct Settings {
     pub turning: (f64, f64),
     /// Who moves its time on.
     pub clock: Clock,
+    /// How it speaks ONVIF, if it does.
+    pub onvif: Option<OnvifSettings>,
 }
 
 impl Default for Settings {
@@ -283,6 +286,7 @@ impl Default for Settings {
             home: None,
             turning: (0.0, 0.0),
             clock: Clock::Real,
+            onvif: None,
         }
     }
 }

@@ -169,14 +169,14 @@ async fn arguments(request: Request) -> Result<String, Response> {
 }
 
 /// What a fault does instead of answering.
-enum Trouble {
+pub(super) enum Trouble {
     None,
     Response(Response),
     Cut(Ending),
     Silence,
 }
 
-fn trouble(fault: &Fault, wrong_logins: u64) -> Trouble {
+pub(super) fn trouble(fault: &Fault, wrong_logins: u64) -> Trouble {
     let status = |code: u16| StatusCode::from_u16(code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     match fault {
         Fault::None | Fault::Delay(_) | Fault::CloseAfterResponse => Trouble::None,

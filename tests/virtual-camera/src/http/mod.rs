@@ -6,6 +6,7 @@ mod auth;
 mod cgi;
 mod connection;
 mod mjpeg;
+mod onvif;
 mod page;
 mod picture;
 mod truth;
@@ -15,7 +16,7 @@ use std::{net::SocketAddr, sync::Arc, thread::JoinHandle};
 use axum::{
     Router,
     middleware::from_fn_with_state,
-    routing::{any, get},
+    routing::{any, get, post},
 };
 use tokio::{net::TcpSocket, sync::oneshot};
 
@@ -125,7 +126,15 @@ fn routes(site: Arc<Site>) -> Router {
         .route("/api/truth", get(truth::truth))
         .route("/api/overview.jpg", get(page::overview))
         .route("/api/ptz", any(page::steer));
-    guarded.merge(faulty).merge(page).with_state(site)
+    // Absent where the camera speaks no ONVIF.
+    let onvif = match site.camera.settings.onvif {
+        Some(_) => Router::new()
+            .route(crate::onvif::DEVICE_SERVICE, post(onvif::service))
+            .route(crate::onvif::MEDIA_SERVICE, post(onvif::service))
+            .route(crate::onvif::PTZ_SERVICE, post(onvif::service)),
+        None => Router::new(),
+    };
+    guarded.merge(faulty).merge(page).merge(onvif).with_state(site)
 }
 
 /// A socket that holds the port without listening.

@@ -101,6 +101,8 @@ pub struct Head {
     unlimited: bool,
     move_speed: f64,
     pending: VecDeque<(u64, Motion)>,
+    /// When the continuous move in force ends by itself.
+    ends: Option<u64>,
     /// Commands that ever came.
     commands: u64,
     /// Where the camera itself looks, behind the play of the gears.
@@ -126,6 +128,7 @@ impl Head {
             unlimited: false,
             move_speed: 100.0,
             pending: VecDeque::new(),
+            ends: None,
             commands: 0,
             view: home,
             history: VecDeque::new(),
@@ -156,6 +159,11 @@ impl Head {
         self.pending.push_back((acts, motion));
     }
 
+    /// Continuous moves end by themselves at this time; `None`: not.
+    pub fn end_at(&mut self, time: Option<Duration>) {
+        self.ends = time.map(|time| time.as_nanos().div_ceil(STEP.as_nanos()) as u64);
+    }
+
     /// Lets time pass until `to`; time already past stays as it was.
     pub fn advance(&mut self, to: Duration) {
         let end = (to.as_nanos() / STEP.as_nanos()) as u64;
@@ -164,6 +172,11 @@ impl Head {
                 if let Some((_, motion)) = self.pending.pop_front() {
                     self.start(motion);
                 }
+            }
+            if self.ends.is_some_and(|end| end <= self.ticks) {
+                self.ends = None;
+                self.stop_pan_tilt();
+                self.zoom.drive = Drive::Rate(0.0);
             }
             if self.motors_idle() {
                 // Nothing happens until the next command acts: hours pass at once.

@@ -49,6 +49,16 @@ impl Device {
         }
     }
 
+    /// Places to go to, `Home` first.
+    pub fn presets(&self) -> &[(String, Pose)] {
+        &self.presets
+    }
+
+    /// How far it turns, as it is told.
+    pub fn turn_limits(&self) -> Limits {
+        self.limits
+    }
+
     /// `ptz.cgi` with `args`, arriving at `now`.
     pub fn ptz(&mut self, args: &Args, now: Duration) -> CgiResponse {
         match self.try_ptz(args, now) {

@@ -1,0 +1,283 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::time::Duration;
+
+use servo::{HardLimits, Range, TableRow};
+use session::{Attributes, Command, Parameters};
+
+use crate::soap::{Element, number};
+
+/// How long a move goes on by itself. Long enough to lose a renewal or two, short enough that a camera whose user died does
+/// not turn far.
+const WANTED_TIMEOUT: Duration = Duration::from_secs(2);
+
+/// Steps of the zoom as the servo counts them.
+const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+
+/// What a PTZ configuration takes, as far as the camera tells. What it does not tell is tried.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Abilities {
+    /// Names and ranges of the spaces, by what they are for.
+    spaces: Vec<Space>,
+    /// How long a move goes on by itself.
+    pub timeout: MoveTimeout,
+}
+
+/// How long moves are to go on by themselves.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum MoveTimeout {
+    /// So long.
+    After(Duration),
+    /// Until they are ended: the camera refuses to be told.
+    Never,
+}
+
+impl Default for MoveTimeout {
+    fn default() -> Self {
+        Self::After(WANTED_TIMEOUT)
+    }
+}
+
+/// A coordinate space.
+#[derive(Debug, Clone, PartialEq)]
+struct Space {
+    /// What it is for, as `Spaces` has it: `ContinuousPanTiltVelocitySpace` and others.
+    kind: &'static str,
+    uri: String,
+    x: Range,
+    y: Option<Range>,
+}
+
+/// A velocity as the camera takes it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Velocity {
+    /// In `space`; `None` leaves both axes alone.
+    pub pan_tilt: Option<(f64, f64)>,
+    /// `None`: the generic one.
+    pub space: Option<String>,
+    /// -1 (out) to 1 (in); `None` leaves the zoom alone.
+    pub zoom: Option<f64>,
+}
+
+const PAN_TILT_VELOCITY: &str = "ContinuousPanTiltVelocitySpace";
+const ZOOM_VELOCITY: &str = "ContinuousZoomVelocitySpace";
+const PAN_TILT_POSITION: &str = "AbsolutePanTiltPositionSpace";
+const ZOOM_POSITION: &str = "AbsoluteZoomPositionSpace";
+
+/// Reads `GetConfigurationOptionsResponse`.
+pub fn parse_abilities(body: &Element) -> Abilities {
+    let Some(options) = body.find(&["GetConfigurationOptionsResponse", "PTZConfigurationOptions"]) else {
+        return Abilities::default();
+    };
+    let kinds = [PAN_TILT_VELOCITY, ZOOM_VELOCITY, PAN_TILT_POSITION, ZOOM_POSITION];
+    let of_kind = |kind: &'static str| {
+        let listed = options.child("Spaces").into_iter().flat_map(move |spaces| spaces.children(kind));
+        listed.filter_map(move |space| {
+            let uri = space.child("URI")?.text().to_owned();
+            Some(Space { kind, uri, x: range(space, "XRange")?, y: range(space, "YRange") })
+        })
+    };
+    let seconds = |name| duration(options.find(&["PTZTimeout", name])?.text());
+    let timeout = match (seconds("Min"), seconds("Max")) {
+        (Some(min), Some(max)) if min <= max => WANTED_TIMEOUT.clamp(min, max),
+        _ => WANTED_TIMEOUT,
+    };
+    let timeout = if timeout.is_zero() { MoveTimeout::Never } else { MoveTimeout::After(timeout) };
+    Abilities { spaces: kinds.into_iter().flat_map(of_kind).take(64).collect(), timeout }
+}
+
+fn range(space: &Element, name: &str) -> Option<Range> {
+    let end = |end: &str| number(space.find(&[name, end])?.text());
+    let range = Range { min: end("Min")?, max: end("Max")? };
+    (range.min < range.max).then_some(range)
+}
+
+/// An XML Schema duration of at most a day, such as `PT1M2.5S`; years and months have no length.
+fn duration(text: &str) -> Option<Duration> {
+    let rest = text.strip_prefix('P')?;
+    let (days, time) = rest.split_once('T').unwrap_or((rest, ""));
+    let mut seconds = 0.0;
+    for (part, units) in [
+        (days, [('D', 86_400.0), ('H', f64::NAN), ('M', f64::NAN)]),
+        (time, [('H', 3600.0), ('M', 60.0), ('S', 1.0)]),
+    ] {
+        for amount in part.split_inclusive(|c: char| c.is_ascii_alphabetic()) {
+            let unit = amount.chars().next_back()?;
+            let (_, factor) = units.into_iter().find(|(name, _)| *name == unit)?;
+            seconds += number(amount.strip_suffix(unit)?)? * factor;
+        }
+    }
+    (0.0..=86_400.0).contains(&seconds).then(|| Duration::from_secs_f64(seconds))
+}
+
+/// Speeds that are told in degrees per second.
+fn is_degrees_per_second(uri: &str) -> bool {
+    uri.ends_with("VelocitySpaceDegrees") || uri.ends_with("VelocityDegreesPerSecond")
+}
+
+/// Positions that are told in degrees.
+fn is_degrees(uri: &str) -> bool {
+    uri.ends_with("SphericalPositionSpaceDegrees")
+}
+
+impl Abilities {
+    fn space(&self, kind: &str, is: impl Fn(&str) -> bool) -> Option<&Space> {
+        self.spaces.iter().find(|space| space.kind == kind && is(&space.uri))
+    }
+
+    /// Degrees per second that the space of velocities in degrees reaches, and its name.
+    fn degrees_per_second(&self) -> Option<(f64, &str)> {
+        let space = self.space(PAN_TILT_VELOCITY, is_degrees_per_second)?;
+        let most = space.y.map_or(space.x.max, |y| y.max.min(space.x.max));
+        (most > 0.0).then_some((most, space.uri.as_str()))
+    }
+
+    /// The velocity of these speed steps. The camera's own is in proportion to the cube of the step: fine where it is slow.
+    pub fn velocity(&self, (pan, tilt): (i8, i8), zoom: Option<i8>) -> Velocity {
+        let (most, space) = self.degrees_per_second().unzip();
+        let most = most.unwrap_or(1.0);
+        Velocity {
+            pan_tilt: Some((part(pan) * most, part(tilt) * most)),
+            space: space.map(ToOwned::to_owned),
+            zoom: zoom.map(|step| f64::from(step) / 100.0),
+        }
+    }
+
+    /// What speed steps mean, where the camera takes velocities in degrees per second.
+    pub fn attributes(&self) -> Option<Attributes> {
+        let (most, _) = self.degrees_per_second()?;
+        let speeds = (1..=100).map(|step| TableRow { step: f64::from(step), value: part(step) * most });
+        Some(Attributes { speeds: speeds.collect(), ..Attributes::default() })
+    }
+
+    /// How it can be moved.
+    pub fn parameters(&self) -> Parameters {
+        Parameters {
+            continuous_pan: Some(self.spaces.is_empty() || self.space(PAN_TILT_VELOCITY, |_| true).is_some()),
+            absolute_pan: Some(self.limits().pan_deg.is_some()),
+            ..Parameters::default()
+        }
+    }
+
+    /// How far it can look, where it tells in degrees.
+    pub fn limits(&self) -> HardLimits {
+        let degrees = self.space(PAN_TILT_POSITION, is_degrees);
+        HardLimits {
+            pan_deg: degrees.map(|space| space.x),
+            tilt_deg: degrees.and_then(|space| space.y),
+            zoom_steps: self.space(ZOOM_POSITION, |_| true).map(|_| ZOOM_STEPS),
+            field_angle_deg: None,
+        }
+    }
+
+    /// Degrees of a place of pan and tilt: told in degrees, or in a space of which the whole range is known in degrees too.
+    pub fn degrees(&self, (x, y): (f64, f64), space: Option<&str>) -> Option<(f64, f64)> {
+        if space.is_some_and(is_degrees) {
+            return Some((x, y));
+        }
+        let degrees = self.space(PAN_TILT_POSITION, is_degrees)?;
+        let told =
+            self.space(PAN_TILT_POSITION, |uri| !is_degrees(uri) && space.is_none_or(|space| space == uri))?;
+        Some((scaled(x, told.x, degrees.x), scaled(y, told.y?, degrees.y?)))
+    }
+
+    /// Zoom steps of a place of the zoom.
+    pub fn zoom_steps(&self, x: f64) -> Option<f64> {
+        let range = self.space(ZOOM_POSITION, |_| true).map_or(Range { min: 0.0, max: 1.0 }, |space| space.x);
+        Some(ZOOM_STEPS.nearest(scaled(x, range, ZOOM_STEPS)))
+    }
+
+    /// Where an absolute move goes to, and the name of the space; `None` where the camera does not take degrees.
+    pub fn place(&self, command: &Command) -> Option<(f64, f64, &str, Option<f64>)> {
+        let Command::Absolute { pan_deg, tilt_deg, zoom, .. } = *command else { return None };
+        let space = self.space(PAN_TILT_POSITION, is_degrees)?;
+        let zoom = zoom.and_then(|step| {
+            let range = self.space(ZOOM_POSITION, |_| true)?.x;
+            Some(scaled(f64::from(step), ZOOM_STEPS, range))
+        });
+        Some((space.x.nearest(pan_deg), space.y?.nearest(tilt_deg), &space.uri, zoom))
+    }
+}
+
+/// The part of full speed that a speed step is.
+fn part(step: i8) -> f64 {
+    (f64::from(step) / 100.0).powi(3)
+}
+
+/// A value in one range as it is in another.
+fn scaled(value: f64, from: Range, to: Range) -> f64 {
+    to.min + (value - from.min) / (from.max - from.min) * (to.max - to.min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn abilities(spaces: &str, timeout: (&str, &str)) -> Abilities {
+        let (min, max) = timeout;
+        let xml = format!(
+            "<Body><GetConfigurationOptionsResponse><PTZConfigurationOptions><Spaces>{spaces}</Spaces><PTZTimeout><Min>{min}</Min><Max>{max}</Max></PTZTimeout></PTZConfigurationOptions></GetConfigurationOptionsResponse></Body>"
+        );
+        parse_abilities(&Element::parse(&xml).unwrap())
+    }
+
+    fn space(kind: &str, uri: &str, (x0, x1): (f64, f64), (y0, y1): (f64, f64)) -> String {
+        format!(
+            "<{kind}><URI>http://www.onvif.org/ver10/tptz/PanTiltSpaces/{uri}</URI><XRange><Min>{x0}</Min><Max>{x1}</Max></XRange><YRange><Min>{y0}</Min><Max>{y1}</Max></YRange></{kind}>"
+        )
+    }
+
+    #[test]
+    fn the_timeout_is_the_nearest_that_the_camera_takes() {
+        let s = Duration::from_secs;
+        for (range, expected) in [
+            (("PT1S", "PT10S"), MoveTimeout::After(s(2))),
+            (("PT5S", "PT1M"), MoveTimeout::After(s(5))),
+            (("PT0S", "PT1S"), MoveTimeout::After(s(1))),
+            (("PT0S", "PT0S"), MoveTimeout::Never),
+            (("", "soon"), MoveTimeout::After(s(2))),
+        ] {
+            assert_eq!(abilities("", range).timeout, expected, "{range:?}");
+        }
+    }
+
+    #[test]
+    fn durations_are_read() {
+        for (text, seconds) in [("PT2S", 2.0), ("PT1M2.5S", 62.5), ("P0DT1H", 3600.0), ("P1D", 86_400.0)] {
+            assert_eq!(duration(text), Some(Duration::from_secs_f64(seconds)), "{text}");
+        }
+        for text in ["", "2", "P1Y", "P1M", "PT-1S", "PTS", "P9999D", "PT1", "PTNaNS"] {
+            assert_eq!(duration(text), None, "{text}");
+        }
+    }
+
+    #[test]
+    fn generic_velocities_are_the_cube_of_the_step() {
+        let velocity = abilities("", ("PT1S", "PT10S")).velocity((-100, 50), Some(-30));
+        assert_eq!(velocity, Velocity { pan_tilt: Some((-1.0, 0.125)), space: None, zoom: Some(-0.3) });
+    }
+
+    #[test]
+    fn velocities_in_degrees_are_taken_where_they_are_offered() {
+        let offered = space(PAN_TILT_VELOCITY, "VelocityGenericSpace", (-1.0, 1.0), (-1.0, 1.0))
+            + &space(PAN_TILT_VELOCITY, "VelocitySpaceDegrees", (-120.0, 120.0), (-80.0, 80.0));
+        let abilities = abilities(&offered, ("PT1S", "PT10S"));
+        let velocity = abilities.velocity((100, -50), None);
+        assert_eq!(velocity.pan_tilt, Some((80.0, -10.0)));
+        assert!(velocity.space.unwrap().ends_with("VelocitySpaceDegrees"));
+        assert_eq!(abilities.attributes().unwrap().speeds[99].value, 80.0);
+    }
+
+    #[test]
+    fn places_are_degrees_only_where_degrees_are_known() {
+        let generic = space(PAN_TILT_POSITION, "PositionGenericSpace", (-1.0, 1.0), (-1.0, 1.0));
+        let degrees =
+            space(PAN_TILT_POSITION, "SphericalPositionSpaceDegrees", (-170.0, 170.0), (-20.0, 90.0));
+        assert_eq!(abilities(&generic, ("", "")).degrees((0.5, 0.0), None), None);
+        let both = abilities(&(generic + &degrees), ("", ""));
+        assert_eq!(both.degrees((0.5, 0.0), None), Some((85.0, 35.0)));
+        assert_eq!(both.degrees((30.0, 40.0), Some("x/SphericalPositionSpaceDegrees")), Some((30.0, 40.0)));
+        assert_eq!(both.limits().pan_deg, Some(Range { min: -170.0, max: 170.0 }));
+        assert_eq!((both.zoom_steps(0.0), both.zoom_steps(2.0)), (Some(1.0), Some(9999.0)));
+    }
+}

@@ -1,0 +1,390 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::time::Duration;
+
+use servo::{Position, Presets};
+use session::http::{Credentials, HttpClient, Identity, Repeat, unexpected};
+use session::{Command, Error, Protocol, Query, Request, Response};
+use tokio::time::timeout;
+
+use crate::abilities::{Abilities, MoveTimeout, Velocity, parse_abilities};
+use crate::answers::{
+    Profile, Services, parse_date, parse_position, parse_presets, parse_profiles, parse_services,
+};
+use crate::clock::CameraClock;
+use crate::messages;
+use crate::moves::{Moves, StopWords, moves_zoom};
+use crate::soap::{Answer, Element, envelope, read_answer};
+use crate::token::security;
+
+/// Where the device service is where the location names no path (ONVIF Core, 5.1.1).
+const DEVICE_SERVICE: &str = "/onvif/device_service";
+
+/// A camera that does not say by then where it looks keeps moves waiting.
+const STATUS_TIMEOUT: Duration = Duration::from_secs(1);
+
+/// After so many questions for its position that it did not answer in time, it is not asked again.
+const LATE_STATUSES: u32 = 2;
+
+/// One camera.
+#[derive(Debug)]
+pub struct Client {
+    http: HttpClient,
+    identity: Identity,
+    /// Path of its device service.
+    device: String,
+    /// Known once it was asked.
+    clock: Option<CameraClock>,
+    services: Option<Services>,
+    profile: Option<Profile>,
+    abilities: Option<Abilities>,
+    /// Tokens of its presets, by their number less one.
+    presets: Vec<String>,
+    moves: Moves,
+    login: Login,
+    /// Questions for its position, in a row, that were not answered in time.
+    late_statuses: u32,
+    warning: Option<String>,
+}
+
+/// What became of our user and password.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Login {
+    /// They were not judged yet.
+    Open,
+    /// They were accepted for something.
+    Accepted,
+    /// They were refused: nothing more is sent, so that the account is not locked.
+    Refused,
+}
+
+impl session::Client for Client {
+    const PROTOCOL: Protocol = Protocol {
+        questions: &[Query::Position, Query::Limits, Query::Attributes, Query::Parameters],
+        // Twice within the timeout of a move.
+        keep_alive: Duration::from_millis(800),
+        confirms_stops: true,
+        has_control_queue: false,
+    };
+
+    fn in_place_of(identity: Identity) -> Result<Self, Error> {
+        let device = match identity.settings.location.path() {
+            "" => DEVICE_SERVICE,
+            path => path,
+        };
+        let device = device.to_owned();
+        let mut own = identity.clone();
+        own.settings.location = identity.settings.location.origin();
+        Ok(Self {
+            http: HttpClient::in_place_of(own)?,
+            identity,
+            device,
+            clock: None,
+            services: None,
+            profile: None,
+            abilities: None,
+            presets: Vec::new(),
+            moves: Moves::default(),
+            login: Login::Open,
+            late_statuses: 0,
+            warning: None,
+        })
+    }
+
+    fn identity(&self) -> Identity {
+        self.identity.clone()
+    }
+
+    fn set_credentials(&mut self, credentials: Option<Credentials>) {
+        self.identity.settings.credentials.clone_from(&credentials);
+        self.http.set_credentials(credentials);
+        self.login = Login::Open;
+    }
+
+    async fn exchange(&mut self, request: &Request) -> Result<Response, Error> {
+        let abilities = self.connected().await?;
+        match request {
+            Request::Command(command) => self.send(command, &abilities).await.map(|()| Response::Accepted),
+            Request::Query(Query::Position) => self.position(&abilities).await.map(Response::Position),
+            Request::Query(Query::Limits) => Ok(Response::Limits(abilities.limits())),
+            Request::Query(Query::Parameters) => Ok(Response::Parameters(abilities.parameters())),
+            Request::Query(Query::Attributes) => {
+                let attributes = abilities.attributes();
+                attributes
+                    .map(Response::Attributes)
+                    .ok_or_else(|| Error::Camera("speeds are not told".to_owned()))
+            }
+            Request::Query(Query::Presets) => self.presets().await.map(Response::Presets),
+            Request::Query(Query::MoveSpeed | Query::Queue(_)) => {
+                Err(Error::Camera("ONVIF has no words for this".to_owned()))
+            }
+        }
+    }
+
+    fn take_warning(&mut self) -> Option<String> {
+        self.warning.take()
+    }
+}
+
+impl Client {
+    /// Asks what has to be known before anything else can be said. What was answered is not asked again, so that a camera
+    /// that is slow, or gone for a while, is got to know all the same.
+    async fn connected(&mut self) -> Result<Abilities, Error> {
+        if self.clock.is_none() {
+            self.clock = Some(self.ask_clock().await?);
+        }
+        if self.services.is_none() {
+            let listed = match self.call(Path::Device, messages::GET_SERVICES).await {
+                Ok(body) => parse_services(&body),
+                // Some close the connection in place of a fault.
+                Err(err) if err.is_answer() || matches!(err, Error::Status { .. } | Error::Broken(_)) => None,
+                Err(err) => return Err(err),
+            };
+            let services = match listed {
+                Some(services) => Some(services),
+                None => parse_services(&self.call(Path::Device, messages::GET_CAPABILITIES).await?),
+            };
+            self.services = Some(services.ok_or(Error::NoPtz)?);
+        }
+        if self.profile.is_none() {
+            let profiles = parse_profiles(&self.call(Path::Media, messages::GET_PROFILES).await?);
+            self.profile = Some(self.choose(profiles)?);
+        }
+        if let Some(abilities) = &self.abilities {
+            return Ok(abilities.clone());
+        }
+        let configuration = self.profile.as_ref().map_or("", |profile| &profile.configuration).to_owned();
+        let options = messages::get_configuration_options(&configuration);
+        let abilities = match self.call(Path::Ptz, &options).await {
+            Ok(body) => parse_abilities(&body),
+            // It may be moved all the same.
+            Err(err) if err.is_answer() || matches!(err, Error::Broken(_)) => Abilities::default(),
+            Err(err) => return Err(err),
+        };
+        if abilities.timeout == MoveTimeout::Never {
+            self.warn_of_no_timeout();
+        }
+        Ok(self.abilities.insert(abilities).clone())
+    }
+
+    fn choose(&self, profiles: Vec<Profile>) -> Result<Profile, Error> {
+        let wanted = &self.http.settings().channel;
+        let names: Vec<_> = profiles.iter().map(|profile| profile.token.clone()).collect();
+        let is_wanted =
+            |profile: &Profile| wanted.is_empty() || *wanted == profile.token || *wanted == profile.name;
+        match profiles.into_iter().find(is_wanted) {
+            Some(profile) => Ok(profile),
+            None if names.is_empty() => Err(Error::NoPtz),
+            None => {
+                Err(Error::Camera(format!("no profile `{wanted}` with PTZ; there are {}", names.join(", "))))
+            }
+        }
+    }
+
+    /// Asked without saying who we are: whoever is refused for a wrong time learns the right one by it.
+    async fn ask_clock(&mut self) -> Result<CameraClock, Error> {
+        let message = envelope("", messages::GET_SYSTEM_DATE_AND_TIME);
+        let answer = self.http.post(&self.device, &message, Repeat::WhereBroken).await?;
+        Ok(match read_answer(&answer) {
+            Ok(Answer::Body(body)) => {
+                parse_date(&body).map_or_else(CameraClock::assumed, CameraClock::showing)
+            }
+            // It is there, and keeps its time to itself.
+            _ => CameraClock::assumed(),
+        })
+    }
+
+    /// The body of the answer to a message.
+    async fn call(&mut self, path: Path, message: &str) -> Result<Element, Error> {
+        if self.login == Login::Refused {
+            return Err(self.bad_credentials());
+        }
+        let path = self.path(path).to_owned();
+        for fresh in [false, true] {
+            if fresh {
+                self.clock = Some(self.ask_clock().await?);
+            }
+            // By HTTP's Digest it is known who we are; a camera that does not take that word for it is told in both ways.
+            let token = self.http.credentials().filter(|_| fresh || !self.http.is_signing()).cloned();
+            let header = token.map_or_else(String::new, |credentials| {
+                security(&credentials, &self.clock.unwrap_or_else(CameraClock::assumed).now())
+            });
+            let answer = self.http.post(&path, &envelope(&header, message), Repeat::WhereBroken).await?;
+            match read_answer(&answer)? {
+                Answer::Body(body) => {
+                    if self.http.credentials().is_some() {
+                        self.login = Login::Accepted;
+                    }
+                    return Ok(body);
+                }
+                Answer::Fault(reason) => return Err(Error::Camera(reason)),
+                Answer::NotAuthorized if self.http.credentials().is_none() => {
+                    return Err(Error::CredentialsMissing);
+                }
+                Answer::NotAuthorized => {}
+            }
+        }
+        if self.login == Login::Accepted {
+            return Err(Error::NotPermitted { user: self.user() });
+        }
+        self.login = Login::Refused;
+        Err(self.bad_credentials())
+    }
+
+    fn path(&self, path: Path) -> &str {
+        match (path, &self.services) {
+            (Path::Media, Some(services)) => &services.media,
+            (Path::Ptz, Some(services)) => &services.ptz,
+            _ => &self.device,
+        }
+    }
+
+    fn user(&self) -> String {
+        self.http.credentials().map_or_else(String::new, |credentials| credentials.user.clone())
+    }
+
+    fn bad_credentials(&self) -> Error {
+        Error::BadCredentials { user: self.user() }
+    }
+
+    fn profile(&self) -> &str {
+        self.profile.as_ref().map_or("", |profile| &profile.token)
+    }
+
+    async fn send(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {
+        if command.is_stop() {
+            return self.stop(command, abilities).await;
+        }
+        self.moves.moving();
+        match *command {
+            Command::Velocity { pan, tilt, zoom, .. } => {
+                let zoom = zoom.filter(|_| self.moves.zooms());
+                let moved = self.move_at(&abilities.velocity((pan, tilt), zoom), abilities).await;
+                if moves_zoom(command) && zoom.is_some() {
+                    let broken = moved
+                        .as_ref()
+                        .is_err_and(|err| matches!(err, Error::Broken(_) | Error::Unexpected(_)));
+                    self.moves.zoomed(broken);
+                    if !self.moves.zooms() {
+                        self.warn("the camera breaks off where it is told to zoom: the zoom is left alone from here on");
+                    }
+                }
+                moved
+            }
+            Command::Absolute { .. } => {
+                let Some((x, y, space, zoom)) = abilities.place(command) else {
+                    return Err(Error::Camera("the camera takes no positions in degrees".to_owned()));
+                };
+                let message = messages::absolute_move(self.profile(), (x, y), Some(space), zoom);
+                self.call(Path::Ptz, &message).await.map(drop)
+            }
+            Command::Preset { number } => {
+                let index = usize::try_from(number).unwrap_or(usize::MAX).wrapping_sub(1);
+                let Some(token) = self.presets.get(index) else {
+                    return Err(Error::Camera(format!("there is no preset {number}")));
+                };
+                let message = messages::goto_preset(self.profile(), token);
+                self.call(Path::Ptz, &message).await.map(drop)
+            }
+            Command::Centre { .. } => Err(Error::Camera("ONVIF has no words for pixels".to_owned())),
+            Command::Halt | Command::Stop => Ok(()),
+        }
+    }
+
+    /// Where the camera does not take a timeout, it is moved without.
+    async fn move_at(&mut self, velocity: &Velocity, abilities: &Abilities) -> Result<(), Error> {
+        let MoveTimeout::After(after) = abilities.timeout else {
+            let message = messages::continuous_move(self.profile(), velocity, None);
+            return self.call(Path::Ptz, &message).await.map(drop);
+        };
+        let message = messages::continuous_move(self.profile(), velocity, Some(after));
+        let moved = self.call(Path::Ptz, &message).await;
+        let refusal = match moved {
+            Err(refusal @ Error::Camera(_)) => refusal,
+            Err(broken @ Error::Broken(_)) if self.moves.breaks_at_timeout() => broken,
+            other => {
+                self.moves.took_timeout(other.is_ok());
+                return other.map(drop);
+            }
+        };
+        let message = messages::continuous_move(self.profile(), velocity, None);
+        // Where it refuses even so, it was not for the timeout.
+        self.call(Path::Ptz, &message).await.map_err(|_| refusal)?;
+        if let Some(abilities) = &mut self.abilities {
+            abilities.timeout = MoveTimeout::Never;
+        }
+        self.warn_of_no_timeout();
+        Ok(())
+    }
+
+    async fn stop(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {
+        let words = self.moves.next_stop();
+        match self.stop_by(words, command, abilities).await {
+            Err(Error::Camera(_)) => {
+                self.moves.stop_refused();
+                let other = self.moves.stop_words();
+                self.stop_by(other, command, abilities).await
+            }
+            other => other,
+        }
+    }
+
+    async fn stop_by(
+        &mut self,
+        words: StopWords,
+        command: &Command,
+        abilities: &Abilities,
+    ) -> Result<(), Error> {
+        match words {
+            StopWords::Stop => self.call(Path::Ptz, &messages::stop(self.profile())).await.map(drop),
+            StopWords::Still => {
+                // A move to a position may have zoomed too.
+                let zoom = !matches!(command, Command::Halt | Command::Velocity { zoom: None, .. });
+                let zoom = (zoom && self.moves.zooms()).then_some(0);
+                self.move_at(&abilities.velocity((0, 0), zoom), abilities).await
+            }
+        }
+    }
+
+    /// Where the camera looks. Some take half a minute to say so: they are asked only whether they are there.
+    async fn position(&mut self, abilities: &Abilities) -> Result<Position, Error> {
+        if self.late_statuses < LATE_STATUSES {
+            let message = messages::get_status(self.profile());
+            match timeout(STATUS_TIMEOUT, self.call(Path::Ptz, &message)).await {
+                Ok(Ok(body)) => {
+                    self.late_statuses = 0;
+                    let position = parse_position(&body, abilities);
+                    return position
+                        .ok_or_else(|| Error::Camera("the camera does not tell its position".to_owned()));
+                }
+                Ok(Err(err)) => return Err(err),
+                Err(_) => self.late_statuses += 1,
+            }
+        }
+        self.clock = Some(self.ask_clock().await?);
+        Err(Error::Camera("the camera takes too long to tell its position".to_owned()))
+    }
+
+    async fn presets(&mut self) -> Result<Presets, Error> {
+        let body = self.call(Path::Ptz, &messages::get_presets(self.profile())).await?;
+        let (tokens, presets) = parse_presets(&body).ok_or_else(|| unexpected(""))?;
+        self.presets = tokens;
+        Ok(presets)
+    }
+
+    fn warn_of_no_timeout(&mut self) {
+        self.warn("the camera refuses to be told how long a move may last: if the network fails while it moves, it goes on turning. Use it with `dead-man`, over a network that does not fail");
+    }
+
+    fn warn(&mut self, text: &str) {
+        self.warning = Some(text.to_owned());
+    }
+}
+
+/// Where a message goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Path {
+    Device,
+    Media,
+    Ptz,
+}

@@ -1,0 +1,118 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Cameras as they are, followed with over real HTTP, in stepped time and with properties as they are by default.
+#![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
+
+#[path = "../../gst-plugin-vapix/tests/common/mod.rs"]
+mod common;
+
+use std::sync::Once;
+
+use common::stage::{Shown, Stage, mean_distance, pacing};
+use common::{Heard, Rig, target};
+use ptztrack_contract::TargetState;
+use virtual_camera::{Auth, Kinematics, OnvifSettings, ProportionalSpeed, Quirk, Settings, SpeedMap};
+
+/// How long somebody is followed.
+const MINUTE_S: f64 = 60.0;
+
+fn camera(onvif: OnvifSettings, full_speed_deg_s: f64) -> Settings {
+    static REGISTER: Once = Once::new();
+    REGISTER.call_once(|| {
+        gst::init().unwrap();
+        gstonvifptz::plugin_register_static().unwrap();
+    });
+    let proportional_speed = ProportionalSpeed { enabled: false, ..Kinematics::default().proportional_speed };
+    let speed_map = SpeedMap::Linear { max_deg_s: full_speed_deg_s };
+    let kinematics = Kinematics { speed_map, proportional_speed, ..Kinematics::default() };
+    Settings { auth: Auth::Digest { qop: true }, onvif: Some(onvif), ..pacing(2, 6, 55.2, kinematics) }
+}
+
+fn log_in(rig: Rig) -> Rig {
+    rig.with("user", "root").with("password", "pass")
+}
+
+/// Follows for a minute, loses the target and sees the camera come to rest; returns what was to be seen.
+fn follow(what: &str, settings: Settings) -> (Vec<Shown>, Stage) {
+    let mut stage = Stage::new(settings, log_in);
+    let shown = stage.follow(MINUTE_S);
+    let pictures = (MINUTE_S / common::stage::FRAME.as_secs_f64()).round() as usize;
+    assert!(shown.len() >= pictures - 5, "{what}: seen in {} of {pictures} pictures", shown.len());
+    assert!(stage.heard.iter().all(|heard| !matches!(heard, Heard::Error(_))), "{what}: {:?}", stage.heard);
+    stage.run(8.0, &target(TargetState::Searching, 0.5, 0.5));
+    assert!(!stage.camera.status().moving, "{what}: it turns on: {:?}", stage.moves());
+    (shown, stage)
+}
+
+/// How far from the middle, in the second half of a minute, once latency and speeds are known.
+fn follows(what: &str, settings: Settings, farthest: f64) -> Stage {
+    let (shown, stage) = follow(what, settings);
+    let settled = mean_distance(&shown[shown.len() / 2..]);
+    assert!(settled < farthest, "{what}: {settled} from the middle");
+    stage
+}
+
+#[test]
+fn a_camera_as_specified() {
+    let stage = follows("as specified", camera(OnvifSettings::default(), 120.0), 0.12);
+    assert!(
+        stage.moves().iter().any(|sent| sent.contains("ContinuousMove") && sent.contains("Timeout=PT2S"))
+    );
+    assert!(!stage.heard.iter().any(Heard::is_warning), "{:?}", stage.heard);
+}
+
+#[test]
+fn each_quirk() {
+    for quirk in Quirk::ALL {
+        let stage = follows(quirk.switch(), camera(OnvifSettings::with(&[*quirk]), 120.0), 0.25);
+        let warnings: Vec<_> = stage.heard.into_iter().filter_map(Heard::into_warning).collect();
+        let expected = match quirk {
+            Quirk::TimeoutRefused => &["refuses to be told how long a move may last"][..],
+            // What a broken connection is for the camera does not say.
+            Quirk::StopCloses => &["connection to the camera failed"],
+            _ => &[],
+        };
+        let told = warnings.iter().zip(expected).all(|(warning, expected)| warning.contains(expected));
+        assert!(warnings.len() == expected.len() && told, "{}: {warnings:?}", quirk.switch());
+    }
+}
+
+#[test]
+fn all_that_can_be_had_together() {
+    let apart = [
+        Quirk::TimeoutRefused,
+        Quirk::TimeoutTen,
+        Quirk::ClockBehind,
+        Quirk::StopMissing,
+        Quirk::StopCloses,
+        Quirk::StopPanTilt,
+        Quirk::StatusIdle,
+        Quirk::ZoomBreaks,
+    ];
+    let quirks: Vec<_> = Quirk::ALL.iter().copied().filter(|quirk| !apart.contains(quirk)).collect();
+    follows("together", camera(OnvifSettings::with(&quirks), 120.0), 0.25);
+}
+
+#[test]
+fn cameras_much_faster_and_slower_than_is_assumed() {
+    for full_speed_deg_s in [30.0, 60.0, 240.0, 360.0] {
+        let what = format!("{full_speed_deg_s} degrees a second");
+        follows(&what, camera(OnvifSettings::default(), full_speed_deg_s), 0.12);
+    }
+}
+
+/// The camera turns away from the person at first; how far is bounded by moves that are slow until it is known better.
+#[test]
+fn a_mirrored_pan_is_corrected_within_five_seconds() {
+    let mut stage = Stage::new(camera(OnvifSettings::with(&[Quirk::PanMirrored]), 120.0), log_in);
+    let shown = stage.follow(MINUTE_S);
+    let farthest = shown.iter().map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
+    assert!(farthest < 20.0, "{farthest} degrees away");
+    let begins = shown.iter().find(|shown| shown.distance() > 0.05).unwrap().at;
+    let later = shown.iter().filter(|shown| shown.at > begins + std::time::Duration::from_secs(5));
+    let farthest = later.map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
+    assert!(farthest < 10.0, "{farthest} degrees away after 5 s");
+    assert!(
+        stage.heard.iter().any(|heard| matches!(heard, Heard::Info(text) if text.contains("invert-pan")))
+    );
+}

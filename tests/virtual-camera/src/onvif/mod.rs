@@ -1,0 +1,37 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The camera's ONVIF face: as much of Profile S as moving it takes, with the quirks of real cameras.
+
+mod message;
+mod quirks;
+mod services;
+
+pub use quirks::{Quirk, quirk_table};
+
+pub(crate) use message::{Message, envelope, fault};
+pub(crate) use services::{Refusal, answer, clock};
+
+/// Path of the device service, which the specification fixes.
+pub(crate) const DEVICE_SERVICE: &str = "/onvif/device_service";
+pub(crate) const MEDIA_SERVICE: &str = "/onvif/media_service";
+pub(crate) const PTZ_SERVICE: &str = "/onvif/ptz_service";
+
+/// How a camera speaks ONVIF.
+#[derive(Debug, Clone, Default)]
+pub struct OnvifSettings {
+    /// In what it differs from the specification.
+    pub quirks: Vec<Quirk>,
+    /// Whether it tells its position in degrees too.
+    pub degrees: bool,
+}
+
+impl OnvifSettings {
+    /// With these quirks.
+    pub fn with(quirks: &[Quirk]) -> Self {
+        Self { quirks: quirks.to_vec(), ..Self::default() }
+    }
+
+    pub(crate) fn has(&self, quirk: Quirk) -> bool {
+        self.quirks.contains(&quirk)
+    }
+}
