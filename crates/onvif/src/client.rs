@@ -199,20 +199,24 @@ impl Client {
         if self.login == Login::Refused {
             return Err(self.bad_credentials());
         }
+        // What anybody may ask says nothing of our password.
+        let open = path == Path::Device;
         let path = self.path(path).to_owned();
         for fresh in [false, true] {
             if fresh {
                 self.clock = Some(self.ask_clock().await?);
             }
             // By HTTP's Digest it is known who we are; a camera that does not take that word for it is told in both ways.
-            let token = self.http.credentials().filter(|_| fresh || !self.http.is_signing()).cloned();
+            let tells = fresh || !open && !self.http.is_signing();
+            let token = self.http.credentials().filter(|_| tells).cloned();
+            let judged = token.is_some() || self.http.is_signing();
             let header = token.map_or_else(String::new, |credentials| {
                 security(&credentials, &self.clock.unwrap_or_else(CameraClock::assumed).now())
             });
             let answer = self.http.post(&path, &envelope(&header, message), Repeat::WhereBroken).await?;
             match read_answer(&answer)? {
                 Answer::Body(body) => {
-                    if self.http.credentials().is_some() {
+                    if judged {
                         self.login = Login::Accepted;
                     }
                     return Ok(body);
