@@ -39,11 +39,11 @@ quirks! {
     /// `MoveStatus` is always `IDLE`
     StatusIdle = "status-idle", "Hikvision, several models: frigate issue 7958";
     /// `GetStatus` is answered after 30 s
-    StatusLate = "status-late", "testspecs issue 132; frigate discussions of cameras that hang";
+    StatusLate = "status-late", "supposed: onvif/testspecs issue 132 asks that it be answered at once";
     /// A `Timeout` is refused
     TimeoutRefused = "timeout-refused", "Bosch: Jazea/Onvif.Core issue 30";
     /// A `Timeout` is taken and has no effect
-    TimeoutIgnored = "timeout-ignored", "onvifsim, list of quirks";
+    TimeoutIgnored = "timeout-ignored", "supposed: no report is at hand";
     /// Only a `Timeout` of 1 to 10 s is taken
     TimeoutTen = "timeout-ten", "Dahua: frigate issue 9056";
     /// `Stop` is refused
@@ -53,7 +53,7 @@ quirks! {
     /// `Stop` has the connection closed
     StopCloses = "stop-closes", "Cohu: iris pull request 177";
     /// `Stop` without elements stops pan and tilt only
-    StopPanTilt = "stop-pan-tilt", "onvifsim, list of quirks";
+    StopPanTilt = "stop-pan-tilt", "supposed: no report is at hand";
     /// Relative moves are announced and not done
     RelativeIdle = "relative-idle", "Uniview: frigate, list of cameras";
     /// Tokens are refused whose time is more than 5 s off, and the clock is 1 h ahead
@@ -69,7 +69,7 @@ quirks! {
     /// Velocities are made one of seven
     SevenSpeeds = "seven-speeds", "obs-face-tracker issue 126; Home Assistant core issue 131492";
     /// Namespaces have other prefixes
-    Prefixes = "prefixes", "gSOAP and others";
+    Prefixes = "prefixes", "any SOAP library chooses its own";
     /// Panning goes the other way
     PanMirrored = "pan-mirrored", "Hikvision DS-2DF5220S: obs-ptz pull request 94";
     /// Tilting goes the other way
@@ -77,9 +77,9 @@ quirks! {
     /// Neither spaces nor timeouts are told
     NoOptions = "no-options", "TP-Link: onvifsim";
     /// Only the second profile has PTZ
-    SecondProfile = "second-profile", "onvifsim, list of quirks";
+    SecondProfile = "second-profile", "onvifsim, C1";
     /// `GetServices` is refused
-    NoServices = "no-services", "cameras from before ONVIF 2.0";
+    NoServices = "no-services", "supposed: devices older than this message";
 }
 
 /// A table of them in Markdown, as the documentation has it.
