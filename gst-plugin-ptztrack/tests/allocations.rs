@@ -139,11 +139,11 @@ fn counts(names: [&str; 3], turns: bool) -> [Vec<usize>; 3] {
 }
 
 /// Names that the bindings make C strings of. Detector: of two metas, each looked for and added, and of a region of interest.
-/// Tracker: of two metas that it looks for, one that it looks for and adds, and of a region of interest.
-const NAMES: [usize; 2] = [5, 5];
-/// The overlay's, at most: two names of metas, four lines of text handed to OpenCV to be measured, and what it draws from: regions and
-/// points as they are read, the trail, and shapes with their points and words.
-const DRAWN: usize = 32;
+/// Tracker: of two metas that it looks for, two that it looks for and adds, and of a region of interest.
+const NAMES: [usize; 2] = [5, 7];
+/// The overlay's, at most: three names of metas, four lines of text handed to OpenCV to be measured, and what it draws from: regions,
+/// points and tracks as they are read, the trail, and shapes with their points and words.
+const DRAWN: usize = 34;
 
 /// What is kept grows by one more allocation in so many pictures at most: none is just like another.
 const RARELY: usize = 10;

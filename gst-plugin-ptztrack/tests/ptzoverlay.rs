@@ -9,8 +9,8 @@ use gst_video::prelude::*;
 use gst_video::{VideoFormat, VideoInfo, VideoOverlayCompositionMeta};
 use ptztrack_contract::{BufferMeta, Feature, MotionMeta, Point, Rect, Region, TargetMeta, TargetState};
 
-const PARTS: [&str; 8] =
-    ["contours", "boxes", "features", "centroid", "trail", "cross-hair", "state", "offset"];
+const PARTS: [&str; 9] =
+    ["contours", "boxes", "tracks", "features", "centroid", "trail", "cross-hair", "state", "offset"];
 const COMPOSITION: &str = "meta:GstVideoOverlayComposition";
 
 fn init() {

@@ -12,10 +12,12 @@
 //! | meta | [`MotionMeta`] | `PtzMotionMeta` |
 //! | meta | [`SceneMeta`] | `PtzSceneMeta` |
 //! | meta | [`TargetMeta`] | `PtzTargetMeta` |
+//! | meta | [`TracksMeta`] | `PtzTracksMeta` |
 //! | upstream event | [`TrackerEvent`] | `ptztrack-tracker` |
 //! | upstream event | [`CameraEvent`] | `ptztrack-camera-state` |
 //! | element message | [`MotionMessage`] | `ptztrack-motion` |
 //! | element message | [`TargetMessage`] | `ptztrack-target` |
+//! | element message | [`TrackMessage`] | `ptztrack-track` |
 //! | element message | [`CameraMessage`] | `ptztrack-camera` |
 
 #[cfg(feature = "gst")]
@@ -42,6 +44,8 @@ mod scene;
 mod target;
 #[cfg(feature = "gst")]
 mod target_meta;
+#[cfg(feature = "gst")]
+mod tracks;
 
 pub use duration::mistaken_unit;
 pub use geometry::{Point, Rect, Vector, aspect};
@@ -58,10 +62,11 @@ mod forms {
         Times,
     };
     pub use crate::meta::BufferMeta;
-    pub use crate::motion::{MOTION_ROI, MotionMeta, Region, RegionTrack};
+    pub use crate::motion::{MOTION_ROI, MotionMeta, Region};
     pub use crate::refused_values::RefusedValues;
     pub use crate::scene::{CameraMotion, Plane, SceneMeta};
     pub use crate::target_meta::{Feature, TargetMeta};
+    pub use crate::tracks::{Track, TrackChange, TrackMessage, TrackState, TracksMeta};
 }
 #[cfg(feature = "gst")]
 pub use forms::*;

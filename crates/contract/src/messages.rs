@@ -28,7 +28,7 @@ impl Times {
         }
     }
 
-    fn write(&self, structure: &mut gst::StructureRef) {
+    pub(crate) fn write(&self, structure: &mut gst::StructureRef) {
         let fields = [
             ("timestamp", self.timestamp),
             ("running-time", self.running_time),
@@ -41,7 +41,7 @@ impl Times {
         }
     }
 
-    fn read(reader: &Reader) -> Result<Self, ContractError> {
+    pub(crate) fn read(reader: &Reader) -> Result<Self, ContractError> {
         Ok(Self {
             timestamp: reader.get_optional("timestamp")?,
             running_time: reader.get_optional("running-time")?,

@@ -3,7 +3,7 @@
 use gst::prelude::*;
 
 use crate::codec::{self, Reader};
-use crate::{BufferMeta, ContractError, Point, Rect, Vector};
+use crate::{BufferMeta, ContractError, Point, Rect};
 
 /// `roi-type` of the standard region-of-interest meta that marks moving regions.
 pub const MOTION_ROI: &str = "motion";
@@ -21,49 +21,6 @@ pub struct Region {
     pub area: f64,
     /// Centre of mass of the area inside the contour.
     pub centroid: Point,
-    /// What is known of it from the pictures before; nothing where the detector does not follow regions.
-    pub track: Option<RegionTrack>,
-}
-
-/// What a region did in the pictures before, measured against the background: the camera's own motion is
-/// taken off.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct RegionTrack {
-    /// Number of the region, counted from 1, the same from picture to picture.
-    pub id: u64,
-    /// For how long it has been seen.
-    pub age: gst::ClockTime,
-    /// Its velocity, frame widths and heights per second.
-    pub velocity: Vector,
-    /// How far it has come since it was first seen: what changes in its place comes nowhere.
-    pub travelled: Vector,
-    /// How much of its area lies where the picture kept changing and nothing came of it: 0 to 1.
-    pub restless: f64,
-}
-
-impl RegionTrack {
-    const NAME: &'static str = "track";
-
-    fn to_structure(self) -> gst::Structure {
-        gst::Structure::builder(Self::NAME)
-            .field("id", self.id)
-            .field("age", self.age)
-            .field("velocity", codec::vector(self.velocity))
-            .field("travelled", codec::vector(self.travelled))
-            .field("restless", self.restless)
-            .build()
-    }
-
-    fn from_structure(structure: &gst::StructureRef) -> Result<Self, ContractError> {
-        let reader = Reader::new(structure, Self::NAME)?;
-        Ok(Self {
-            id: reader.get("id")?,
-            age: reader.get("age")?,
-            velocity: reader.vector("velocity")?,
-            travelled: reader.vector("travelled")?,
-            restless: reader.number("restless")?,
-        })
-    }
 }
 
 impl Region {
@@ -76,7 +33,6 @@ impl Region {
             .field("perimeter", self.perimeter)
             .field("area", self.area)
             .field("centroid", codec::point(self.centroid))
-            .field_if_some("track", self.track.map(RegionTrack::to_structure))
             .build()
     }
 
@@ -91,10 +47,6 @@ impl Region {
             perimeter: reader.number("perimeter")?,
             area: reader.number("area")?,
             centroid: reader.point("centroid")?,
-            track: reader
-                .get_optional::<&gst::StructureRef>("track")?
-                .map(RegionTrack::from_structure)
-                .transpose()?,
         };
         Ok(())
     }

@@ -24,10 +24,21 @@ prop_compose! {
     }
 }
 
-fn track() -> impl Strategy<Value = RegionTrack> {
-    (any::<u64>(), clock_time(), vector(), vector(), 0.0..=1.0f64).prop_map(
-        |(id, age, velocity, travelled, restless)| RegionTrack { id, age, velocity, travelled, restless },
-    )
+fn track_state() -> impl Strategy<Value = TrackState> {
+    prop::sample::select(vec![TrackState::Seen, TrackState::Shared, TrackState::Hidden])
+}
+
+prop_compose! {
+    fn track()(
+        id in any::<u64>(),
+        bounds in rect(),
+        velocity in vector(),
+        state in track_state(),
+        confidence in 0.0..=1.0f64,
+        is_target in any::<bool>(),
+    ) -> Track {
+        Track { id, bounds, velocity, state, confidence, is_target }
+    }
 }
 
 prop_compose! {
@@ -37,9 +48,8 @@ prop_compose! {
         perimeter in number(),
         area in number(),
         centroid in point(),
-        track in prop::option::of(track()),
     ) -> Region {
-        Region { bounds, contour, perimeter, area, centroid, track }
+        Region { bounds, contour, perimeter, area, centroid }
     }
 }
 
@@ -115,6 +125,15 @@ proptest! {
     }
 
     #[test]
+    fn tracks_meta(tracks in prop::collection::vec(track(), 0..4)) {
+        gst::init().unwrap();
+        let meta = TracksMeta { tracks };
+        let mut buffer = gst::Buffer::new();
+        meta.attach(buffer.get_mut().unwrap()).unwrap();
+        prop_assert_eq!(TracksMeta::of(&buffer).unwrap().unwrap(), meta);
+    }
+
+    #[test]
     fn tracker_event(state in target_state(), bounds in prop::option::of(rect())) {
         gst::init().unwrap();
         let event = TrackerEvent { state, bounds };
@@ -149,6 +168,8 @@ proptest! {
             velocity, confidence: 0.5,
         };
         prop_assert_eq!(TargetMessage::from_structure(&target.to_structure()).unwrap(), target);
+        let track = TrackMessage { change: TrackChange::Merged, times, id, into: Some(7) };
+        prop_assert_eq!(TrackMessage::from_structure(&track.to_structure()).unwrap(), track);
         let camera = CameraMessage { change: CameraChange::AtLimit, times, detail: "pan 180°".into() };
         prop_assert_eq!(CameraMessage::from_structure(&camera.to_structure()).unwrap(), camera);
     }

@@ -186,7 +186,7 @@ impl Stream {
         self.zones.set(&config.zones, &config.exclude_zones);
         self.zones.carry(seen.camera_motion.as_ref(), elapsed, heard.view);
         let size = (frame.width() as usize, frame.height() as usize);
-        let motion = self.detector.process_likelihood(&seen, size, elapsed, &config, &self.zones)?;
+        let motion = self.detector.process_likelihood(&seen, size, &config, &self.zones)?;
         let scene = SceneMeta {
             from_pts,
             camera_motion: seen.camera_motion,

@@ -5,7 +5,7 @@
 use gst_video::{VideoInfo, VideoRegionOfInterestMeta};
 use ptztrack_contract::{
     BufferMeta, ContractError, Feature, MOTION_ROI, MotionMeta, Rect, TARGET_ROI, TargetChange,
-    TargetMessage, TargetMeta, TargetState, Times, aspect,
+    TargetMessage, TargetMeta, TargetState, Times, Track, TracksMeta, aspect,
 };
 
 use crate::region_of_interest::remove_regions_of_interest;
@@ -56,19 +56,19 @@ impl Detections {
             // Each gets memory of the other.
             std::mem::swap(&mut detection.contour, &mut region.contour);
             detection.bounds = region.bounds;
-            detection.restless = region.track.map_or(0.0, |track| track.restless as f32);
             detection.outside = outside;
         }
     }
 }
 
-/// Attaches the target's own meta, and the standard one where there is a target. Gives the points back, as memory.
+/// Attaches the target's own meta, and the standard one where there is a target, and everybody's. Gives points and tracks
+/// back, as memory.
 pub(super) fn attach(
     buffer: &mut gst::BufferRef,
     info: &VideoInfo,
     tracked: Tracked,
     capture_time: Option<gst::ClockTime>,
-) -> Result<Vec<Feature>, glib::BoolError> {
+) -> Result<(Vec<Feature>, Vec<Track>), glib::BoolError> {
     remove_regions_of_interest(buffer, TARGET_ROI);
     if matches!(tracked.state, TargetState::Tracking | TargetState::Occluded) {
         let pixels = tracked.bounds.to_pixels(info.width(), info.height());
@@ -76,6 +76,8 @@ pub(super) fn attach(
             VideoRegionOfInterestMeta::add(buffer, TARGET_ROI, pixels);
         }
     }
+    let everybody = TracksMeta { tracks: tracked.tracks };
+    everybody.attach(buffer)?;
     let meta = TargetMeta {
         state: tracked.state,
         id: tracked.id,
@@ -88,7 +90,8 @@ pub(super) fn attach(
         aspect: aspect((info.width(), info.height()), info.par().into()),
         capture_time,
     };
-    meta.attach(buffer).map(|()| meta.features)
+    meta.attach(buffer)?;
+    Ok((meta.features, everybody.tracks))
 }
 
 /// The message that says so.

@@ -9,9 +9,9 @@ use gst_base::prelude::*;
 use gst_base::subclass::BaseTransformMode;
 use gst_base::subclass::prelude::*;
 use gst_video::subclass::prelude::*;
-use gst_video::{NavigationEvent, VideoFrameRef, VideoInfo};
+use gst_video::{VideoFrameRef, VideoInfo};
 use ptztrack_contract::{
-    CameraEvent, MOTION_ROI, Point, RefusedValues, TargetChange, TargetState, Times, TrackerEvent,
+    CameraEvent, MOTION_ROI, RefusedValues, TargetChange, TargetState, Times, TrackMessage, TrackerEvent,
 };
 
 use super::scene_source::SceneSource;
@@ -23,15 +23,14 @@ use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
 use crate::vision::{self, CameraMoves, Observation, TargetRequest};
 
+mod operator;
+
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("lkfeaturetrack", gst::DebugColorFlags::empty(), Some("Feature point tracker"))
 });
 
 /// A frame's duration where neither timestamps nor caps tell.
 const DEFAULT_FRAME: gst::ClockTime = gst::ClockTime::from_mseconds(40);
-/// Mouse buttons as `GstNavigation` counts them.
-const LEFT_BUTTON: i32 = 1;
-const RIGHT_BUTTON: i32 = 3;
 
 #[derive(Debug, Clone)]
 struct Settings {
@@ -41,6 +40,8 @@ struct Settings {
     roi_type: Arc<str>,
     confirm_frames: u32,
     coast_time_ns: u64,
+    memory_time_ns: u64,
+    post_tracks: bool,
     manual_size: f64,
     message_interval_ns: u64,
     stationary_timeout_ns: u64,
@@ -55,6 +56,8 @@ impl Default for Settings {
             roi_type: MOTION_ROI.into(),
             confirm_frames: 3,
             coast_time_ns: 3_000_000_000,
+            memory_time_ns: 60_000_000_000,
+            post_tracks: false,
             manual_size: 0.25,
             message_interval_ns: 0,
             stationary_timeout_ns: 0,
@@ -82,6 +85,7 @@ impl Settings {
             },
             confirm_frames: self.confirm_frames,
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
+            memory_s: gst::ClockTime::from_nseconds(self.memory_time_ns).seconds_f64(),
             manual_size: self.manual_size,
             must_travel: self.profile == Profile::Robust && own_detector,
             detector_pause_s: if own_detector { 0.0 } else { FOREIGN_DETECTOR_PAUSE_S },
@@ -183,6 +187,16 @@ pub struct LkFeatureTrack {
         blurb = "Height of the box around a place selected by hand where nothing was detected, in frame heights"
     )]
     #[property(
+        name = "memory-time", get, type = u64, member = memory_time_ns, mutable_playing,
+        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "memory-time", value) { lock(&imp.settings).memory_time_ns = value },
+        maximum = 3_600_000_000_000, default = Settings::default().memory_time_ns,
+        blurb = "How long somebody who is gone is remembered, in nanoseconds: whoever comes back within it has their old number (0: not at all)"
+    )]
+    #[property(
+        name = "post-tracks", get, set, type = bool, member = post_tracks, default = Settings::default().post_tracks, mutable_playing,
+        blurb = "Post an element message ptztrack-track for everybody who comes or goes, target or not"
+    )]
+    #[property(
         name = "message-interval", get, type = u64, member = message_interval_ns, mutable_playing,
         set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "message-interval", value) { lock(&imp.settings).message_interval_ns = value },
         maximum = 3_600_000_000_000, default = Settings::default().message_interval_ns,
@@ -206,6 +220,8 @@ pub struct LkFeatureTrack {
     /// Width and height of the frames, for clicks from other threads.
     size: Mutex<Option<(u32, u32)>>,
     request: Mutex<Option<TargetRequest>>,
+    /// Numbers of the tracks in the last frame, ascending, for requests from other threads.
+    numbers: Mutex<Vec<u64>>,
     camera: Mutex<CameraMoves>,
     refused: RefusedValues,
 }
@@ -228,33 +244,7 @@ impl ObjectImpl for LkFeatureTrack {
     }
 
     fn signals() -> &'static [glib::subclass::Signal] {
-        static SIGNALS: LazyLock<Vec<glib::subclass::Signal>> = LazyLock::new(|| {
-            vec![
-                // Follow what is at (x, y), in frame sizes from the left and the top, 0 to 1.
-                glib::subclass::Signal::builder("select-target")
-                    .param_types([f64::static_type(), f64::static_type()])
-                    .run_last()
-                    .action()
-                    .class_handler(|args| {
-                        let element = args[0].get::<super::LkFeatureTrack>().ok()?;
-                        let (x, y) = (args[1].get().ok()?, args[2].get().ok()?);
-                        element.imp().select(Point { x, y });
-                        None
-                    })
-                    .build(),
-                // Let the target go.
-                glib::subclass::Signal::builder("release-target")
-                    .run_last()
-                    .action()
-                    .class_handler(|args| {
-                        let element = args[0].get::<super::LkFeatureTrack>().ok()?;
-                        element.imp().release();
-                        None
-                    })
-                    .build(),
-            ]
-        });
-        &SIGNALS
+        operator::signals()
     }
 }
 
@@ -297,6 +287,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         }
         *lock(&self.size) = None;
         *lock(&self.request) = None;
+        lock(&self.numbers).clear();
         *lock(&self.camera) = CameraMoves::default();
         Ok(())
     }
@@ -373,33 +364,6 @@ impl VideoFilterImpl for LkFeatureTrack {
     }
 }
 
-/// Operator and application.
-impl LkFeatureTrack {
-    fn select(&self, place: Point) {
-        let inside = |coordinate| (0.0..=1.0).contains(&coordinate);
-        if inside(place.x) && inside(place.y) {
-            *lock(&self.request) = Some(TargetRequest::Select(place));
-        } else {
-            gst::warning!(CAT, imp = self, "nothing to select outside the frame: {place:?}");
-        }
-    }
-
-    fn release(&self) {
-        *lock(&self.request) = Some(TargetRequest::Release);
-    }
-
-    fn navigate(&self, event: &gst::EventRef) {
-        let Some((width, height)) = *lock(&self.size) else { return };
-        match NavigationEvent::parse(event) {
-            Ok(NavigationEvent::MouseButtonPress { button: LEFT_BUTTON, x, y, .. }) => {
-                self.select(Point { x: x / f64::from(width), y: y / f64::from(height) });
-            }
-            Ok(NavigationEvent::MouseButtonPress { button: RIGHT_BUTTON, .. }) => self.release(),
-            _ => (),
-        }
-    }
-}
-
 /// One frame.
 impl LkFeatureTrack {
     fn track(&self, stream: &mut Stream, settings: &Settings, buffer: &mut gst::BufferRef) {
@@ -420,8 +384,9 @@ impl LkFeatureTrack {
             }
         };
         self.announce(stream, settings, &tracked, times, step);
+        self.count(settings, &tracked, times);
         match buffer::attach(buffer, &stream.info, tracked, times.running_time) {
-            Ok(features) => stream.tracker.recycle(features),
+            Ok((features, tracks)) => stream.tracker.recycle(features, tracks),
             Err(err) => self.warn_once(stream, &format!("no meta can be attached: {err}")),
         }
     }
@@ -491,6 +456,21 @@ impl LkFeatureTrack {
         }
     }
 
+    /// Keeps the numbers of the tracks, and tells the bus who comes and goes.
+    fn count(&self, settings: &Settings, tracked: &vision::Tracked, times: Times) {
+        {
+            let mut numbers = lock(&self.numbers);
+            numbers.clear();
+            numbers.extend(tracked.tracks.iter().map(|track| track.id));
+            numbers.sort_unstable();
+        }
+        if settings.post_tracks {
+            for &(change, id, into) in &tracked.track_changes {
+                self.post_structure(TrackMessage { change, times, id, into }.to_structure());
+            }
+        }
+    }
+
     /// A detector must not sleep on when nobody is left to wake it. The own pad is no longer active then.
     fn wake_detector(&self) {
         if let Some(detector) = self.obj().sink_pad().peer() {
@@ -501,7 +481,10 @@ impl LkFeatureTrack {
     }
 
     fn post(&self, tracked: &vision::Tracked, change: TargetChange, times: Times) {
-        let structure = buffer::message(tracked, change, times).to_structure();
+        self.post_structure(buffer::message(tracked, change, times).to_structure());
+    }
+
+    fn post_structure(&self, structure: gst::Structure) {
         let obj = self.obj();
         let message = gst::message::Element::builder(structure).src(&*obj).build();
         if obj.post_message(message).is_err() {

@@ -3,9 +3,17 @@
 //! SECTION:element-lkfeaturetrack
 //!
 //! Follows one target by its feature points (thesis 3.5), also while the camera turns. Takes what
-//! `bgavgdetect` saw, or the `GstVideoRegionOfInterestMeta`s of any other detector (`roi-type`), chooses
-//! one of them (`selection`), and attaches a `PtzTargetMeta` to every frame that holds a picture (not to gaps)
-//! and a region of interest named `target` where there is one. Pixels pass untouched and uncopied; only those around the target are looked at.
+//! `bgavgdetect` saw, or the `GstVideoRegionOfInterestMeta`s of any other detector (`roi-type`), keeps a track of everybody who is
+//! seen, chooses one of them as the target (`selection`), and attaches to every frame that holds a picture (not to gaps) a
+//! `PtzTracksMeta` of everybody, a `PtzTargetMeta`, and a region of interest named `target` where there is one. Pixels pass untouched
+//! and uncopied.
+//!
+//! ## Tracks
+//! Every track has a number, which is the target's number while it is the target. Of several people in one region each keeps their
+//! own. Who is not seen is predicted for three seconds, or for `coast-time` where that is longer; then the track ends. Whoever comes
+//! back in the same clothes within `memory-time` has their old number, and a target that was lost is taken up again before anybody
+//! else. With `post-tracks` everybody who comes or goes is told of by an element message named `ptztrack-track` (`change`: `new`,
+//! `back`, `merged` with the number `into` which it went, `gone`).
 //!
 //! ## States
 //! *Searching* → *tracking* → *occluded* (hidden: coasted for `coast-time` and looked for) → *tracking* again
@@ -17,9 +25,11 @@
 //! Buffers that a leaky queue dropped before do not: all motion is taken over real time steps.
 //!
 //! ## Operator
-//! A left click in any video sink (`GstNavigation`) selects the detection there, or else a box of `manual-size`
-//! around it; a right click releases the target. Applications emit `select-target` (x and y in frame sizes, 0
-//! to 1) and `release-target` instead. What was released is not chosen again for three seconds.
+//! A left click in any video sink (`GstNavigation`) selects the track there, or else a box of `manual-size`
+//! around it; a right click releases the target. The key `n` selects the track of the next number, a digit the track of that number.
+//! Applications emit `select-target` (x and y in frame sizes, 0 to 1), `select-track` (a number), `next-target` and
+//! `release-target` instead. A number that nobody has is a warning, and the target stays. What was released is not chosen again for
+//! three seconds.
 //!
 //! ## Giving up
 //! Both limits are off by default: whoever guards a door wants to see who waits there. A message `released` says

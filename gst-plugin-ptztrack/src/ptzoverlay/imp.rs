@@ -6,7 +6,9 @@ use glib::Properties;
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use gst_video::{VideoFormat, VideoOverlayComposition, VideoOverlayCompositionMeta, VideoOverlayRectangle};
-use ptztrack_contract::{BufferMeta, ContractError, MotionMeta, RefusedValues, TargetMeta, TargetState};
+use ptztrack_contract::{
+    BufferMeta, ContractError, MotionMeta, RefusedValues, TargetMeta, TargetState, TracksMeta,
+};
 
 use super::{caps, pixels};
 use crate::allocation::refuse_crop;
@@ -23,6 +25,7 @@ static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
 struct Settings {
     contours: bool,
     boxes: bool,
+    tracks: bool,
     features: bool,
     centroid: bool,
     trail: bool,
@@ -37,6 +40,7 @@ impl Default for Settings {
         Self {
             contours: true,
             boxes: true,
+            tracks: true,
             features: true,
             centroid: true,
             trail: true,
@@ -50,8 +54,8 @@ impl Default for Settings {
 
 impl Settings {
     fn parts(self) -> Parts {
-        let Self { contours, boxes, features, centroid, trail, cross_hair, state, offset, .. } = self;
-        Parts { contours, boxes, features, centroid, trail, cross_hair, state, offset }
+        let Self { contours, boxes, tracks, features, centroid, trail, cross_hair, state, offset, .. } = self;
+        Parts { contours, boxes, tracks, features, centroid, trail, cross_hair, state, offset }
     }
 }
 
@@ -97,6 +101,10 @@ pub struct PtzOverlay {
     #[property(
         name = "boxes", get, set, type = bool, member = boxes, default = Settings::default().boxes, mutable_playing,
         blurb = "Draw the boxes of what moves and of the target"
+    )]
+    #[property(
+        name = "tracks", get, set, type = bool, member = tracks, default = Settings::default().tracks, mutable_playing,
+        blurb = "Draw thin boxes of everybody else who is seen, with their numbers"
     )]
     #[property(
         name = "features", get, set, type = bool, member = features, default = Settings::default().features, mutable_playing,
@@ -367,13 +375,15 @@ impl PtzOverlay {
         let unreadable = |err: ContractError| format!("unreadable meta: {err}");
         let motion = MotionMeta::of(buffer).transpose().map_err(unreadable)?;
         let target = TargetMeta::of(buffer).transpose().map_err(unreadable)?;
-        if motion.is_none() && target.is_none() {
+        let tracks = TracksMeta::of(buffer).transpose().map_err(unreadable)?;
+        if motion.is_none() && target.is_none() && tracks.is_none() {
             return Ok(Vec::new());
         }
         let settings = *lock(&self.settings);
         remember(&mut memory.trail, buffer.pts(), target.as_ref(), settings.trail_duration_ns);
         let trail: Vec<_> = memory.trail.points().collect();
-        let seen = Seen { motion: motion.as_ref(), target: target.as_ref(), trail: &trail };
+        let seen =
+            Seen { motion: motion.as_ref(), target: target.as_ref(), tracks: tracks.as_ref(), trail: &trail };
         vision::scene(frame_size(info), settings.parts(), seen).map_err(failed)
     }
 }

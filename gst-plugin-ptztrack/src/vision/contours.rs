@@ -53,7 +53,6 @@ impl Grid {
             perimeter: imgproc::arc_length(contour, true)? / (2.0 * (self.width + self.height)),
             area: imgproc::contour_area_def(contour)? / (self.width * self.height),
             centroid,
-            track: None,
         })
     }
 }

@@ -15,7 +15,6 @@ use super::extremes::Extremes;
 use super::morphology::clean;
 use super::persistence::Persistence;
 use super::reduce::{divisor, with_reduced};
-use super::region_tracks::RegionTracks;
 use super::scene_model::SceneView;
 use super::segmentation::Segmentation;
 use super::zones::{Zones, zone_mask};
@@ -125,7 +124,6 @@ pub struct Detector {
     background: Background,
     afterimage: Afterimage,
     persistence: Persistence,
-    tracks: RegionTracks,
     /// Pictures learned since the last start.
     learned: u32,
     frame: (usize, usize),
@@ -156,7 +154,6 @@ impl Detector {
         self.background.restart();
         self.afterimage.restart();
         self.persistence.restart();
-        self.tracks.restart();
         self.learned = 0;
         self.mask = Mat::default();
     }
@@ -184,16 +181,14 @@ impl Detector {
         found
     }
 
-    /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods in `scene`,
-    /// `elapsed` after the one before. Gives the moving regions, longest perimeter first, or `None` while
-    /// the background is learned.
+    /// Looks at a picture of that size (pixels) whose foreground is told from its likelihoods in `scene`. Gives the moving
+    /// regions, longest perimeter first, or `None` while the background is learned.
     ///
     /// Who is followed may leave `zones`, so regions outside of them are given apart.
     pub fn process_likelihood(
         &mut self,
         scene: &SceneView,
         frame: (usize, usize),
-        elapsed: Duration,
         config: &DetectorConfig,
         zones: &CarriedZones,
     ) -> Result<Option<MotionMeta>, DetectorError> {
@@ -213,7 +208,6 @@ impl Detector {
         self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?)?;
         let MotionMeta { regions: mut found, mut outside } = std::mem::take(&mut self.told);
         self.find_regions(config, &mut found)?;
-        self.tracks.update(&mut found, scene.camera_motion.as_ref(), elapsed);
         let mut regions = self.persistence.confirmed(found, config.confirm_pictures);
         outside.extend(regions.extract_if(.., |region| !zones.allow(region.centroid)));
         Ok(Some(MotionMeta { regions: config.choice.of(regions), outside }))

@@ -129,7 +129,6 @@ mod tests {
             perimeter: 0.3,
             area: 0.06,
             centroid: bounds.centre(),
-            track: None,
         }
     }
 

@@ -3,7 +3,20 @@
 //! Everything that computes on pictures: plain types, tested by themselves.
 //!
 //! A picture's way: `camera_motion` and the background that travels with it (`scene_model`) → moving regions
-//! (`detector`) → figure and ground near the target → target (`tracker`).
+//! (`detector`) → tracks: everybody, each region with one owner (`tracker/tracks`) → target, the number of a track
+//! (`tracker/policy`) → figure and ground near it (`tracker/target`).
+//!
+//! ## Papers behind the tracks
+//!
+//! | paper | what is taken from it | where |
+//! |---|---|---|
+//! | Yi et al., "Detection of moving objects with non-stationary cameras in 5.8 ms", CVPRW 2013 | a background with an age that travels with the camera | `travelling` |
+//! | Bewley et al., "Simple online and realtime tracking" (SORT), ICIP 2016 | Kalman filter and Hungarian assignment | `tracker/tracks/track`, `association` |
+//! | Aharon et al., "BoT-SORT", 2022 | prediction by the camera's motion | `tracker/tracks/track` |
+//! | McKenna et al., "Tracking groups of people", CVIU 2000 | who merge keep their tracks; colours tell who is who after | `tracker/tracks/groups` |
+//! | Senior et al., "Appearance models for occlusion handling", IVC 2006 | the nearer feet are in front | `tracker/tracks/groups` |
+//! | Bolme et al., "Visual object tracking using adaptive correlation filters", CVPR 2010 | the target's looks | `tracker/correlation_filter` |
+//! | Bertinetto et al., "Staple", CVPR 2016 | colours of figure and ground | `tracker/colour` |
 //!
 //! ## Equations of the thesis
 //!
@@ -42,7 +55,6 @@ mod persistence;
 mod picture;
 mod presence;
 mod reduce;
-mod region_tracks;
 mod scene;
 mod scene_model;
 mod segmentation;

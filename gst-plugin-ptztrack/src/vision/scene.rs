@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use ptztrack_contract::{MotionMeta, Point, Rect, Region, TargetMeta, TargetState};
+use ptztrack_contract::{
+    MotionMeta, Point, Rect, Region, TargetMeta, TargetState, Track, TrackState, TracksMeta,
+};
 
 use super::draw::{Colour, Shape};
 use super::font::text_width;
@@ -47,6 +49,8 @@ pub struct Parts {
     pub contours: bool,
     /// Boxes of what moves and of the target.
     pub boxes: bool,
+    /// Boxes and numbers of everybody else who is seen.
+    pub tracks: bool,
     /// Feature points.
     pub features: bool,
     /// Centre of mass of the target.
@@ -62,6 +66,7 @@ pub struct Parts {
 }
 
 const MOTION: Colour = Colour::new(80, 200, 255);
+const TRACK: Colour = Colour::new(235, 235, 245);
 const KEPT: Colour = Colour::new(80, 235, 70);
 const REJECTED: Colour = Colour::new(255, 60, 50);
 const TRAIL: Colour = Colour::new(255, 220, 90);
@@ -105,6 +110,8 @@ pub struct Seen<'a> {
     pub motion: Option<&'a MotionMeta>,
     /// By the tracker.
     pub target: Option<&'a TargetMeta>,
+    /// By the tracker: everybody.
+    pub tracks: Option<&'a TracksMeta>,
     /// Where the target was lately, oldest first.
     pub trail: &'a [Point],
 }
@@ -120,6 +127,10 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
     }
     for region in seen.motion.iter().flat_map(|motion| &motion.regions) {
         scene.region(region);
+    }
+    if parts.tracks {
+        let others = seen.tracks.iter().flat_map(|meta| &meta.tracks).filter(|track| !track.is_target);
+        others.for_each(|track| scene.track(track));
     }
     if parts.cross_hair {
         scene.cross_hair();
@@ -148,11 +159,14 @@ impl Scene {
     }
 
     fn bounds(&mut self, rect: Rect, colour: Colour) {
+        self.outline(rect, self.style.stroke, colour);
+    }
+
+    fn outline(&mut self, rect: Rect, width: i32, colour: Colour) {
         let (right, bottom) = (rect.x + rect.width, rect.y + rect.height);
         let corners = [(rect.x, rect.y), (right, rect.y), (right, bottom), (rect.x, bottom)];
-        let points =
-            corners.map(|(x, y)| self.frame.spot(Point { x, y }).snapped(self.style.stroke)).to_vec();
-        self.shapes.push(Shape::Line { points, closed: true, width: self.style.stroke, colour });
+        let points = corners.map(|(x, y)| self.frame.spot(Point { x, y }).snapped(width)).to_vec();
+        self.shapes.push(Shape::Line { points, closed: true, width, colour });
     }
 
     fn region(&mut self, region: &Region) {
@@ -162,6 +176,16 @@ impl Scene {
         if self.parts.contours {
             self.line(region.contour.iter().copied(), true, MOTION);
         }
+    }
+
+    /// A thin box with its number above; fainter where it is not seen.
+    fn track(&mut self, track: &Track) {
+        let colour = TRACK.with_alpha(if track.state == TrackState::Hidden { 0.35 } else { 0.8 });
+        self.outline(track.bounds, 1, colour);
+        let corner = self.frame.spot(Point { x: track.bounds.x, y: track.bounds.y });
+        let height = self.style.text * 0.75;
+        let origin = Spot { x: corner.x, y: (corner.y - 0.3 * height).max(height) };
+        self.shapes.push(Shape::Text { origin, text: track.id.to_string(), height, colour });
     }
 
     fn trail(&mut self, trail: &[Point]) {
@@ -255,6 +279,7 @@ mod tests {
     const NONE: Parts = Parts {
         contours: false,
         boxes: false,
+        tracks: false,
         features: false,
         centroid: false,
         trail: false,
@@ -265,6 +290,7 @@ mod tests {
     const ALL: Parts = Parts {
         contours: true,
         boxes: true,
+        tracks: true,
         features: true,
         centroid: true,
         trail: true,
@@ -290,7 +316,16 @@ mod tests {
         let trail = [Point { x: 0.1, y: 0.1 }, Point { x: 0.2, y: 0.1 }, Point { x: 0.3, y: 0.1 }];
         let region = Region { contour: trail.to_vec(), ..Region::default() };
         let motion = MotionMeta { regions: vec![region], ..MotionMeta::default() };
-        let seen = Seen { motion: Some(&motion), target: Some(target), trail: &trail };
+        let track = |id: u64| Track {
+            id,
+            bounds: target.bounds,
+            velocity: ptztrack_contract::Vector::default(),
+            state: TrackState::Seen,
+            confidence: 1.0,
+            is_target: id == target.id,
+        };
+        let tracks = TracksMeta { tracks: vec![track(target.id), track(3)] };
+        let seen = Seen { motion: Some(&motion), target: Some(target), tracks: Some(&tracks), trail: &trail };
         scene(FRAME, parts, seen).unwrap()
     }
 
@@ -308,25 +343,26 @@ mod tests {
         assert_eq!(count(NONE), 0);
         assert_eq!(count(Parts { contours: true, ..NONE }), 1);
         assert_eq!(count(Parts { boxes: true, ..NONE }), 2);
+        assert_eq!(count(Parts { tracks: true, ..NONE }), 2, "the target has a box of its own");
         assert_eq!(count(Parts { features: true, ..NONE }), 2);
         assert_eq!(count(Parts { centroid: true, ..NONE }), 2);
         assert_eq!(count(Parts { trail: true, ..NONE }), 1);
         assert_eq!(count(Parts { cross_hair: true, ..NONE }), 4);
         assert_eq!(count(Parts { state: true, ..NONE }), 2);
         assert_eq!(count(Parts { offset: true, ..NONE }), 3);
-        assert_eq!(count(ALL), 16, "state and offset share a plate");
+        assert_eq!(count(ALL), 18, "state and offset share a plate");
     }
 
     #[test]
     fn words_and_numbers() {
         let shapes = shapes(ALL, &target(TargetState::Tracking));
-        assert_eq!(texts(&shapes), ["tracking #7  87%", "dx +0.10  dy +0.00"]);
+        assert_eq!(texts(&shapes), ["tracking #7  87%", "dx +0.10  dy +0.00", "3"]);
     }
 
     #[test]
     fn searching_shows_no_target() {
         let target = target(TargetState::Searching);
-        assert_eq!(texts(&shapes(ALL, &target)), ["searching"]);
+        assert_eq!(texts(&shapes(ALL, &target)), ["searching", "3"]);
         assert!(shapes(Parts { features: true, centroid: true, offset: true, ..NONE }, &target).is_empty());
     }
 

@@ -13,6 +13,7 @@ use gst_video::{NavigationEvent, VideoRegionOfInterestMeta};
 use gstptztrack::luma_source::FORMATS;
 use ptztrack_contract::{
     BufferMeta, CameraEvent, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMeta, TargetState,
+    TrackChange, TrackMessage, TracksMeta,
 };
 
 #[test]
@@ -174,6 +175,56 @@ fn an_application_selects_and_releases() {
     assert!((meta.bounds.height - 0.3).abs() < 1e-6 && meta.bounds.contains(meta.centroid));
     element.emit_by_name::<()>("release-target", &[]);
     assert_eq!(bench.push(picture(Some((60, 80)), None), &[]).state, TargetState::Searching);
+}
+
+/// Two who stand there, and what the bus hears of them.
+const TWO: [Seen; 2] = [("motion", (60, 80, 32, 72)), ("motion", (200, 80, 32, 72))];
+
+fn track_messages(bench: &Bench) -> Vec<(TrackChange, u64)> {
+    let messages = bench.bus.iter();
+    let read = messages.filter_map(|message| TrackMessage::from_structure(message.structure()?).ok());
+    read.map(|message| (message.change, message.id)).collect()
+}
+
+#[test]
+fn everybody_is_told_of_and_whoever_is_asked_for_is_followed() {
+    let mut bench = Bench::new(|element| {
+        element.set_property_from_str("selection", "manual");
+        element.set_property("post-tracks", true);
+    });
+    let mut tracks = TracksMeta::default();
+    let mut see = |bench: &mut Bench| {
+        let out = bench.push_through(street(0, [(60, 80), (200, 80)]), &TWO);
+        tracks = TracksMeta::of(&out).expect("a meta on every frame").expect("readable");
+        let targets: Vec<_> = tracks.tracks.iter().filter(|track| track.is_target).collect();
+        assert!(targets.len() <= 1);
+        (TargetMeta::of(&out).unwrap().unwrap().id, tracks.tracks.len())
+    };
+    for _ in 0..3 {
+        see(&mut bench);
+    }
+    assert_eq!(see(&mut bench), (0, 2));
+    assert_eq!(track_messages(&bench), [(TrackChange::New, 1), (TrackChange::New, 2)]);
+    let element = bench.harness.element().unwrap();
+    element.emit_by_name::<()>("select-track", &[&2_u64]);
+    assert_eq!(see(&mut bench), (2, 2));
+    element.emit_by_name::<()>("next-target", &[]);
+    assert_eq!(see(&mut bench), (1, 2));
+    bench.harness.push_upstream_event(NavigationEvent::new_key_press("n").build());
+    assert_eq!(see(&mut bench), (2, 2));
+    bench.harness.push_upstream_event(NavigationEvent::new_key_press("1").build());
+    assert_eq!(see(&mut bench), (1, 2));
+    element.emit_by_name::<()>("select-track", &[&7_u64]);
+    assert_eq!(see(&mut bench), (1, 2), "there is nobody of that number");
+    let warnings = std::iter::from_fn(|| bench.bus.pop_filtered(&[gst::MessageType::Warning])).count();
+    assert_eq!(warnings, 1);
+}
+
+#[test]
+fn who_comes_and_goes_is_told_of_only_where_that_is_asked_for() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    assert_eq!(track_messages(&bench), []);
 }
 
 #[test]

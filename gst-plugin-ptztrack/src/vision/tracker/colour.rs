@@ -68,7 +68,7 @@ impl Histogram {
     }
 
     /// The Bhattacharyya coefficients of brightness and tint, multiplied: 0 to 1.
-    fn likeness(&self, other: &Self) -> f32 {
+    pub fn likeness(&self, other: &Self) -> f32 {
         let coefficient = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a * b).sqrt()).sum::<f32>();
         let tints =
             if self.has_tints() && other.has_tints() { coefficient(&self.tints, &other.tints) } else { 1.0 };

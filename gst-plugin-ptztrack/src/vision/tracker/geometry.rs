@@ -102,6 +102,13 @@ impl Frame {
         Rect2f::new(0.0, 0.0, self.width, self.height)
     }
 
+    /// Which sides of a box (left, top, right, bottom) the frame cuts off.
+    pub fn cut_sides(self, bounds: Rect2f) -> [bool; 4] {
+        const EDGE: f32 = 2.0;
+        let end = bounds.br();
+        [bounds.x < EDGE, bounds.y < EDGE, end.x > self.width - EDGE, end.y > self.height - EDGE]
+    }
+
     pub fn point_to_pixels(self, point: Point) -> Point2f {
         Point2f::new(point.x as f32 * self.width, point.y as f32 * self.height)
     }

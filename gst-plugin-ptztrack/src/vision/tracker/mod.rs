@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Follows one target through a moving camera's picture (thesis 3.5).
+//! Keeps account of everybody who is seen, and follows one of them through a moving camera's picture (thesis 3.5).
 //!
 //! | step | thesis | file |
 //! |---|---|---|
-//! | choose a detection that goes somewhere | 3.0, "an operator input which target to track" | `selection` |
+//! | whose each detection is | beyond | `tracks` |
+//! | choose a track that goes somewhere | 3.0, "an operator input which target to track" | `policy` |
 //! | figure and ground around it, by motion, colour and silhouette | beyond | `figure`, `colour` |
 //! | corners on the figure, outliers rejected | 3.5.1 | `corners` |
 //! | Lucas-Kanade in a patch around it | 3.5.2 | `patch`, `flow` |
@@ -15,8 +16,9 @@
 //! | how long it is followed and stands | beyond | `dwell_time` |
 //! | who is not taken again | beyond | `suppressed_regions` |
 //!
-//! [`Tracker`] is the state machine around one `target`, which is followed by all cues (`target/robust.rs`) or as the
-//! thesis does it (`target/thesis.rs`).
+//! [`Tracker`] is the state machine around one `target`, which is the number of a track. Its pixels are followed by all cues
+//! (`target/robust.rs`) or as the thesis does it (`target/thesis.rs`). What is followed by all cues is where its track is seen, or
+//! nowhere: the pixels tell where in its region it is, and help the track on where no region shows it.
 
 mod colour;
 mod corners;
@@ -29,15 +31,16 @@ mod geometry;
 mod grey_histogram;
 mod patch;
 mod points;
+mod policy;
 mod presence;
 mod sample;
-mod selection;
 mod state;
 mod suppressed_regions;
 #[cfg(test)]
 mod synthetic;
 mod target;
+mod tracks;
 
 pub use dwell_time::TimeLimits;
-pub use selection::Choice;
+pub use policy::Choice;
 pub use state::{Config, Detection, Profile, TargetRequest, Tracked, Tracker};

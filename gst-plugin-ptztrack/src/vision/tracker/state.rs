@@ -1,21 +1,28 @@
 // SPDX-License-Identifier: MPL-2.0
 
+mod reconcile;
+
 use opencv::core::{Point2f, Rect2f};
-use ptztrack_contract::{Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, Vector};
+use ptztrack_contract::{
+    Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
+};
 
 use super::dwell_time::{DwellTime, TimeLimits};
 use super::ego_motion::EgoMotion;
 use super::geometry::{ASPECT, Frame, around};
-use super::selection::{Choice, Sighting, TargetSelector};
+use super::policy::{Choice, Policy, Sighting, clicked, sight, tell_apart};
 use super::target::{Follow, Robust, Sight, Thesis};
+use super::tracks::{Region, Rules, Track, Tracks, people};
 use crate::vision::Observation;
 
 /// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
 const MIN_DT_S: f64 = 1e-3;
 /// After a longer gap, seconds, a velocity says nothing about where the target is.
 const MAX_DT_S: f64 = 2.0;
-/// How long after a loss the same person gets the same number, seconds.
-const KNOWN_S: f64 = 10.0;
+/// After so long without anything that speaks for them, nobody is there, seconds; or after the time that a hidden target is coasted.
+const DECAY_S: f64 = 3.0;
+/// For how long somebody who is not seen is told of, seconds.
+const TOLD_S: f64 = 0.5;
 
 /// How a target is followed.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -36,8 +43,10 @@ pub struct Config {
     pub choice: Choice,
     /// Frames that a detection must be seen in before it is chosen.
     pub confirm_frames: u32,
-    /// Seconds that a hidden target is coasted and looked for.
+    /// Seconds that a hidden target is coasted and looked for, and after which nobody is where nobody is seen.
     pub coast_s: f64,
+    /// Seconds for which who is gone is remembered: whoever comes back within them has their old number.
+    pub memory_s: f64,
     /// Height, in frame heights, of the box that is made around a place selected by hand.
     pub manual_size: f64,
     /// Whether a detection is chosen only once it has travelled across the background: right for a motion detector,
@@ -56,8 +65,6 @@ pub struct Detection {
     pub bounds: Rect,
     /// Polygon around it; empty where only the box is known.
     pub contour: Vec<Point>,
-    /// How much of it lies where much changed before and nothing came of it: 0 to 1.
-    pub restless: f32,
     /// Whether it lies outside of the detector's zones: nobody is chosen there.
     pub outside: bool,
 }
@@ -85,15 +92,24 @@ pub struct Tracked {
     pub confidence: f64,
     /// The feature points, kept and rejected.
     pub features: Vec<Feature>,
+    /// Everybody who is seen.
+    pub tracks: Vec<ptztrack_contract::Track>,
+    /// Who came and went in this frame, by number; who merged, with the number that they go on under.
+    pub track_changes: Vec<(TrackChange, u64, Option<u64>)>,
 }
 
-/// Somebody who is followed.
+/// The track that is followed.
 struct Target {
+    /// Number of its track.
     id: u64,
     follow: Box<dyn Follow>,
     dwell: DwellTime,
     /// Its box when it was last seen, carried along with the background.
     seen_at: Rect2f,
+    /// Whether more than its looks said in the last picture that it is where it is followed.
+    is_borne_out: bool,
+    /// For how long its pixels were followed elsewhere than where its track is seen, seconds.
+    astray_s: f64,
 }
 
 enum Phase {
@@ -106,26 +122,34 @@ enum Phase {
 /// What an operator or the application asked for; carried out with the next frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TargetRequest {
-    /// Follow what is at this place: the detection there, or else a box of [`Config::manual_size`] around it.
+    /// Follow what is at this place: the track there, or else a box of [`Config::manual_size`] around it.
     Select(Point),
+    /// Follow the track of that number, if there is one.
+    SelectTrack(u64),
+    /// Follow the track of the next number, or that of the first after the last.
+    Next,
     /// Let the target go.
     Release,
 }
 
-/// Chooses a target and follows it. The same pictures always give the same answers.
+/// Keeps account of everybody who is seen, chooses one of them and follows it. The same pictures always give the same answers.
 pub struct Tracker {
     config: Config,
     phase: Phase,
-    selection: TargetSelector,
+    tracks: Tracks,
+    policy: Policy,
     request: Option<TargetRequest>,
     camera_rests: bool,
-    /// Whom it lost, and how many seconds ago.
-    lost: Option<(Target, f64)>,
+    /// Number of who was lost last.
+    lost: Option<u64>,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
-    last_id: u64,
-    /// Memory for the next frame's features.
+    /// Memory for the next frame's features, tracks and sightings.
     features: Vec<Feature>,
+    reported: Vec<ptztrack_contract::Track>,
+    sightings: Vec<Sighting>,
+    regions: Vec<Region>,
+    people: Vec<Rect2f>,
 }
 
 impl Tracker {
@@ -134,19 +158,23 @@ impl Tracker {
         Self {
             config,
             phase: Phase::Searching,
-            selection: TargetSelector::default(),
+            tracks: Tracks::default(),
+            policy: Policy::default(),
             request: None,
             camera_rests: true,
             lost: None,
             size: None,
-            last_id: 0,
             features: Vec::new(),
+            reported: Vec::new(),
+            sightings: Vec::new(),
+            regions: Vec::new(),
+            people: Vec::new(),
         }
     }
 
     /// Takes back what it reported, as memory for the next frame.
-    pub fn recycle(&mut self, features: Vec<Feature>) {
-        self.features = features;
+    pub fn recycle(&mut self, features: Vec<Feature>, tracks: Vec<ptztrack_contract::Track>) {
+        (self.features, self.reported) = (features, tracks);
     }
 
     /// Changes how it works from the next frame on.
@@ -186,10 +214,11 @@ impl Tracker {
         let same_stream = self.size.replace(size) == Some(size) && dt_s <= MAX_DT_S;
         if !same_stream {
             // Another picture, or one from another time: nothing that was remembered holds.
-            self.selection.reset();
+            self.tracks.restart();
+            self.policy.restart();
             self.lost = None;
         }
-        self.watch(seen, detections, frame, dt_s);
+        self.watch(seen, detections, frame, if same_stream { dt_s } else { MIN_DT_S });
         let request = self.request.take();
         let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
         let mut tracked = Tracked { features: std::mem::take(&mut self.features), ..Tracked::default() };
@@ -204,17 +233,27 @@ impl Tracker {
             phase = self.follow(phase, seen, dt_s, frame, &mut tracked, &mut changes)?;
         }
         phase = match request {
-            Some(TargetRequest::Select(place)) => {
-                self.take_over(phase, seen, place, frame, &mut tracked, &mut changes)?
-            }
             Some(TargetRequest::Release) => {
                 self.let_go(phase, ReleaseReason::Request, frame, &mut tracked, &mut changes)
             }
+            Some(request) => match self.requested(request, &phase, frame) {
+                Some(id) => self.take_over(phase, seen, id, frame, &mut tracked, &mut changes)?,
+                None => phase,
+            },
             None => phase,
         };
         if matches!(phase, Phase::Searching) && changes.is_empty() {
             phase = self.acquire_chosen(seen, frame, &mut tracked, &mut changes)?;
         }
+        let target = match &phase {
+            Phase::Tracking(target) | Phase::Occluded(target, _) => target.id,
+            Phase::Searching => 0,
+        };
+        tracked.tracks = std::mem::take(&mut self.reported);
+        tracked.tracks.clear();
+        let told = self.tracks.iter().filter(|track| track.journey.unseen_s <= TOLD_S || track.id == target);
+        tracked.tracks.extend(told.map(|track| reported(track, target, frame)));
+        tracked.track_changes.extend(self.tracks.events().iter().copied());
         self.phase = phase;
         Ok(Tracked { changes, ..tracked })
     }
@@ -224,25 +263,30 @@ impl Tracker {
         EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default))
     }
 
-    /// Keeps account of what the detector sees, whether a target is followed or not.
+    /// Keeps account of everybody, whether a target is followed or not.
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
-        self.lost =
-            self.lost.take().map(|(target, ago_s)| (target, ago_s + dt_s)).filter(|(_, s)| *s <= KNOWN_S);
-        // Only the thesis asks for it.
+        // The thesis takes what it sees as it is, and its corners in the contour.
         let contour = |detection: &Detection| match self.config.profile {
             Profile::Thesis => detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
             Profile::Robust => Vec::new(),
         };
-        let sightings = detections.iter().map(|detection| Sighting {
-            bounds: frame.rect_to_pixels(detection.bounds),
-            contour: contour(detection),
-            restless: detection.restless,
-            outside: detection.outside,
-            ..Sighting::default()
-        });
+        let mut regions = std::mem::take(&mut self.regions);
+        regions.clear();
+        for detection in detections {
+            let known =
+                if self.config.profile == Profile::Robust { detection.contour.as_slice() } else { &[] };
+            let outline = known.iter().map(|point| frame.point_to_pixels(*point));
+            people(frame.rect_to_pixels(detection.bounds), outline, &mut self.people);
+            let people = self.people.iter();
+            regions.extend(people.map(|bounds| Region::new(*bounds, contour(detection), detection.outside)));
+        }
+        let Config { confirm_frames, coast_s, memory_s, detector_pause_s, .. } = self.config;
+        let coast_s = coast_s.max(DECAY_S);
+        let rules = Rules { confirm_pictures: confirm_frames, coast_s, memory_s, detector_pause_s };
         let ego = self.ego_motion(seen);
-        self.selection.detector_pause_s = self.config.detector_pause_s;
-        self.selection.update(sightings, ego, frame, dt_s);
+        self.policy.pass(ego, dt_s);
+        self.tracks.update(seen, regions.drain(..), ego, dt_s, rules);
+        self.regions = regions;
     }
 
     fn follow(
@@ -259,16 +303,18 @@ impl Tracker {
             Phase::Tracking(target) => (target, None),
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
-        let coast_s = if self.config.profile == Profile::Robust { self.config.coast_s } else { 0.0 };
-        let mut sight = match hidden_s {
-            None => target.follow.follow(seen, dt_s as f32, &self.selection)?,
-            Some(_) => target.follow.coast(seen, dt_s as f32, &self.selection)?,
+        target.id = self.tracks.number_now(target.id);
+        let Config { coast_s, confirm_frames, .. } = self.config;
+        let coast_s = if self.config.profile == Profile::Robust { coast_s } else { 0.0 };
+        sight(&self.tracks, target.id, confirm_frames, &mut self.sightings);
+        let sight = match hidden_s {
+            None => target.follow.follow(seen, dt_s as f32, &self.sightings)?,
+            Some(_) => target.follow.coast(seen, dt_s as f32, &self.sightings)?,
         };
-        if sight != Sight::Seen
-            && let Some(follow) = self.find_again(&target, seen, frame)?
-        {
-            (target.follow, sight) = (follow, Sight::Seen);
-        }
+        let sight = match self.config.profile {
+            Profile::Thesis => sight,
+            Profile::Robust => self.reconcile(&mut target, sight, seen, dt_s)?,
+        };
         let state = match sight {
             Sight::Seen => TargetState::Tracking,
             Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => TargetState::Occluded,
@@ -281,8 +327,9 @@ impl Tracker {
             _ => {}
         }
         target.dwell.pass(dt_s);
-        if sight == Sight::Seen && target.follow.estimate().is_sure() && !target.dwell.is_on_trial() {
-            self.selection.tell_apart(target.follow.estimate().bounds, self.config.confirm_frames);
+        let is_sure = target.is_borne_out && target.follow.estimate().is_sure();
+        if sight == Sight::Seen && is_sure && !target.dwell.is_on_trial() {
+            tell_apart(&mut self.tracks, target.id, target.follow.estimate().bounds);
         }
         let ego = self.ego_motion(seen);
         let bounds = target.follow.estimate().bounds;
@@ -297,7 +344,7 @@ impl Tracker {
         *tracked = tracked_of(state, &target, frame, std::mem::take(&mut tracked.features));
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
-            self.selection.suppressed.add(target.follow.estimate().bounds);
+            self.policy.suppressed.add(target.follow.estimate().bounds);
             return Ok(self.let_go(Phase::Tracking(target), reason, frame, tracked, changes));
         }
         Ok(match state {
@@ -308,48 +355,46 @@ impl Tracker {
                 Phase::Occluded(target, hidden_s.unwrap_or(0.0))
             }
             _ => {
-                self.lost = Some((target, 0.0));
+                self.lost = Some(target.id);
                 Phase::Searching
             }
         })
     }
 
-    /// Who goes somewhere and looks like a hidden target is the target: however they sat, stooped or turned before.
-    fn find_again(
-        &self,
-        target: &Target,
-        seen: &Observation,
-        frame: Frame,
-    ) -> opencv::Result<Option<Box<dyn Follow>>> {
-        if self.config.profile != Profile::Robust {
-            return Ok(None);
-        }
-        for sighting in self.selection.travelling(self.config.confirm_frames, frame) {
-            if target.follow.may_be_in(sighting) && target.follow.resembles(seen, sighting)? {
-                return self.follow_anew(seen, sighting);
+    /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
+    fn requested(&mut self, request: TargetRequest, phase: &Phase, frame: Frame) -> Option<u64> {
+        let numbers = || self.tracks.iter().map(|track| track.id);
+        let now = match phase {
+            Phase::Tracking(target) | Phase::Occluded(target, _) => target.id,
+            Phase::Searching => 0,
+        };
+        match request {
+            TargetRequest::Release => None,
+            TargetRequest::SelectTrack(id) => numbers().find(|other| *other == id && id != now),
+            TargetRequest::Next => {
+                let next = numbers().filter(|id| *id > now).min().or_else(|| numbers().min());
+                next.filter(|id| *id != now)
+            }
+            TargetRequest::Select(place) => {
+                let place = frame.point_to_pixels(place);
+                let bounds = clicked(&self.tracks, place).map(Track::seen_bounds);
+                let bounds = bounds.unwrap_or_else(|| self.box_at(place, frame));
+                Some(self.tracks.number_at(bounds, frame))
             }
         }
-        Ok(None)
     }
 
     fn take_over(
         &mut self,
         old: Phase,
         seen: &Observation,
-        place: Point,
+        id: u64,
         frame: Frame,
         tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
-        let pixels = frame.point_to_pixels(place);
-        let sighting = self
-            .selection
-            .at(pixels)
-            .cloned()
-            .unwrap_or_else(|| Sighting { bounds: self.box_at(pixels, frame), ..Sighting::default() });
         let old = self.let_go(old, ReleaseReason::Request, frame, tracked, changes);
-        self.lost = None;
-        match self.acquire(seen, &sighting)? {
+        match self.acquire(seen, id)? {
             Some(target) => Ok(self.begin(target, frame, tracked, changes)),
             None => Ok(old),
         }
@@ -371,7 +416,7 @@ impl Tracker {
         if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
             if reason != ReleaseReason::Stationary {
                 // It may move, and would be taken again at once.
-                self.selection.release(target.follow.estimate().bounds);
+                self.policy.release(target.id);
             }
             *tracked =
                 tracked_of(TargetState::Searching, &target, frame, std::mem::take(&mut tracked.features));
@@ -389,10 +434,10 @@ impl Tracker {
         tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
-        let Config { choice, confirm_frames, must_travel, .. } = self.config;
-        let chosen = self.selection.choose(choice, confirm_frames, must_travel, frame).cloned();
-        let Some(sighting) = chosen else { return Ok(Phase::Searching) };
-        match self.acquire(seen, &sighting)? {
+        let Config { choice, must_travel, .. } = self.config;
+        let chosen = self.policy.choose(&self.tracks, choice, self.lost, must_travel, frame);
+        let Some(id) = chosen.map(|track| track.id) else { return Ok(Phase::Searching) };
+        match self.acquire(seen, id)? {
             Some(mut target) => {
                 if must_travel {
                     target.dwell = DwellTime::on_trial();
@@ -403,17 +448,26 @@ impl Tracker {
         }
     }
 
-    /// Takes up what was sighted: under its old number where it is who was lost. `None` where it cannot be followed.
-    fn acquire(&mut self, seen: &Observation, sighting: &Sighting) -> opencv::Result<Option<Target>> {
-        let Some(follow) = self.follow_anew(seen, sighting)? else { return Ok(None) };
-        let known = match self.lost.take() {
-            Some((lost, _)) if !sighting.another && lost.follow.resembles(seen, sighting)? => Some(lost.id),
-            _ => None,
-        };
-        let id = known.unwrap_or(self.last_id + 1);
-        self.last_id = self.last_id.max(id);
-        let seen_at = follow.estimate().bounds;
-        Ok(Some(Target { id, follow, dwell: DwellTime::default(), seen_at }))
+    /// Takes up the track of that number; `None` where it cannot be followed.
+    fn acquire(&mut self, seen: &Observation, id: u64) -> opencv::Result<Option<Target>> {
+        let sighting = self.tracks.get(id).map(|track| Sighting {
+            bounds: track.seen_bounds(),
+            contour: self.tracks.region(track).map_or_else(Vec::new, |region| region.contour.clone()),
+            velocity: track.velocity(),
+            ..Sighting::default()
+        });
+        let Some(sighting) = sighting else { return Ok(None) };
+        let Some(follow) = self.follow_anew(seen, &sighting)? else { return Ok(None) };
+        self.lost = None;
+        self.tracks.target(id);
+        Ok(Some(Target {
+            id,
+            follow,
+            dwell: DwellTime::default(),
+            seen_at: sighting.bounds,
+            is_borne_out: true,
+            astray_s: 0.0,
+        }))
     }
 
     fn follow_anew(
@@ -434,10 +488,28 @@ impl Tracker {
         tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
-        self.selection.take(target.follow.estimate().bounds);
+        self.policy.take(target.follow.estimate().bounds, &self.tracks);
         changes.push(TargetChange::Acquired);
         *tracked = tracked_of(TargetState::Tracking, &target, frame, std::mem::take(&mut tracked.features));
         Phase::Tracking(target)
+    }
+}
+
+/// What is told of a track.
+fn reported(track: &Track, target: u64, frame: Frame) -> ptztrack_contract::Track {
+    ptztrack_contract::Track {
+        id: track.id,
+        bounds: frame.rect(track.bounds()),
+        velocity: frame.vector(track.velocity()),
+        state: if track.is_alone() {
+            TrackState::Seen
+        } else if track.is_shared() {
+            TrackState::Shared
+        } else {
+            TrackState::Hidden
+        },
+        confidence: f64::from(track.confidence()),
+        is_target: track.id == target,
     }
 }
 
@@ -462,6 +534,8 @@ fn tracked_of(state: TargetState, target: &Target, frame: Frame, mut features: V
         ego_velocity: ego.map(|ego| frame.vector(ego)),
         confidence: f64::from(estimate.confidence),
         features,
+        tracks: Vec::new(),
+        track_changes: Vec::new(),
     }
 }
 
@@ -479,6 +553,8 @@ impl Default for Tracked {
             ego_velocity: None,
             confidence: 0.0,
             features: Vec::new(),
+            tracks: Vec::new(),
+            track_changes: Vec::new(),
         }
     }
 }

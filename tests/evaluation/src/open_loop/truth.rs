@@ -192,7 +192,6 @@ impl Truth {
             perimeter: length / (2.0 * (width + height)),
             area: f64::abs(twice) / 2.0 / (width * height),
             centroid: Point { x: centroid.0 / width, y: centroid.1 / height },
-            track: None,
         })
     }
 

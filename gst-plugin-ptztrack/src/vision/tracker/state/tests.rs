@@ -15,6 +15,7 @@ fn config() -> Config {
         choice: Choice::Largest,
         confirm_frames: 1,
         coast_s: 1.5,
+        memory_s: 60.0,
         manual_size: 0.3,
         must_travel: false,
         detector_pause_s: 0.0,

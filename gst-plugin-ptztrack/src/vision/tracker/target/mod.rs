@@ -14,7 +14,7 @@ pub(super) use thesis::Thesis;
 
 use super::geometry::{Frame, share_inside};
 use super::points::Points;
-use super::selection::{Sighting, TargetSelector};
+use super::policy::Sighting;
 use crate::vision::{Luma, Observation};
 
 /// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
@@ -63,16 +63,13 @@ impl Estimate {
 /// A way to follow one target from picture to picture.
 pub(super) trait Follow: Send {
     /// Follows the target into the next picture, `dt_s` later; `sightings` are what the detector saw in it.
-    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight>;
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
 
     /// Looks for a hidden target where it should be by now, and where the detector saw something.
-    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight>;
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
 
-    /// Whether `sighting` is the same person, wherever it is.
-    fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool>;
-
-    /// Whether a target that is not seen may have come as far as `sighting` since it was, which shows as much as half of it.
-    fn may_be_in(&self, sighting: &Sighting) -> bool;
+    /// It is not where it was followed to, but here, if anywhere, and moves like this against the background.
+    fn expect(&mut self, bounds: Rect2f, velocity: Point2f);
 
     /// What is known of the target now.
     fn estimate(&self) -> &Estimate;

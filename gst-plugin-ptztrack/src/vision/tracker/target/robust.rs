@@ -16,12 +16,12 @@ use crate::vision::tracker::figure::{
     CONTEXT, Cells, Evidence, FigureMap, Grid, Halves, Level, Looks, Shape, Template,
 };
 use crate::vision::tracker::flow::{Flow, Followed};
-use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, scaled};
+use crate::vision::tracker::geometry::{around, centre, in_ellipse, length, overlap, scaled};
 use crate::vision::tracker::grey_histogram::near_the_middle;
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::{Consensus, Points};
+use crate::vision::tracker::policy::{Owner, Sighting};
 use crate::vision::tracker::presence::Presence;
-use crate::vision::tracker::selection::{Sighting, TargetSelector};
 use crate::vision::{Luma, Observation};
 
 /// Cells of the map of figure and ground in one of the filter's, across and down.
@@ -70,8 +70,6 @@ const GROWTH_GAIN: f32 = 0.5;
 const WIDENING: f32 = 0.03;
 /// By its looks the box never grows or shrinks further than this from the size that the detector last gave it.
 const MAX_GROWTH: f32 = 4.0;
-/// A region that is larger than so many boxes shows somebody else as well, where others are near.
-const MAX_GROWTH_BESIDE_OTHERS: f32 = 2.0;
 /// How much of that it adopts in one picture.
 const ADOPTED: f32 = 0.3;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
@@ -86,13 +84,11 @@ const ALONE_BESIDE_OTHERS: f32 = 0.5;
 const OTHERS_TIME_S: f32 = 2.0;
 /// Time after somebody else was near from which the target is rather alone, seconds.
 const ALONE_TIME_S: f32 = 4.0;
-/// How much of the width and height of the target a region has that shows all of it, and of its height one that may show part of
-/// it.
+/// How much of the width and height of the target a region has that shows all of it.
 const WHOLE: f32 = 0.7;
-const PART: f32 = 0.5;
-/// How much of the height of the target a region has that shows it from head to foot.
-const NEARLY_WHOLE: f32 = 0.9;
-/// Time over which regions give the size of the target, seconds: their width swings with every stride.
+/// Intersection over union with what is somebody else's from which nothing is learned.
+const SHARED: f32 = 0.15;
+/// Time over which the track gives the size of the box, seconds.
 const STRIDE_S: f32 = 1.0;
 /// How alike in colour whoever goes somewhere must be to a hidden target.
 const ALIKE: f32 = 0.6;
@@ -249,10 +245,10 @@ impl Robust {
     }
 
     /// Notices who else is near: one who was seen beside the target may be behind it, or it behind them, a moment later.
-    fn watch_others(&mut self, sightings: &TargetSelector, dt_s: f32) {
+    fn watch_others(&mut self, sightings: &[Sighting], dt_s: f32) {
         let reach = scaled(self.estimate.bounds, CONTEXT.0, CONTEXT.1);
         let near =
-            sightings.current().any(|sighting| sighting.another && (sighting.bounds & reach).area() > 0.0);
+            sightings.iter().any(|one| one.owner == Owner::Another && (one.bounds & reach).area() > 0.0);
         self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
     }
 
@@ -346,10 +342,18 @@ impl Robust {
     }
 
     /// Takes a place over as the target's own.
-    fn settle(&mut self, seen: &Observation, place: &Place, dt_s: f32) -> opencv::Result<()> {
+    fn settle(
+        &mut self,
+        seen: &Observation,
+        place: &Place,
+        sightings: &[Sighting],
+        dt_s: f32,
+    ) -> opencv::Result<()> {
         self.estimate.bounds = place.bounds;
         self.look_closely(seen);
-        if place.is_unhidden() {
+        // Who is seen whole and alone is learned however they look: who turns round looks new.
+        let is_own = self.is_whole(sightings);
+        if is_own || (place.is_unhidden() && !self.is_shared(sightings)) {
             self.learn(seen, place, dt_s)?;
         }
         self.remember(&seen.luma)?;
@@ -484,51 +488,48 @@ impl Robust {
         );
     }
 
-    /// The box grows with the region that the detector sees the target in, while it is young or nobody else is near, and narrows
-    /// with one that shows it from head to foot; by how much its middle shifts, which is no motion of the target.
-    fn adopt(&mut self, sightings: &TargetSelector, dt_s: f32) -> Point2f {
-        let Some(region) = self.own_region(sightings) else { return Point2f::default() };
+    /// The box takes the size of the target's track where that is seen alone; by how much its middle shifts, which is no motion of the
+    /// target.
+    fn adopt(&mut self, sightings: &[Sighting], dt_s: f32) -> Point2f {
+        let Some(track) = self.own_region(sightings) else { return Point2f::default() };
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
-        let young = self.age_s < YOUNG_S;
-        // Young, it is still finding its size; later on one picture may show it together with what merely flickers beside it.
-        let larger = if young { ADOPTED } else { self.alone() * dt_s / (dt_s + STRIDE_S) };
-        // Along an axis in which the region is the smaller, part of the target is hidden or not seen.
-        let is_whole = region.height >= NEARLY_WHOLE * bounds.height;
-        let narrower = if is_whole && !young { larger } else { 0.0 };
-        let across = if region.width > bounds.width { larger } else { narrower };
-        let down = if region.height > bounds.height { larger } else { 0.0 };
-        let off = centre(region) - middle;
-        let shift = Point2f::new(off.x * across, off.y * down);
-        let size = (
-            bounds.width + across * (region.width - bounds.width),
-            bounds.height + down * (region.height - bounds.height),
-        );
+        // Young, it is still finding its size.
+        let rate = if self.age_s < YOUNG_S { ADOPTED } else { dt_s / (dt_s + STRIDE_S) };
+        let shift = (centre(track) - middle) * rate;
+        let mix = |old: f32, new: f32| old + (new - old) * rate;
+        let size = (mix(bounds.width, track.width), mix(bounds.height, track.height));
         self.estimate.bounds = around(middle + shift, size.0, size.1);
-        let measured = |old: f32, new: f32, adopted: f32| if adopted > 0.0 { new } else { old };
-        let (width, height) = self.measured_size;
-        self.measured_size = (measured(width, size.0, across), measured(height, size.1, down));
+        self.measured_size = size;
         shift
     }
 
+    /// Whether what is seen in the box is also somebody else's: nothing is learned of it then.
+    fn is_shared(&self, sightings: &[Sighting]) -> bool {
+        sightings.iter().any(|sighting| {
+            matches!(sighting.owner, Owner::Several | Owner::Another)
+                && overlap(sighting.bounds, self.estimate.bounds) > SHARED
+        })
+    }
+
+    /// Whether the box shows the target's track, all of it and nobody else.
+    fn is_whole(&self, sightings: &[Sighting]) -> bool {
+        sightings.iter().any(|sighting| {
+            sighting.owner == Owner::Target
+                && sighting.is_whole
+                && overlap(sighting.bounds, self.estimate.bounds) >= WHOLE
+        })
+    }
+
     /// The region that the detector sees the target in, and nobody else.
-    fn own_region(&self, sightings: &TargetSelector) -> Option<Rect2f> {
-        let bounds = self.estimate.bounds;
-        let most = if self.alone() > 0.5 { MAX_GROWTH } else { MAX_GROWTH_BESIDE_OTHERS };
-        let own = sightings.current().find(|sighting| {
-            let region = sighting.bounds;
-            !sighting.is_group()
-                && region.contains(centre(bounds))
-                && region.width <= most * bounds.width
-                && region.height <= most * bounds.height
-        });
-        own.map(|sighting| sighting.bounds)
+    fn own_region(&self, sightings: &[Sighting]) -> Option<Rect2f> {
+        sightings.iter().find(|sighting| sighting.owner == Owner::Target).map(|sighting| sighting.bounds)
     }
 
     /// The best of what the detector saw within reach that looks like the target.
-    fn recognise(&mut self, seen: &Observation, sightings: &TargetSelector) -> opencv::Result<Option<Place>> {
+    fn recognise(&mut self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let mut best: Option<Place> = None;
-        for sighting in sightings.current().filter(|sighting| !sighting.another) {
+        for sighting in sightings.iter().filter(|sighting| sighting.owner != Owner::Another) {
             let bounds = self.box_in(sighting);
             if self.distance_in(bounds, UNSEEN_REACH) > 1.0 {
                 continue;
@@ -546,7 +547,7 @@ impl Robust {
                 continue;
             }
             // In a crowd there is always somebody who fits: who is farther away must have the target's colours.
-            let found = if !self.resembles(seen, sighting)? {
+            let found = if !self.resembles(seen, sighting) {
                 Place { share: by_looks.share * self.likely_at(place.bounds), ..place }
             } else {
                 by_colours.filter(|by_colours| by_colours.share > by_looks.share).unwrap_or(by_looks)
@@ -558,6 +559,15 @@ impl Robust {
         Ok(best)
     }
 
+    /// Whether who was sighted has the target's colours.
+    fn resembles(&self, seen: &Observation, sighting: &Sighting) -> bool {
+        let Some(colours) = &self.colours else { return false };
+        let cells = Cells::observe(seen, sighting.bounds, self.grid);
+        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
+        let (figure, _) = cells.histograms(&map);
+        colours.likeness(&figure) >= ALIKE
+    }
+
     /// Somebody in the target's colours, where it is expected and nobody else is near, is the target, however it turned: all of
     /// it, or, while it is hidden, the part that comes out again.
     /// Takes the target's box in the region, and the best `place` there.
@@ -567,7 +577,7 @@ impl Robust {
         if !whole && self.presence.is_here() {
             return None;
         }
-        if whole && !sighting.is_group() {
+        if whole && sighting.owner != Owner::Several {
             let mix = |old: f32, new: f32| old + (new - old) * ADOPTED;
             let (width, height) = (mix(bounds.width, region.width), mix(bounds.height, region.height));
             bounds = around(centre(region), width, height);
@@ -582,7 +592,7 @@ impl Robust {
         let bounds = self.estimate.bounds;
         let middle = centre(bounds);
         let x = middle.x.clamp(region.x, region.x + region.width);
-        let y = if region.height > WHOLE * bounds.height && !sighting.is_group() {
+        let y = if region.height > WHOLE * bounds.height && sighting.owner != Owner::Several {
             region.y + bounds.height / 2.0
         } else {
             middle.y.clamp(region.y, region.y + region.height)
@@ -604,7 +614,7 @@ impl Robust {
     }
 
     /// The best place where a hidden target may be by now.
-    fn search(&mut self, seen: &Observation, sightings: &TargetSelector) -> opencv::Result<Option<Place>> {
+    fn search(&mut self, seen: &Observation, sightings: &[Sighting]) -> opencv::Result<Option<Place>> {
         let bounds = self.estimate.bounds;
         let mut best = self.recognise(seen, sightings)?;
         for sideways in [0.0, -0.6, 0.6] {
@@ -619,7 +629,7 @@ impl Robust {
 }
 
 impl Follow for Robust {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         let expected = self.estimate.own_velocity * dt_s;
@@ -673,12 +683,12 @@ impl Follow for Robust {
             let by_places = (centre(place.bounds) - start - self.ego.at(start)) / dt_s;
             self.learn_velocity(by_places + (by_points - by_places) * lead, dt_s);
         }
-        self.settle(seen, &place, dt_s)?;
+        self.settle(seen, &place, sightings, dt_s)?;
         self.course.correct(self.measured(), (1.0 - hidden).max(trust));
         Ok(if is_gone(self.estimate.bounds, &seen.luma) { Sight::Gone } else { Sight::Seen })
     }
 
-    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &TargetSelector) -> opencv::Result<Sight> {
+    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight> {
         self.watch_background(seen, dt_s);
         self.watch_others(sightings, dt_s);
         self.unseen_s += dt_s;
@@ -704,18 +714,11 @@ impl Follow for Robust {
         Ok(Sight::Seen)
     }
 
-    fn resembles(&self, seen: &Observation, sighting: &Sighting) -> opencv::Result<bool> {
-        let Some(colours) = &self.colours else { return Ok(false) };
-        let cells = Cells::observe(seen, sighting.bounds, self.grid);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(self.grid));
-        let (figure, _) = cells.histograms(&map);
-        Ok(colours.likeness(&figure) >= ALIKE)
-    }
-
-    fn may_be_in(&self, sighting: &Sighting) -> bool {
-        // A hand that comes out is no smaller person.
-        sighting.bounds.height >= PART * self.estimate.bounds.height
-            && self.distance_in(self.box_in(sighting), UNSEEN_REACH) <= 1.0
+    fn expect(&mut self, bounds: Rect2f, velocity: Point2f) {
+        self.estimate.bounds = bounds;
+        self.estimate.own_velocity = velocity;
+        self.estimate.centroid = centre(bounds);
+        self.course = self.measured();
     }
 
     fn estimate(&self) -> &Estimate {

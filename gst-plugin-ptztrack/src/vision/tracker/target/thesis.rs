@@ -11,7 +11,7 @@ use crate::vision::tracker::geometry::{around, centre, mean};
 use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::Points;
-use crate::vision::tracker::selection::{Sighting, TargetSelector};
+use crate::vision::tracker::policy::Sighting;
 use crate::vision::{Luma, Observation};
 
 /// Standard deviations that a first corner may lie from the mean of all: "a 20% range from the standard deviation".
@@ -73,7 +73,7 @@ impl Thesis {
 }
 
 impl Follow for Thesis {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &TargetSelector) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &[Sighting]) -> opencv::Result<Sight> {
         let luma = &seen.luma;
         let expected = self.estimate.own_velocity * dt_s;
         let start = centre(self.estimate.bounds);
@@ -113,16 +113,12 @@ impl Follow for Thesis {
     }
 
     /// The thesis loses what it does not see.
-    fn coast(&mut self, _: &Observation, _: f32, _: &TargetSelector) -> opencv::Result<Sight> {
+    fn coast(&mut self, _: &Observation, _: f32, _: &[Sighting]) -> opencv::Result<Sight> {
         Ok(Sight::Gone)
     }
 
-    fn resembles(&self, _: &Observation, _: &Sighting) -> opencv::Result<bool> {
-        Ok(false)
-    }
-
-    fn may_be_in(&self, _: &Sighting) -> bool {
-        false
+    fn expect(&mut self, bounds: Rect2f, velocity: Point2f) {
+        (self.estimate.bounds, self.estimate.own_velocity) = (bounds, velocity);
     }
 
     fn estimate(&self) -> &Estimate {

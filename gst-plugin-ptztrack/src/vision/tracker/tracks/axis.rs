@@ -1,0 +1,191 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! One axis of a track's box: its middle, rate and size, in a Kalman filter that takes each side as a measurement of its own.
+
+/// Deviations from which a side is not the track's own: it is hidden, or it is somebody else's.
+const GATE: f32 = 3.0;
+
+/// A side of the box along an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Side {
+    /// Left, or the head.
+    Low,
+    /// Right, or the feet.
+    High,
+}
+
+impl Side {
+    /// Its place, in sizes of the box from the middle.
+    fn offset(self) -> f32 {
+        match self {
+            Self::Low => -0.5,
+            Self::High => 0.5,
+        }
+    }
+}
+
+/// Middle (pixels), rate (pixels per second, against the background) and size (pixels) along one axis, with covariance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Axis {
+    pub middle: f32,
+    pub rate: f32,
+    pub size: f32,
+    covariance: [[f32; 3]; 3],
+}
+
+/// How much an axis changes by itself, as spectral densities per second.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct ProcessNoise {
+    /// Of the rate, pixels² per second³.
+    pub acceleration: f32,
+    /// Of the size, pixels² per second.
+    pub size: f32,
+}
+
+impl Axis {
+    /// As first seen; the deviations are of middle, rate and size.
+    pub fn new(middle: f32, size: f32, deviations: [f32; 3]) -> Self {
+        let mut covariance = [[0.0; 3]; 3];
+        for (place, deviation) in deviations.into_iter().enumerate() {
+            covariance[place][place] = deviation * deviation;
+        }
+        Self { middle, rate: 0.0, size, covariance }
+    }
+
+    /// The place of a side, pixels.
+    pub fn side(&self, side: Side) -> f32 {
+        self.middle + side.offset() * self.size
+    }
+
+    /// Variance of the middle, pixels².
+    pub fn variance(&self) -> f32 {
+        self.covariance[0][0]
+    }
+
+    /// The background carries it to `middle` and enlarges it by `scale`.
+    pub fn carry(&mut self, middle: f32, scale: f32) {
+        self.middle = middle;
+        self.rate *= scale;
+        self.size *= scale;
+        self.covariance.iter_mut().flatten().for_each(|value| *value *= scale * scale);
+    }
+
+    /// Goes on for `dt_s`.
+    pub fn predict(&mut self, dt_s: f32, noise: ProcessNoise) {
+        self.middle += self.rate * dt_s;
+        let c = &mut self.covariance;
+        c[0][0] += dt_s * (c[0][1] + c[1][0] + dt_s * c[1][1]);
+        c[0][1] += dt_s * c[1][1];
+        c[0][2] += dt_s * c[1][2];
+        let q = noise.acceleration;
+        c[0][0] += q * dt_s.powi(3) / 3.0;
+        c[0][1] += q * dt_s * dt_s / 2.0;
+        c[1][1] += q * dt_s;
+        c[2][2] += noise.size * dt_s;
+        (c[1][0], c[2][0], c[2][1]) = (c[0][1], c[0][2], c[1][2]);
+    }
+
+    /// Takes a side that was seen at `place` with that deviation, in pixels. One that is too far off is no measurement; the longer
+    /// there was none, the farther off it may be.
+    pub fn measure(&mut self, side: Side, place: f32, deviation: f32) {
+        let half = side.offset();
+        let c = &self.covariance;
+        let gain: [f32; 3] = std::array::from_fn(|row| c[row][0] + half * c[row][2]);
+        let variance = gain[0] + half * gain[2] + deviation * deviation;
+        let innovation = place - self.side(side);
+        if innovation * innovation <= GATE * GATE * variance {
+            self.correct(gain, innovation, variance);
+        }
+    }
+
+    /// Takes a rate, pixels per second.
+    pub fn measure_rate(&mut self, rate: f32, deviation: f32) {
+        let gain: [f32; 3] = std::array::from_fn(|row| self.covariance[row][1]);
+        self.correct(gain, rate - self.rate, gain[1] + deviation * deviation);
+    }
+
+    fn correct(&mut self, gain: [f32; 3], innovation: f32, variance: f32) {
+        if !(innovation.is_finite() && variance > f32::EPSILON) {
+            return;
+        }
+        self.middle += gain[0] / variance * innovation;
+        self.rate += gain[1] / variance * innovation;
+        self.size = (self.size + gain[2] / variance * innovation).max(1.0);
+        for (row, a) in gain.iter().enumerate() {
+            for (column, b) in gain.iter().enumerate() {
+                self.covariance[row][column] -= a * b / variance;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    const NOISE: ProcessNoise = ProcessNoise { acceleration: 400.0, size: 40.0 };
+    const DT: f32 = 0.04;
+
+    fn axis() -> Axis {
+        Axis::new(100.0, 40.0, [4.0, 40.0, 8.0])
+    }
+
+    #[test]
+    fn who_walks_has_their_speed_and_size() {
+        let mut axis = axis();
+        for n in 1..50 {
+            axis.predict(DT, NOISE);
+            let middle = 100.0 + 60.0 * DT * n as f32;
+            axis.measure(Side::Low, middle - 15.0, 2.0);
+            axis.measure(Side::High, middle + 15.0, 2.0);
+        }
+        assert!((axis.rate - 60.0).abs() < 6.0 && (axis.size - 30.0).abs() < 2.0, "{axis:?}");
+    }
+
+    #[test]
+    fn a_hidden_side_costs_nothing() {
+        let mut axis = axis();
+        for n in 1..50 {
+            axis.predict(DT, NOISE);
+            axis.measure(Side::Low, 80.0 + 60.0 * DT * n as f32, 2.0);
+        }
+        assert!((axis.side(Side::Low) - 80.0 - 60.0 * DT * 49.0).abs() < 2.0, "{axis:?}");
+        assert!((axis.size - 40.0).abs() < 6.0, "{axis:?}");
+    }
+
+    #[test]
+    fn a_side_far_off_is_not_believed_at_once_but_in_the_end() {
+        let mut settled = axis();
+        for _ in 0..25 {
+            settled.predict(DT, NOISE);
+            settled.measure(Side::Low, 80.0, 2.0);
+            settled.measure(Side::High, 120.0, 2.0);
+        }
+        settled.predict(DT, NOISE);
+        settled.measure(Side::High, 220.0, 2.0);
+        assert!((settled.side(Side::High) - 120.0).abs() < 2.0, "{settled:?}");
+        for _ in 0..400 {
+            settled.predict(DT, NOISE);
+            settled.measure(Side::Low, 80.0, 2.0);
+            settled.measure(Side::High, 160.0, 2.0);
+        }
+        assert!((settled.side(Side::High) - 160.0).abs() < 2.0, "{settled:?}");
+    }
+
+    proptest! {
+        #[test]
+        fn doubt_grows_unseen_and_never_turns_negative(
+            sides in prop::collection::vec((any::<bool>(), -500.0_f32..500.0, 0.5_f32..20.0), 0..40),
+        ) {
+            let mut axis = axis();
+            for (low, place, deviation) in sides {
+                let before = axis.variance();
+                axis.predict(DT, NOISE);
+                prop_assert!(axis.variance() >= before);
+                axis.measure(if low { Side::Low } else { Side::High }, place, deviation);
+                prop_assert!(axis.variance() >= -1e-2 && axis.middle.is_finite() && axis.size >= 1.0);
+            }
+        }
+    }
+}

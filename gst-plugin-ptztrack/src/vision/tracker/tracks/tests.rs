@@ -1,0 +1,204 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use super::*;
+use crate::vision::Luma;
+use proptest::prelude::*;
+
+const DT: f64 = 0.1;
+const STILL: Option<EgoMotion> = None;
+
+/// Takes these regions of a picture of 640x480 of which nothing else is known; who is seen in three of them is confirmed.
+pub(in super::super) fn seen_in(tracks: &mut Tracks, regions: &[Rect2f], ego: Option<EgoMotion>, dt_s: f64) {
+    seen_by(tracks, regions, ego, dt_s, 0.0);
+}
+
+fn seen_by(
+    tracks: &mut Tracks,
+    regions: &[Rect2f],
+    ego: Option<EgoMotion>,
+    dt_s: f64,
+    detector_pause_s: f64,
+) {
+    static BLACK: [u8; 640 * 480] = [0; 640 * 480];
+    let seen = Observation::from(Luma::packed(&BLACK, 640));
+    let regions = regions.iter().map(|bounds| Region::new(*bounds, Vec::new(), false));
+    let rules = Rules { confirm_pictures: 3, coast_s: 3.0, memory_s: 60.0, detector_pause_s };
+    tracks.update(&seen, regions, ego, dt_s, rules);
+}
+
+fn at(x: f32, y: f32, width: f32, height: f32) -> Rect2f {
+    Rect2f::new(x, y, width, height)
+}
+
+fn person(x: f32) -> Rect2f {
+    at(x, 100.0, 40.0, 90.0)
+}
+
+fn numbers(tracks: &Tracks) -> Vec<u64> {
+    tracks.iter().map(|track| track.id).collect()
+}
+
+#[test]
+fn a_walker_is_one_track_with_their_speed() {
+    let mut tracks = Tracks::default();
+    for n in 0..20 {
+        seen_in(&mut tracks, &[person(100.0 + 6.0 * n as f32)], STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [1]);
+    let track = tracks.get(1).expect("there");
+    assert!((track.velocity().x - 60.0).abs() < 6.0 && track.velocity().y.abs() < 3.0, "{track:?}");
+    assert!((track.bounds().x - 214.0).abs() < 4.0, "{track:?}");
+}
+
+#[test]
+fn the_cameras_own_motion_is_no_motion_of_theirs() {
+    let mut tracks = Tracks::default();
+    let pan = EgoMotion::translation(Point2f::new(-9.0, 0.0));
+    for n in 0..20 {
+        seen_in(&mut tracks, &[person(500.0 - 9.0 * n as f32)], Some(pan), DT);
+    }
+    assert_eq!(numbers(&tracks), [1]);
+    assert!(tracks.get(1).is_some_and(|track| track.velocity().x.abs() < 3.0));
+}
+
+#[test]
+fn two_who_pass_through_each_other_keep_their_numbers() {
+    let mut tracks = Tracks::default();
+    for n in 0..41 {
+        let (one, other) = (100.0 + 8.0 * n as f32, 420.0 - 8.0 * n as f32);
+        let (left, right) = (person(one.min(other)), person(one.max(other)));
+        let merged = right.x < left.x + 44.0;
+        let regions = if merged { vec![left | right] } else { vec![person(one), person(other)] };
+        seen_in(&mut tracks, &regions, STILL, DT);
+        if n == 20 {
+            assert!(tracks.iter().all(Track::is_shared));
+        }
+    }
+    let place = |id| tracks.get(id).map(|track| track.bounds().x);
+    assert!(place(1).is_some_and(|x| (x - 420.0).abs() < 10.0), "{:?}", place(1));
+    assert!(place(2).is_some_and(|x| (x - 100.0).abs() < 10.0), "{:?}", place(2));
+}
+
+#[test]
+fn trunk_and_legs_are_parts_of_who_was_seen_whole() {
+    let mut tracks = Tracks::default();
+    for n in 0..30 {
+        let whole = at(100.0 + 4.0 * n as f32, 100.0, 40.0, 120.0);
+        let (trunk, legs) = (at(whole.x, 100.0, 40.0, 60.0), at(whole.x + 5.0, 170.0, 30.0, 50.0));
+        let regions = if n < 10 { vec![whole] } else { vec![legs, trunk] };
+        seen_in(&mut tracks, &regions, STILL, DT);
+        assert!(tracks.seen().count() == 1, "picture {n}");
+    }
+    let track = tracks.get(1).expect("there");
+    assert!((track.height() - 120.0).abs() < 6.0, "{track:?}");
+}
+
+#[test]
+fn trunk_and_legs_that_were_never_seen_together_become_one() {
+    let mut tracks = Tracks::default();
+    for n in 0..15 {
+        let x = 100.0 + 4.0 * n as f32;
+        seen_in(&mut tracks, &[at(x, 100.0, 40.0, 60.0), at(x + 5.0, 165.0, 35.0, 55.0)], STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [1]);
+    assert!(tracks.get(1).is_some_and(|track| (track.height() - 120.0).abs() < 8.0));
+}
+
+/// Somebody who comes in shows a hand first.
+#[test]
+fn a_hand_that_was_seen_first_becomes_the_person() {
+    let mut tracks = Tracks::default();
+    for _ in 0..4 {
+        seen_in(&mut tracks, &[at(60.0, 150.0, 20.0, 15.0)], STILL, DT);
+    }
+    for n in 0..15 {
+        seen_in(&mut tracks, &[at(20.0 + 2.0 * n as f32, 100.0, 60.0, 150.0)], STILL, DT);
+    }
+    assert_eq!(tracks.seen().count(), 1);
+    let track = tracks.seen().next().expect("there");
+    assert!(track.is_alone() && (track.height() - 150.0).abs() < 10.0, "{track:?}");
+}
+
+#[test]
+fn a_table_before_the_legs_costs_nothing_at_first() {
+    let mut tracks = Tracks::default();
+    for n in 0..35 {
+        let height = if n < 20 { 120.0 } else { 60.0 };
+        seen_in(&mut tracks, &[at(100.0 + 4.0 * n as f32, 100.0, 40.0, height)], STILL, DT);
+    }
+    let track = tracks.get(1).expect("there");
+    assert!((track.height() - 120.0).abs() < 15.0 && track.is_alone(), "{track:?}");
+}
+
+#[test]
+fn nobody_is_there_after_three_seconds_and_a_new_one_is_somebody_else() {
+    let mut tracks = Tracks::default();
+    for _ in 0..15 {
+        seen_in(&mut tracks, &[person(300.0)], STILL, DT);
+    }
+    for n in 0..35 {
+        seen_in(&mut tracks, &[], STILL, DT);
+        assert_eq!(tracks.get(1).is_some(), n < 30, "picture {n}");
+    }
+    for _ in 0..4 {
+        seen_in(&mut tracks, &[person(100.0)], STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [2], "nothing is known of their looks");
+}
+
+/// A neural network may look at every fourth frame, or less.
+#[test]
+fn a_detector_need_not_see_every_frame() {
+    let count = |detector_pause_s: f64| {
+        let mut tracks = Tracks::default();
+        for n in 0..40 {
+            let seen = [person(100.0 + 2.0 * n as f32)];
+            seen_by(&mut tracks, if n % 8 == 0 { &seen } else { &[] }, STILL, DT, detector_pause_s);
+        }
+        tracks.iter().count()
+    };
+    assert_eq!(count(1.0), 1);
+    assert_eq!(count(0.0), 0, "what flickers is not confirmed by one that sees every frame");
+}
+
+#[test]
+fn absurd_regions_are_nobody() {
+    let mut tracks = Tracks::default();
+    let absurd = [
+        at(10.0, 10.0, 0.0, 0.0),
+        at(0.0, 0.0, 640.0, 480.0),
+        at(f32::NAN, 10.0, 30.0, 60.0),
+        at(-900.0, 10.0, 30.0, 60.0),
+        at(10.0, 10.0, f32::INFINITY, 60.0),
+        at(10.0, 10.0, -30.0, -60.0),
+    ];
+    for _ in 0..20 {
+        seen_in(&mut tracks, &absurd, STILL, DT);
+    }
+    assert_eq!(tracks.iter().count(), 0);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn every_region_has_an_owner_and_every_number_is_one_track(
+        pictures in prop::collection::vec(
+            prop::collection::vec((0.0_f32..600.0, 0.0_f32..400.0, 6.0_f32..150.0, 6.0_f32..250.0), 0..9), 1..20),
+        pan in -20.0_f32..20.0,
+    ) {
+        let mut tracks = Tracks::default();
+        let ego = EgoMotion::translation(Point2f::new(pan, 0.0));
+        for picture in pictures {
+            let regions: Vec<_> = picture.into_iter().map(|(x, y, w, h)| at(x, y, w, h)).collect();
+            seen_in(&mut tracks, &regions, Some(ego), DT);
+            let mut ids = numbers(&tracks);
+            ids.sort_unstable();
+            prop_assert!(ids.windows(2).all(|pair| pair[0] != pair[1]), "{:?}", ids);
+            prop_assert!(tracks.regions.iter().all(|region| region.is_owned));
+            for track in tracks.iter() {
+                let b = track.bounds();
+                prop_assert!([b.x, b.y, b.width, b.height].iter().all(|side| side.is_finite()));
+            }
+        }
+    }
+}
