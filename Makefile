@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all soak deny fuzz prove install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all evaluate-everybody soak deny fuzz prove install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -40,6 +40,10 @@ BENCH_SIZE ?= 1280x720
 BENCH_SECONDS ?= 16
 ROUNDS ?= 5
 LIVE_SECONDS ?= 20
+RECORDING ?=
+TRUTH ?=
+# With two people and more.
+EVERYBODY_STRATA := crossing,parting,groups
 # A package of its own, which shares what is compiled.
 BENCHMARKS := --manifest-path tests/benchmarks/Cargo.toml --target-dir target
 # The runner must be of the version that the benchmarks are built with.
@@ -123,6 +127,22 @@ evaluate: packages-evaluate
 evaluate-all: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate --matrix --out target/evaluation/all $(ARGS)
+
+## evaluate-everybody: score who is who among all who are in view (HOTA, IDF1, MOTA): ours beside SORT, ByteTrack, OC-SORT and BoT-SORT
+##       over the same regions, in open-loop scenes with two people and more, or in RECORDING=file with TRUTH=file (MOTChallenge); leaves
+##       tracks and the table in target/evaluation/everybody (ARGS="--stratum crossing --seed 1 ...")
+evaluate-everybody: packages-evaluate
+	@scripts/install-packages python3 python3-venv
+	$(CARGO) build --release --package evaluation
+	rm -rf target/evaluation/everybody
+	if [ -n "$(TRUTH)" ]; then \
+		recording="$(RECORDING)"; \
+		target/release/evaluate --motchallenge target/evaluation/everybody --still-recording "$${recording:-$$(scripts/footage)}" --truth "$(TRUTH)"; \
+	else \
+		target/release/evaluate --motchallenge target/evaluation/everybody --open-loop --out target/evaluation/everybody-open-loop \
+			$(or $(ARGS),--stratum $(EVERYBODY_STRATA)); \
+	fi
+	scripts/score-everybody target/evaluation/everybody
 
 ## soak: follow with four cameras for DURATION=600 seconds while everything happens to them (SEED=1), and leave a plot and an
 ##       account in target/soak: every camera at rest, nothing grown, nothing lost

@@ -84,7 +84,7 @@ pub struct Args {
     #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
     pub footage: Option<PathBuf>,
     /// Instead of the tests, follow one person in a recording as it is: no camera, no codec, no delays
-    #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
+    #[arg(long, value_name = "FILE", groups = ["recording", "shown"], requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
     pub still_recording: Option<PathBuf>,
     /// Who is where in the recording: MOTChallenge (frame,id,left,top,width,height,...); for --still-recording also one box
     /// a line, left,top,width,height or left,top,right,bottom

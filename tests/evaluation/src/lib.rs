@@ -24,6 +24,7 @@ mod footage;
 pub mod gallery;
 mod lockstep;
 pub mod metrics;
+pub mod motchallenge;
 pub mod open_loop;
 mod people;
 mod pipeline;

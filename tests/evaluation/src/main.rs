@@ -12,7 +12,7 @@ use clap::Parser;
 use evaluation::{
     Experiment,
     cli::Args,
-    gallery,
+    gallery, motchallenge,
     record::{Run, Suite},
     report,
     store::Store,
@@ -49,6 +49,12 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     }
     if let Some(suite) = args.strata.suite() {
         return strata(args, suite);
+    }
+    if let (Some(recording), Some(truth), Some(folder)) =
+        (&args.still_recording, &args.truth, &args.strata.motchallenge)
+    {
+        motchallenge::write_recording(recording, truth, folder)?;
+        return Ok(true);
     }
     let gallery = args.gallery()?;
     if !gallery.is_empty() {

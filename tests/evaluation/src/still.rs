@@ -25,7 +25,7 @@ use crate::{
 const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(30);
 
 /// Pictures a second where the file does not tell.
-const UNKNOWN_RATE: f64 = 25.0;
+pub(crate) const UNKNOWN_RATE: f64 = 25.0;
 /// Their distance.
 pub(crate) const USUAL_PERIOD: Duration = Duration::from_millis(40);
 
@@ -43,7 +43,7 @@ pub struct Recording {
 /// Shows it to the tracker of `experiment`.
 pub(crate) fn drive(experiment: &Experiment, recording: &Recording, run: &mut Run) -> Result<(), RunError> {
     (run.codec, run.delays) = (Codec::Raw, Delays { video: Duration::ZERO, command: Duration::ZERO });
-    let projector = Projector::open(recording)?;
+    let projector = Projector::open(&recording.file)?;
     let mut samples = projector.samples();
     let first = samples.next().unwrap_or_else(|| Err(projector.fault()))?;
     let info = info(&first).ok_or_else(|| projector.fault())?;
@@ -140,7 +140,7 @@ impl<'a> Screening<'a> {
 }
 
 /// A person of a recording, seen from where it was made.
-fn sighting(person: &Person, size: (u32, u32)) -> Sighting {
+pub(crate) fn sighting(person: &Person, size: (u32, u32)) -> Sighting {
     let in_view = person.bounds.part_inside(size);
     let truth = GroundTruth {
         id: person.id,
@@ -155,12 +155,12 @@ fn sighting(person: &Person, size: (u32, u32)) -> Sighting {
     Sighting::of_box(truth, size)
 }
 
-fn info(sample: &gst::Sample) -> Option<gst_video::VideoInfo> {
+pub(crate) fn info(sample: &gst::Sample) -> Option<gst_video::VideoInfo> {
     gst_video::VideoInfo::from_caps(sample.caps()?).ok()
 }
 
 /// The picture with a time that only depends on its number.
-fn stamped(sample: &gst::Sample, time_s: f64) -> Result<gst::Buffer, RunError> {
+pub(crate) fn stamped(sample: &gst::Sample, time_s: f64) -> Result<gst::Buffer, RunError> {
     let mut buffer = sample.buffer_owned().ok_or(PipelineError::Stalled)?;
     let stamped = buffer.make_mut();
     stamped.set_pts(gst::ClockTime::from_nseconds((time_s * 1e9).round() as u64));
@@ -170,13 +170,13 @@ fn stamped(sample: &gst::Sample, time_s: f64) -> Result<gst::Buffer, RunError> {
 }
 
 /// A video file, picture by picture.
-struct Projector {
+pub(crate) struct Projector {
     pipeline: gst::Pipeline,
     sink: gst_app::AppSink,
 }
 
 impl Projector {
-    fn open(recording: &Recording) -> Result<Self, PipelineError> {
+    pub fn open(file: &Path) -> Result<Self, PipelineError> {
         let pipeline = gst::parse::launch(
             "filesrc name=file ! decodebin ! videoconvert ! video/x-raw,format=I420 \
              ! appsink name=pictures sync=false max-buffers=2",
@@ -185,7 +185,7 @@ impl Projector {
         .map_err(|_| PipelineError::NoElement("pictures"))?;
         let sink = pipeline.by_name("pictures").and_downcast::<gst_app::AppSink>();
         let sink = sink.ok_or(PipelineError::NoElement("pictures"))?;
-        pipeline.element("file")?.set_property("location", recording.file.display().to_string());
+        pipeline.element("file")?.set_property("location", file.display().to_string());
         let projector = Self { pipeline, sink };
         // A file that cannot be decoded is told of before the first picture.
         projector.go_to(gst::State::Paused)?;
@@ -199,14 +199,15 @@ impl Projector {
     }
 
     /// All pictures of the file, and at last why there are no more if that is not its end.
-    fn samples(&self) -> impl Iterator<Item = Result<gst::Sample, PipelineError>> + '_ {
+    pub fn samples(&self) -> impl Iterator<Item = Result<gst::Sample, PipelineError>> + '_ {
         std::iter::from_fn(|| match self.sink.try_pull_sample(PATIENCE) {
             Some(sample) => Some(Ok(sample)),
             None => self.posted().or_else(|| (!self.sink.is_eos()).then(|| self.fault())).map(Err),
         })
     }
 
-    fn fault(&self) -> PipelineError {
+    /// Why it gives no picture.
+    pub fn fault(&self) -> PipelineError {
         let nothing = || PipelineError::Posted("the recording gives no picture".into());
         self.posted().unwrap_or_else(nothing)
     }

@@ -3,11 +3,17 @@
 //! People in recordings that the test makes itself: followed within one, and in one as it is.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::{fmt::Write, fs, path::PathBuf};
+use std::{
+    fmt::Write,
+    fs,
+    path::{Path, PathBuf},
+    process::Command,
+};
 
 use evaluation::{
     Experiment, Scene, SceneError, Target, Whom,
     metrics::Metrics,
+    motchallenge::write_recording,
     record::{Codec, FirstBox, Run, TrackerName},
     report,
 };
@@ -160,6 +166,43 @@ fn it_ends_with_the_persons_last_box() {
     let closed = Scene::footage(&file, &truth, Whom::Longest, (320, 240)).unwrap().remove(0);
     let as_it_is = Scene::recordings(&file, &truth, Whom::Longest).unwrap().remove(0);
     assert_eq!([closed, as_it_is].map(|scene| run(&scene, TrackerName::Still).frames.len()), [20, 20]);
+}
+
+#[test]
+fn everybody_in_a_recording_is_written_as_the_motchallenge_has_it() {
+    let (file, truth) = recording("everybody");
+    let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("everybody");
+    write_recording(&file, &truth, &out).unwrap();
+    let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
+    let boxes = |text: &str| -> Vec<Vec<f64>> {
+        text.lines().map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect()
+    };
+    assert!(read("gt/everybody/seqinfo.ini").contains("\nframeRate=25.000\nseqLength=50\nimWidth=480\n"));
+    let (written, given) =
+        (boxes(&read("gt/everybody/gt/gt.txt")), boxes(&fs::read_to_string(truth).unwrap()));
+    assert_eq!(written, given);
+    // Both walk before a background that has to be learned first.
+    let regions = boxes(&read("gt/everybody/det/det.txt"));
+    for walk in &WALKS {
+        let on_them = regions.iter().filter(|region| {
+            let left = walk.left(region[0] as usize - 1) as f64;
+            (region[2] - left).abs() < 20.0 && (region[3] - walk.top as f64).abs() < 20.0
+        });
+        assert!(on_them.count() > PICTURES / 3, "person {}: {regions:?}", walk.id);
+    }
+    assert!(boxes(&read("ptztrack/data/everybody.txt")).iter().all(|track| track[1] >= 1.0));
+    let nowhere = write_recording(&out, &file.with_extension("csv"), &out).unwrap_err().to_string();
+    assert!(nowhere.starts_with(&out.display().to_string()), "{nowhere}");
+}
+
+/// The other side of the same text.
+#[test]
+fn the_scorer_reads_what_it_writes() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("everybody");
+    let mut python = Command::new("python3");
+    let output =
+        python.args(["-B", "-m", "unittest", "test_motchallenge"]).current_dir(folder).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
 }
 
 #[test]

@@ -5,7 +5,6 @@
 //! pairs, and nothing is drawn again until what draws changes.
 
 mod library;
-mod motchallenge;
 mod recorded;
 mod recorder;
 mod replay;

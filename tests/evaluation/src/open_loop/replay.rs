@@ -2,19 +2,12 @@
 
 //! Shows a recording to decoder, detector and tracker.
 
-use std::{
-    path::Path,
-    str::FromStr,
-    sync::{Arc, Mutex},
-};
+use std::{path::Path, str::FromStr};
 
-use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, MotionMeta, Rect};
 use virtual_camera::Settings;
 
 use super::{
     library,
-    motchallenge::Sequence,
     recorded::{RecordedPicture, RecordedScene},
     truth::Replacement,
 };
@@ -22,8 +15,10 @@ use crate::{
     experiment::Experiment,
     film,
     lockstep::{RunError, clock_time, estimate, info},
-    pipeline::{Elements, Pipeline, PipelineError, SINK, SOURCE, lock},
+    motchallenge::{Listener, Said, Sequence},
+    pipeline::{Pipeline, PipelineError, SINK, SOURCE},
     record::{FrameRecord, Run},
+    report::slug,
     trackers::{Cue, Phase, Tracker},
 };
 
@@ -38,10 +33,10 @@ pub(crate) fn drive(
     run.frame_rate = 1.0 / scene.period.as_secs_f64();
     let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
     let screening = Screening::begin(experiment, &scene, film.as_deref())?;
-    let mut sequence = Sequence::default();
+    let mut sequence = Sequence::new(experiment.size);
     for (index, picture) in scene.pictures.iter().enumerate() {
-        let (record, regions) = screening.picture(index, picture)?;
-        sequence.add(&record, picture, &regions);
+        let (record, said) = screening.picture(index, picture)?;
+        sequence.add(record.truth.iter().chain(&record.others), &said, picture.motion.as_ref());
         if index >= scene.first {
             run.frames.push(record);
         }
@@ -50,9 +45,9 @@ pub(crate) fn drive(
         screening.pipeline.end()?;
     }
     match &experiment.motchallenge {
-        Some(folder) => {
-            sequence.write(folder, run).map_err(|source| RunError::Keep { file: folder.clone(), source })
-        }
+        Some(folder) => sequence
+            .write(folder, &slug(&run.title), run.tracker.name(), run.frame_rate)
+            .map_err(|source| RunError::Keep { file: folder.clone(), source }),
         None => Ok(()),
     }
 }
@@ -64,8 +59,7 @@ struct Screening<'a> {
     pipeline: Pipeline,
     tracker: Tracker,
     replacement: Replacement,
-    /// Moving regions of the picture that passed last.
-    regions: Arc<Mutex<Vec<Rect>>>,
+    listener: Listener,
 }
 
 impl<'a> Screening<'a> {
@@ -85,12 +79,12 @@ impl<'a> Screening<'a> {
         if film.is_some() {
             film::attach(pipeline.bin(), tracker.cue(), &info(experiment.size, scene.period)?)?;
         }
-        let regions = collect_regions(&pipeline)?;
+        let listener = Listener::attach(&pipeline)?;
         pipeline.start()?;
-        Ok(Self { experiment, scene, pipeline, tracker, replacement, regions })
+        Ok(Self { experiment, scene, pipeline, tracker, replacement, listener })
     }
 
-    fn picture(&self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Vec<Rect>), RunError> {
+    fn picture(&self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Said), RunError> {
         let (first, size) = (self.scene.first, self.experiment.size);
         let phase = Phase::of(index >= first, index > first);
         let cue = Cue { phase, truth: picture.truth.truth.clone(), motion: picture.motion, size };
@@ -108,19 +102,6 @@ impl<'a> Screening<'a> {
         }
         let said = target.map(|target| self.replacement.judged(estimate(&target, size), picture));
         let record = picture.truth.clone().judged(said, &picture.people);
-        Ok((record, std::mem::take(&mut *lock(&self.regions))))
+        Ok((record, self.listener.take()))
     }
-}
-
-fn collect_regions(pipeline: &Pipeline) -> Result<Arc<Mutex<Vec<Rect>>>, PipelineError> {
-    let regions = Arc::<Mutex<Vec<Rect>>>::default();
-    let seen = regions.clone();
-    pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
-        let motion = info.buffer().and_then(|buffer| MotionMeta::of(buffer)).and_then(Result::ok);
-        *lock(&seen) = motion
-            .map(|motion| motion.regions.iter().map(|region| region.bounds).collect())
-            .unwrap_or_default();
-        gst::PadProbeReturn::Ok
-    });
-    Ok(regions)
 }

@@ -23,7 +23,7 @@ pub const HELD_OUT: RangeInclusive<u64> = 11..=20;
 pub struct StrataArgs {
     /// Show scenes of the strata to detector and tracker alone, from recordings that are made once: seeds 1 to 10 are for tuning,
     /// 11 to 20 are held out: run them once, at the end, and never look into them
-    #[arg(long, conflicts_with_all = ["test", "suite", "sweep_delay", "matrix", "gallery", "real_time", "recording", "photographs"])]
+    #[arg(long, group = "shown", conflicts_with_all = ["test", "suite", "sweep_delay", "matrix", "gallery", "real_time", "recording", "photographs"])]
     pub open_loop: bool,
     /// The same scenes with a camera that is steered by what the tracker says
     #[arg(long, conflicts_with_all = ["open_loop", "test", "suite", "sweep_delay", "matrix", "gallery", "real_time", "recording", "photographs"])]
@@ -47,8 +47,9 @@ pub struct StrataArgs {
     /// Replace what these stages say by the truth (open loop only): motion, regions, owner, hidden, size
     #[arg(long, value_name = "STAGE", value_delimiter = ',', requires = "open_loop")]
     pub replace: Vec<Stage>,
-    /// Write truth, regions and tracks into this folder too, as MOTChallenge text (open loop only)
-    #[arg(long, value_name = "FOLDER", requires = "open_loop")]
+    /// Write truth, regions and tracks of everybody into this folder, as MOTChallenge text: in open loop beside what else is
+    /// written, of --still-recording instead of it
+    #[arg(long, value_name = "FOLDER", requires = "shown")]
     pub motchallenge: Option<PathBuf>,
 }
 

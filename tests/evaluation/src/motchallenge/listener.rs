@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What the elements say of everybody, picture by picture.
+
+use std::sync::{Arc, Mutex};
+
+use gst::prelude::*;
+use ptztrack_contract::{BufferMeta, MotionMeta, Rect, TargetMeta, TargetState};
+
+use crate::pipeline::{Elements, Pipeline, PipelineError, SINK, lock};
+
+/// Boxes of one picture, in frame sizes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Said {
+    /// The moving regions of the detector.
+    pub regions: Vec<Rect>,
+    /// Number and box of each track.
+    pub tracks: Vec<(u64, Rect)>,
+}
+
+/// Hears what reaches the sink of a pipeline.
+pub(crate) struct Listener(Arc<Mutex<Said>>);
+
+impl Listener {
+    /// To be called before the pipeline starts.
+    pub fn attach(pipeline: &Pipeline) -> Result<Self, PipelineError> {
+        let said = Arc::<Mutex<Said>>::default();
+        let heard = said.clone();
+        pipeline.bin().pad(SINK, "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
+            if let Some(buffer) = info.buffer() {
+                *lock(&heard) = Said::of(buffer);
+            }
+            gst::PadProbeReturn::Ok
+        });
+        Ok(Self(said))
+    }
+
+    /// What was said of the last picture; can be had once.
+    pub fn take(&self) -> Said {
+        std::mem::take(&mut *lock(&self.0))
+    }
+}
+
+impl Said {
+    fn of(buffer: &gst::BufferRef) -> Self {
+        let motion = MotionMeta::of(buffer).and_then(Result::ok).unwrap_or_default();
+        let target = TargetMeta::of(buffer).and_then(Result::ok);
+        let placed =
+            |target: &TargetMeta| matches!(target.state, TargetState::Tracking | TargetState::Occluded);
+        let target = target.filter(placed);
+        Self {
+            regions: motion.regions.iter().map(|region| region.bounds).collect(),
+            tracks: target.map(|target| (target.id, target.bounds)).into_iter().collect(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ptztrack_contract::Region;
+
+    use super::*;
+
+    #[test]
+    fn regions_and_a_target_that_has_a_place_are_heard() {
+        gst::init().unwrap();
+        let rect = |x| Rect { x, y: 0.2, width: 0.1, height: 0.4 };
+        let said = |state| {
+            let mut buffer = gst::Buffer::new();
+            let buffer = buffer.get_mut().unwrap();
+            let region = Region { bounds: rect(0.1), ..Region::default() };
+            MotionMeta { regions: vec![region], ..MotionMeta::default() }.attach(buffer).unwrap();
+            TargetMeta { state, id: 3, bounds: rect(0.5), ..TargetMeta::default() }.attach(buffer).unwrap();
+            Said::of(buffer)
+        };
+        let tracks = vec![(3, rect(0.5))];
+        for state in [TargetState::Tracking, TargetState::Occluded] {
+            assert_eq!(said(state), Said { regions: vec![rect(0.1)], tracks: tracks.clone() });
+        }
+        for state in [TargetState::Searching, TargetState::Lost] {
+            assert_eq!(said(state).tracks, []);
+        }
+        assert_eq!(Said::of(gst::Buffer::new().as_ref()), Said::default());
+    }
+}
