@@ -440,7 +440,7 @@ mod tests {
         assert_eq!(count(TrackerName::Thesis, FirstBox::Given), 144);
         assert_eq!(count(TrackerName::Csrt, FirstBox::Detected), 144);
         assert_eq!(count(TrackerName::Csrt, FirstBox::Given), 0, "it is given the box anyway");
-        assert_eq!(experiments.len(), 720 * 2 + 144 * 2 + 144 * 8);
+        assert_eq!(experiments.len(), 720 * 2 + 144 * 2 + 144 * 11);
     }
 
     #[test]

@@ -140,6 +140,7 @@ impl<'a> Stage<'a> {
         self.tracker.next(self.pipeline.bin(), cue)?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
+        self.tracker.steer(&self.camera, exposure, target.as_ref())?;
         let record = FrameRecord { commands: count_commands(&self.camera, &mut self.counted), ..witnessed };
         let record = record.judged(target.map(|target| estimate(&target, size)), &people);
         Ok((record, picture))

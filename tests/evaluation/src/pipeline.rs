@@ -40,6 +40,9 @@ pub(crate) enum PipelineError {
     /// An element posted an error or a warning: a run that is not sound is no run.
     #[error("{0}")]
     Posted(String),
+    /// Who steers past all elements was not heard.
+    #[error("the camera is not commanded: {0}")]
+    Command(#[from] std::io::Error),
     /// Nothing came for [`PATIENCE`].
     #[error("the pipeline did not finish a picture within {PATIENCE:?}")]
     Stalled,

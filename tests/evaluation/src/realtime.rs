@@ -138,6 +138,10 @@ impl Watch {
         let target = TargetMeta::of(buffer).and_then(Result::ok);
         let size = self.experiment.size;
         let (witnessed, people) = self.experiment.witness(&self.camera, number, self.first);
+        let exposure = experiment::exposure(number, self.camera.frame_period());
+        if let Err(error) = self.tracker.steer(&self.camera, exposure, target.as_ref()) {
+            journal.fault.get_or_insert(error);
+        }
         let commands = count_commands(&self.camera, &mut journal.counted);
         let said = target.map(|target| estimate(&target, size));
         let record = FrameRecord { commands, ..witnessed }.judged(said, &people);

@@ -84,6 +84,12 @@ named! {
         Mosse = "mosse",
         /// GStreamer's `cvtracker algorithm=medianflow`.
         MedianFlow = "medianflow",
+        /// Others' law: relative moves, each waited for, as Frigate's autotracker makes them; knows the truth of the delayed picture.
+        RelativeMoves = "relative-moves",
+        /// Others' law: proportional control of the box's place; knows the truth of the delayed picture.
+        BoxPid = "box-pid",
+        /// Others' law: absolute moves to a predicted place (Tang and Bilodeau 2017), with GStreamer's `cvtracker algorithm=kcf`.
+        KcfPredicted = "kcf-predicted",
         /// Bound: knows the truth of the delayed picture. What is lost is lost by the servo.
         Oracle = "oracle",
         /// Bound: an oracle that also tells the servo how the background moves, as ours does.

@@ -76,6 +76,20 @@ fn who_knows_the_truth_is_always_right_and_keeps_the_person_in_view() {
 }
 
 #[test]
+fn followers_with_a_law_of_their_own_command_the_camera_themselves() {
+    for tracker in [TrackerName::RelativeMoves, TrackerName::BoxPid] {
+        let run = run(&experiment(tracker));
+        let last = run.frames.last().unwrap();
+        assert!(last.pan_deg > 15.0, "{tracker}: the camera looks {} degrees right", last.pan_deg);
+        let commands: u32 = run.frames.iter().map(|frame| frame.commands).sum();
+        let seconds = run.frames.len() as f64 / run.frame_rate;
+        // A change of speed every 250 ms, or a move every 200 ms, and stops besides.
+        assert!(commands > 3 && f64::from(commands) < 8.0 * seconds, "{tracker}: {commands} commands");
+        assert_eq!(Metrics::of(&run).precision, Some(1.0), "{tracker} sees the truth");
+    }
+}
+
+#[test]
 fn from_a_camera_that_never_moves_the_person_walks_out_as_geometry_says() {
     let run = run(&experiment(TrackerName::Still));
     assert!(run.frames.iter().all(|frame| frame.pan_deg == 0.0 && frame.commands == 0));

@@ -2,12 +2,15 @@
 
 //! What follows the person: each a few elements between decoder and servo, and the same first box for all.
 
-use std::sync::{Arc, Mutex};
+use std::{
+    sync::{Arc, Mutex},
+    time::Duration,
+};
 
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 
-use virtual_camera::Matrix;
+use virtual_camera::{Matrix, VirtualCamera};
 
 use crate::{
     pipeline::{PipelineError, SINK, lock},
@@ -15,8 +18,11 @@ use crate::{
 };
 
 mod bounds;
+mod followers;
 mod ours;
 mod stock;
+
+use followers::Follower;
 
 /// Where a picture stands in its run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -65,16 +71,47 @@ impl Cue {
     }
 }
 
+/// What tells where the person is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Perception {
+    /// Our elements.
+    Ours,
+    /// GStreamer's `cvtracker`.
+    Stock,
+    /// The truth, or nothing that anybody hears.
+    Truth,
+}
+
+fn perception(name: TrackerName) -> Perception {
+    match name {
+        TrackerName::Ptztrack | TrackerName::Thesis => Perception::Ours,
+        TrackerName::Csrt
+        | TrackerName::Kcf
+        | TrackerName::Mosse
+        | TrackerName::MedianFlow
+        | TrackerName::KcfPredicted => Perception::Stock,
+        TrackerName::RelativeMoves
+        | TrackerName::BoxPid
+        | TrackerName::Oracle
+        | TrackerName::OracleEgo
+        | TrackerName::OracleXray
+        | TrackerName::Still => Perception::Truth,
+    }
+}
+
 /// A tracker's part in one pipeline.
 pub(crate) struct Tracker {
     name: TrackerName,
     first_box: FirstBox,
     cue: CurrentCue,
+    /// What commands the camera, where that is not our servo.
+    follower: Option<Mutex<Follower>>,
 }
 
 impl Tracker {
     pub fn new(name: TrackerName, first_box: FirstBox, size: (u32, u32)) -> Self {
-        Self { name, first_box, cue: Arc::new(Mutex::new(Cue::new(size))) }
+        let follower = Follower::of(name, size).map(Mutex::new);
+        Self { name, first_box, cue: Arc::new(Mutex::new(Cue::new(size))), follower }
     }
 
     /// What it is told of the picture that is under way.
@@ -84,23 +121,21 @@ impl Tracker {
 
     /// Its elements, from decoded pictures to pictures with or without a target meta.
     pub fn description(&self) -> String {
-        match self.name {
-            TrackerName::Ptztrack => ours::DEFAULTS.to_owned(),
-            TrackerName::Thesis => ours::THESIS.to_owned(),
-            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
-                stock::description(self.name)
-            }
-            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
-                "identity name=tracker".to_owned()
-            }
+        match (perception(self.name), self.name) {
+            (Perception::Ours, TrackerName::Thesis) => ours::THESIS.to_owned(),
+            (Perception::Ours, _) => ours::DEFAULTS.to_owned(),
+            (Perception::Stock, name) => stock::description(name),
+            (Perception::Truth, _) => "identity name=tracker".to_owned(),
         }
     }
 
     /// The element that moves the camera at `location`, with `settings` that are the same for all; one that moves nothing
-    /// where the tracker is not to.
+    /// where the tracker is not to, or commands it by [`Self::steer`].
     pub fn sink(&self, location: &str, settings: &str) -> String {
         match self.name {
-            TrackerName::Still => format!("fakesink name={SINK} sync=false async=false"),
+            name if name == TrackerName::Still || self.follower.is_some() => {
+                format!("fakesink name={SINK} sync=false async=false")
+            }
             // The thesis knows its camera from the start.
             TrackerName::Thesis => {
                 format!(
@@ -113,36 +148,39 @@ impl Tracker {
 
     /// Puts up its probes.
     pub fn attach(&self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
-        match self.name {
-            TrackerName::Ptztrack | TrackerName::Thesis => ours::attach(pipeline, self.first_box, &self.cue),
-            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
-                stock::attach(pipeline, &self.cue)
-            }
-            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
-                bounds::attach(pipeline, self.name, &self.cue)
-            }
+        match perception(self.name) {
+            Perception::Ours => ours::attach(pipeline, self.first_box, &self.cue),
+            Perception::Stock => stock::attach(pipeline, &self.cue),
+            Perception::Truth => bounds::attach(pipeline, self.name, &self.cue),
         }
     }
 
     /// To be called before each picture.
     pub fn next(&self, pipeline: &gst::Pipeline, cue: Cue) -> Result<(), PipelineError> {
         *lock(&self.cue) = cue.clone();
-        match self.name {
-            TrackerName::Ptztrack | TrackerName::Thesis => ours::next(pipeline, self.first_box, &cue),
-            TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow => {
-                stock::next(pipeline, &cue)
-            }
-            TrackerName::Oracle | TrackerName::OracleEgo | TrackerName::OracleXray | TrackerName::Still => {
-                Ok(())
-            }
+        match perception(self.name) {
+            Perception::Ours => ours::next(pipeline, self.first_box, &cue),
+            Perception::Stock => stock::next(pipeline, &cue),
+            Perception::Truth => Ok(()),
         }
+    }
+
+    /// To be called when the picture of that `exposure` has gone all the way, with what was said of it: commands `camera`, where
+    /// no element does.
+    pub fn steer(
+        &self,
+        camera: &VirtualCamera,
+        exposure: Duration,
+        target: Option<&TargetMeta>,
+    ) -> Result<(), PipelineError> {
+        let Some(follower) = &self.follower else { return Ok(()) };
+        Ok(lock(follower).steer(camera, exposure, target)?)
     }
 }
 
 /// Why `name` cannot run here: `None` where it can.
 pub fn missing(name: TrackerName) -> Option<String> {
-    let stock =
-        matches!(name, TrackerName::Csrt | TrackerName::Kcf | TrackerName::Mosse | TrackerName::MedianFlow);
+    let stock = perception(name) == Perception::Stock;
     (stock && gst::ElementFactory::find("cvtracker").is_none())
         .then(|| format!("{name} is skipped: GStreamer has no `cvtracker`; install gstreamer1.0-opencv"))
 }

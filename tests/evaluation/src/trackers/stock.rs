@@ -24,7 +24,7 @@ const ROI: &str = "object";
 pub(super) fn description(name: TrackerName) -> String {
     let algorithm = match name {
         TrackerName::Csrt => "CSRT",
-        TrackerName::Kcf => "KCF",
+        TrackerName::Kcf | TrackerName::KcfPredicted => "KCF",
         TrackerName::Mosse => "MOSSE",
         _ => "MedianFlow",
     };
