@@ -128,10 +128,7 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 
 /// One line on one run.
 fn summary(run: &Run) -> String {
-    let mut line = format!("{} {}", run.tracker, run.title);
-    if run.sweep {
-        line += &format!(" at {} ms", run.delays.total().as_millis());
-    }
+    let line = format!("{} {}", run.tracker, run.title);
     if let Some(error) = &run.error {
         return line + ": " + error;
     }

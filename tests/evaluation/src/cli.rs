@@ -24,7 +24,7 @@ pub struct Args {
     pub test: Vec<Tests>,
     /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests, numbered
     /// too, have codecs, sizes and delays of their own
-    #[arg(long, value_parser = suite, conflicts_with_all = ["sweep_delay", "footage", "still_recording", "real_time"])]
+    #[arg(long, value_parser = suite, conflicts_with_all = ["footage", "still_recording", "real_time"])]
     pub suite: Option<Suite>,
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
@@ -44,16 +44,13 @@ pub struct Args {
     /// From a command's arrival to the first movement, in milliseconds
     #[arg(long, value_name = "MS", default_value_t = 60)]
     pub command_delay: u64,
-    /// Run tests 1, 19, 37 and 55 with delays of 0 to 600 ms as well
-    #[arg(long)]
-    pub sweep_delay: bool,
     /// Who draws the first box: detected (by those that can) or given (the truth, to every tracker). Detected in tests and given
     /// in recordings, unless said otherwise
     #[arg(long)]
     pub first_box: Option<FirstBox>,
     /// Run everything that the published tables are made from, hours of it: ours and `thesis` on seeds 1 to 10, all others on 1
     /// and 6. What is kept is not run again, so it may be broken off and called again
-    #[arg(long, conflicts_with_all = ["test", "tracker", "seed", "first_box", "sweep_delay", "footage", "still_recording", "real_time"])]
+    #[arg(long, conflicts_with_all = ["test", "tracker", "seed", "first_box", "footage", "still_recording", "real_time"])]
     pub matrix: bool,
     /// Run everything anew, whatever results are kept
     #[arg(long)]
@@ -74,17 +71,17 @@ pub struct Args {
     pub record: bool,
     /// Instead of running tests, write pictures of the room, of the hard tests or of the photographs, to look at: every
     /// subject, light and occlusion, from far and near
-    #[arg(long, conflicts_with_all = ["test", "sweep_delay", "footage", "still_recording", "real_time", "record"])]
+    #[arg(long, conflicts_with_all = ["test", "footage", "still_recording", "real_time", "record"])]
     pub gallery: bool,
     /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
     /// pictures that the tracker has no time for are dropped and counted
     #[arg(long, conflicts_with_all = ["record", "still_recording"])]
     pub real_time: bool,
     /// Instead of the tests, follow one person in a still camera's recording, as seen by a camera that turns within it
-    #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test", "sweep_delay"])]
+    #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test"])]
     pub footage: Option<PathBuf>,
     /// Instead of the tests, follow one person in a recording as it is: no camera, no codec, no delays
-    #[arg(long, value_name = "FILE", groups = ["recording", "shown"], requires = "truth", conflicts_with_all = ["test", "sweep_delay", "footage"])]
+    #[arg(long, value_name = "FILE", groups = ["recording", "shown"], requires = "truth", conflicts_with_all = ["test", "footage"])]
     pub still_recording: Option<PathBuf>,
     /// Who is where in the recording: MOTChallenge (frame,id,left,top,width,height,...); for --still-recording also one box
     /// a line, left,top,width,height or left,top,right,bottom
@@ -96,10 +93,10 @@ pub struct Args {
     pub person: Whom,
     /// Instead of the tests, twelve ways through each photograph of a folder: panoramas in panoramas/, in walker/ somebody cut out
     /// of film
-    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "sweep_delay", "matrix"])]
+    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "matrix"])]
     pub photos: Option<PathBuf>,
     /// Instead of the tests, twelve ways through this equirectangular panorama
-    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "sweep_delay", "matrix"])]
+    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "matrix"])]
     pub photo: Option<PathBuf>,
     /// Folder of somebody cut out of film: walker.csv, and the pictures that it lists
     #[arg(long, value_name = "FOLDER", requires = "photo")]
@@ -201,9 +198,6 @@ fn size(text: &str) -> Result<(u32, u32), String> {
         .filter(|(width, height)| (16..=4096).contains(width) && (16..=4096).contains(height))
         .ok_or_else(|| format!("a size is WIDTHxHEIGHT, 16 to 4096 pixels each, not `{text}`"))
 }
-
-/// Tests of the series over the delay: nothing hidden, best light, one for each way of walking.
-const SWEPT: [u32; 4] = [1, 19, 37, 55];
 
 impl Args {
     /// The tests asked for, in order and each once.
@@ -365,26 +359,8 @@ impl Args {
         for tracker in trackers {
             let of = |(scene, seed): &(Scene, u64)| self.experiment(scene.clone(), *tracker, *seed);
             experiments.extend(scenes.iter().map(of));
-            if self.sweep_delay {
-                experiments.extend(self.sweep(*tracker));
-            }
         }
         Ok(experiments)
-    }
-
-    /// The command takes its 60 ms where there are as many, the video what is left.
-    fn sweep(&self, tracker: TrackerName) -> Vec<Experiment> {
-        let delays = (0..=6).map(|n| Duration::from_millis(100 * n)).map(|total| {
-            let command = total.min(Delays::default().command);
-            Delays { video: total - command, command }
-        });
-        let seed = self.seeds().first().copied().unwrap_or(1);
-        let at = |delays: Delays| {
-            let scenes = SWEPT.into_iter().filter_map(|test| Scene::room(TestId(test), seed));
-            let experiments = scenes.map(move |scene| self.experiment(scene, tracker, seed));
-            experiments.map(move |experiment| Experiment { delays, sweep: true, films: None, ..experiment })
-        };
-        delays.flat_map(at).collect()
     }
 }
 
@@ -448,18 +424,6 @@ mod tests {
         crate::init().unwrap();
         let (there, left_out) = parse("--tracker all").unwrap().trackers();
         assert_eq!(there.len() + left_out.len(), TrackerName::ALL.len());
-    }
-
-    #[test]
-    fn the_sweep_goes_to_600_ms_and_is_marked() {
-        let args = parse("--test 1 --sweep-delay --size 320x240 --seed 5").unwrap();
-        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
-        assert_eq!(experiments.iter().filter(|experiment| experiment.sweep).count(), 28);
-        let mut totals: Vec<_> =
-            experiments.iter().filter(|e| e.sweep).map(|e| e.delays.total().as_millis()).collect();
-        totals.dedup();
-        assert_eq!(totals, [0, 100, 200, 300, 400, 500, 600]);
-        assert!(experiments.iter().all(|e| e.size == (320, 240) && e.seed == 5));
     }
 
     #[test]

@@ -124,8 +124,6 @@ pub struct Experiment {
     pub servo: String,
     /// Who draws the first box.
     pub first_box: FirstBox,
-    /// Whether it is one of a series over the delay.
-    pub sweep: bool,
     /// Whether the clock is looked at: the camera streams, and pictures that come too early for the tracker are dropped.
     pub real_time: bool,
     /// Folder of the videos, with everything drawn in (Matroska); none is made unless given.
@@ -152,7 +150,6 @@ impl Experiment {
             elements: None,
             servo: String::new(),
             first_box: FirstBox::Detected,
-            sweep: false,
             real_time: false,
             films: None,
             recordings: None,
@@ -260,7 +257,6 @@ impl Experiment {
             seed: self.seed,
             delays: self.delays,
             first_box: self.first_box,
-            sweep: self.sweep,
             frame_rate: 0.0,
             dropped: self.real_time.then_some(0),
             frames: Vec::new(),

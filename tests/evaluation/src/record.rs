@@ -313,8 +313,6 @@ pub struct Run {
     pub delays: Delays,
     /// Who drew the first box.
     pub first_box: FirstBox,
-    /// Whether it is one of a series over the delay, and so not for the tables.
-    pub sweep: bool,
     /// Pictures a second.
     pub frame_rate: f64,
     /// Pictures that were there but never reached the tracker; only in real time, `None` in virtual time.

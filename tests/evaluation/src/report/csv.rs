@@ -15,8 +15,8 @@ use crate::{
 /// Digits after the point; as many as the thesis gives.
 const DECIMALS: usize = 6;
 
-const SETUP: [&str; 8] =
-    ["codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms", "sweep", "real_time"];
+const SETUP: [&str; 7] =
+    ["codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms", "real_time"];
 /// What every line on a run begins with.
 const RUN: [&str; 3] = ["title", "test", "tracker"];
 
@@ -179,7 +179,7 @@ fn estimate(frame: &FrameRecord) -> [String; 9] {
     [state, x, y, left, top, width, height, estimate.id.to_string(), estimate.features.to_string()]
 }
 
-fn setup(setup: &Setup) -> [String; 8] {
+fn setup(setup: &Setup) -> [String; 7] {
     let (video, command) = (setup.delays.video.as_millis(), setup.delays.command.as_millis());
     [
         setup.codec.to_string(),
@@ -188,7 +188,6 @@ fn setup(setup: &Setup) -> [String; 8] {
         setup.first_box.to_string(),
         video.to_string(),
         command.to_string(),
-        setup.sweep.to_string(),
         setup.real_time.to_string(),
     ]
 }

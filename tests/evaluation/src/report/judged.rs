@@ -46,8 +46,6 @@ impl Worlds {
 /// What makes runs comparable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Setup {
-    /// Only one point of a series over the delay.
-    pub sweep: bool,
     /// Which suite.
     pub suite: Suite,
     /// Who draws the first box.
@@ -66,19 +64,18 @@ pub struct Setup {
 
 impl Setup {
     fn of(run: &Run) -> Self {
-        let Run { sweep, suite, seed, codec, size, first_box, delays, .. } = *run;
+        let Run { suite, seed, codec, size, first_box, delays, .. } = *run;
         let (worlds, real_time) = (Worlds::of(seed), run.dropped.is_some());
-        Self { sweep, suite, first_box, worlds, codec, size, delays, real_time }
+        Self { suite, first_box, worlds, codec, size, delays, real_time }
     }
 
     /// Name of a folder for runs of that seed.
     pub fn folder(&self, seed: u64) -> String {
-        let Self { suite, codec, size: (width, height), first_box, delays, sweep, real_time, .. } = self;
+        let Self { suite, codec, size: (width, height), first_box, delays, real_time, .. } = self;
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
-        let sweep = if *sweep { "sweep-" } else { "" };
         let real_time = if *real_time { "realtime-" } else { "" };
         format!(
-            "{suite}/{sweep}{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
+            "{suite}/{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
         )
     }
 }

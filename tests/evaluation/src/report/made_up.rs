@@ -22,7 +22,6 @@ pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
         delays: Delays::default(),
         first_box: FirstBox::Given,
         frame_rate: 10.0,
-        sweep: false,
         snapshots: Vec::new(),
         dropped: None,
         frames,

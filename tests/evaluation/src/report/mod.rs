@@ -11,7 +11,7 @@
 //! | `summary.md` | the worst conditions, trackers × figures, causes of losses: for a screen, and for the README |
 //! | `tables.md` | trackers × figures, trackers × conditions |
 //! | `tests.md` | every test of every tracker beside the thesis' figures |
-//! | `plots/….png` | d_gc and d_gp over time; figures against delay |
+//! | `plots/….png` | d_gc and d_gp over time |
 //! | `index.html` | all of it in one file |
 //!
 //! The same runs give the same bytes, in whichever order they come.
@@ -163,16 +163,13 @@ pub(crate) fn save(path: &Path, content: impl AsRef<[u8]>) -> Result<(), ReportE
 struct Content<'a> {
     /// Comparable runs.
     sections: Vec<Section<'a>>,
-    /// Runs that differ in delay, in order of delay.
-    sweep: Vec<Section<'a>>,
     /// Why trackers were not run.
     left_out: &'a [String],
 }
 
 impl<'a> Content<'a> {
     fn of(judged: &'a [Judged<'a>], left_out: &'a [String]) -> Self {
-        let (sweep, sections) = Section::all(judged).into_iter().partition(|section| section.setup.sweep);
-        Self { sections, sweep, left_out }
+        Self { sections: Section::all(judged), left_out }
     }
 
     /// What is looked at closely: the thesis' figures, or else the first there is.
@@ -183,28 +180,17 @@ impl<'a> Content<'a> {
         if chosen.is_empty() { titles.first().map(|(_, title)| *title).into_iter().collect() } else { chosen }
     }
 
-    fn plots_against_delay(&self) -> Vec<Plot> {
-        let plots = plot::AGAINST_DELAY.iter().map(|column| Plot::against_delay(&self.sweep, column));
-        plots.filter(|_| !self.sweep.is_empty()).collect()
-    }
-
-    fn tables_against_delay(&self) -> Vec<Table> {
-        let tables = plot::AGAINST_DELAY.iter().map(|column| tables::against_delay(&self.sweep, column));
-        tables.filter(|_| !self.sweep.is_empty()).collect()
-    }
-
     /// Draws all plots; says what went wrong, once.
     fn draw(&self, folder: &Path) -> Option<String> {
         let over_time = self.sections.iter().flat_map(|section| {
             self.shown(section).into_iter().map(|title| Plot::over_time(section, title)).collect::<Vec<_>>()
         });
-        let plots = over_time.chain(self.plots_against_delay());
-        let failed: Vec<_> = plots.filter_map(|plot| plot.draw(folder).err()).collect();
+        let failed: Vec<_> = over_time.filter_map(|plot| plot.draw(folder).err()).collect();
         failed.first().map(|error| format!("plots are missing ({} of them): {error}", failed.len()))
     }
 
     fn failures(&self) -> impl Iterator<Item = (String, &'a str)> {
-        self.sections.iter().chain(&self.sweep).flat_map(|section| section.runs).filter_map(|one| {
+        self.sections.iter().flat_map(|section| section.runs).filter_map(|one| {
             Some((format!("{}, {}", one.run.title, one.run.tracker), one.run.error.as_deref()?))
         })
     }
@@ -222,7 +208,7 @@ impl<'a> Content<'a> {
         let sections: Vec<_> = self.sections.iter().map(of_section).collect();
         let note = self.sections.iter().any(|section| !section.printed().is_empty());
         let note = if note { format!("\n{}\n", thesis::NOTE) } else { String::new() };
-        sections.join("\n") + &note + &joined(self.tables_against_delay().into_iter())
+        sections.join("\n") + &note
     }
 
     /// Everything by condition.

@@ -33,9 +33,8 @@ pub fn html(content: &Content, plots: &Path) -> String {
          <style>\n{STYLE}</style>\n<h1>Following a person with a moving camera</h1>\n\
          <p>ptztrack {version}. The thesis' tests (its chapter 5), rerun in closed loop against a virtual camera in a \
          simulated room, and recordings of real people: pictures delayed, encoded and decoded, commands delayed, every \
-         tracker with the same servo. The same seed gives the same figures on any x86-64 machine with the same libraries.</p>\n{}{sections}{}{}",
+         tracker with the same servo. The same seed gives the same figures on any x86-64 machine with the same libraries.</p>\n{}{sections}{}",
         left_out(content) + &failures(content),
-        sweep(content, plots),
         definitions(),
     )
 }
@@ -88,15 +87,6 @@ fn losses(section: &Section) -> String {
     });
     let pictures: String = pictures.collect();
     titled("h3", "Losses", tables::causes(section).html() + &pictures)
-}
-
-fn sweep(content: &Content, plots: &Path) -> String {
-    let html = content
-        .plots_against_delay()
-        .into_iter()
-        .zip(content.tables_against_delay())
-        .map(|(plot, table)| image(&plot, plots).unwrap_or_default() + &table.html());
-    titled("h2", "Against delay", html.collect())
 }
 
 fn definitions() -> String {

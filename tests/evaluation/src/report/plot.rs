@@ -8,11 +8,7 @@ use std::{
     process::{Command, Stdio},
 };
 
-use super::{
-    column::{self, Column},
-    judged::{Judged, Section, slug},
-    tables::swept,
-};
+use super::judged::{Judged, Section, slug};
 use crate::{
     metrics::{d_gc, d_gp, is_hidden},
     record::{FrameRecord, TrackerName},
@@ -63,32 +59,6 @@ impl Plot {
         }
     }
 
-    /// A figure against the delay of a sweep.
-    pub fn against_delay(sweep: &[Section], column: &Column) -> Self {
-        let file = format!("delay-{}.png", column.key);
-        let trackers = swept(sweep);
-        let data: String = trackers
-            .iter()
-            .map(|name| {
-                let points = sweep.iter().map(|section| {
-                    let mean = column.mean(section.whole(*name).map(|one| &one.metrics));
-                    (section.setup.delays.total().as_secs_f64() * 1e3, mean)
-                });
-                datablock("delay", *name, points)
-            })
-            .collect();
-        let curves = plot(trackers.iter().map(|name| Curve { points: true, ..Curve::of("delay", *name) }));
-        let header = header(&file, 450, "delay of video and command together, ms");
-        Self {
-            caption: format!("{} against delay", column.heading),
-            script: format!(
-                "{header}{data}set ylabel \"{}\"\nset yrange [0:*]\n{curves}",
-                subscripts(column.heading)
-            ),
-            file,
-        }
-    }
-
     /// Draws it into a folder.
     ///
     /// # Errors
@@ -119,18 +89,14 @@ impl Plot {
     }
 }
 
-/// Both figures that the delay spoils.
-pub const AGAINST_DELAY: [Column; 2] = [column::MEAN_DGC, column::TF];
-
 struct Curve {
     block: String,
     tracker: TrackerName,
-    points: bool,
 }
 
 impl Curve {
     fn of(block: &str, tracker: TrackerName) -> Self {
-        Self { block: format!("${block}_{}", variable(tracker)), tracker, points: false }
+        Self { block: format!("${block}_{}", variable(tracker)), tracker }
     }
 }
 
@@ -145,11 +111,10 @@ fn header(file: &str, height: u32, x: &str) -> String {
 /// One line a tracker, ours the thickest.
 fn plot(curves: impl Iterator<Item = Curve>) -> String {
     let curves: Vec<_> = curves
-        .map(|Curve { block, tracker, points }| {
-            let with = if points { "linespoints pointtype 7" } else { "lines" };
+        .map(|Curve { block, tracker }| {
             let width = if tracker == TrackerName::Ptztrack { 3 } else { 2 };
             let colour = colour(tracker);
-            format!("{block} using 1:2 with {with} linewidth {width} linecolor rgb \"{colour}\" title \"{tracker}\"")
+            format!("{block} using 1:2 with lines linewidth {width} linecolor rgb \"{colour}\" title \"{tracker}\"")
         })
         .collect();
     if curves.is_empty() { String::new() } else { format!("plot {}\n", curves.join(", \\\n  ")) }
@@ -189,10 +154,6 @@ fn shade_hidden(frames: &[FrameRecord]) -> String {
             ))
         })
         .collect()
-}
-
-fn subscripts(heading: &str) -> String {
-    heading.replace("d_gc", "d_{gc}").replace("d_gp", "d_{gp}")
 }
 
 /// Told apart by people who do not see red or green, too (Okabe and Ito).

@@ -222,28 +222,6 @@ pub fn recordings(section: &Section) -> Table {
     }
 }
 
-/// One figure against the whole delay: a row for every point, a column for every tracker.
-pub fn against_delay(sweep: &[Section], column: &Column) -> Table {
-    let trackers = swept(sweep);
-    let line = |section: &Section| {
-        let delays = section.setup.delays;
-        let mean = |name: &TrackerName| column.mean(section.whole(*name).map(|one| &one.metrics));
-        let cells = trackers.iter().map(|name| column.show(mean(name)));
-        std::iter::once(delays.total().as_millis().to_string()).chain(cells).collect()
-    };
-    Table {
-        caption: format!("{} against the delay of video and command together", column.heading),
-        headings: headings(&["delay, ms"], trackers.iter().map(ToString::to_string)),
-        rows: sweep.iter().map(line).collect(),
-    }
-}
-
-/// Who took part in a sweep.
-pub fn swept(sweep: &[Section]) -> Vec<TrackerName> {
-    let takes_part = |name: &TrackerName| sweep.iter().any(|section| section.of(*name).next().is_some());
-    TrackerName::ALL.iter().copied().filter(takes_part).collect()
-}
-
 /// Conditions of which a test was run.
 pub fn conditions(section: &Section) -> impl Iterator<Item = &'static Condition> {
     let printed = section.printed();

@@ -2,11 +2,11 @@
 
 //! Reports of runs that nobody ran.
 
-use std::{collections::BTreeMap, fs, path::PathBuf, time::Duration};
+use std::{collections::BTreeMap, fs, path::PathBuf};
 
 use super::*;
 use crate::record::{
-    Bounds, Delays, Estimate, FrameRecord, GroundTruth, Moment, Run, Snapshot, TargetState, TrackerName,
+    Bounds, Estimate, FrameRecord, GroundTruth, Moment, Run, Snapshot, TargetState, TrackerName,
 };
 
 /// Of one test, gone at its end.
@@ -99,11 +99,12 @@ fn has_every_run_and_figure() {
     assert_eq!(lines.len(), 1 + 6);
     // 35 right and 5 wrong of 40; d_gp is 5 of 100 pixels; all 40 lie on the person; the boxes are the same; d_gc 0.1 is
     // not central.
-    let ours = "test 1,1,ptztrack,1,mjpeg,80,60,given,100,60,false,false,40,35,87.500000,100.000000,0.000000,\
+    let ours = "test 1,1,ptztrack,1,mjpeg,80,60,given,100,60,false,40,35,87.500000,100.000000,0.000000,\
                 0.100000,0.000000,0.050000,0.000000,100.000000,100.000000,,,0.000000,0.000000,100.000000,10.000000,,";
     assert!(lines[1].starts_with(ours), "{}", lines[1]);
     assert!(lines[1].ends_with(",room,1,t,s,l,"), "{}", lines[1]);
-    let still = "test 1,1,still,1,mjpeg,80,60,given,100,60,false,false,40,35,,0.000000,0.000000,0.100000,0.000000,,,,";
+    let still =
+        "test 1,1,still,1,mjpeg,80,60,given,100,60,false,40,35,,0.000000,0.000000,0.100000,0.000000,,,,";
     assert!(lines[2].starts_with(still), "{}", lines[2]);
     let losses = folder.read("losses.csv");
     assert_eq!(
@@ -197,29 +198,6 @@ fn same_runs_give_same_bytes_in_any_order() {
     write(&runs, &[], &other.0).unwrap();
     assert!(one.all() == other.all());
     assert!(one.all().len() >= 11);
-}
-
-#[test]
-fn a_sweep_is_drawn_against_delay_and_kept_out_of_the_tables() {
-    let swept = |ms| Run {
-        sweep: true,
-        delays: Delays { video: Duration::from_millis(ms), ..Delays::default() },
-        ..run(1, TrackerName::Ptztrack)
-    };
-    let runs = [swept(500), swept(0), run(1, TrackerName::Ptztrack)];
-    let folder = Folder::new("sweep");
-    let report = write(&runs, &[], &folder.0).unwrap();
-    assert!(report.summary.contains("| delay, ms | ptztrack |\n"), "{}", report.summary);
-    assert!(
-        report.summary.contains("| 60        |    0.100 |\n| 560       |    0.100 |\n"),
-        "{}",
-        report.summary
-    );
-    assert_eq!(
-        folder.read("conditions.csv").lines().filter(|line| line.starts_with("ptztrack,all,")).count(),
-        1
-    );
-    assert_eq!(folder.read("results.csv").lines().count(), 4);
 }
 
 #[test]

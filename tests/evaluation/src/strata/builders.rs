@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use virtual_camera::{Action, Event, Lighting, Occlusion, Seeded, Subject};
+use virtual_camera::{Action, Event, Lighting, Occlusion, Place, Seeded, Subject};
 
 use super::draft::Draft;
 use crate::{experiment::Target, record::FirstBox};
@@ -56,6 +56,39 @@ pub(super) fn nobody(draft: &mut Draft, chance: &mut Seeded) {
     draft.room.events = Event::ALL.into_iter().map(|(event, _)| event).filter(|_| happens(chance)).collect();
     // Nothing happens in the first minute and a half of some of them.
     draft.begin = Duration::from_secs_f64(chance.range(90.0, 300.0));
+}
+
+fn in_yard(draft: &mut Draft, place: Place, action: Action) {
+    draft.room.place = place;
+    draft.room.action = action;
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+}
+
+pub(super) fn far(draft: &mut Draft, chance: &mut Seeded) {
+    in_yard(draft, Place::Yard, Action::Far);
+    draft.room.events = weather(&[Event::Draught, Event::Clouds], chance);
+}
+
+pub(super) fn outdoors(draft: &mut Draft, chance: &mut Seeded) {
+    let place = chance.pick(&[Place::Yard, Place::Yard, Place::NightYard, Place::InfraredYard]);
+    in_yard(draft, place, Action::Test);
+    let light = if place == Place::Yard { Event::Clouds } else { Event::Headlights };
+    draft.room.events = weather(&[Event::Draught, Event::Rain, light], chance);
+}
+
+fn weather(events: &[Event], chance: &mut Seeded) -> Vec<Event> {
+    events.iter().copied().filter(|_| chance.unit() < 0.6).collect()
+}
+
+pub(super) fn vehicles(draft: &mut Draft, chance: &mut Seeded) {
+    if chance.unit() < 0.5 {
+        in_yard(draft, Place::Yard, Action::Drive);
+    } else {
+        in_yard(draft, Place::Yard, Action::Test);
+        draft.room.vehicles = 1 + chance.below(3);
+        draft.first_box = FirstBox::Given;
+    }
 }
 
 pub(super) fn near(draft: &mut Draft, _chance: &mut Seeded) {

@@ -23,7 +23,7 @@ pub struct Endpoints {
     /// tracker's: from the middle of the box to that of the true box, in the same unit, over the pictures in which a tenth of
     /// them or more is to be seen; no box, or one farther away, counts as 1.
     pub distance: Option<f64>,
-    /// How often the box went from holding somebody to holding somebody else; where there is nobody else, `None`.
+    /// How often the box went from holding somebody, and no longer did, to holding somebody else; where there is nobody else, `None`.
     pub changes: Option<usize>,
     /// How often something was followed that never was anybody.
     pub pursuits: usize,
@@ -77,18 +77,24 @@ fn off(frame: &FrameRecord) -> f64 {
     })
 }
 
-/// Number of whom the box holds best.
-fn who(frame: &FrameRecord) -> Option<u32> {
+/// Number of whom the box holds: of several it stays with whom it held `before`, else it is who it holds best.
+fn who(frame: &FrameRecord, before: Option<u32>) -> Option<u32> {
     let estimate = placed(frame)?;
     let people = frame.truth.iter().chain(&frame.others);
     let overlaps = people.map(|person| (overlap_with(&estimate.bounds, &person.bounds), person.id));
-    let held = overlaps.filter(|(overlap, _)| *overlap >= HELD_IOU);
-    held.max_by(|one, other| one.0.total_cmp(&other.0)).map(|(_, id)| id)
+    let held: Vec<_> = overlaps.filter(|(overlap, _)| *overlap >= HELD_IOU).collect();
+    let same = held.iter().find(|(_, id)| Some(*id) == before);
+    let best = held.iter().max_by(|one, other| one.0.total_cmp(&other.0));
+    same.or(best).map(|(_, id)| *id)
 }
 
 fn changes(frames: &[FrameRecord]) -> usize {
-    let held: Vec<_> = frames.iter().filter_map(who).collect();
-    held.windows(2).filter(|pair| pair[0] != pair[1]).count()
+    let mut held = None;
+    let is_change = |frame: &&FrameRecord| {
+        let Some(now) = who(frame, held) else { return false };
+        held.replace(now).is_some_and(|before| before != now)
+    };
+    frames.iter().filter(is_change).count()
 }
 
 fn pursuits_of_nobody(frames: &[FrameRecord]) -> usize {
@@ -168,6 +174,10 @@ mod tests {
         let frames = [&one, &none, &one, &none, &two, &two, &one].map(Clone::clone);
         assert_eq!(of(Suite::OpenLoop, &frames).changes, Some(2));
         assert_eq!(of(Suite::OpenLoop, &[tracked()]).changes, None);
+        // Whom it holds it stays with, however much better it holds another.
+        let beside = GroundTruth { bounds: Bounds { left: 38.0, ..other.bounds }, ..other.clone() };
+        let between = FrameRecord { others: vec![beside], ..shifted(tracked(), 5.0) };
+        assert_eq!(of(Suite::OpenLoop, &[one, between]).changes, Some(0));
     }
 
     #[test]

@@ -40,8 +40,14 @@ named! {
         Dark = "dark",
         /// Nobody: whatever is followed is wrong.
         Nobody = "nobody",
+        /// One person far away in a yard, 20 to 40 pixels high.
+        Far = "far",
         /// One person who comes so near that they fill the picture.
         Near = "near",
+        /// One person in a yard: wind, clouds' shadows, rain, headlights, street lamps, infrared light.
+        Outdoors = "outdoors",
+        /// A car to be followed, or one person while cars drive by.
+        Vehicles = "vehicles",
         /// One person who is in view from the start, before a camera that turns from the start.
         Turning = "turning",
     }
@@ -57,7 +63,10 @@ impl Stratum {
             Self::Groups => builders::groups,
             Self::Dark => builders::dark,
             Self::Nobody => builders::nobody,
+            Self::Far => builders::far,
             Self::Near => builders::near,
+            Self::Outdoors => builders::outdoors,
+            Self::Vehicles => builders::vehicles,
             Self::Turning => builders::turning,
         }
     }
