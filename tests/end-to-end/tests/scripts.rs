@@ -56,7 +56,9 @@ fn said(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
 
-const BUILT: [&str; 3] = ["libgstptztrack.so", "libgstvapix.so", "vapix-watchdog"];
+/// The plugins, and the watchdogs after them.
+const BUILT: [&str; 5] =
+    ["libgstptztrack.so", "libgstvapix.so", "libgstonvifptz.so", "vapix-watchdog", "onvif-watchdog"];
 
 /// `pkg-config` that puts the plugins into the system's folder.
 fn pkg_config(system: &System) {
@@ -75,7 +77,7 @@ fn without_apt_it_is_said_what_is_needed() {
 #[test]
 fn what_is_not_built_is_not_installed_and_named() {
     let system = System::with("built", &["id", "install"]);
-    let build = system.build(&BUILT[..2]);
+    let build = system.build(&BUILT[..3]);
     let output = system.run("install-plugins", &[&build, system.0.join("usr").to_str().unwrap(), ""]);
     assert!(!output.status.success() && said(&output).contains("vapix-watchdog is not built"), "{output:?}");
     assert!(!system.0.join("usr").exists());
