@@ -7,14 +7,15 @@
 mod common;
 
 use std::sync::Once;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use common::stage::{Shown, Stage, mean_distance, pacing};
 use common::{Heard, Rig, target};
 use ptztrack_contract::TargetState;
 use virtual_camera::{Auth, Kinematics, OnvifSettings, ProportionalSpeed, Quirk, Settings, SpeedMap};
 
-/// How long somebody is followed.
-const MINUTE_S: f64 = 60.0;
+/// How long somebody is followed: twice to and fro, and as long again as a camera takes to be known.
+const FOLLOWED_S: f64 = 30.0;
 
 fn camera(onvif: OnvifSettings, full_speed_deg_s: f64) -> Settings {
     static REGISTER: Once = Once::new();
@@ -32,11 +33,23 @@ fn log_in(rig: Rig) -> Rig {
     rig.with("user", "root").with("password", "pass")
 }
 
-/// Follows for a minute, loses the target and sees the camera come to rest; returns what was to be seen.
+/// Has every case tested, some at once: each waits for its camera most of the time.
+fn each<T: Copy + Sync>(cases: &[T], test: impl Fn(T) + Sync) {
+    const AT_ONCE: usize = 4;
+    let next = AtomicUsize::new(0);
+    let take = || cases.get(next.fetch_add(1, Ordering::Relaxed)).copied();
+    std::thread::scope(|scope| {
+        for _ in 0..AT_ONCE {
+            scope.spawn(|| std::iter::from_fn(take).for_each(&test));
+        }
+    });
+}
+
+/// Follows for a while, loses the target and sees the camera come to rest; returns what was to be seen.
 fn follow(what: &str, settings: Settings) -> (Vec<Shown>, Stage) {
     let mut stage = Stage::new(settings, log_in);
-    let shown = stage.follow(MINUTE_S);
-    let pictures = (MINUTE_S / common::stage::FRAME.as_secs_f64()).round() as usize;
+    let shown = stage.follow(FOLLOWED_S);
+    let pictures = (FOLLOWED_S / common::stage::FRAME.as_secs_f64()).round() as usize;
     assert!(shown.len() >= pictures - 5, "{what}: seen in {} of {pictures} pictures", shown.len());
     assert!(stage.heard.iter().all(|heard| !matches!(heard, Heard::Error(_))), "{what}: {:?}", stage.heard);
     stage.run(8.0, &target(TargetState::Searching, 0.5, 0.5));
@@ -44,7 +57,7 @@ fn follow(what: &str, settings: Settings) -> (Vec<Shown>, Stage) {
     (shown, stage)
 }
 
-/// How far from the middle, in the second half of a minute, once latency and speeds are known.
+/// How far from the middle, in the second half, once latency and speeds are known.
 fn follows(what: &str, settings: Settings, farthest: f64) -> Stage {
     let (shown, stage) = follow(what, settings);
     let settled = mean_distance(&shown[shown.len() / 2..]);
@@ -63,8 +76,8 @@ fn a_camera_as_specified() {
 
 #[test]
 fn each_quirk() {
-    for quirk in Quirk::ALL {
-        let stage = follows(quirk.switch(), camera(OnvifSettings::with(&[*quirk]), 120.0), 0.25);
+    each(Quirk::ALL, |quirk| {
+        let stage = follows(quirk.switch(), camera(OnvifSettings::with(&[quirk]), 120.0), 0.25);
         let warnings: Vec<_> = stage.heard.into_iter().filter_map(Heard::into_warning).collect();
         let expected = match quirk {
             Quirk::TimeoutRefused => &["refuses to be told how long a move may last"][..],
@@ -74,7 +87,7 @@ fn each_quirk() {
         };
         let told = warnings.iter().zip(expected).all(|(warning, expected)| warning.contains(expected));
         assert!(warnings.len() == expected.len() && told, "{}: {warnings:?}", quirk.switch());
-    }
+    });
 }
 
 #[test]
@@ -95,17 +108,17 @@ fn all_that_can_be_had_together() {
 
 #[test]
 fn cameras_much_faster_and_slower_than_is_assumed() {
-    for full_speed_deg_s in [30.0, 60.0, 240.0, 360.0] {
+    each(&[30.0, 60.0, 240.0, 360.0], |full_speed_deg_s| {
         let what = format!("{full_speed_deg_s} degrees a second");
         follows(&what, camera(OnvifSettings::default(), full_speed_deg_s), 0.12);
-    }
+    });
 }
 
 /// The camera turns away from the person at first; how far is bounded by moves that are slow until it is known better.
 #[test]
 fn a_mirrored_pan_is_corrected_within_five_seconds() {
     let mut stage = Stage::new(camera(OnvifSettings::with(&[Quirk::PanMirrored]), 120.0), log_in);
-    let shown = stage.follow(MINUTE_S);
+    let shown = stage.follow(FOLLOWED_S);
     let farthest = shown.iter().map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
     assert!(farthest < 20.0, "{farthest} degrees away");
     let begins = shown.iter().find(|shown| shown.distance() > 0.05).unwrap().at;

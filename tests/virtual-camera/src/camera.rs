@@ -13,7 +13,7 @@ use std::{
 };
 
 use crate::{
-    Error, Fault, ReceivedCommand, Settings, Status,
+    Clock, Error, Fault, ReceivedCommand, Settings, Status,
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
@@ -83,9 +83,12 @@ impl Camera {
             + imaging::MEMORY
             + Duration::from_secs(2);
         let limits = settings.kinematics.limits_in(world.limits());
-        let head =
-            Head::new(settings.kinematics.clone(), world.optics(), limits, settings.home_pose(), memory)
-                .turning(settings.turning);
+        let kinematics = match &settings.onvif {
+            Some(onvif) if settings.clock == Clock::Stepped => onvif.stepped(&settings.kinematics),
+            _ => settings.kinematics.clone(),
+        };
+        let head = Head::new(kinematics, world.optics(), limits, settings.home_pose(), memory)
+            .turning(settings.turning);
         let device = Device::new(&settings, head, limits, world.view_size());
         let state = State {
             device,

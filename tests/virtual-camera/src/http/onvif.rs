@@ -18,7 +18,7 @@ use super::{
     connection::{Connection, Ending},
 };
 use crate::{
-    Auth,
+    Auth, Clock,
     onvif::{self, Message, OnvifSettings, Quirk, Refusal},
     seeded::Seeded,
 };
@@ -89,6 +89,11 @@ pub(super) async fn service(
     if name == "GetStatus" && settings.has(Quirk::StatusLate) {
         tokio::time::sleep(STATUS_LATE).await;
     }
+    // In stepped time its head is late instead: nobody steps while an answer is waited for.
+    if settings.has(Quirk::Late) && camera.settings.clock == Clock::Real {
+        let late = Seeded::new(camera.now().as_nanos() as u64).unit();
+        tokio::time::sleep(Quirk::LEAST_LATE + Quirk::MORE_LATE.mul_f64(late)).await;
+    }
     let answer = onvif::answer(camera, settings, message.body, &host);
     let status = match &answer {
         Ok(_) => 200,
@@ -97,10 +102,6 @@ pub(super) async fn service(
     };
     if matches!(name.as_str(), "ContinuousMove" | "Stop" | "AbsoluteMove" | "GotoPreset" | "RelativeMove") {
         camera.note_command(&summary(&name, &message), status);
-    }
-    if settings.has(Quirk::Late) {
-        let late = Seeded::new(camera.now().as_nanos() as u64).unit();
-        tokio::time::sleep(Duration::from_millis(100) + Duration::from_millis(700).mul_f64(late)).await;
     }
     match answer {
         Ok(body) => soap(StatusCode::OK, &onvif::envelope(&body, settings.has(Quirk::Prefixes))),

@@ -11,6 +11,8 @@ pub use quirks::{Quirk, quirk_table};
 pub(crate) use message::{Message, envelope, fault};
 pub(crate) use services::{Refusal, answer, clock};
 
+use crate::kinematics::Kinematics;
+
 /// Path of the device service, which the specification fixes.
 pub(crate) const DEVICE_SERVICE: &str = "/onvif/device_service";
 pub(crate) const MEDIA_SERVICE: &str = "/onvif/media_service";
@@ -29,6 +31,16 @@ impl OnvifSettings {
     /// With these quirks.
     pub fn with(quirks: &[Quirk]) -> Self {
         Self { quirks: quirks.to_vec(), ..Self::default() }
+    }
+
+    /// How the head of such a camera moves where its time is stepped.
+    pub(crate) fn stepped(&self, kinematics: &Kinematics) -> Kinematics {
+        let mut kinematics = kinematics.clone();
+        if self.has(Quirk::Late) {
+            kinematics.command_delay += Quirk::LEAST_LATE;
+            kinematics.command_jitter += Quirk::MORE_LATE;
+        }
+        kinematics
     }
 
     pub(crate) fn has(&self, quirk: Quirk) -> bool {

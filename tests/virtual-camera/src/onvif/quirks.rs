@@ -2,7 +2,7 @@
 
 //! How cameras were seen to differ from the specification.
 
-use std::fmt::Write;
+use std::{fmt::Write, time::Duration};
 
 /// One list makes the switches and their table.
 macro_rules! quirks {
@@ -64,7 +64,7 @@ quirks! {
     ZoomBreaks = "zoom-breaks", "TP-Link TL-IPC652P-A4: onvifsim";
     /// The connection is closed in place of a fault
     FaultCloses = "fault-closes", "Xiongmai: onvif-tt, expected failures";
-    /// Answers come 100 to 800 ms late
+    /// Commands are acted on, and answered, 100 to 800 ms late
     Late = "late", "onvifsim, facts; python-onvif issue 63";
     /// Velocities are made one of seven
     SevenSpeeds = "seven-speeds", "obs-face-tracker issue 126; Home Assistant core issue 131492";
@@ -80,6 +80,13 @@ quirks! {
     SecondProfile = "second-profile", "onvifsim, C1";
     /// `GetServices` is refused
     NoServices = "no-services", "supposed: devices older than this message";
+}
+
+impl Quirk {
+    /// [`Self::Late`] is at least so late, ...
+    pub(crate) const LEAST_LATE: Duration = Duration::from_millis(100);
+    /// ... and up to so much later.
+    pub(crate) const MORE_LATE: Duration = Duration::from_millis(700);
 }
 
 /// A table of them in Markdown, as the documentation has it.
