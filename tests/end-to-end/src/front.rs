@@ -5,7 +5,9 @@
 use std::io::{Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Instant;
 
 use socket2::SockRef;
 
@@ -26,6 +28,8 @@ pub enum Way {
 /// The only way to one port of a camera, for video and PTZ alike.
 pub struct Front {
     state: Arc<State>,
+    /// Whoever accepts connections, while they are.
+    listener: Mutex<Option<JoinHandle<()>>>,
 }
 
 struct State {
@@ -55,8 +59,8 @@ impl Front {
         let traffic =
             Mutex::new(Traffic { way: Way::Open, streams: Vec::new(), video_requests: 0, video_bytes: 0 });
         let state = Arc::new(State { address, camera, traffic, changed: Condvar::new() });
-        listen(state.clone(), listener);
-        Self { state }
+        let listener = Mutex::new(Some(listen(state.clone(), listener)));
+        Self { state, listener }
     }
 
     /// Where the camera is to be found.
@@ -66,19 +70,21 @@ impl Front {
 
     /// Makes the way like this.
     pub fn set(&self, way: Way) {
-        let before = {
+        {
             let mut traffic = self.state.traffic.lock().unwrap();
             if way == Way::Refused {
                 traffic.streams.drain(..).for_each(|stream| reset(&stream));
             }
-            std::mem::replace(&mut traffic.way, way)
-        };
+            traffic.way = way;
+        }
         self.state.changed.notify_all();
-        if way == Way::Refused {
-            // Wakes the listener, which then goes away.
+        let mut listener = self.listener.lock().unwrap_or_else(PoisonError::into_inner);
+        if way != Way::Refused {
+            listener.get_or_insert_with(|| listen(self.state.clone(), again(self.state.address)));
+        } else if let Some(thread) = listener.take() {
+            // Wakes it, and it goes away. Waited for, as it would stay where the way is free again before it has looked.
             let _ = TcpStream::connect(self.state.address);
-        } else if before == Way::Refused {
-            listen(self.state.clone(), again(self.state.address));
+            let _ = thread.join();
         }
     }
 
@@ -127,26 +133,31 @@ impl Drop for Front {
     }
 }
 
+/// Somebody else may have the port for a moment, as the one of a connection.
 fn again(address: SocketAddr) -> TcpListener {
+    let begin = Instant::now();
     loop {
-        // Until its predecessor is gone.
-        if let Ok(listener) = TcpListener::bind(address) {
-            return listener;
+        match TcpListener::bind(address) {
+            Ok(listener) => return listener,
+            Err(err) => assert!(begin.elapsed() < crate::PATIENCE, "{address}: {err}"),
         }
         std::thread::yield_now();
     }
 }
 
-fn listen(state: Arc<State>, listener: TcpListener) {
+fn listen(state: Arc<State>, listener: TcpListener) -> JoinHandle<()> {
     std::thread::spawn(move || {
         for client in listener.incoming().map_while(Result::ok) {
-            if state.traffic.lock().unwrap().way == Way::Refused {
+            let camera = TcpStream::connect(state.camera);
+            let mut traffic = state.traffic.lock().unwrap();
+            if traffic.way == Way::Refused {
                 return;
             }
-            let Ok(camera) = TcpStream::connect(state.camera) else { continue };
+            let Ok(camera) = camera else { continue };
             let both = [(&client, &camera), (&camera, &client)].map(clones);
             // Before anything passes: whoever has got something can be reset.
-            state.traffic.lock().unwrap().streams.extend([client, camera]);
+            traffic.streams.extend([client, camera]);
+            drop(traffic);
             let asked = Arc::new(AtomicU64::new(0));
             for (from, to) in both {
                 let (state, asked) = (state.clone(), asked.clone());
@@ -156,7 +167,7 @@ fn listen(state: Arc<State>, listener: TcpListener) {
                 });
             }
         }
-    });
+    })
 }
 
 fn clones((from, to): (&TcpStream, &TcpStream)) -> (TcpStream, TcpStream) {

@@ -4,6 +4,7 @@
 
 use std::net::IpAddr;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, Method, StatusCode, header};
@@ -13,6 +14,7 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use subtle::ConstantTimeEq;
 
+use super::Visit;
 use crate::config::{Credentials, Http};
 
 /// What is asked of everybody, for all but `/healthz`.
@@ -66,9 +68,14 @@ impl Access {
 
 /// Every request passes here.
 pub async fn check(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
-    let ip = request.extensions().get::<axum::extract::ConnectInfo<super::Local>>().map(|local| local.0.0);
-    match access.refuse(request.method(), request.headers(), ip) {
-        None => next.run(request).await,
+    let visit = request.extensions().get::<Visit>();
+    match access.refuse(request.method(), request.headers(), visit.map(|visit| visit.local)) {
+        None => {
+            if let Some(visit) = visit {
+                visit.welcome.store(true, Ordering::Relaxed);
+            }
+            next.run(request).await
+        }
         Some((StatusCode::UNAUTHORIZED, reason)) => {
             let ask = [(header::WWW_AUTHENTICATE, "Basic realm=\"ptztrack\", charset=\"UTF-8\"")];
             (StatusCode::UNAUTHORIZED, ask, reason).into_response()

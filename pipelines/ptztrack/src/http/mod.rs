@@ -8,11 +8,12 @@ mod metrics;
 use std::convert::Infallible;
 use std::net::IpAddr;
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use access::Access;
 use axum::body::{Body, Bytes};
-use axum::extract::{ConnectInfo, Path, Query, State};
+use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
@@ -26,6 +27,7 @@ use serde_json::json;
 use socket2::SockRef;
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
+use tokio::task::JoinHandle;
 
 use crate::camera::{Known, Look, Steering};
 use crate::config::Http;
@@ -47,9 +49,14 @@ const ACCEPT_AGAIN: Duration = Duration::from_millis(200);
 /// Between two pictures of a stream.
 const BOUNDARY: &str = "ptztrack-picture";
 
-/// The address of this machine that was connected to.
-#[derive(Debug, Clone, Copy)]
-pub struct Local(IpAddr);
+/// A connection of somebody.
+#[derive(Debug, Clone)]
+pub struct Visit {
+    /// The address of this machine that was connected to.
+    local: IpAddr,
+    /// Something was asked that they may ask.
+    welcome: Arc<AtomicBool>,
+}
 
 /// Where it is to be asked.
 ///
@@ -60,30 +67,42 @@ pub async fn listen(http: &Http) -> std::io::Result<TcpListener> {
 }
 
 /// Serves until the process ends. Whoever connects before they have said who they are costs a little for a short time: no more
-/// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor.
+/// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor. Where there
+/// are too many, the first of them makes room.
 pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>) {
     let router = router(http, fleet);
     let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
-    // It is never closed.
-    while let Ok(place) = places.clone().acquire_owned().await {
+    let mut visits: Vec<(Visit, JoinHandle<()>)> = Vec::new();
+    loop {
         let Ok((stream, _)) = listener.accept().await else {
             // Out of descriptors, for instance: there may be some later.
             tokio::time::sleep(ACCEPT_AGAIN).await;
             continue;
         };
-        let ip = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip());
+        visits.retain(|(_, connection)| !connection.is_finished());
+        let is_stranger = |(visit, _): &(Visit, _)| !visit.welcome.load(Ordering::Relaxed);
+        if places.available_permits() == 0
+            && let Some(first) = visits.iter().position(is_stranger)
+        {
+            visits.remove(first).1.abort();
+        }
+        // It is never closed.
+        let Ok(place) = places.clone().acquire_owned().await else { return };
+        let local = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip());
+        let visit = Visit { local, welcome: Arc::default() };
         // Who takes nothing of what was sent is gone; where that cannot be asked for, the system has its own limit.
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(LONGEST_STALL));
-        let service = router.clone().layer(Extension(ConnectInfo(Local(ip))));
+        let service = router.clone().layer(Extension(visit.clone()));
         let connection = http1::Builder::new()
             .timer(TokioTimer::new())
             .header_read_timeout(LONGEST_HEAD)
             .serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
-        tokio::spawn(async move {
+        let connection = tokio::spawn(async move {
             // How it ended is a matter of who connected.
             let _ = connection.await;
             drop(place);
         });
+        visits.push((visit, connection));
     }
 }
 
