@@ -19,8 +19,6 @@ TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium mosquitto mosquitto-client
 # rustup puts Rust there; a cargo that is recent enough elsewhere in PATH does as well.
 export PATH := $(HOME)/.cargo/bin:$(PATH)
 CARGO ?= cargo
-# Every test has its own limits; this ends a run that hangs in spite of them. A critical of GLib ends its test.
-TEST_TIMEOUT ?= 25m
 
 # The plugins; the watchdogs, programs of the crates `ptztrack-vapix` and `ptztrack-onvif`; what `pipelines/` are run with; and the program `ptztrack`.
 PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package gst-plugin-onvifptz --package ptztrack-vapix \
@@ -62,9 +60,9 @@ test: packages-test check-format
 	@# Clippy's own compiler builds what is tested, so that nothing is compiled twice; it denies warnings as in `make lint`.
 	export RUSTC_WORKSPACE_WRAPPER="$$(command -v clippy-driver)" CLIPPY_ARGS="-Dwarnings__CLIPPY_HACKERY__"; \
 	$(CARGO) build --workspace --all-targets; \
-	: With cameras on this machine the tests speak plain HTTP, no proxy has a way to these. Most tests wait and compute nothing.; \
+	: With cameras on this machine the tests speak plain HTTP, no proxy has a way to these. A critical of GLib ends its test.; \
 	env -u http_proxy -u HTTP_PROXY G_DEBUG=fatal-criticals RUST_TEST_THREADS=$${RUST_TEST_THREADS:-4} scripts/with-plugins debug \
-		timeout --kill-after=10 $(TEST_TIMEOUT) $(CARGO) test --workspace --no-fail-fast
+		scripts/run-tests
 
 ## lint: check formatting, run clippy and shell syntax checks, warnings denied
 lint: packages-build check-format

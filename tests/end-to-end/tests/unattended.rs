@@ -72,7 +72,7 @@ fn a_camera_with_a_wrong_password_is_given_up_and_no_matter_to_the_others() {
     let event: Value = serde_json::from_str(&line).unwrap();
     assert_eq!((&event["camera"], &event["level"]), (&json!("other"), &json!("error")), "{line}");
     follows(&good);
-    assert!(program.ask("GET", "/metrics").1.contains("ptztrack_picture_up{camera=\"good\"} 1.0"));
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"good\"} 1.0"));
 
     // The file is read again, and only what changed is touched.
     let before = network.http.video_requests();
@@ -151,8 +151,11 @@ fn a_camera_that_reboots_is_told_of_once_and_comes_back() {
     let network = Network::before(&camera);
     let file = |folder: &Path| Program::entry("door", &network.url(), &folder.join("password"));
     let mut program = Program::start("reboot", file, &[]);
-    program.launch.wait_for_line("door: the picture is there");
-    program.launch.wait_for_line("acquired");
+    let is_well_and_follows = |cameras: &str| {
+        let cameras: Value = serde_json::from_str(cameras).unwrap();
+        cameras[0]["well"] == json!(true) && cameras[0]["target"] != Value::Null
+    };
+    program.wait_for("/cameras", is_well_and_follows);
     network.set(Way::Refused);
     network.reset();
     program.launch.wait_for_line("tried again until it is back");
@@ -161,7 +164,7 @@ fn a_camera_that_reboots_is_told_of_once_and_comes_back() {
     let cameras: Value = serde_json::from_str(&program.ask("GET", "/cameras").1).unwrap();
     assert_eq!((&cameras[0]["target"], &cameras[0]["well"]), (&Value::Null, &json!(false)), "{cameras}");
     network.set(Way::Open);
-    program.launch.wait_for_line("door: the picture is there");
+    program.wait_for("/cameras", is_well_and_follows);
     follows(&camera);
     let said = program.end("INT");
     // Each reason once.
