@@ -17,8 +17,10 @@ const MOST: usize = 1024;
 pub struct Services {
     /// Media.
     pub media: String,
-    /// PTZ.
-    pub ptz: String,
+    /// Media 2, which knows H.265.
+    pub media2: Option<String>,
+    /// PTZ, of a camera that turns.
+    pub ptz: Option<String>,
 }
 
 /// A media profile that has a PTZ configuration.
@@ -47,7 +49,7 @@ pub fn parse_date(body: &Element) -> Option<i64> {
     Some(time.and_utc().timestamp())
 }
 
-/// Reads `GetServicesResponse` or `GetCapabilitiesResponse`; `None` where the camera has no PTZ.
+/// Reads `GetServicesResponse` or `GetCapabilitiesResponse`; `None` of what has no video.
 pub fn parse_services(body: &Element) -> Option<Services> {
     let services = body.child("GetServicesResponse");
     let listed = |namespace: &str| {
@@ -58,9 +60,10 @@ pub fn parse_services(body: &Element) -> Option<Services> {
     };
     let capabilities = body.find(&["GetCapabilitiesResponse", "Capabilities"]);
     let capability = |name: &str| path(capabilities?.find(&[name, "XAddr"])?.text());
-    let ptz = listed("http://www.onvif.org/ver20/ptz/wsdl").or_else(|| capability("PTZ"))?;
+    let ptz = listed("http://www.onvif.org/ver20/ptz/wsdl").or_else(|| capability("PTZ"));
+    let media2 = listed("http://www.onvif.org/ver20/media/wsdl");
     let media = listed("http://www.onvif.org/ver10/media/wsdl").or_else(|| capability("Media"))?;
-    Some(Services { media, ptz })
+    Some(Services { media, media2, ptz })
 }
 
 /// Path and query of an address.
@@ -139,12 +142,16 @@ mod tests {
         let list = body(
             "<GetServicesResponse><Service><Namespace>http://www.onvif.org/ver20/media/wsdl</Namespace><XAddr>http://10.0.0.1/onvif/media2</XAddr></Service><Service><Namespace>http://www.onvif.org/ver10/media/wsdl</Namespace><XAddr>http://10.0.0.1:8080/onvif/media?a=b</XAddr></Service><Service><Namespace>http://www.onvif.org/ver20/ptz/wsdl</Namespace><XAddr>http://10.0.0.1/onvif/ptz</XAddr></Service></GetServicesResponse>",
         );
-        let expected = Services { media: "/onvif/media?a=b".to_owned(), ptz: "/onvif/ptz".to_owned() };
+        let expected = Services {
+            media: "/onvif/media?a=b".to_owned(),
+            media2: Some("/onvif/media2".to_owned()),
+            ptz: Some("/onvif/ptz".to_owned()),
+        };
         assert_eq!(parse_services(&list), Some(expected.clone()));
         let old = body(
             "<GetCapabilitiesResponse><Capabilities><Media><XAddr>http://h/onvif/media?a=b</XAddr></Media><PTZ><XAddr>http://h/onvif/ptz</XAddr></PTZ></Capabilities></GetCapabilitiesResponse>",
         );
-        assert_eq!(parse_services(&old), Some(expected));
+        assert_eq!(parse_services(&old), Some(Services { media2: None, ..expected }));
         assert_eq!(parse_services(&body("<GetCapabilitiesResponse/>")), None);
     }
 

@@ -15,6 +15,7 @@ use crate::clock::CameraClock;
 use crate::messages;
 use crate::moves::{Moves, StopWords, moves_zoom};
 use crate::soap::{Answer, Element, envelope, read_answer};
+use crate::streams::{Encoding, StreamAddress, VideoStream, parse_stream_address, parse_streams};
 use crate::token::security;
 
 /// Where the device service is where the location names no path (ONVIF Core, 5.1.1).
@@ -127,9 +128,45 @@ impl session::Client for Client {
 }
 
 impl Client {
-    /// Asks what has to be known before anything else can be said. What was answered is not asked again, so that a camera
-    /// that is slow, or gone for a while, is got to know all the same.
-    async fn connected(&mut self) -> Result<Abilities, Error> {
+    /// Whether the camera turns, by its own word.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn has_ptz(&mut self) -> Result<bool, Error> {
+        Ok(self.reached().await?.ptz.is_some())
+    }
+
+    /// Which video streams it has.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn streams(&mut self) -> Result<Vec<VideoStream>, Error> {
+        let services = self.reached().await?;
+        let mut streams = parse_streams(&self.call(Path::Media, messages::GET_PROFILES).await?);
+        if services.media2.is_some() {
+            // The only one that tells of H.265. Where it fails, the other is what there is.
+            let body = self.call(Path::Media2, messages::GET_PROFILES_2).await.unwrap_or_default();
+            streams
+                .extend(parse_streams(&body).into_iter().filter(|stream| stream.encoding == Encoding::H265));
+        }
+        Ok(streams)
+    }
+
+    /// Where one of them is.
+    ///
+    /// # Errors
+    /// Any.
+    pub async fn stream_address(&mut self, stream: &VideoStream) -> Result<StreamAddress, Error> {
+        let body = if stream.encoding == Encoding::H265 {
+            self.call(Path::Media2, &messages::get_stream_uri_2(&stream.profile)).await?
+        } else {
+            self.call(Path::Media, &messages::get_stream_uri(&stream.profile)).await?
+        };
+        parse_stream_address(&body).ok_or_else(|| unexpected("no address of a stream by RTSP"))
+    }
+
+    /// Asks what anybody may know.
+    async fn reached(&mut self) -> Result<Services, Error> {
         if self.clock.is_none() {
             self.clock = Some(self.ask_clock().await?);
         }
@@ -141,10 +178,23 @@ impl Client {
                 Err(err) => return Err(err),
             };
             let services = match listed {
-                Some(services) => Some(services),
-                None => parse_services(&self.call(Path::Device, messages::GET_CAPABILITIES).await?),
+                Some(services) if services.ptz.is_some() => Some(services),
+                listed => match self.call(Path::Device, messages::GET_CAPABILITIES).await {
+                    Ok(body) => parse_services(&body).or(listed),
+                    Err(err) if listed.is_none() => return Err(err),
+                    Err(_) => listed,
+                },
             };
             self.services = Some(services.ok_or(Error::NoPtz)?);
+        }
+        self.services.clone().ok_or(Error::NoPtz)
+    }
+
+    /// Asks what has to be known before anything else can be said. What was answered is not asked again, so that a camera
+    /// that is slow, or gone for a while, is got to know all the same.
+    async fn connected(&mut self) -> Result<Abilities, Error> {
+        if self.reached().await?.ptz.is_none() {
+            return Err(Error::NoPtz);
         }
         if self.profile.is_none() {
             let profiles = parse_profiles(&self.call(Path::Media, messages::GET_PROFILES).await?);
@@ -238,7 +288,8 @@ impl Client {
     fn path(&self, path: Path) -> &str {
         match (path, &self.services) {
             (Path::Media, Some(services)) => &services.media,
-            (Path::Ptz, Some(services)) => &services.ptz,
+            (Path::Media2, Some(Services { media2: Some(media2), .. })) => media2,
+            (Path::Ptz, Some(Services { ptz: Some(ptz), .. })) => ptz,
             _ => &self.device,
         }
     }
@@ -390,5 +441,6 @@ impl Client {
 enum Path {
     Device,
     Media,
+    Media2,
     Ptz,
 }

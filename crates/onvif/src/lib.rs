@@ -16,7 +16,9 @@ mod clock;
 mod messages;
 mod moves;
 mod soap;
+mod streams;
 mod token;
+mod ws_discovery;
 
 pub use abilities::{Abilities, MoveTimeout, parse_abilities};
 pub use answers::{
@@ -24,3 +26,5 @@ pub use answers::{
 };
 pub use client::Client;
 pub use soap::{Answer, Element, read_answer};
+pub use streams::{Encoding, StreamAddress, VideoStream, parse_stream_address, parse_streams};
+pub use ws_discovery::{Announcement, GROUP, parse_announcements, probe};

@@ -14,6 +14,23 @@ pub const GET_SERVICES: &str =
 pub const GET_CAPABILITIES: &str =
     "<tds:GetCapabilities><tds:Category>All</tds:Category></tds:GetCapabilities>";
 pub const GET_PROFILES: &str = "<trt:GetProfiles/>";
+pub const GET_PROFILES_2: &str = "<tr2:GetProfiles><tr2:Type>VideoEncoder</tr2:Type></tr2:GetProfiles>";
+
+/// Where the stream of a profile is, by the service Media.
+pub fn get_stream_uri(profile: &str) -> String {
+    format!(
+        "<trt:GetStreamUri><trt:StreamSetup><tt:Stream>RTP-Unicast</tt:Stream><tt:Transport><tt:Protocol>RTSP</tt:Protocol></tt:Transport></trt:StreamSetup><trt:ProfileToken>{}</trt:ProfileToken></trt:GetStreamUri>",
+        escaped(profile)
+    )
+}
+
+/// The same, by the service Media 2.
+pub fn get_stream_uri_2(profile: &str) -> String {
+    format!(
+        "<tr2:GetStreamUri><tr2:Protocol>RTSP</tr2:Protocol><tr2:ProfileToken>{}</tr2:ProfileToken></tr2:GetStreamUri>",
+        escaped(profile)
+    )
+}
 
 /// Which spaces, limits and timeouts a PTZ configuration has.
 pub fn get_configuration_options(configuration: &str) -> String {

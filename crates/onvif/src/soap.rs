@@ -32,7 +32,7 @@ pub enum Answer {
     Fault(String),
 }
 
-/// A message with this header and body, whose elements have the prefixes `tds`, `trt`, `tptz`, `tt`, `wsse` and `wsu`.
+/// A message with this header and body, whose elements have the prefixes `tds`, `trt`, `tr2`, `tptz`, `tt`, `wsse` and `wsu`.
 pub fn envelope(header: &str, body: &str) -> String {
     format!(
         concat!(
@@ -40,6 +40,7 @@ pub fn envelope(header: &str, body: &str) -> String {
             r#"<s:Envelope xmlns:s="http://www.w3.org/2003/05/soap-envelope""#,
             r#" xmlns:tds="http://www.onvif.org/ver10/device/wsdl""#,
             r#" xmlns:trt="http://www.onvif.org/ver10/media/wsdl""#,
+            r#" xmlns:tr2="http://www.onvif.org/ver20/media/wsdl""#,
             r#" xmlns:tptz="http://www.onvif.org/ver20/ptz/wsdl""#,
             r#" xmlns:tt="http://www.onvif.org/ver10/schema">"#,
             "<s:Header>{}</s:Header><s:Body>{}</s:Body></s:Envelope>"

@@ -4,11 +4,14 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
+use onvif::VideoStream;
 
-use crate::config::{CameraSettings, Codec, Credentials, Secret};
-use crate::log::Format;
+use crate::config::{CameraSettings, Codec, Credentials, Protocol, Secret, Watchdogs};
+use crate::discovery::{Found, ask};
+use crate::log::{Format, Log};
 use crate::shard::Shard;
 
 /// Follows people with pan-tilt-zoom network cameras by itself.
@@ -36,9 +39,14 @@ pub enum Task {
         /// Only this process' share of the cameras: 0/10 to 9/10 for ten processes that read the same file
         #[arg(long, value_name = "NUMBER/OF")]
         shard: Option<Shard>,
-        /// Socket of a `vapix-watchdog --listen` that stops the cameras if this process dies; else one is started
-        #[arg(long, value_name = "SOCKET")]
-        watchdog: Option<String>,
+        #[command(flatten)]
+        watchdogs: Watchdogs,
+    },
+    /// List the cameras of this network segment: name, address, what they are spoken to by, and whether they turn
+    Discover {
+        /// How long to wait for answers, in seconds
+        #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = seconds)]
+        wait: Duration,
     },
     /// Follow with one camera, without a file
     Follow(Box<Follow>),
@@ -66,21 +74,24 @@ pub struct Serving {
 
 #[derive(Debug, Args)]
 pub struct Follow {
-    /// The camera, for example http://192.168.0.90
+    /// The camera: a host name or an address, for example 192.168.0.90 or https://192.168.0.90
     address: String,
+    /// What it is spoken to by; else it is asked for VAPIX, then for ONVIF
+    #[arg(long, value_enum)]
+    protocol: Option<Protocol>,
     /// Account with the right to control PTZ; its password is in the environment variable CAMERA_PASSWORD or in a file
     #[arg(long)]
     user: Option<String>,
     /// File with the password
     #[arg(long, value_name = "FILE", requires = "user")]
     password_file: Option<PathBuf>,
-    /// How pictures come
-    #[arg(long, value_enum, default_value = "mjpeg")]
-    codec: Codec,
+    /// How pictures come [default: by VAPIX mjpeg; by ONVIF as the stream is that suits best]
+    #[arg(long, value_enum)]
+    codec: Option<Codec>,
     /// The camera's RTSP server, for example rtsp://192.168.0.90:554
     #[arg(long, value_name = "ADDRESS")]
     rtsp: Option<String>,
-    /// Size of the picture, for example 640x480
+    /// Size of the picture, for example 640x480; by ONVIF the stream is taken that comes nearest
     #[arg(long, value_parser = |text: &str| crate::config::size(text).ok_or("width and height in pixels, as 640x480"))]
     size: Option<(u32, u32)>,
     /// Pictures per second
@@ -94,23 +105,33 @@ pub struct Follow {
 }
 
 impl Follow {
-    /// The camera that was meant.
+    /// The camera that was meant, as it answers.
     ///
     /// # Errors
     /// What is wrong with it.
-    pub fn camera(&self) -> Result<CameraSettings, String> {
-        let camera = CameraSettings::at("camera", &self.address)?;
-        let rtsp = self.rtsp.as_deref().map_or(camera.rtsp, |rtsp| rtsp.trim_end_matches('/').to_owned());
+    pub async fn camera(&self, log: &Log) -> Result<CameraSettings, String> {
         let credentials =
             self.user.as_ref().map(|user| self.password().map(|password| (user, password))).transpose()?;
+        let credentials = credentials.map(|(user, password)| Credentials { user: user.clone(), password });
+        let found = ask(&self.address, self.protocol, credentials.as_ref()).await?;
+        let Found { protocol, address, streams } = found;
+        let best = VideoStream::best(&streams, self.codec.and_then(Codec::encoding), self.size);
+        let codec = match (self.codec, best) {
+            (Some(codec), _) => codec,
+            (None, Some(best)) => Codec::of(best.encoding).unwrap_or(Codec::usual(protocol)),
+            (None, None) => Codec::usual(protocol),
+        };
+        codec.check(protocol)?;
+        let stream = best.map_or_else(String::new, |best| format!(", its stream is {best}"));
+        log.info("found", format!("{address} speaks {}{stream}", protocol.name()));
         let camera = CameraSettings {
-            rtsp,
-            codec: self.codec,
+            rtsp: self.rtsp.as_deref().map(|rtsp| rtsp.trim_end_matches('/').to_owned()),
+            codec,
             size: self.size,
             rate: self.rate,
             show: self.show,
-            credentials: credentials.map(|(user, password)| Credentials { user: user.clone(), password }),
-            ..camera
+            credentials,
+            ..CameraSettings::at("camera", protocol, &address)?
         };
         camera.lacks().map_or(Ok(camera), Err)
     }
@@ -124,4 +145,9 @@ impl Follow {
             }),
         }
     }
+}
+
+fn seconds(text: &str) -> Result<Duration, &'static str> {
+    let seconds = text.parse().ok().filter(|seconds| (0.1..=60.0).contains(seconds));
+    seconds.map(Duration::from_secs_f64).ok_or("a number from 0.1 to 60")
 }

@@ -6,6 +6,7 @@ mod camera;
 mod cli;
 mod config;
 mod control_file;
+mod discovery;
 mod event;
 mod fleet;
 mod http;
@@ -72,13 +73,15 @@ fn run(options: Options) -> Result<(), Failure> {
     gst::init().map_err(|err| err.to_string())?;
     let log = Arc::new(Log::new(options.log_format));
     match options.command {
-        Task::Run { file, serving, shard, watchdog } => {
-            follow(Origin::File { path: file, shard, watchdog }, &serving, log)
+        Task::Run { file, serving, shard, watchdogs } => {
+            follow(Origin::File { path: file, shard, watchdogs }, &serving, log)
         }
         Task::Follow(follow_one) => {
-            let config = Config { cameras: vec![follow_one.camera()?], http: None, mqtt: None };
+            let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
+            let config = Config { cameras, http: None, mqtt: None };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
+        Task::Discover { wait } => Ok(runtime(1)?.block_on(discovery::discover(wait))?),
         Task::Check { file } => {
             let config = Config::load(&file)?;
             config.check_machine()?;
@@ -120,10 +123,10 @@ fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failur
         .name("main-context".to_owned())
         .spawn(|| glib::MainLoop::new(None, false).run())
         .map_err(|err| err.to_string())?;
-    let runtime = tokio::runtime::Builder::new_multi_thread()
-        .worker_threads(2)
-        .enable_all()
-        .build()
-        .map_err(|err| err.to_string())?;
-    Ok(runtime.block_on(service::run(origin, config, log))?)
+    Ok(runtime(2)?.block_on(service::run(origin, config, log))?)
+}
+
+fn runtime(threads: usize) -> Result<tokio::runtime::Runtime, String> {
+    let mut builder = tokio::runtime::Builder::new_multi_thread();
+    builder.worker_threads(threads).enable_all().build().map_err(|err| err.to_string())
 }

@@ -12,7 +12,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::task::JoinHandle;
 use tokio::time::{Interval, interval};
 
-use crate::config::{Config, Http, NotLoaded};
+use crate::config::{Config, Http, NotLoaded, Watchdogs};
 use crate::fleet::Fleet;
 use crate::http;
 use crate::log::Log;
@@ -26,7 +26,7 @@ const LOOK_AGAIN: Duration = Duration::from_secs(10);
 
 /// Where the cameras come from, and come from again on SIGHUP.
 pub enum Origin {
-    File { path: PathBuf, shard: Option<Shard>, watchdog: Option<String> },
+    File { path: PathBuf, shard: Option<Shard>, watchdogs: Watchdogs },
     CommandLine(Box<Config>),
 }
 
@@ -43,11 +43,9 @@ impl Origin {
     /// What is wrong with the file.
     pub fn read(&self) -> Result<Config, NotLoaded> {
         match self {
-            Self::File { path, shard, watchdog } => {
+            Self::File { path, shard, watchdogs } => {
                 let mut config = Config::load(path)?;
-                if let Some(socket) = watchdog {
-                    config.cameras.iter_mut().for_each(|camera| camera.use_watchdog(socket));
-                }
+                config.cameras.iter_mut().for_each(|camera| camera.use_watchdog(watchdogs));
                 config.cameras.retain(|camera| shard.is_none_or(|shard| shard.has(camera)));
                 Ok(config)
             }

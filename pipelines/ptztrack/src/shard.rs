@@ -45,6 +45,7 @@ fn fnv1a(bytes: &[u8]) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::config::Protocol;
 
     #[test]
     fn is_the_published_hash() {
@@ -55,7 +56,7 @@ mod tests {
     #[test]
     fn every_camera_is_in_one_share() {
         for n in 0..200 {
-            let camera = CameraSettings::at(&format!("camera-{n}"), "http://a").unwrap();
+            let camera = CameraSettings::at(&format!("camera-{n}"), Protocol::Vapix, "http://a").unwrap();
             let shares = (0..10).filter(|number| Shard { number: *number, of: 10 }.has(&camera));
             assert_eq!(shares.count(), 1);
         }

@@ -33,7 +33,7 @@ fn ptztrack() -> Command {
 
 #[test]
 fn one_camera_is_followed_without_a_file() {
-    for codec in ["mjpeg", "h264", "mpeg4"] {
+    for codec in ["mjpeg", "h264", "mpeg4", "h265"] {
         let camera = camera();
         let mut command = ptztrack();
         command.args([

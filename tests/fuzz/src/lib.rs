@@ -106,5 +106,8 @@ pub fn onvif(bytes: &[u8]) -> bool {
         || onvif::parse_date(&body).is_some()
         || onvif::parse_services(&body).is_some()
         || !onvif::parse_profiles(&body).is_empty()
+        || !onvif::parse_streams(&body).is_empty()
+        || onvif::parse_stream_address(&body).is_some()
         || onvif::parse_presets(&body).is_some()
+        || !onvif::parse_announcements(&text(bytes)).is_empty()
 }

@@ -5,7 +5,7 @@
 use std::{
     net::SocketAddr,
     sync::{
-        Arc, Condvar, Mutex, PoisonError,
+        Arc, Condvar, Mutex, OnceLock, PoisonError,
         atomic::{AtomicBool, Ordering},
     },
     thread::JoinHandle,
@@ -19,6 +19,7 @@ use crate::{
     http::HttpServer,
     imaging::{self, Lens, NoiseFilter, Sway},
     kinematics::{Head, Limits, Motion, Optics, Pose, within_a_turn},
+    onvif::Discovery,
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
@@ -58,6 +59,8 @@ pub(crate) struct Camera {
     changed: Condvar,
     noise_filter: Mutex<NoiseFilter>,
     pub fault: tokio::sync::watch::Sender<Fault>,
+    /// Known once RTSP is served.
+    rtsp_port: OnceLock<u16>,
 }
 
 /// Counts a request as in flight, or a client as watching, for as long as it lives.
@@ -109,6 +112,7 @@ impl Camera {
             changed: Condvar::new(),
             noise_filter: Mutex::default(),
             fault: tokio::sync::watch::Sender::new(Fault::None),
+            rtsp_port: OnceLock::new(),
         })
     }
 
@@ -186,6 +190,16 @@ impl Camera {
     /// Runs `param.cgi`.
     pub fn param(&self, args: &Args, _cookie: Option<&str>) -> CgiResponse {
         self.update(|state| state.device.param(args))
+    }
+
+    /// Port of RTSP; 0 until it is served.
+    pub fn rtsp_port(&self) -> u16 {
+        self.rtsp_port.get().copied().unwrap_or(0)
+    }
+
+    /// Width and height in pixels that it sends unless asked for others.
+    pub fn view_size(&self) -> (u32, u32) {
+        self.world.view_size()
     }
 
     /// Has the head do this now; continuous moves end by themselves after `lasts`.
@@ -419,6 +433,7 @@ pub struct VirtualCamera {
     camera: Arc<Camera>,
     http: HttpServer,
     rtsp: RtspServer,
+    discovery: Option<Discovery>,
     pulse: Option<JoinHandle<()>>,
 }
 
@@ -429,12 +444,17 @@ impl VirtualCamera {
         let camera = Arc::new(Camera::new(settings)?);
         let http = HttpServer::start(camera.clone())?;
         let rtsp = RtspServer::start(camera.clone())?;
+        // Nobody has set it before.
+        let _ = camera.rtsp_port.set(rtsp.address().port());
+        let discoverable = camera.settings.onvif.as_ref().is_some_and(|onvif| onvif.discoverable);
+        let discovery = discoverable.then(|| Discovery::start(http.address())).transpose();
+        let discovery = discovery.map_err(|source| Error::Discovery { source })?;
         let pulsing = camera.clone();
         let pulse = std::thread::Builder::new()
             .name("camera-pulse".into())
             .spawn(move || pulsing.pulse())
             .map_err(|source| Error::Thread { source })?;
-        Ok(Self { camera, http, rtsp, pulse: Some(pulse) })
+        Ok(Self { camera, http, rtsp, discovery, pulse: Some(pulse) })
     }
 
     /// Where HTTP is served.
@@ -604,6 +624,7 @@ impl VirtualCamera {
 
 impl Drop for VirtualCamera {
     fn drop(&mut self) {
+        self.discovery = None;
         self.camera.close();
         self.rtsp.close();
         self.camera.stop();

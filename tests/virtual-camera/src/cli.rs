@@ -208,9 +208,12 @@ pub struct Options {
     #[arg(long, value_name = "STEP", value_parser = not_negative)]
     zoom: Option<f64>,
 
-    /// Speak ONVIF as well, as cameras of most makes do: full velocity is the speed of step 100, and speed is in proportion
+    /// Speak ONVIF as well, as cameras of most makes do, WS-Discovery on the loopback interface too: full velocity is the speed of step 100, and speed is in proportion
     #[arg(long, conflicts_with = "speed_map")]
     onvif: bool,
+    /// Speak nothing but ONVIF, and RTSP
+    #[arg(long, requires = "onvif")]
+    onvif_alone: bool,
     /// Differ from the ONVIF specification as some camera does (docs/onvif.md lists them); can be given again
     #[arg(long, value_enum, value_name = "QUIRK", value_delimiter = ',', requires = "onvif")]
     onvif_quirk: Vec<Quirk>,
@@ -309,7 +312,11 @@ impl TryFrom<Options> for Settings {
                 vibration_deg: options.vibration,
                 noise_filter: options.noise_filter,
             },
-            onvif: options.onvif.then(|| OnvifSettings::with(&options.onvif_quirk)),
+            onvif: options.onvif.then(|| OnvifSettings {
+                alone: options.onvif_alone,
+                discoverable: true,
+                ..OnvifSettings::with(&options.onvif_quirk)
+            }),
             presets: options.presets,
             user: options.user,
             password: options.password,

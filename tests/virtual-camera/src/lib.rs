@@ -79,6 +79,12 @@ pub enum Error {
         /// What the system says.
         reason: String,
     },
+    /// It cannot let itself be found.
+    #[error("cannot answer who looks for cameras (WS-Discovery, UDP port 3702): {source}")]
+    Discovery {
+        /// What the system says.
+        source: std::io::Error,
+    },
     /// The system gives no thread.
     #[error("cannot start a thread: {source}")]
     Thread {

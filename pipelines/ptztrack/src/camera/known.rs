@@ -190,7 +190,7 @@ impl Known {
         u64::try_from(self.begin.elapsed().as_nanos()).unwrap_or(u64::MAX)
     }
 
-    /// What `vapixptzsink` says of itself, where one runs.
+    /// What the sink says of itself, where one runs.
     pub fn servo(&self) -> Option<gst::Structure> {
         lock(&self.elements).as_ref()?.servo_stats()
     }

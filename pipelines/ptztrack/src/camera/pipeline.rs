@@ -4,19 +4,18 @@
 
 use std::error::Error;
 use std::fmt::Write;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
 use ptztrack_contract::lock::lock;
-use ptztrack_contract::{BufferMeta, TargetMeta};
 
 use super::known::{Known, Steering};
 use super::recording::{self, Recorder};
 use super::video::{self, Failure, Video};
-use crate::config::{CameraSettings, Codec, Credentials};
+use crate::config::{CameraSettings, Codec, Credentials, Protocol};
 
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
 const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0";
@@ -36,9 +35,6 @@ const LONGEST_START: Duration = Duration::from_secs(4);
 /// Between two pictures for who looks.
 const VIEW_EVERY: Duration = Duration::from_millis(200);
 
-/// Closed while the camera is somebody else's; the stream's end passes all the same.
-const STEER: &str = "valve name=steer drop-mode=forward-sticky-events";
-
 /// Copies of what is recorded, for a pipeline of its own: whatever becomes of that, nobody is followed the worse for it.
 const TAP: &str = "appsink name=tap sync=false async=false enable-last-sample=false";
 
@@ -50,7 +46,7 @@ pub fn description(camera: &CameraSettings) -> String {
     let recording = camera.recording.as_ref();
     let mut text = source(camera.codec, recording.is_some_and(|recording| !recording.overlay));
     write_all(&mut text, &format!(" ! {NEWEST} name=newest ! bgavgdetect ! {TRACKER} ! tee name=followed "));
-    write_all(&mut text, &format!("followed. ! {NEWEST} ! {STEER} ! vapixptzsink "));
+    write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", camera.protocol.sink()));
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
     if recording.is_some_and(|recording| recording.overlay) {
         let encoder = recording::ENCODER;
@@ -83,6 +79,7 @@ fn source(codec: Codec, tapped: bool) -> String {
         }
         Codec::Mpeg4 => rtsp("rtpmp4vdepay", "avdec_mpeg4"),
         Codec::H264 => rtsp("rtph264depay", "avdec_h264"),
+        Codec::H265 => rtsp("rtph265depay", "avdec_h265"),
     }
 }
 
@@ -136,7 +133,6 @@ pub fn build(
     count(&pipeline, known);
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
-    elements.hide_target();
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
     elements.steer(known.steering_at_start(elements.override_timeout()));
     *lock(&known.elements) = Some(elements);
@@ -151,7 +147,7 @@ fn parse(camera: &CameraSettings) -> Result<gst::Pipeline, Box<dyn Error>> {
 /// Address, password and properties.
 fn configure(element: &gst::Element, camera: &CameraSettings) {
     let Some(factory) = element.factory() else { return };
-    if factory.name() == "vapixptzsink" {
+    if Protocol::SINKS.contains(&factory.name().as_str()) {
         element.set_property("location", &camera.address);
         log_in(element, camera.credentials.as_ref(), ["user", "password"]);
     }
@@ -265,26 +261,15 @@ fn of_factory(pipeline: &gst::Pipeline, name: &str) -> Option<gst::Element> {
 pub struct Elements {
     tracker: Option<gst::Element>,
     servo: Option<gst::Element>,
-    /// `home` and `home-timeout`, as they were set.
-    home: Option<String>,
-    home_timeout: u64,
-    steer: Option<gst::Element>,
-    /// On the way home: `vapixptzsink` goes there while it sees pictures with nobody in them.
-    goes_home: Arc<AtomicBool>,
     view: Option<gst::Element>,
     picture: Option<gst_app::AppSink>,
 }
 
 impl Elements {
     fn of(pipeline: &gst::Pipeline) -> Self {
-        let servo = of_factory(pipeline, "vapixptzsink");
         Self {
             tracker: of_factory(pipeline, "lkfeaturetrack"),
-            home: servo.as_ref().and_then(|servo| servo.property("home")),
-            home_timeout: servo.as_ref().map_or(0, |servo| servo.property("home-timeout")),
-            servo,
-            steer: pipeline.by_name("steer"),
-            goes_home: Arc::default(),
+            servo: Protocol::SINKS.into_iter().find_map(|sink| of_factory(pipeline, sink)),
             view: pipeline.by_name("view"),
             picture: pipeline.by_name("picture").and_then(|element| element.downcast().ok()),
         }
@@ -316,26 +301,6 @@ impl Elements {
         picture.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(show).build());
     }
 
-    /// On the way home, `vapixptzsink` sees the pictures, but not who is in them.
-    fn hide_target(&self) {
-        let goes_home = self.goes_home.clone();
-        let hide = move |_: &gst::Pad, info: &mut gst::PadProbeInfo| {
-            if let Some(buffer) = info.buffer_mut().filter(|_| goes_home.load(Ordering::Relaxed))
-                && let Some(Ok(target)) = TargetMeta::of(buffer)
-            {
-                let TargetMeta { aspect, capture_time, .. } = target;
-                let nobody = TargetMeta { aspect, capture_time, ..TargetMeta::default() };
-                if nobody.attach(buffer.make_mut()).is_err() {
-                    return gst::PadProbeReturn::Drop;
-                }
-            }
-            gst::PadProbeReturn::Ok
-        };
-        if let Some(pad) = self.steer.as_ref().and_then(|steer| steer.static_pad("src")) {
-            pad.add_probe(gst::PadProbeType::BUFFER, hide);
-        }
-    }
-
     /// Makes pictures for who looks, or none.
     pub fn look(&self, somebody: bool) {
         if let Some(view) = &self.view {
@@ -358,24 +323,23 @@ impl Elements {
 
     /// Whether there is a home to go to.
     pub fn has_home(&self) -> bool {
-        self.home.is_some() && self.steer.is_some()
+        self.servo.as_ref().is_some_and(|servo| servo.property::<Option<String>>("home").is_some())
     }
 
     /// Whether the camera can be handed over.
     pub fn can_hand_over(&self) -> bool {
-        self.servo.is_some() && self.steer.is_some()
+        self.servo.is_some()
     }
 
-    /// Lets the camera follow, sends it home, or leaves it to somebody else. Where no target comes, `vapixptzsink` stops it.
+    /// Lets the camera follow, sends it home, or leaves it to somebody else.
     pub fn steer(&self, steering: Steering) {
-        let (Some(servo), Some(steer)) = (&self.servo, &self.steer) else { return };
-        let goes_home = matches!(steering, Steering::GoHome(_));
-        self.goes_home.store(goes_home, Ordering::Relaxed);
-        let somebody_elses = matches!(steering, Steering::HandedOver | Steering::Operator(_));
-        steer.set_property("drop", somebody_elses);
-        let home = self.home.as_ref().filter(|_| !somebody_elses);
-        servo.set_property("home", home);
-        servo.set_property("home-timeout", if goes_home { 0 } else { self.home_timeout });
+        let Some(servo) = &self.servo else { return };
+        let to = match steering {
+            Steering::Follow => "follow",
+            Steering::GoHome(_) => "home",
+            Steering::HandedOver | Steering::Operator(_) => "off",
+        };
+        servo.set_property_from_str("steering", to);
     }
 
     /// How long a camera is left to who has moved it.
@@ -389,7 +353,7 @@ impl Elements {
         self.servo_stats().and_then(|stats| stats.get::<String>("state").ok()).as_deref() == Some("at-rest")
     }
 
-    /// What `vapixptzsink` says of itself.
+    /// What the sink says of itself.
     pub fn servo_stats(&self) -> Option<gst::Structure> {
         self.servo.as_ref().map(|servo| servo.property("stats"))
     }

@@ -4,10 +4,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use gst::prelude::*;
+use onvif::Encoding;
 use session::http::{Authentication, Trust};
 
 use super::credentials::{self, Credentials};
 use super::properties::{self, ELEMENTS, Property};
+use super::protocol::{Protocol, Watchdogs};
 use super::table::{Read, Table, whole};
 use super::units;
 
@@ -20,10 +22,12 @@ const UGLY: &str = "gstreamer1.0-plugins-ugly";
 #[derive(Debug, Clone, PartialEq)]
 pub struct CameraSettings {
     pub name: String,
-    /// `http://` or `https://`, no path.
+    /// What it is spoken to by.
+    pub protocol: Protocol,
+    /// `http://` or `https://`; with ONVIF there may be a path, of its device service.
     pub address: String,
-    /// `rtsp://` or `rtsps://`, no path.
-    pub rtsp: String,
+    /// `rtsp://` or `rtsps://`, no path, where it is said.
+    pub rtsp: Option<String>,
     pub codec: Codec,
     /// Width and height in pixels; the camera's own where it is not said.
     pub size: Option<(u32, u32)>,
@@ -49,6 +53,8 @@ pub enum Codec {
     Mpeg4,
     /// H.264 over RTSP
     H264,
+    /// H.265 over RTSP
+    H265,
 }
 
 /// What is kept.
@@ -66,14 +72,54 @@ pub struct Recording {
 }
 
 impl Read for Codec {
-    const WHAT: &'static str = "\"mjpeg\", \"mpeg4\" or \"h264\"";
+    const WHAT: &'static str = "\"mjpeg\", \"mpeg4\", \"h264\" or \"h265\"";
 
     fn read(value: &toml::de::DeValue) -> Option<Self> {
         match value.as_str()? {
             "mjpeg" => Some(Self::Mjpeg),
             "mpeg4" => Some(Self::Mpeg4),
             "h264" => Some(Self::H264),
+            "h265" => Some(Self::H265),
             _ => None,
+        }
+    }
+}
+
+impl Codec {
+    /// What is taken where nothing is said.
+    pub fn usual(protocol: Protocol) -> Self {
+        match protocol {
+            Protocol::Vapix => Self::Mjpeg,
+            Protocol::Onvif => Self::H264,
+        }
+    }
+
+    /// As ONVIF calls it; MJPEG comes otherwise.
+    pub fn encoding(self) -> Option<Encoding> {
+        match self {
+            Self::Mjpeg => None,
+            Self::Mpeg4 => Some(Encoding::Mpeg4),
+            Self::H264 => Some(Encoding::H264),
+            Self::H265 => Some(Encoding::H265),
+        }
+    }
+
+    /// What ONVIF calls so.
+    pub fn of(encoding: Encoding) -> Option<Self> {
+        [Self::Mpeg4, Self::H264, Self::H265].into_iter().find(|codec| codec.encoding() == Some(encoding))
+    }
+
+    /// Whether pictures come so by a protocol.
+    ///
+    /// # Errors
+    /// That they do not.
+    pub fn check(self, protocol: Protocol) -> Result<(), String> {
+        match (self, protocol) {
+            (Self::Mjpeg, Protocol::Onvif) => {
+                Err("with ONVIF `codec` must be \"h264\", \"h265\" or \"mpeg4\": pictures come by RTSP"
+                    .to_owned())
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -83,23 +129,31 @@ impl CameraSettings {
     ///
     /// # Errors
     /// Where that is no address.
-    pub fn at(name: &str, address: &str) -> Result<Self, String> {
+    pub fn at(name: &str, protocol: Protocol, address: &str) -> Result<Self, String> {
         let address = address.trim_end_matches('/');
-        let host = host(address).ok_or_else(|| format!("`{address}` is not {ADDRESS}"))?;
-        Ok(Self {
-            address: address.to_owned(),
-            // Who asks for the one to be encrypted does not want the other in clear.
-            rtsp: match address.starts_with("https") {
-                true => format!("rtsps://{host}:{RTSPS_PORT}"),
-                false => format!("rtsp://{host}:{RTSP_PORT}"),
-            },
-            ..Self::without_address(name)
-        })
+        let (server, path) = split_path(address);
+        if host(server).is_none() || !path.is_empty() && protocol == Protocol::Vapix {
+            return Err(format!("`{address}` is not {ADDRESS}"));
+        }
+        let camera = Self { protocol, address: address.to_owned(), ..Self::without_address(name) };
+        Ok(Self { codec: Codec::usual(protocol), ..camera })
     }
 
-    /// Has the watchdog at this socket stop the camera, unless the file names another.
-    pub fn use_watchdog(&mut self, socket: &str) {
-        let (element, name) = ("vapixptzsink", "dead-man-socket");
+    /// Where its RTSP is: as it is said; else on its own host, at `port`.
+    pub fn rtsp_server(&self, port: u16) -> String {
+        let host = host(split_path(&self.address).0).unwrap_or_default();
+        match &self.rtsp {
+            Some(rtsp) => rtsp.clone(),
+            // Who asks for the one to be encrypted does not want the other in clear.
+            None if self.address.starts_with("https") => format!("rtsps://{host}:{RTSPS_PORT}"),
+            None => format!("rtsp://{host}:{port}"),
+        }
+    }
+
+    /// Has the watchdog of its protocol stop the camera, unless the file names another.
+    pub fn use_watchdog(&mut self, watchdogs: &Watchdogs) {
+        let Some(socket) = watchdogs.of(self.protocol) else { return };
+        let (element, name) = (self.protocol.sink(), "dead-man-socket");
         if !self.properties.iter().any(|property| property.element == element && property.name == name) {
             self.properties.push(Property { element, name: name.to_owned(), value: format!("{socket:?}") });
         }
@@ -114,6 +168,7 @@ impl CameraSettings {
             Codec::Mjpeg => (Vec::new(), "jpegparse"),
             Codec::Mpeg4 => (vec![("avdec_mpeg4", LIBAV)], "mpeg4videoparse"),
             Codec::H264 => (vec![("avdec_h264", LIBAV)], "h264parse"),
+            Codec::H265 => (vec![("avdec_h265", LIBAV)], "h265parse"),
         };
         match &self.recording {
             Some(recording) if recording.overlay => needed.extend([("x264enc", UGLY), ("h264parse", BAD)]),
@@ -125,10 +180,10 @@ impl CameraSettings {
         Some(format!("GStreamer has no element {element}; on Debian it is in the package {package}"))
     }
 
-    /// How it may be proved who we are, and whose certificates are believed: as `vapixptzsink` is told, for pictures too.
+    /// How it may be proved who we are, and whose certificates are believed: as the sink is told, for pictures too.
     pub fn security(&self) -> (Authentication, Trust) {
         let of = |name| {
-            let is = |property: &&Property| property.element == "vapixptzsink" && property.name == name;
+            let is = |property: &&Property| property.element == self.protocol.sink() && property.name == name;
             // The last one counts.
             self.properties.iter().rfind(is).map(|property| property.value.trim_matches('"'))
         };
@@ -149,8 +204,9 @@ impl CameraSettings {
             table.wrong(format!("camera `{name}`: a name has letters, digits, `-` and `_` only"));
         }
         let address: Option<String> = table.need("address");
-        let camera =
-            address.and_then(|address| Self::at(&name, &address).inspect_err(|err| table.wrong(err)).ok());
+        let protocol = table.get("protocol").unwrap_or_default();
+        let camera = address
+            .and_then(|address| Self::at(&name, protocol, &address).inspect_err(|err| table.wrong(err)).ok());
         // The rest is read all the same, so that every mistake is found at once.
         let mut camera = camera.unwrap_or_else(|| Self::without_address(&name));
         let of_rtsp = |value: &toml::de::DeValue| {
@@ -158,9 +214,15 @@ impl CameraSettings {
         };
         let what = "an address such as \"rtsp://192.168.0.90:554\", or with rtsps:// and port 322";
         if let Some(rtsp) = table.get_with("rtsp", what, of_rtsp) {
-            camera.rtsp = rtsp.trim_end_matches('/').to_owned();
+            camera.rtsp = Some(rtsp.trim_end_matches('/').to_owned());
         }
-        camera.codec = table.get("codec").unwrap_or(Codec::Mjpeg);
+        camera.codec = table.get("codec").unwrap_or(Codec::usual(protocol));
+        if let Err(reason) = camera.codec.check(protocol) {
+            table.wrong(reason);
+        }
+        if protocol == Protocol::Onvif && table.value("rate").is_some() {
+            table.wrong("with ONVIF `rate` is set on the camera's own pages");
+        }
         camera.size = table
             .get_with("size", "width and height in pixels, as \"640x480\"", |value| size(value.as_str()?));
         camera.rate = table.get_with("rate", "pictures per second, a whole number from 1 to 60", |value| {
@@ -172,7 +234,7 @@ impl CameraSettings {
         }
         camera.recording = table.table("recording").and_then(Recording::read);
         camera.properties = zones(&mut table);
-        camera.properties.extend(security(&mut table));
+        camera.properties.extend(security(&mut table, protocol.sink()));
         for element in ELEMENTS {
             camera
                 .properties
@@ -206,8 +268,9 @@ impl CameraSettings {
     fn without_address(name: &str) -> Self {
         Self {
             name: name.to_owned(),
+            protocol: Protocol::default(),
             address: String::new(),
-            rtsp: String::new(),
+            rtsp: None,
             codec: Codec::Mjpeg,
             size: None,
             rate: None,
@@ -222,10 +285,17 @@ impl CameraSettings {
 }
 
 /// RFC 7826, section 4.2; IANA.
-const RTSP_PORT: u16 = 554;
+pub const RTSP_PORT: u16 = 554;
 const RTSPS_PORT: u16 = 322;
 
 const ADDRESS: &str = "an address such as http://192.168.0.90";
+
+/// An address, and the path behind it.
+fn split_path(address: &str) -> (&str, &str) {
+    let begin = address.find("://").map_or(0, |scheme| scheme + 3);
+    let end = address[begin..].find('/').map_or(address.len(), |end| begin + end);
+    address.split_at(end)
+}
 
 /// Host of an address, in brackets where it is of IPv6.
 fn host(address: &str) -> Option<&str> {
@@ -275,8 +345,8 @@ fn zones(table: &mut Table) -> Vec<Property> {
     found
 }
 
-/// What `vapixptzsink` and the pictures are to believe, among its properties.
-fn security(table: &mut Table) -> Vec<Property> {
+/// What the sink and the pictures are to believe, among its properties.
+fn security(table: &mut Table, sink: &'static str) -> Vec<Property> {
     let mut found = Vec::new();
     for key in ["auth", "ca-file", "insecure"] {
         let Some(value) = table.value(key) else { continue };
@@ -284,7 +354,7 @@ fn security(table: &mut Table) -> Vec<Property> {
             toml::de::DeValue::Boolean(yes) => yes.to_string(),
             other => other.as_str().unwrap_or_default().to_owned(),
         };
-        match properties::of("vapixptzsink", key, &text) {
+        match properties::of(sink, key, &text) {
             Ok(property) => found.push(property),
             Err(reason) => table.source.wrong(value.span(), reason),
         }

@@ -7,6 +7,7 @@ mod credentials;
 mod mqtt;
 mod problem;
 mod properties;
+mod protocol;
 mod table;
 mod units;
 
@@ -16,10 +17,11 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-pub use camera::{CameraSettings, Codec, Recording, rtsp_host, size};
+pub use camera::{CameraSettings, Codec, RTSP_PORT, Recording, rtsp_host, size};
 pub use credentials::{Credentials, Secret};
 pub use mqtt::Mqtt;
 pub use problem::Problems;
+pub use protocol::{Protocol, Watchdogs};
 use table::{Source, Table};
 
 /// An example with everything in it, commented.

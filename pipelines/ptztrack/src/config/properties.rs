@@ -9,7 +9,8 @@ use super::table::Table;
 use super::units;
 
 /// The elements whose properties can be set.
-pub const ELEMENTS: [&str; 4] = ["bgavgdetect", "lkfeaturetrack", "ptzoverlay", "vapixptzsink"];
+pub const ELEMENTS: [&str; 5] =
+    ["bgavgdetect", "lkfeaturetrack", "ptzoverlay", "vapixptzsink", "onvifptzsink"];
 
 /// What the program sets itself.
 const OURS: [&str; 5] = ["name", "parent", "location", "user", "password"];

@@ -16,7 +16,7 @@ fn five_lines_are_enough() {
         parse("[camera.door]\naddress = \"http://192.168.0.90/\"\nsize = \"640x480\"\nrate = 15\n").unwrap();
     let [door] = config.cameras.as_slice() else { panic!("{config:?}") };
     assert_eq!((door.name.as_str(), door.address.as_str()), ("door", "http://192.168.0.90"));
-    assert_eq!((door.rtsp.as_str(), door.codec), ("rtsp://192.168.0.90:554", Codec::Mjpeg));
+    assert_eq!((door.rtsp_server(554).as_str(), door.codec), ("rtsp://192.168.0.90:554", Codec::Mjpeg));
     assert_eq!((door.size, door.rate), (Some((640, 480)), Some(15)));
     assert_eq!(config.http, None);
 }
@@ -33,9 +33,9 @@ fn every_mistake_is_named_with_its_line_and_what_is_allowed() {
         "line 2: `listen` must be an address and a port",
         "line 3: `address` is missing",
         "line 3: `user` needs one of `password-file`",
-        "line 4: `codec` must be \"mjpeg\", \"mpeg4\" or \"h264\"",
+        "line 4: `codec` must be \"mjpeg\", \"mpeg4\", \"h264\" or \"h265\"",
         "line 5: `rate` must be pictures per second, a whole number from 1 to 60",
-        "line 6: `sise` is not known here; there are: address, rtsp, codec, size",
+        "line 6: `sise` is not known here; there are: address, protocol, rtsp, codec",
         "line 8: a recording needs `keep`",
         "line 10: `segment` must be a duration",
     ] {
@@ -85,7 +85,12 @@ fn an_address_is_a_camera_and_nothing_more() {
         ("10.0.0.1", false),
         ("http://", false),
     ] {
-        assert_eq!(CameraSettings::at("a", address).is_ok(), right, "{address}");
+        assert_eq!(CameraSettings::at("a", Protocol::Vapix, address).is_ok(), right, "{address}");
+    }
+    for (address, right) in
+        [("http://10.0.0.1:8899/onvif/device", true), ("http:///onvif", false), ("http://me@a/onvif", false)]
+    {
+        assert_eq!(CameraSettings::at("a", Protocol::Onvif, address).is_ok(), right, "{address}");
     }
 }
 
@@ -131,7 +136,10 @@ fn a_recording_is_kept_for_so_long_or_so_much() {
 fn pictures_are_as_safe_as_control() {
     let camera = |text: &str| parse(&format!("[camera.a]\n{text}")).unwrap().cameras[0].clone();
     let (plain, secure) = (camera("address = \"http://a\""), camera("address = \"https://a:8443\""));
-    assert_eq!((plain.rtsp.as_str(), secure.rtsp.as_str()), ("rtsp://a:554", "rtsps://a:322"));
+    assert_eq!(
+        (plain.rtsp_server(554).as_str(), secure.rtsp_server(554).as_str()),
+        ("rtsp://a:554", "rtsps://a:322")
+    );
     assert_eq!(plain.security(), (Authentication::Auto, Trust::System));
     let told = camera("address = \"https://a\"\nauth = \"basic\"\nca-file = \"/ca.pem\"");
     assert_eq!(told.security(), (Authentication::Basic, Trust::Authority("/ca.pem".into())));
@@ -151,6 +159,19 @@ fn pictures_are_as_safe_as_control() {
             "{address}"
         );
     }
+}
+
+#[test]
+fn cameras_by_onvif_have_no_mjpeg() {
+    let camera =
+        |more: &str| parse(&format!("[camera.a]\naddress = \"http://a\"\nprotocol = \"onvif\"\n{more}"));
+    let config = camera("[camera.a.onvifptzsink]\nauth = \"basic\"\n").unwrap();
+    let camera_a = &config.cameras[0];
+    assert_eq!((camera_a.protocol, camera_a.codec), (Protocol::Onvif, Codec::H264));
+    assert_eq!(camera_a.security().0, Authentication::Basic);
+    assert_eq!(camera_a.rtsp_server(8554), "rtsp://a:8554");
+    let wrong = camera("codec = \"mjpeg\"\nrate = 5\n").unwrap_err();
+    assert!(wrong.contains("`codec` must be \"h264\"") && wrong.contains("`rate` is set on"), "{wrong}");
 }
 
 #[test]

@@ -145,7 +145,7 @@ impl Cameras {
         self.0.iter().flat_map(of).collect()
     }
 
-    /// A number in what `vapixptzsink` says of itself.
+    /// A number in what the sink says of itself.
     fn servo(&self, field: &str, unit: f64) -> Values {
         self.each(|known| Some(known.servo()?.get::<u64>(field).ok()? as f64 * unit))
     }

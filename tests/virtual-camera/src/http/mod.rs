@@ -20,7 +20,7 @@ use axum::{
 };
 use tokio::{net::TcpSocket, sync::oneshot};
 
-use crate::{Error, Fault, camera::Camera, threads::Threads};
+use crate::{Error, Fault, OnvifSettings, camera::Camera, threads::Threads};
 use auth::Guard;
 use connection::{Connection, Door};
 
@@ -126,15 +126,20 @@ fn routes(site: Arc<Site>) -> Router {
         .route("/api/truth", get(truth::truth))
         .route("/api/overview.jpg", get(page::overview))
         .route("/api/ptz", any(page::steer));
+    let vapix = match site.camera.settings.onvif {
+        Some(OnvifSettings { alone: true, .. }) => Router::new(),
+        _ => guarded.merge(faulty),
+    };
     // Absent where the camera speaks no ONVIF.
     let onvif = match site.camera.settings.onvif {
         Some(_) => Router::new()
             .route(crate::onvif::DEVICE_SERVICE, post(onvif::service))
             .route(crate::onvif::MEDIA_SERVICE, post(onvif::service))
+            .route(crate::onvif::MEDIA2_SERVICE, post(onvif::service))
             .route(crate::onvif::PTZ_SERVICE, post(onvif::service)),
         None => Router::new(),
     };
-    guarded.merge(faulty).merge(page).merge(onvif).with_state(site)
+    vapix.merge(page).merge(onvif).with_state(site)
 }
 
 /// A socket that holds the port without listening.

@@ -76,6 +76,7 @@ pub(crate) fn envelope(body: &str, prefixes: bool) -> String {
             r#"<env:Envelope xmlns:env="http://www.w3.org/2003/05/soap-envelope""#,
             r#" xmlns:ter="http://www.onvif.org/ver10/error" xmlns:tt="http://www.onvif.org/ver10/schema""#,
             r#" xmlns:tds="http://www.onvif.org/ver10/device/wsdl" xmlns:trt="http://www.onvif.org/ver10/media/wsdl""#,
+            r#" xmlns:tr2="http://www.onvif.org/ver20/media/wsdl""#,
             r#" xmlns:tptz="http://www.onvif.org/ver20/ptz/wsdl"><env:Body>{}</env:Body></env:Envelope>"#
         ),
         body

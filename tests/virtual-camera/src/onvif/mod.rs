@@ -2,12 +2,14 @@
 
 //! The camera's ONVIF face: as much of Profile S as moving it takes, with the quirks of real cameras.
 
+mod discovery;
 mod message;
 mod quirks;
 mod services;
 
 pub use quirks::{Quirk, quirk_table};
 
+pub(crate) use discovery::Discovery;
 pub(crate) use message::{Message, envelope, fault};
 pub(crate) use services::{Refusal, answer, clock};
 
@@ -16,6 +18,7 @@ use crate::kinematics::Kinematics;
 /// Path of the device service, which the specification fixes.
 pub(crate) const DEVICE_SERVICE: &str = "/onvif/device_service";
 pub(crate) const MEDIA_SERVICE: &str = "/onvif/media_service";
+pub(crate) const MEDIA2_SERVICE: &str = "/onvif/media2_service";
 pub(crate) const PTZ_SERVICE: &str = "/onvif/ptz_service";
 
 /// How a camera speaks ONVIF.
@@ -25,6 +28,10 @@ pub struct OnvifSettings {
     pub quirks: Vec<Quirk>,
     /// Whether it tells its position in degrees too.
     pub degrees: bool,
+    /// Whether it speaks no VAPIX.
+    pub alone: bool,
+    /// Whether it answers who asks on the loopback interface which cameras there are (WS-Discovery).
+    pub discoverable: bool,
 }
 
 impl OnvifSettings {

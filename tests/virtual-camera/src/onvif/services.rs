@@ -8,7 +8,7 @@ use std::time::Duration;
 use roxmltree::Node;
 
 use super::message::{child, number};
-use super::{DEVICE_SERVICE, MEDIA_SERVICE, OnvifSettings, PTZ_SERVICE, Quirk};
+use super::{DEVICE_SERVICE, MEDIA_SERVICE, MEDIA2_SERVICE, OnvifSettings, PTZ_SERVICE, Quirk};
 use crate::camera::Camera;
 use crate::kinematics::{Limits, Motion, ZOOM_RANGE};
 
@@ -52,7 +52,9 @@ pub(crate) fn answer(camera: &Camera, onvif: &OnvifSettings, request: Node, host
         "GetDeviceInformation" => Ok(
             "<tds:GetDeviceInformationResponse><tds:Manufacturer>ptztrack</tds:Manufacturer><tds:Model>virtual camera</tds:Model><tds:FirmwareVersion>1</tds:FirmwareVersion><tds:SerialNumber>1</tds:SerialNumber><tds:HardwareId>1</tds:HardwareId></tds:GetDeviceInformationResponse>".into(),
         ),
-        "GetProfiles" => Ok(profiles(onvif)),
+        "GetProfiles" if is_media2(request) => Ok(profiles2(camera)),
+        "GetProfiles" => Ok(profiles(camera, onvif)),
+        "GetStreamUri" => stream_uri(camera, request, host),
         "GetConfigurationOptions" if onvif.has(Quirk::NoOptions) => {
             Ok("<tptz:GetConfigurationOptionsResponse><tptz:PTZConfigurationOptions><tt:Spaces/></tptz:PTZConfigurationOptions></tptz:GetConfigurationOptionsResponse>".into())
         }
@@ -92,6 +94,7 @@ fn services(host: &str) -> String {
     let all = [
         ("http://www.onvif.org/ver10/device/wsdl", DEVICE_SERVICE),
         ("http://www.onvif.org/ver10/media/wsdl", MEDIA_SERVICE),
+        ("http://www.onvif.org/ver20/media/wsdl", MEDIA2_SERVICE),
         ("http://www.onvif.org/ver20/ptz/wsdl", PTZ_SERVICE),
     ];
     let mut text = String::new();
@@ -110,16 +113,65 @@ fn capabilities(host: &str) -> String {
     )
 }
 
-fn profiles(onvif: &OnvifSettings) -> String {
+/// The streams of its profiles: how each is encoded, by `videocodec` of VAPIX, and its width and height.
+fn streams(camera: &Camera) -> [(&'static str, &'static str, (u32, u32)); 3] {
+    let (width, height) = camera.view_size();
+    let half = (width / 4 * 2, height / 4 * 2);
+    [("profile_1", "h264", (width, height)), ("profile_2", "mpeg4", half), ("profile_3", "h265", half)]
+}
+
+fn encoder(name: &str, encoding: &str, (width, height): (u32, u32)) -> String {
+    format!(
+        "<{name} token=\"{encoding}\"><tt:Name>{encoding}</tt:Name><tt:UseCount>1</tt:UseCount><tt:Encoding>{encoding}</tt:Encoding><tt:Resolution><tt:Width>{width}</tt:Width><tt:Height>{height}</tt:Height></tt:Resolution><tt:Quality>5</tt:Quality>"
+    )
+}
+
+fn is_media2(request: Node) -> bool {
+    request.tag_name().namespace() == Some("http://www.onvif.org/ver20/media/wsdl")
+}
+
+/// Media 2 lists the one of H.265 only.
+fn profiles2(camera: &Camera) -> String {
+    let (token, _, size) = streams(camera)[2];
+    let encoder = encoder("tr2:VideoEncoder", "H265", size);
+    format!(
+        "<tr2:GetProfilesResponse><tr2:Profiles token=\"{token}\" fixed=\"true\"><tr2:Name>Profile 3</tr2:Name><tr2:Configurations>{encoder}</tr2:VideoEncoder></tr2:Configurations></tr2:Profiles></tr2:GetProfilesResponse>"
+    )
+}
+
+fn stream_uri(camera: &Camera, request: Node, host: &str) -> Answer {
+    let token = child(request, "ProfileToken").and_then(|token| token.text()).unwrap_or_default().trim();
+    let Some((_, codec, (width, height))) = streams(camera).into_iter().find(|(name, ..)| *name == token)
+    else {
+        return refused("NoProfile", "no such profile");
+    };
+    let host = host.rsplit_once(':').map_or(host, |(host, _)| host);
+    let port = camera.rtsp_port();
+    let uri = format!(
+        "rtsp://{host}:{port}/axis-media/media.amp?videocodec={codec}&amp;resolution={width}x{height}"
+    );
+    Ok(if is_media2(request) {
+        format!("<tr2:GetStreamUriResponse><tr2:Uri>{uri}</tr2:Uri></tr2:GetStreamUriResponse>")
+    } else {
+        format!(
+            "<trt:GetStreamUriResponse><trt:MediaUri><tt:Uri>{uri}</tt:Uri><tt:InvalidAfterConnect>false</tt:InvalidAfterConnect><tt:InvalidAfterReboot>false</tt:InvalidAfterReboot><tt:Timeout>PT0S</tt:Timeout></trt:MediaUri></trt:GetStreamUriResponse>"
+        )
+    })
+}
+
+fn profiles(camera: &Camera, onvif: &OnvifSettings) -> String {
+    let streams = streams(camera);
     let ptz = "<tt:PTZConfiguration token=\"ptz_1\"><tt:Name>ptz</tt:Name><tt:UseCount>1</tt:UseCount><tt:NodeToken>node_1</tt:NodeToken></tt:PTZConfiguration>";
-    let profile = |number: u32| {
+    let profile = |number: u32, encoding: &str, size: (u32, u32)| {
         let has_ptz = (number == 2) == onvif.has(Quirk::SecondProfile);
         let ptz = if has_ptz { ptz } else { "" };
+        let encoder = encoder("tt:VideoEncoderConfiguration", encoding, size);
         format!(
-            "<trt:Profiles token=\"profile_{number}\" fixed=\"true\"><tt:Name>Profile {number}</tt:Name>{ptz}</trt:Profiles>"
+            "<trt:Profiles token=\"profile_{number}\" fixed=\"true\"><tt:Name>Profile {number}</tt:Name>{encoder}<tt:Multicast><tt:Address><tt:Type>IPv4</tt:Type><tt:IPv4Address>0.0.0.0</tt:IPv4Address></tt:Address><tt:Port>0</tt:Port><tt:TTL>1</tt:TTL><tt:AutoStart>false</tt:AutoStart></tt:Multicast><tt:SessionTimeout>PT60S</tt:SessionTimeout></tt:VideoEncoderConfiguration>{ptz}</trt:Profiles>"
         )
     };
-    format!("<trt:GetProfilesResponse>{}{}</trt:GetProfilesResponse>", profile(1), profile(2))
+    let (first, second) = (profile(1, "H264", streams[0].2), profile(2, "MPEG4", streams[1].2));
+    format!("<trt:GetProfilesResponse>{first}{second}</trt:GetProfilesResponse>")
 }
 
 fn options(onvif: &OnvifSettings, limits: &Limits) -> String {

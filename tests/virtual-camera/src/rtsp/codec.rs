@@ -8,6 +8,7 @@ use crate::wish::Wish;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Codec {
     H264,
+    H265,
     Mpeg4,
     Jpeg,
 }
@@ -16,6 +17,7 @@ impl Codec {
     pub fn parse(name: &str) -> Option<Self> {
         match name {
             "h264" => Some(Self::H264),
+            "h265" => Some(Self::H265),
             "mpeg4" => Some(Self::Mpeg4),
             "jpeg" => Some(Self::Jpeg),
             _ => None,
@@ -28,6 +30,12 @@ impl Codec {
             Self::H264 => format!(
                 "x264enc tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max={} bitrate={} \
                  ! video/x-h264,profile=constrained-baseline ! rtph264pay config-interval=-1 pt=96",
+                Self::key_interval(wish),
+                Self::bits_per_second(wish) / 1000
+            ),
+            Self::H265 => format!(
+                "x265enc tune=zerolatency speed-preset=ultrafast key-int-max={} bitrate={} option-string=pools=1:frame-threads=1:log-level=error \
+                 ! video/x-h265,profile=main ! rtph265pay config-interval=-1 pt=96",
                 Self::key_interval(wish),
                 Self::bits_per_second(wish) / 1000
             ),

@@ -129,6 +129,7 @@ impl Recorder {
             Codec::Mjpeg => "jpegparse",
             Codec::Mpeg4 => "mpeg4videoparse",
             Codec::H264 => "h264parse",
+            Codec::H265 => "h265parse",
         };
         let description = format!(
             "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \

@@ -10,6 +10,7 @@
 //! ```
 
 mod http;
+mod onvif;
 mod rtsp;
 mod rtsp_message;
 
@@ -22,12 +23,15 @@ use gst_app::AppSrc;
 use session::Error;
 use session::http::{ClientSettings, Credentials, Location, Secret};
 
-use crate::config::{CameraSettings, Codec};
+use crate::config::{CameraSettings, Codec, Protocol, RTSP_PORT};
 
 /// Without anything new for so long the way is no way any more.
 const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 /// For the first: to log in over a long way, and for the camera to start an encoder.
 const LONGEST_START: Duration = Duration::from_secs(4);
+
+/// To ask a camera where its streams are, which takes some seven questions.
+const LONGEST_ASKING: Duration = Duration::from_secs(7);
 
 /// Why there are no pictures.
 #[derive(Debug, Clone)]
@@ -69,9 +73,8 @@ impl Video {
     /// Why there is none.
     pub fn open(camera: &CameraSettings, ended: Ended) -> Result<Self, Failure> {
         let (report, opened) = sync_channel(1);
-        let target = target(camera);
         let settings = client_settings(camera)?;
-        let (codec, rtsp) = (camera.codec, camera.rtsp.clone());
+        let asked = camera.clone();
         thread::Builder::new()
             .name(format!("{}-video", camera.name))
             .spawn(move || {
@@ -79,18 +82,29 @@ impl Video {
                     Ok(runtime) => runtime,
                     Err(err) => return drop(report.try_send(Err(Failure::new(err)))),
                 };
-                match codec {
-                    Codec::Mjpeg => runtime.block_on(http::carry(settings, &target, &report)),
-                    Codec::Mpeg4 | Codec::H264 => {
-                        runtime.block_on(rtsp::carry(&settings, &rtsp, &target, &report, &ended));
+                runtime.block_on(async {
+                    if asked.codec == Codec::Mjpeg {
+                        return http::carry(settings, &target(&asked), &report).await;
                     }
-                }
+                    let found = match asked.protocol {
+                        Protocol::Vapix => Ok((asked.rtsp_server(RTSP_PORT), target(&asked))),
+                        Protocol::Onvif => onvif::find(settings.clone(), &asked).await,
+                    };
+                    match found {
+                        Ok((server, target)) => {
+                            rtsp::carry(&settings, &server, &target, &report, &ended).await
+                        }
+                        // Who waited for it may have given up.
+                        Err(failure) => drop(report.try_send(Err(failure))),
+                    }
+                });
                 // A look-up of a name is not waited for.
                 runtime.shutdown_background();
             })
             .map_err(Failure::new)?;
         let no_answer = |_| Err(Failure::new(Error::Timeout(LONGEST_START)));
-        opened.recv_timeout(LONGEST_START + LONGEST_SILENCE).unwrap_or_else(no_answer)
+        let asking = if camera.protocol == Protocol::Onvif { LONGEST_ASKING } else { Duration::ZERO };
+        opened.recv_timeout(asking + LONGEST_START + LONGEST_SILENCE).unwrap_or_else(no_answer)
     }
 }
 
@@ -99,7 +113,7 @@ fn client_settings(camera: &CameraSettings) -> Result<ClientSettings, Failure> {
     let credentials = camera.credentials.as_ref();
     Ok(ClientSettings {
         location: Location::parse(&camera.address)?.0,
-        channel: "1".to_owned(),
+        channel: String::new(),
         credentials: credentials.map(|credentials| Credentials {
             user: credentials.user.clone(),
             password: Secret::new(credentials.password.reveal()),
@@ -110,7 +124,7 @@ fn client_settings(camera: &CameraSettings) -> Result<ClientSettings, Failure> {
     })
 }
 
-/// Path and query of a camera's pictures.
+/// Path and query of a camera's pictures by VAPIX.
 pub fn target(camera: &CameraSettings) -> String {
     let size = camera.size.map(|(width, height)| format!("resolution={width}x{height}"));
     let rate = camera.rate.map(|rate| format!("fps={rate}"));
@@ -118,6 +132,7 @@ pub fn target(camera: &CameraSettings) -> String {
         Codec::Mjpeg => ("/axis-cgi/mjpg/video.cgi", "compression=30"),
         Codec::Mpeg4 => ("/axis-media/media.amp", "videocodec=mpeg4"),
         Codec::H264 => ("/axis-media/media.amp", "videocodec=h264"),
+        Codec::H265 => ("/axis-media/media.amp", "videocodec=h265"),
     };
     let query: Vec<String> = [Some(first.to_owned()), size, rate].into_iter().flatten().collect();
     format!("{path}?{}", query.join("&"))

@@ -1,0 +1,183 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Asks one camera what it is spoken to by.
+
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
+use std::time::Duration;
+
+use onvif::VideoStream;
+use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::{Client, Error, Query, Request};
+use tokio::net::{UdpSocket, lookup_host};
+
+use super::probe::listen;
+use crate::config::{self, Protocol};
+
+/// Longest wait for one answer.
+const PATIENCE: Duration = Duration::from_secs(3);
+
+/// What was found at an address.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Found {
+    pub protocol: Protocol,
+    /// Where the camera is, as the file of cameras has it.
+    pub address: String,
+    /// Its video streams, where it tells them.
+    pub streams: Vec<VideoStream>,
+}
+
+/// Finds out what the camera at an address, or of a host, is spoken to by: VAPIX is asked for first, then ONVIF, wherever the
+/// camera says that it has it; or only `wanted`.
+///
+/// # Errors
+/// Why it cannot be followed with, in words.
+pub async fn ask(
+    address: &str,
+    wanted: Option<Protocol>,
+    credentials: Option<&config::Credentials>,
+) -> Result<Found, String> {
+    let address = with_scheme(address);
+    let mut refusals = Vec::new();
+    if wanted != Some(Protocol::Onvif) {
+        match ask_vapix(&address, credentials).await {
+            Ok(()) => return Ok(Found { protocol: Protocol::Vapix, address, streams: Vec::new() }),
+            Err(err) if err.is_final() || matches!(err, Error::Location { .. }) => {
+                return Err(sentence(&address, &err));
+            }
+            Err(err) => refusals.push((Protocol::Vapix, err)),
+        }
+    }
+    if wanted != Some(Protocol::Vapix) {
+        match ask_onvif(&address, credentials).await {
+            Ok(streams) => return Ok(Found { protocol: Protocol::Onvif, address, streams }),
+            Err(err) if err.is_final() => return Err(sentence(&address, &err)),
+            Err(err) => refusals.push((Protocol::Onvif, err)),
+        }
+        for elsewhere in told_by(&address).await {
+            match ask_onvif(&elsewhere, credentials).await {
+                Ok(streams) => return Ok(Found { protocol: Protocol::Onvif, address: elsewhere, streams }),
+                Err(err) => refusals.push((Protocol::Onvif, err)),
+            }
+        }
+    }
+    let reasons: Vec<_> =
+        refusals.iter().map(|(protocol, err)| format!("  by {}: {err}", protocol.name())).collect();
+    Err(format!("{address} is no camera that can be followed with:\n{}", reasons.join("\n")))
+}
+
+fn sentence(address: &str, err: &Error) -> String {
+    let advice = match err {
+        Error::CredentialsMissing => {
+            "Say who you are by --user, with the password in the environment variable CAMERA_PASSWORD, or by --password-file."
+        }
+        Error::BadCredentials { .. } => {
+            "Check both; nothing more was tried, so that the account is not locked. Some cameras have users of their own for ONVIF: --protocol onvif asks as one of these only."
+        }
+        _ => err.advice(),
+    };
+    format!("{address}: {err}. {advice}")
+}
+
+/// Host names and bare addresses are asked by HTTP.
+fn with_scheme(address: &str) -> String {
+    let address = address.trim_end_matches('/');
+    match address {
+        _ if address.contains("://") => address.to_owned(),
+        _ if address.parse::<Ipv6Addr>().is_ok() => format!("http://[{address}]"),
+        _ => format!("http://{address}"),
+    }
+}
+
+fn settings(
+    location: &str,
+    channel: &str,
+    credentials: Option<&config::Credentials>,
+) -> Result<ClientSettings, Error> {
+    let credentials = credentials.map(|credentials| Credentials {
+        user: credentials.user.clone(),
+        password: Secret::new(credentials.password.reveal()),
+    });
+    Ok(ClientSettings {
+        location: Location::parse(location)?.0,
+        channel: channel.to_owned(),
+        credentials,
+        authentication: Authentication::Auto,
+        timeout: PATIENCE,
+        trust: Trust::System,
+    })
+}
+
+async fn ask_vapix(address: &str, credentials: Option<&config::Credentials>) -> Result<(), Error> {
+    let mut client = vapix::Client::new(settings(address, "1", credentials)?)?;
+    match client.exchange(&Request::Query(Query::Position)).await {
+        // In VAPIX' own words: it is spoken there.
+        Err(Error::Camera(_)) => Ok(()),
+        other => other.map(drop),
+    }
+}
+
+/// Whether VAPIX is spoken there, as far as can be told without logging in.
+pub async fn has_vapix(address: &str) -> bool {
+    matches!(ask_vapix(address, None).await, Ok(()) | Err(Error::CredentialsMissing))
+}
+
+/// What speaks ONVIF to a camera.
+///
+/// # Errors
+/// Where that is no address.
+pub fn onvif_client(
+    location: &str,
+    credentials: Option<&config::Credentials>,
+) -> Result<onvif::Client, Error> {
+    onvif::Client::new(settings(location, "", credentials)?)
+}
+
+/// The streams of a camera that turns.
+async fn ask_onvif(
+    address: &str,
+    credentials: Option<&config::Credentials>,
+) -> Result<Vec<VideoStream>, Error> {
+    let mut client = onvif_client(address, credentials)?;
+    if !client.has_ptz().await? {
+        return Err(Error::NoPtz);
+    }
+    client.streams().await
+}
+
+/// Where else its host says that it has ONVIF: many have it at another port.
+async fn told_by(address: &str) -> Vec<String> {
+    let rest = address.split_once("://").map_or(address, |(_, rest)| rest);
+    let authority = rest.split('/').next().unwrap_or(rest);
+    let host = match authority.rsplit_once(':') {
+        Some((host, port)) if !port.contains(']') => host,
+        _ => authority,
+    };
+    let found = lookup_host(format!("{host}:{}", onvif::GROUP.port())).await;
+    let Some(whom) = found.ok().and_then(|mut found| found.find(SocketAddr::is_ipv4)) else {
+        return Vec::new();
+    };
+    let Ok(socket) = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).await else { return Vec::new() };
+    let heard = listen(socket, whom, PATIENCE / 3).await.unwrap_or_default();
+    let mut addresses: Vec<_> = heard.iter().map(super::Heard::address).collect();
+    addresses.dedup();
+    addresses.retain(|elsewhere| elsewhere != address);
+    addresses
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_host_is_enough() {
+        for (typed, asked) in [
+            ("192.168.0.90", "http://192.168.0.90"),
+            ("camera.local/", "http://camera.local"),
+            ("2001:db8::1", "http://[2001:db8::1]"),
+            ("camera:8080", "http://camera:8080"),
+            ("https://camera", "https://camera"),
+        ] {
+            assert_eq!(with_scheme(typed), asked);
+        }
+    }
+}
