@@ -269,6 +269,16 @@ fn the_page_shows_every_camera_and_steers_it() {
     browser.wait_for(&format!("{}.innerText.includes('looks for somebody, the camera rests')", of("hall")));
     browser.wait_for("document.querySelector('#troubled').innerText == 'Trouble with away'");
     browser.save_picture("ptztrack-page.png");
+    // One click makes one large, another small again.
+    let size = format!("{}.querySelector('.size')", of("hall"));
+    let width =
+        |browser: &mut Browser| browser.value(&format!("{}.clientWidth", of("hall"))).as_f64().unwrap();
+    let small = width(&mut browser);
+    browser.value(&format!("{size}.click()"));
+    browser.save_picture("ptztrack-page-large.png");
+    assert!(width(&mut browser) > 1.9 * small, "{small}");
+    browser.value(&format!("{size}.click()"));
+    assert!((width(&mut browser) - small).abs() < 1.0, "{small}");
     let click = |browser: &mut Browser, what: &str| {
         let button = format!("{}.querySelector('[data-order={what}]')", of("door"));
         browser.wait_for(&format!("!{button}.hidden"));

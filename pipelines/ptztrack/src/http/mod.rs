@@ -46,6 +46,8 @@ const LONGEST_STALL: Duration = Duration::from_secs(30);
 /// After no connection could be taken.
 const ACCEPT_AGAIN: Duration = Duration::from_millis(200);
 
+/// A camera's state in words, sent along with its picture: asked for by itself it may be that of another picture.
+const STATE_HEADER: &str = "ptztrack-state";
 /// Between two pictures of a stream.
 const BOUNDARY: &str = "ptztrack-picture";
 
@@ -158,13 +160,15 @@ fn describe(known: &Known) -> serde_json::Value {
     })
 }
 
-/// The next picture.
+/// The next picture, and the camera's state in words as it was then.
 async fn picture(State(fleet): State<Arc<Fleet>>, Path(name): Path<String>) -> Response {
     let Some(known) = fleet.of(&name) else { return StatusCode::NOT_FOUND.into_response() };
     let mut look = known.look();
     match tokio::time::timeout(LONGEST_WAIT, look.next()).await {
-        Ok(Some(jpeg)) => ([(header::CONTENT_TYPE, "image/jpeg"), (header::CACHE_CONTROL, "no-store")], jpeg)
-            .into_response(),
+        Ok(Some(jpeg)) => {
+            let head = [(header::CONTENT_TYPE, "image/jpeg"), (header::CACHE_CONTROL, "no-store")];
+            (head, [(STATE_HEADER, known.in_words())], jpeg).into_response()
+        }
         _ => (StatusCode::SERVICE_UNAVAILABLE, "no picture\n").into_response(),
     }
 }
