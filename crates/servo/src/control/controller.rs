@@ -21,8 +21,8 @@ pub struct ControlLaw {
 
 /// Proportional control with feed-forward, a dead zone and bounded acceleration, each axis for itself.
 ///
-/// Each axis switches modes, as the servos of disk drives do: it seeks a new target at a higher gain and by dead reckoning, and
-/// from then on follows it at the usual gain, by what the pictures show.
+/// Each axis switches modes, as the servos of disk drives do: it seeks a new target at a higher gain, by dead reckoning where the
+/// background is not seen, and from then on follows it at the usual gain, by what the pictures show.
 #[derive(Debug, Default)]
 pub struct Controller {
     pan: Axis,

@@ -34,8 +34,8 @@ pub struct Offset {
     pub seen: PanTilt,
     /// When a command sent now acts.
     pub expected: PanTilt,
-    /// The part of `expected` that dead reckoning since the target was first seen leaves, never more than that; `None` where that
-    /// is too long ago to tell.
+    /// The part of `expected` that dead reckoning since the target was first seen leaves, never more than that, and all of it where
+    /// the background is seen; `None` where the target was first seen too long ago to tell.
     pub reckoned: Option<PanTilt>,
     /// How steeply below or above the camera the target is, from 0 at the horizon to 1: the squared sine of its elevation.
     pub steepness: f64,
@@ -56,6 +56,8 @@ pub struct TargetEstimator {
     taken_at: Duration,
     /// When the target was first seen, and how far off the middle.
     first_seen: Option<(Duration, PanTilt)>,
+    /// Whether the last picture told how the background moved.
+    background_seen: bool,
 }
 
 impl TargetEstimator {
@@ -72,6 +74,7 @@ impl TargetEstimator {
             elevation_deg: 0.0,
             taken_at: Duration::ZERO,
             first_seen: None,
+            background_seen: false,
         }
     }
 
@@ -90,6 +93,7 @@ impl TargetEstimator {
             return self.foresee(measurement, view);
         }
         self.place(measurement, view);
+        self.background_seen = measurement.ego_velocity.is_some();
         // The target's own motion is what is left of its motion in the picture without the camera's:
         // seen in the background, or else known from the commands.
         let rate = match measurement.ego_velocity {
@@ -206,6 +210,9 @@ impl TargetEstimator {
     /// The first error, plus the target's mean motion since, less all turns commanded since; where that and the expected error
     /// disagree, the smaller, and zero if the signs differ. A camera that is later or slower than assumed is so not commanded
     /// twice; one that is faster shows in the expected error.
+    ///
+    /// Where the background is seen, pictures show how far the camera really turned, and its speeds are learned: a reckoning by
+    /// the speeds it began with would end the seek early.
     fn reckoned(
         &self,
         expected: PanTilt,
@@ -217,6 +224,9 @@ impl TargetEstimator {
         let since = now.saturating_sub(first_at);
         if since > Self::RECKONED {
             return None;
+        }
+        if self.background_seen {
+            return Some(self.in_picture(expected));
         }
         let walked = self.walked(self.pace() * (since + delays.sum()).as_secs_f64());
         let left = self.in_picture(first + walked - history.rotation(delays.sent_by(first_at), now));
