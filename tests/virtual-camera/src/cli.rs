@@ -35,7 +35,7 @@ pub struct Options {
     #[arg(long, value_name = "NUMBER", value_parser = clap::value_parser!(u32).range(1..=72))]
     room_test: Option<u32>,
     /// What people in the room do instead of a test: nobody, cross, cross-alike, part, overtake, stop-and-go, sit, approach, run,
-    /// wander, group, near; in the yard far or drive too
+    /// wander, group, near, reach; in the yard far or drive too
     #[arg(long, value_name = "ACTION", value_parser = action)]
     action: Option<Action>,
     /// How many more people there are in the room: they walk along in a group, else they wander about
@@ -47,6 +47,9 @@ pub struct Options {
     /// How many cars drive by, in a yard
     #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
     vehicles: u8,
+    /// By how many grey levels people differ from what is behind them, on the average; as they do unless given
+    #[arg(long, value_name = "LEVELS", value_parser = not_negative)]
+    faint: Option<f64>,
     /// What happens by itself: door, film, sun, switch, draught; in a yard clouds, headlights, rain, and draught in its trees
     #[arg(long, value_name = "EVENT", value_delimiter = ',', value_parser = event)]
     events: Vec<Event>,
@@ -388,6 +391,7 @@ impl Options {
             others: usize::from(self.others),
             place: self.place.unwrap_or_default(),
             vehicles: usize::from(self.vehicles),
+            faint: self.faint,
             events: self.events.clone(),
             shadows: self.cast_shadows,
             reflections: self.reflecting_floor,
@@ -554,6 +558,7 @@ mod tests {
         assert!(!room("--world room --once").repeats);
         assert_eq!(room("--action cross-alike --seed 2").action, Action::CrossAlike);
         assert!(settings("--action fly").is_err());
+        assert_eq!(room("--world room --faint 4").faint, Some(4.0));
         let busy = room("--world room --events door,sun --cast-shadows --reflecting-floor");
         assert_eq!(
             (busy.events, busy.shadows, busy.reflections),

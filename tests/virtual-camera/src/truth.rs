@@ -41,6 +41,15 @@ impl Bounds {
         (self.left..=self.left + self.width).contains(&x) && (self.top..=self.top + self.height).contains(&y)
     }
 
+    /// Whether a part of it lies in another one.
+    pub fn overlaps(&self, other: &Self) -> bool {
+        let common = |start: f64, length: f64, other: f64, other_length: f64| {
+            start < other + other_length && other < start + length
+        };
+        common(self.left, self.width, other.left, other.width)
+            && common(self.top, self.height, other.top, other.height)
+    }
+
     /// What part of it, 0 to 1, is inside a picture of that size.
     pub fn part_inside(&self, size: (u32, u32)) -> f64 {
         let part = |start: f64, length: f64, end: u32| {

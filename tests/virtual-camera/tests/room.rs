@@ -156,29 +156,27 @@ fn everybody(action: Action, seed: u64, step_ms: u64) -> Vec<Vec<GroundTruth>> {
 
 #[test]
 fn two_who_cross_hide_one_another_once() {
-    for seed in 1..3 {
-        for action in [Action::Cross, Action::CrossAlike] {
-            let moments = everybody(action, seed, 60);
-            assert!(moments.iter().all(|people| people.iter().all(|one| [1, 2].contains(&one.id))));
-            let both = moments.iter().filter(|people| people.len() == 2).count();
-            assert!(both * 2 > moments.len(), "{both}");
-            let hidden = |people: &[GroundTruth]| people.iter().any(|one| one.unhidden < 0.6);
-            let times = moments.windows(2).filter(|pair| !hidden(&pair[0]) && hidden(&pair[1])).count();
-            assert_eq!(times, 1, "{action:?} {seed}");
-            // They change sides.
-            let side = |people: &[GroundTruth]| {
-                let x = |id| people.iter().find(|one| one.id == id).map(|one| one.centroid.0);
-                x(1).zip(x(2)).map(|(one, other)| one < other)
-            };
-            let sides: Vec<bool> = moments.iter().filter_map(|people| side(people)).collect();
-            assert_ne!(sides.first(), sides.last());
-        }
+    for (action, seed) in [(Action::Cross, 1), (Action::CrossAlike, 2)] {
+        let moments = everybody(action, seed, 60);
+        assert!(moments.iter().all(|people| people.iter().all(|one| [1, 2].contains(&one.id))));
+        let both = moments.iter().filter(|people| people.len() == 2).count();
+        assert!(both * 2 > moments.len(), "{both}");
+        let hidden = |people: &[GroundTruth]| people.iter().any(|one| one.unhidden < 0.6);
+        let times = moments.windows(2).filter(|pair| !hidden(&pair[0]) && hidden(&pair[1])).count();
+        assert_eq!(times, 1, "{action:?} {seed}");
+        // They change sides.
+        let side = |people: &[GroundTruth]| {
+            let x = |id| people.iter().find(|one| one.id == id).map(|one| one.centroid.0);
+            x(1).zip(x(2)).map(|(one, other)| one < other)
+        };
+        let sides: Vec<bool> = moments.iter().filter_map(|people| side(people)).collect();
+        assert_ne!(sides.first(), sides.last());
     }
 }
 
 #[test]
 fn two_who_part_are_close_at_first_and_far_apart_in_the_end() {
-    for seed in 1..4 {
+    for seed in 1..3 {
         let apart: Vec<f64> = everybody(Action::Part, seed, 400)
             .iter()
             .filter_map(|people| {
@@ -194,9 +192,9 @@ fn two_who_part_are_close_at_first_and_far_apart_in_the_end() {
 #[test]
 fn nobody_is_nobody_and_somebody_alone_is_one() {
     for action in [Action::StopAndGo, Action::Sit, Action::Approach, Action::Run] {
-        let moments = everybody(action, 2, 200);
+        let moments = everybody(action, 2, 1000);
         assert!(moments.iter().all(|people| people.len() <= 1), "{action:?}");
-        assert!((40..220).contains(&moments.len()), "{action:?} {}", moments.len());
+        assert!((8..44).contains(&moments.len()), "{action:?} {}", moments.len());
     }
     let camera = acting(Action::Nobody, 1);
     for second in [0, 60, 599] {
@@ -269,6 +267,36 @@ fn who_is_near_fills_the_picture() {
 }
 
 #[test]
+fn who_reaches_into_the_view_is_hands_at_first_and_walks_in_then() {
+    let room = RoomSettings { action: Action::Reach, ..RoomSettings::test(1, 2).unwrap() };
+    let (home, camera) = (room.home(), camera_in(room));
+    let parts: Vec<f64> = (10..80)
+        .map(|step| camera.ground_truth_from(&home, Duration::from_millis(100 * step), SIZE)[0].visible)
+        .collect();
+    let hands = parts.iter().filter(|part| (0.005..0.2).contains(*part)).count();
+    assert!((8..40).contains(&hands) && parts.iter().any(|part| *part > 0.95), "{parts:?}");
+}
+
+#[test]
+fn who_is_faint_is_a_few_grey_levels_from_the_wall() {
+    let (time, room) = (Duration::from_secs(5), RoomSettings::test(2, 3).unwrap());
+    let cameras = [0.0, 4.0].map(|faint| camera_in(RoomSettings { faint: Some(faint), ..room.clone() }));
+    let [nobody, somebody] = cameras.each_ref().map(|camera| {
+        camera.advance_to(time + camera.video_delay());
+        camera.picture(time, SIZE).unwrap()
+    });
+    let shape = cameras[0].people(time, SIZE).remove(0).silhouette;
+    let luma = nobody.planes[0].data.iter().zip(&somebody.planes[0].data).enumerate();
+    let inside = luma.filter(|(index, _)| {
+        let (column, row) = (index % SIZE.0 as usize, index / SIZE.0 as usize);
+        shape.shows((column as f64 + 0.5, row as f64 + 0.5))
+    });
+    let differences: Vec<f64> = inside.map(|(_, (one, other))| f64::from(one.abs_diff(*other))).collect();
+    let mean = differences.iter().sum::<f64>() / differences.len() as f64;
+    assert!(differences.len() > 500 && (2.0..7.0).contains(&mean), "{mean} of {}", differences.len());
+}
+
+#[test]
 fn a_world_may_begin_with_the_person_in_view_and_the_camera_turning() {
     let room = RoomSettings { begins: Duration::from_secs(5), ..RoomSettings::test(1, 1).unwrap() };
     let whole = RoomSettings::test(1, 1).unwrap().duration();
@@ -289,18 +317,18 @@ fn a_world_may_begin_with_the_person_in_view_and_the_camera_turning() {
 
 #[test]
 fn every_room_is_bright_enough_to_see_unless_it_is_to_be_dark() {
-    let mean = |seed, lighting| {
-        let room = RoomSettings { lighting, ..RoomSettings::test(1, seed).unwrap() };
-        let picture = camera_in(room).picture(Duration::ZERO, SIZE).unwrap();
+    // Rooms of a seed are painted once as long as one of them is there.
+    let room = |seed, lighting| camera_in(RoomSettings { lighting, ..RoomSettings::test(1, seed).unwrap() });
+    let mean = |camera: &VirtualCamera| {
+        let picture = camera.picture(Duration::ZERO, SIZE).unwrap();
         let luma = &picture.planes[0].data;
         luma.iter().map(|value| f64::from(*value)).sum::<f64>() / luma.len() as f64
     };
     // By night and by day.
-    for seed in [3, 7] {
-        assert!((60.0..110.0).contains(&mean(seed, Lighting::Optimal)), "seed {seed}");
-    }
-    assert!((50.0..110.0).contains(&mean(3, Lighting::Dim)));
-    assert!(mean(7, Lighting::Dark) < 45.0);
+    let night = [Lighting::Optimal, Lighting::Dim].map(|lighting| room(3, lighting));
+    let day = [Lighting::Optimal, Lighting::Dark].map(|lighting| room(7, lighting));
+    assert!((60.0..110.0).contains(&mean(&night[0])) && (60.0..110.0).contains(&mean(&day[0])));
+    assert!((50.0..110.0).contains(&mean(&night[1])) && mean(&day[1]) < 45.0);
 }
 
 fn yard(action: Action) -> RoomSettings {

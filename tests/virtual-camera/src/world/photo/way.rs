@@ -130,7 +130,15 @@ impl Way {
             let moving = right.hypot(ahead) > 0.02;
             let step = if moving { missing.clamp(-TURN / room::RATE, TURN / room::RATE) } else { 0.0 };
             heading = Some(was + step);
-            room::Moment { x, z, heading: was + step, speed, turning: step * room::RATE, seated: 0.0 }
+            room::Moment {
+                x,
+                z,
+                heading: was + step,
+                speed,
+                turning: step * room::RATE,
+                seated: 0.0,
+                reaching: 0.0,
+            }
         };
         (0..count.max(2)).map(moment).collect()
     }

@@ -37,11 +37,13 @@ pub enum Action {
     Far,
     /// Nobody walks: number 1 is a car that drives along the street, stops and drives on. Out of doors only.
     Drive,
+    /// Stands beside the first view and holds their hands into it for a while; then walks across the room.
+    Reach,
 }
 
 impl Action {
     /// Every one, with its name for command lines and tables.
-    pub const ALL: [(Self, &'static str); 15] = [
+    pub const ALL: [(Self, &'static str); 16] = [
         (Self::Test, "test"),
         (Self::Nobody, "nobody"),
         (Self::Cross, "cross"),
@@ -57,6 +59,7 @@ impl Action {
         (Self::Near, "near"),
         (Self::Far, "far"),
         (Self::Drive, "drive"),
+        (Self::Reach, "reach"),
     ];
 
     /// A number for streams of chance; the way of a thesis test has those of the tests.

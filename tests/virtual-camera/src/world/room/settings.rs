@@ -100,6 +100,9 @@ pub struct RoomSettings {
     pub others: usize,
     /// How many cars drive by on the street, out of doors: the first at once, the next some seconds later.
     pub vehicles: usize,
+    /// How much people and vehicles differ from what is behind them, on the average, in grey levels of 219 as painted; as they do
+    /// unless given. The floor below them is no darker then.
+    pub faint: Option<f64>,
     /// How far the action has come when the world begins. Later than two seconds, the person is in the first view already.
     pub begins: Duration,
     /// What happens besides.
@@ -126,6 +129,7 @@ impl Default for RoomSettings {
             action: Action::Test,
             others: 0,
             vehicles: 0,
+            faint: None,
             begins: Duration::ZERO,
             events: Vec::new(),
             shadows: false,

@@ -10,7 +10,7 @@ use super::{
     scene::{Plan, Scene, Style},
     settings::{Place, RoomSettings},
     view::{Vector, View},
-    walker::{Mover, movers, obstacles},
+    walker::{Mover, SkinPatch, bounds, mark, movers, obstacles},
     weather::Weather,
 };
 use crate::{
@@ -51,6 +51,8 @@ pub(crate) struct Room {
     effects: Effects,
     weather: Weather,
     sensor: Sensor,
+    /// As [`RoomSettings::faint`].
+    faint: Option<f64>,
     /// How far everything has come when the world begins.
     begins: Duration,
     /// How far the lens is ahead of the axes that the camera turns about, in metres.
@@ -77,6 +79,20 @@ struct Body<'a> {
     place: Vector,
 }
 
+/// Their skin as a view shows it.
+struct Figure<'a> {
+    body: Body<'a>,
+    patches: Vec<SkinPatch>,
+    /// In pixels of the view, inside of it or not; `None` unless all of them is ahead of the camera.
+    bounds: Option<Bounds>,
+}
+
+impl Figure<'_> {
+    fn may_hide(&self, other: &Self) -> bool {
+        self.bounds.zip(other.bounds).is_some_and(|(one, other)| one.overlaps(&other))
+    }
+}
+
 impl Room {
     pub fn new(room: &RoomSettings, settings: &Settings) -> Self {
         let seeded = Seeded::new(room.seed);
@@ -95,6 +111,7 @@ impl Room {
             movers,
             effects: Effects::new(room),
             weather: Weather::new(room),
+            faint: room.faint,
             begins: room.begins,
             lens_offset_m: settings.imaging.lens_offset_m,
             sensor: Sensor::new(
@@ -139,15 +156,37 @@ impl Room {
     ) -> Picture {
         let time = self.seconds(exposure.time);
         let bodies = self.bodies_at(exposure.time);
+        let mut canvas = self.draw(&bodies, exposure, view, sweep, &seen);
+        if let Some(levels) = self.faint {
+            canvas = faded(canvas, self.draw(&[], exposure, view, sweep, &seen), levels);
+        }
+        self.effects.switch(time, &mut canvas);
+        self.weather.apply(time, view, &mut canvas);
+        canvas.planes.iter_mut().for_each(soften);
+        canvas
+    }
+
+    /// The scene with these people in it.
+    fn draw(
+        &self,
+        bodies: &[Body],
+        exposure: &Exposure,
+        view: &View,
+        sweep: (f64, f64),
+        seen: impl Fn(f64) -> View,
+    ) -> Picture {
+        let time = self.seconds(exposure.time);
         let mut canvas = Picture::grey(view.size.0 as u32, view.size.1 as u32, 0);
         self.scene.draw_shell(view, &mut canvas);
-        bodies.iter().for_each(|body| body.mover.draw_shadow(time, view, &mut canvas));
+        if self.faint.is_none() {
+            bodies.iter().for_each(|body| body.mover.draw_shadow(time, view, &mut canvas));
+        }
         self.effects.on_floor(&self.movers, time, view, &self.scene.light, &mut canvas);
         self.scene.draw_pieces(time, view, &mut canvas);
         motion_blur(&mut canvas, sweep.0, sweep.1);
         let views = std::array::from_fn(|moment| seen((moment as f64 + 0.5) / MOMENTS as f64));
         // Who is nearer is laid over who is farther away.
-        for Body { mover, place, .. } in &bodies {
+        for Body { mover, place, .. } in bodies {
             let layer = mover.layer(time, exposure.duration.as_secs_f64(), &views, &self.scene.light);
             if let Some(layer) = layer {
                 let close = layer.view(view);
@@ -156,52 +195,89 @@ impl Room {
                 layer.over(&mut canvas, unhidden, sweep);
             }
         }
-        self.effects.switch(time, &mut canvas);
-        self.weather.apply(time, view, &mut canvas);
-        canvas.planes.iter_mut().for_each(soften);
         canvas
     }
 
-    /// What is seen through a view of the first of `bodies`, which the others are nearer than: all of it, what nothing
-    /// hides, and the numbers of those of the others who hide it.
-    fn shape(&self, bodies: &[Body], time: Duration, view: &View) -> ([Plane; 2], Vec<u32>) {
-        let mut shapes = bodies.iter().map(|body| {
+    /// Everybody at a time as they are seen through `view`, the farthest from the camera first.
+    fn figures_at<'a>(&'a self, time: Duration, view: &View) -> Vec<Figure<'a>> {
+        let figure = |body: Body<'a>| {
+            let patches = body.mover.patches(self.seconds(time), view);
+            let bounds = bounds(&patches, view).map(|[left, top, right, bottom]| Bounds {
+                left,
+                top,
+                width: right - left,
+                height: bottom - top,
+            });
+            Figure { body, patches, bounds }
+        };
+        self.bodies_at(time).into_iter().map(figure).collect()
+    }
+
+    /// What is seen through a view of `figure`: all of it, what nothing hides, and the numbers of those of the `nearer` ones who
+    /// hide it.
+    fn shape(
+        &self,
+        figure: &Figure,
+        nearer: &[Figure],
+        time: Duration,
+        view: &View,
+    ) -> ([Plane; 2], Vec<u32>) {
+        let shape = |figure: &Figure| {
             let mut shape = Plane::filled(view.size.0, view.size.1, 0);
-            body.mover.silhouette(self.seconds(time), view, &mut shape);
-            (body.id, shape)
-        });
-        let whole =
-            shapes.next().map_or_else(|| Plane::filled(view.size.0, view.size.1, 0), |(_, whole)| whole);
+            mark(&figure.patches, view, &mut shape);
+            shape
+        };
+        let whole = shape(figure);
         let (mut unhidden, mut hidden_by) = (whole.clone(), Vec::new());
-        if let Some(body) = bodies.first() {
-            self.scene.hide(body.place, self.seconds(time), view, &mut unhidden);
-        }
-        for (id, nearer) in shapes {
-            if whole.data.iter().zip(&nearer.data).any(|(whole, nearer)| *whole > 0 && *nearer > 0) {
-                hidden_by.push(id);
+        self.scene.hide(figure.body.place, self.seconds(time), view, &mut unhidden);
+        for other in nearer.iter().filter(|other| other.may_hide(figure)) {
+            let over = shape(other);
+            if whole.data.iter().zip(&over.data).any(|(whole, over)| *whole > 0 && *over > 0) {
+                hidden_by.push(other.body.id);
             }
-            let hidden = unhidden.data.iter_mut().zip(nearer.data).filter(|(_, nearer)| *nearer > 0);
+            let hidden = unhidden.data.iter_mut().zip(over.data).filter(|(_, over)| *over > 0);
             hidden.for_each(|(pixel, _)| *pixel = 0);
         }
         hidden_by.sort_unstable();
         ([whole, unhidden], hidden_by)
     }
 
-    /// The first of `bodies`, which the others are nearer than, in a view, inside of it or not; `None` unless all of them
-    /// is ahead of the camera.
-    fn person(&self, bodies: &[Body], time: Duration, pose: &Pose, size: (u32, u32)) -> Option<Sighting> {
-        let (body, view) = (bodies.first()?, self.view(pose, size));
-        let [left, top, right, bottom] = body.mover.bounds(self.seconds(time), &view)?;
-        let bounds = Bounds { left, top, width: right - left, height: bottom - top };
+    /// The first of `figures`, which the others are nearer than, in the view along `pose` that they are seen through; `None`
+    /// unless all of them is ahead of the camera.
+    fn person(
+        &self,
+        figures: &[Figure],
+        time: Duration,
+        (pose, view): (&Pose, &View),
+        size: (u32, u32),
+    ) -> Option<Sighting> {
+        let (figure, nearer) = figures.split_first()?;
         let mut hidden_by = Vec::new();
         let shapes = |close: &View| {
-            let (shapes, hiding) = self.shape(bodies, time, close);
+            let (shapes, hiding) = self.shape(figure, nearer, time, close);
             hidden_by = hiding;
             shapes
         };
-        let sighting = sight(body.id, body.place, bounds, (pose, &view), size, shapes);
+        let body = &figure.body;
+        let sighting = sight(body.id, body.place, figure.bounds?, (pose, view), size, shapes);
         Some(Sighting { kind: body.mover.kind(), hidden_by, ..sighting })
     }
+}
+
+/// A picture with people in it whose luma differs from that `without` them by `levels` on the average, where it does by more.
+fn faded(mut with: Picture, without: Picture, levels: f64) -> Picture {
+    let luma = with.planes[0].data.iter().zip(&without.planes[0].data);
+    let (sum, count) = luma
+        .filter(|(with, without)| with != without)
+        .fold((0.0, 0.0), |(sum, count), (a, b)| (sum + f64::from(a.abs_diff(*b)), count + 1.0));
+    let share = if sum > 0.0 { (levels * count / sum).min(1.0) } else { 1.0 };
+    for (with, without) in with.planes.iter_mut().zip(without.planes) {
+        for (pixel, behind) in with.data.iter_mut().zip(without.data) {
+            let behind = f64::from(behind);
+            *pixel = (behind + share * (f64::from(*pixel) - behind)).round() as u8;
+        }
+    }
+    with
 }
 
 impl World for Room {
@@ -238,18 +314,21 @@ impl World for Room {
     }
 
     fn people(&self, exposure: &Exposure, size: (u32, u32)) -> Vec<Sighting> {
-        let (bodies, time) = (self.bodies_at(exposure.time), exposure.time);
-        let person = |first| self.person(&bodies[first..], time, &exposure.opening, size);
-        let mut people: Vec<_> = (0..bodies.len()).filter_map(person).collect();
+        let (time, pose) = (exposure.time, &exposure.opening);
+        let view = self.view(pose, size);
+        let figures = self.figures_at(time, &view);
+        let person = |first| self.person(&figures[first..], time, (pose, &view), size);
+        let mut people: Vec<_> = (0..figures.len()).filter_map(person).collect();
         people.sort_by_key(|person| person.truth.id);
         people
     }
 
     fn silhouette(&self, exposure: &Exposure, size: (u32, u32)) -> Option<Mask> {
-        let (bodies, view) = (self.bodies_at(exposure.time), self.view(&exposure.opening, size));
+        let view = self.view(&exposure.opening, size);
+        let figures = self.figures_at(exposure.time, &view);
         let mut seen = Plane::filled(view.size.0, view.size.1, 0);
-        for first in 0..bodies.len() {
-            let ([_, unhidden], _) = self.shape(&bodies[first..], exposure.time, &view);
+        for (index, figure) in figures.iter().enumerate() {
+            let ([_, unhidden], _) = self.shape(figure, &figures[index + 1..], exposure.time, &view);
             seen.data.iter_mut().zip(unhidden.data).for_each(|(pixel, one)| *pixel = one.max(*pixel));
         }
         Some(mask(seen))

@@ -157,21 +157,19 @@ impl Scene {
         self.shell.iter().for_each(|surface| surface.draw(view, canvas));
     }
 
-    /// What stands in the room as it is at a time in seconds.
-    fn standing(&self, time: f64) -> impl Iterator<Item = (&Solid, Cow<'_, [Surface]>)> {
-        self.pieces.iter().enumerate().map(move |(index, piece)| {
-            let surfaces =
-                self.moving.get(&index).map_or(Cow::Borrowed(piece.surfaces.as_slice()), |moving| {
-                    Cow::Owned(moving.surfaces(&piece.surfaces, time))
-                });
-            (&piece.solid, surfaces)
-        })
+    /// The surfaces of one of its pieces as they are at a time in seconds.
+    fn surfaces(&self, index: usize, time: f64) -> Cow<'_, [Surface]> {
+        let surfaces = self.pieces[index].surfaces.as_slice();
+        match self.moving.get(&index) {
+            Some(moving) => Cow::Owned(moving.surfaces(surfaces, time)),
+            None => Cow::Borrowed(surfaces),
+        }
     }
 
     /// Draws all that stands in the room, as it is at a time in seconds.
     pub fn draw_pieces(&self, time: f64, view: &View, canvas: &mut Canvas) {
-        for (_, surfaces) in self.standing(time) {
-            surfaces.iter().for_each(|surface| surface.draw(view, canvas));
+        for index in 0..self.pieces.len() {
+            self.surfaces(index, time).iter().for_each(|surface| surface.draw(view, canvas));
         }
     }
 
@@ -179,8 +177,9 @@ impl Scene {
     /// at a time in seconds.
     pub fn hide(&self, feet: Vector, time: f64, view: &View, mask: &mut Plane) {
         let head = [feet[0], feet[1] + TALLEST, feet[2]];
-        for (_, surfaces) in self.standing(time).filter(|(solid, _)| solid.hides(&[feet, head])) {
-            for surface in surfaces.iter() {
+        let before = |index: &usize| self.pieces[*index].solid.hides(&[feet, head]);
+        for index in (0..self.pieces.len()).filter(before) {
+            for surface in self.surfaces(index, time).iter() {
                 cover(&surface.polygon(view), view.size, |covered| {
                     let line = &mut mask.data[covered.row * view.size.0..][..view.size.0];
                     line[covered.whole.clone()].fill(0);

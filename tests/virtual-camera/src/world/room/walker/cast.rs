@@ -10,7 +10,7 @@ use super::{
         settings::{RoomSettings, Subject},
     },
     route::{Leg, Leg::*, Way},
-    walk::ENTRY_DEG,
+    walk::{ENTRY_DEG, TO_THE_EDGE},
 };
 use crate::{seeded::Seeded, truth::Kind};
 
@@ -25,6 +25,9 @@ const DEPARTURE: f64 = 0.8;
 const WANDERING: f64 = 180.0;
 /// The part of the floor in which they walk: from side to side and ahead of the camera, in metres.
 const FLOOR: ((f64, f64), (f64, f64)) = ((-4.2, 4.2), (4.9, 6.9));
+
+/// Who reaches into the view stands so far outside of it, in metres: hands and forearms are in it.
+const HANDS_IN: f64 = 0.4;
 
 /// Those in a group walk so far apart, in metres, and so fast.
 const APART: f64 = 0.62;
@@ -69,6 +72,7 @@ pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
         Action::Near => alone(stage.near(&mut chance)),
         Action::Far => alone(stage.far(&mut chance)),
         Action::Drive => alone(stage.drive(&mut chance)),
+        Action::Reach => alone(stage.reach(&mut chance)),
     };
     let first = if settings.action == Action::Drive { Kind::Vehicle } else { Kind::Person };
     let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
@@ -352,6 +356,14 @@ impl Stage {
             Past(self.at(-reach, lane + back), SPEED),
         ];
         self.way(self.at(-reach, lane), DEPARTURE, legs)
+    }
+
+    /// Stands beside the first view for a while and reaches into it; then walks in.
+    fn reach(&self, chance: &mut Seeded) -> Way {
+        let start = self.start(self.lane);
+        let stop = (start.0 + self.side * (TO_THE_EDGE - HANDS_IN), self.lane);
+        let legs = vec![To(stop, SPEED), Reach(chance.range(0.8, 2.5)), Past(self.end(self.lane), SPEED)];
+        self.way(start, DEPARTURE, legs)
     }
 
     /// Along the street, with a stop on the way.

@@ -20,6 +20,8 @@ const RUNNING_STANCE: f64 = 0.36;
 /// Height of a seat in metres, and how far behind the feet somebody sits.
 const SEAT: f64 = 0.44;
 const SITS_BACK: f64 = 0.4;
+/// How far an arm is raised that is held ahead, in radians.
+const LEVEL: f64 = 1.35;
 /// Below this speed (m/s) and turning (rad/s) the feet come together.
 const STANDING: (f64, f64) = (0.3, 0.6);
 
@@ -265,6 +267,7 @@ impl Gait {
         // The arm swings with the other side's leg, a little behind it.
         let forwards = outwards * (swing - 0.25).cos();
         let raised = build.arm_swing * effort * forwards * (1.0 + 0.5 * run) + 0.06 + 0.45 * now.seated;
+        let raised = raised + (LEVEL - raised) * now.reaching;
         let bent =
             build.elbow + 0.4 * build.arm_swing * effort * (1.0 + forwards) + 1.1 * run + 0.75 * now.seated;
         let upper = chest.pitched(raised).rolled(-outwards * build.arm_out);

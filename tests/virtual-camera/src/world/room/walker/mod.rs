@@ -19,8 +19,10 @@ mod vehicle;
 mod walk;
 mod wardrobe;
 
+pub(super) use mesh::SkinPatch;
 pub(in crate::world) use mover::Mover;
 pub(super) use obstruction::obstacles;
+pub(super) use paint::{bounds, mark};
 pub(crate) use walk::Walk;
 pub(in crate::world) use walk::{Moment, RATE};
 
@@ -29,7 +31,7 @@ use self::{
     clothes::{Cloth, Outfit},
     figure::Build,
     gait::{BodyPose, Gait},
-    mesh::{Detail, SkinPatch},
+    mesh::Detail,
     vehicle::Vehicle,
 };
 use super::{

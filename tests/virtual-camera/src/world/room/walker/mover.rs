@@ -80,12 +80,6 @@ pub(in crate::world) trait Mover: Send + Sync {
     /// Its left, top, right and bottom in pixels of the view, inside of it or not, edges of pixels at whole numbers;
     /// `None` unless all of it is ahead.
     fn bounds(&self, time: f64, view: &View) -> Option<[f64; 4]> {
-        let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
-        for vertex in self.patches(time, view).iter().flat_map(|patch| &patch.vertices) {
-            let ((x, y), _) = view.pixel(vertex.place)?;
-            let (x, y) = (x + 0.5, y + 0.5);
-            bounds = [bounds[0].min(x), bounds[1].min(y), bounds[2].max(x), bounds[3].max(y)];
-        }
-        Some(bounds)
+        paint::bounds(&self.patches(time, view), view)
     }
 }

@@ -213,8 +213,20 @@ fn lit([y, u, v]: [i32; 3], shade: i32) -> [u8; 4] {
     [scaled(y, 16), scaled(u, 128), scaled(v, 128), 1]
 }
 
+/// Left, top, right and bottom of skins in pixels of the view, inside of it or not, edges of pixels at whole numbers; `None` unless
+/// all of them is ahead of the camera.
+pub(in crate::world::room) fn bounds(patches: &[SkinPatch], view: &View) -> Option<[f64; 4]> {
+    let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
+    for vertex in patches.iter().flat_map(|patch| &patch.vertices) {
+        let ((x, y), _) = view.pixel(vertex.place)?;
+        let (x, y) = (x + 0.5, y + 0.5);
+        bounds = [bounds[0].min(x), bounds[1].min(y), bounds[2].max(x), bounds[3].max(y)];
+    }
+    Some(bounds)
+}
+
 /// Marks the pixels whose centre the body covers.
-pub(super) fn mark(patches: &[SkinPatch], view: &View, mask: &mut Plane) {
+pub(in crate::world::room) fn mark(patches: &[SkinPatch], view: &View, mask: &mut Plane) {
     let Some(window) = window(patches, view) else { return };
     for patch in patches {
         for corners in facing(patch, view, |_, pixel, _| corner(&window, pixel, (0.0, 0.0), [0.0; 4])) {

@@ -19,6 +19,8 @@ const PASSED: f64 = 0.35;
 const REACHED: f64 = 0.04;
 /// How long it takes to sit down or to rise, in seconds.
 const SITTING_DOWN: f64 = 1.5;
+/// How long it takes to raise the arms or to lower them, in seconds.
+const RAISING: f64 = 0.6;
 /// Time in which everybody comes to a stand, in seconds.
 const STOPPING: f64 = 1.5;
 /// Nobody needs longer for a way; a route that is never finished ends here, in seconds.
@@ -37,6 +39,8 @@ pub(super) enum Leg {
     Stand(f64),
     /// Sits down backwards, sits for some seconds, and rises.
     Sit(f64),
+    /// Stands, and holds both arms ahead for some seconds.
+    Reach(f64),
 }
 
 /// Where somebody goes, by legs.
@@ -56,23 +60,25 @@ pub(super) struct Way {
 /// Who goes a way, from the world's start until they stand still, and when they have gone all of it, in seconds.
 pub(super) fn follow(way: &Way) -> (Vec<Moment>, f64) {
     let ((x, z), heading) = (way.start, way.heading);
-    let now = Moment { x, z, heading, speed: 0.0, turning: 0.0, seated: 0.0 };
+    let now = Moment { x, z, heading, speed: 0.0, turning: 0.0, seated: 0.0, reaching: 0.0 };
     let mut walker = Follower { now, moments: vec![now] };
-    walker.stay(way.departure, |_| 0.0);
+    walker.stay(way.departure, |_, _| {});
     for leg in &way.legs {
         match *leg {
             Leg::Past(place, speed) => walker.go(place, speed, false),
             Leg::To(place, speed) => walker.go(place, speed, true),
             Leg::Face(heading) => walker.face(heading),
-            Leg::Stand(seconds) => walker.stay(seconds, |_| 0.0),
-            Leg::Sit(seconds) => walker.stay(seconds + 2.0 * SITTING_DOWN, |time| {
-                let share = (time.min(seconds + 2.0 * SITTING_DOWN - time) / SITTING_DOWN).clamp(0.0, 1.0);
-                share * share * (3.0 - 2.0 * share)
+            Leg::Stand(seconds) => walker.stay(seconds, |_, _| {}),
+            Leg::Sit(seconds) => walker.stay(seconds + 2.0 * SITTING_DOWN, |now, time| {
+                now.seated = eased(time, seconds, SITTING_DOWN);
+            }),
+            Leg::Reach(seconds) => walker.stay(seconds + 2.0 * RAISING, |now, time| {
+                now.reaching = eased(time, seconds, RAISING);
             }),
         }
     }
     let duration = (walker.moments.len() - 1) as f64 / RATE;
-    walker.stay(STOPPING, |_| 0.0);
+    walker.stay(STOPPING, |_, _| {});
     (walker.moments, duration)
 }
 
@@ -110,12 +116,13 @@ impl Follower {
         }
     }
 
-    fn stay(&mut self, seconds: f64, seated: impl Fn(f64) -> f64) {
+    /// Stands for some seconds; `holds` says how, by the time since then.
+    fn stay(&mut self, seconds: f64, holds: impl Fn(&mut Moment, f64)) {
         for step in 0..(seconds * RATE) as u32 {
-            self.now.seated = seated(f64::from(step) / RATE);
+            holds(&mut self.now, f64::from(step) / RATE);
             self.step(0.0, 2.0 * BRISK, 0.0);
         }
-        self.now.seated = 0.0;
+        (self.now.seated, self.now.reaching) = (0.0, 0.0);
     }
 
     fn step(&mut self, speed: f64, acceleration: f64, turning: f64) {
@@ -134,6 +141,12 @@ impl Follower {
         };
         self.moments.push(self.now);
     }
+}
+
+/// Up from 0 to 1 within so many seconds, held for `seconds`, and down again, at a time since the beginning of that.
+fn eased(time: f64, seconds: f64, within: f64) -> f64 {
+    let share = (time.min(seconds + 2.0 * within - time) / within).clamp(0.0, 1.0);
+    share * share * (3.0 - 2.0 * share)
 }
 
 /// The same angle from -π to π.

@@ -27,7 +27,7 @@ const TURNING_TIME: f64 = 1.1;
 /// When the person sets off, in seconds; they come into view at 2 s.
 const DEPARTURE: f64 = 0.8;
 /// How far the way has gone when the person's middle passes the edge of the first view, in metres.
-const TO_THE_EDGE: f64 = 1.7;
+pub(super) const TO_THE_EDGE: f64 = 1.7;
 /// Steps of the table a second.
 pub(in crate::world) const RATE: f64 = 250.0;
 /// Height of the middle of a person, in metres.
@@ -56,6 +56,8 @@ pub(crate) struct Moment {
     pub turning: f64,
     /// 0 upright, 1 seated.
     pub seated: f64,
+    /// How far the arms are held ahead: 0 they hang, 1 they are level.
+    pub reaching: f64,
 }
 
 /// The way of a test.
@@ -122,6 +124,7 @@ impl Walk {
             speed: between(before.speed, after.speed),
             turning: between(before.turning, after.turning),
             seated: between(before.seated, after.seated),
+            reaching: between(before.reaching, after.reaching),
         }
     }
 
@@ -263,7 +266,8 @@ impl Plan {
     /// The way itself, up to the person's standing still.
     fn walked(&self, x: f64, z: f64, heading: f64, side: f64) -> Vec<Moment> {
         let steps = ((self.duration() + SPEED / BRISK) * RATE).ceil() as usize + 1;
-        let mut now = Moment { x, z, heading, speed: self.speed(0.0), turning: 0.0, seated: 0.0 };
+        let mut now =
+            Moment { x, z, heading, speed: self.speed(0.0), turning: 0.0, seated: 0.0, reaching: 0.0 };
         let mut moments = vec![now];
         for step in 0..steps {
             let (middle, end) = ((step as f64 + 0.5) / RATE, (step as f64 + 1.0) / RATE);
@@ -277,7 +281,7 @@ impl Plan {
                 heading: now.heading + turned,
                 speed: self.speed(end),
                 turning: -side * self.turning(end),
-                seated: 0.0,
+                ..now
             };
             moments.push(now);
         }
