@@ -115,10 +115,14 @@ fn strata(args: &Args, suite: Suite) -> Result<bool, Box<dyn std::error::Error>>
     let scene = |((id, experiment), run): ((SceneId, Experiment), Run)| SceneRun {
         id,
         replicate: experiment.replicate,
+        replaced: experiment.replaced,
         run,
     };
     let scenes: Vec<_> = asked.into_iter().zip(runs).map(scene).collect();
-    let table = strata::table::write(&scenes, &args.out)?;
+    let table = match args.strata.by_stage {
+        true => strata::stages::write(&scenes, &args.out)?,
+        false => strata::table::write(&scenes, &args.out)?,
+    };
     tell(io::stdout(), format_args!("{table}"))?;
     Ok(whole)
 }

@@ -5,7 +5,7 @@
 use std::sync::{Arc, Mutex};
 
 use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, MotionMeta, Rect, TargetMeta, TargetState};
+use ptztrack_contract::{BufferMeta, MotionMeta, Rect, TargetMeta, TargetState, TracksMeta};
 
 use crate::pipeline::{Elements, Pipeline, PipelineError, SINK, lock};
 
@@ -44,20 +44,27 @@ impl Listener {
 impl Said {
     fn of(buffer: &gst::BufferRef) -> Self {
         let motion = MotionMeta::of(buffer).and_then(Result::ok).unwrap_or_default();
-        let target = TargetMeta::of(buffer).and_then(Result::ok);
-        let placed =
-            |target: &TargetMeta| matches!(target.state, TargetState::Tracking | TargetState::Occluded);
-        let target = target.filter(placed);
+        let tracks = TracksMeta::of(buffer).and_then(Result::ok);
         Self {
             regions: motion.regions.iter().map(|region| region.bounds).collect(),
-            tracks: target.map(|target| (target.id, target.bounds)).into_iter().collect(),
+            tracks: match tracks {
+                Some(tracks) => tracks.tracks.iter().map(|track| (track.id, track.bounds)).collect(),
+                None => Self::target(buffer).into_iter().collect(),
+            },
         }
+    }
+
+    /// Of a tracker that tells of its target alone.
+    fn target(buffer: &gst::BufferRef) -> Option<(u64, Rect)> {
+        let target = TargetMeta::of(buffer)?.ok()?;
+        let placed = matches!(target.state, TargetState::Tracking | TargetState::Occluded);
+        placed.then_some((target.id, target.bounds))
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use ptztrack_contract::Region;
+    use ptztrack_contract::{Region, Track, TrackState, Vector};
 
     use super::*;
 
@@ -81,5 +88,25 @@ mod tests {
             assert_eq!(said(state).tracks, []);
         }
         assert_eq!(Said::of(gst::Buffer::new().as_ref()), Said::default());
+    }
+
+    #[test]
+    fn everybody_is_heard_of_whom_the_tracker_tells() {
+        gst::init().unwrap();
+        let track = |id, state| Track {
+            id,
+            bounds: Rect { x: 0.1, y: 0.2, width: 0.1, height: 0.4 },
+            velocity: Vector::default(),
+            state,
+            confidence: 1.0,
+            is_target: id == 2,
+        };
+        let tracks = vec![track(2, TrackState::Seen), track(5, TrackState::Hidden)];
+        let mut buffer = gst::Buffer::new();
+        let writable = buffer.get_mut().unwrap();
+        TracksMeta { tracks }.attach(writable).unwrap();
+        TargetMeta { state: TargetState::Tracking, id: 2, ..TargetMeta::default() }.attach(writable).unwrap();
+        let numbers: Vec<_> = Said::of(&buffer).tracks.iter().map(|(id, _)| *id).collect();
+        assert_eq!(numbers, [2, 5]);
     }
 }

@@ -5,6 +5,7 @@
 //! pairs, and nothing is drawn again until what draws changes.
 
 mod library;
+mod placement;
 mod recorded;
 mod recorder;
 mod replay;

@@ -8,6 +8,7 @@ use virtual_camera::Settings;
 
 use super::{
     library,
+    placement::Placement,
     recorded::{RecordedPicture, RecordedScene},
     truth::Replacement,
 };
@@ -32,7 +33,7 @@ pub(crate) fn drive(
     let scene = library::recording(experiment, settings, folder)?;
     run.frame_rate = 1.0 / scene.period.as_secs_f64();
     let film = experiment.films.as_ref().map(|films| film::file(films, run)).transpose()?;
-    let screening = Screening::begin(experiment, &scene, film.as_deref())?;
+    let mut screening = Screening::begin(experiment, &scene, film.as_deref())?;
     let mut sequence = Sequence::new(experiment.size);
     for (index, picture) in scene.pictures.iter().enumerate() {
         let (record, said) = screening.picture(index, picture)?;
@@ -59,6 +60,7 @@ struct Screening<'a> {
     pipeline: Pipeline,
     tracker: Tracker,
     replacement: Replacement,
+    placement: Placement,
     listener: Listener,
 }
 
@@ -81,10 +83,11 @@ impl<'a> Screening<'a> {
         }
         let listener = Listener::attach(&pipeline)?;
         pipeline.start()?;
-        Ok(Self { experiment, scene, pipeline, tracker, replacement, listener })
+        let placement = Placement::new(&experiment.replaced);
+        Ok(Self { experiment, scene, pipeline, tracker, replacement, placement, listener })
     }
 
-    fn picture(&self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Said), RunError> {
+    fn picture(&mut self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Said), RunError> {
         let (first, size) = (self.scene.first, self.experiment.size);
         let phase = Phase::of(index >= first, index > first);
         let cue = Cue { phase, truth: picture.truth.truth.clone(), motion: picture.motion, size };
@@ -100,7 +103,7 @@ impl<'a> Screening<'a> {
         if let Some(state) = &picture.told {
             self.pipeline.send_upstream(state.event())?;
         }
-        let said = target.map(|target| self.replacement.judged(estimate(&target, size), picture));
+        let said = target.map(|target| self.placement.replaced(estimate(&target, size), &picture.truth));
         let record = picture.truth.clone().judged(said, &picture.people);
         Ok((record, self.listener.take()))
     }

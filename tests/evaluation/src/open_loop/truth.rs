@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! One stage at a time replaced by the truth, to see what it costs: between detector and tracker what the metas say is changed,
-//! and the box after the tracker. The elements know nothing of it.
+//! Stages replaced by the truth, to see what each costs: what the metas say is changed between detector and tracker, which know
+//! nothing of it. What is replaced after the tracker is in [`super::placement`].
 
 use std::sync::{Arc, Mutex};
 
@@ -15,7 +15,7 @@ use super::recorded::RecordedPicture;
 use crate::{
     metrics::SPECK,
     pipeline::{Elements, PipelineError, lock},
-    record::{Bounds, Estimate, named},
+    record::{Bounds, named},
     trackers::normalised,
 };
 
@@ -30,8 +30,16 @@ named! {
         Owner = "owner",
         /// What is hidden: there is a region where all of the person is, as long as a part of them is hidden.
         Hidden = "hidden",
+        /// The speed at hiding: the place of who is hidden goes on as they really do.
+        Speed = "speed",
         /// The size of the box: around its middle it has the true one.
         Size = "size",
+        /// What of the error of the box's place stays over a second, in the direction of the person's motion.
+        Lag = "lag",
+        /// What of it stays, across that.
+        Bias = "bias",
+        /// What of it does not stay.
+        Jitter = "jitter",
     }
 }
 
@@ -83,16 +91,6 @@ impl Replacement {
                 size: picture.truth.size,
             });
         }
-    }
-
-    /// What the tracker said, with what is replaced in it.
-    pub fn judged(&self, mut estimate: Estimate, picture: &RecordedPicture) -> Estimate {
-        if let Some(person) = picture.truth.truth.as_ref().filter(|_| self.stages.contains(&Stage::Size)) {
-            let (x, y) = estimate.bounds.centre();
-            let Bounds { width, height, .. } = person.bounds;
-            estimate.bounds = Bounds { left: x - width / 2.0, top: y - height / 2.0, width, height };
-        }
-        estimate
     }
 }
 

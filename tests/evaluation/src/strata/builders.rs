@@ -102,3 +102,19 @@ pub(super) fn turning(draft: &mut Draft, chance: &mut Seeded) {
     draft.begin = Duration::from_secs_f64(chance.range(4.0, 5.0));
     draft.lead = Duration::from_millis(1500);
 }
+
+pub(super) fn faint(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Dim;
+    draft.room.faint = Some(chance.range(3.0, 5.0));
+}
+
+pub(super) fn reaching(draft: &mut Draft, chance: &mut Seeded) {
+    draft.room.action = Action::Reach;
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+    draft.room.events = vec![Event::Film];
+    draft.room.events.extend(Some(Event::Draught).filter(|_| chance.unit() < 0.5));
+    // Hands show from about 2 s on.
+    draft.begin = Duration::from_millis(1000);
+}

@@ -7,6 +7,7 @@ mod builders;
 mod draft;
 mod endpoints;
 pub mod options;
+pub mod stages;
 pub mod table;
 
 use std::fmt;
@@ -50,6 +51,10 @@ named! {
         Vehicles = "vehicles",
         /// One person who is in view from the start, before a camera that turns from the start.
         Turning = "turning",
+        /// One person who is hardly to be told from the wall, in the noise of little light.
+        Faint = "faint",
+        /// One person who holds their hands into the view for a while before they walk in, where other things move too.
+        Reaching = "reaching",
     }
 }
 
@@ -68,6 +73,8 @@ impl Stratum {
             Self::Outdoors => builders::outdoors,
             Self::Vehicles => builders::vehicles,
             Self::Turning => builders::turning,
+            Self::Faint => builders::faint,
+            Self::Reaching => builders::reaching,
         }
     }
 }

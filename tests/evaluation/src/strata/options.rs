@@ -6,7 +6,7 @@ use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::Args;
 
-use super::{NUMBERS, SceneId, Stratum};
+use super::{NUMBERS, SceneId, Stratum, stages};
 use crate::{
     experiment::Experiment,
     open_loop::Stage,
@@ -44,9 +44,12 @@ pub struct StrataArgs {
     /// Folder of the recordings
     #[arg(long, value_name = "FOLDER", default_value = "target/evaluation/recordings")]
     pub recordings: PathBuf,
-    /// Replace what these stages say by the truth (open loop only): motion, regions, owner, hidden, size
+    /// Replace what these stages say by the truth: motion, regions, owner, hidden, speed, size, lag, bias, jitter
     #[arg(long, value_name = "STAGE", value_delimiter = ',', requires = "open_loop")]
     pub replace: Vec<Stage>,
+    /// Show each scene with no stage, each alone, all but each and all replaced, and write a table of what that changes
+    #[arg(long, requires = "open_loop", conflicts_with = "replace")]
+    pub by_stage: bool,
     /// Write truth, regions and tracks of everybody into this folder, as MOTChallenge text: in open loop beside what else is
     /// written, of --still-recording instead of it
     #[arg(long, value_name = "FOLDER", requires = "shown")]
@@ -77,10 +80,12 @@ impl StrataArgs {
             {
                 let numbers =
                     (1..=self.scenes).flat_map(|number| (1..=self.replicates).map(move |one| (number, one)));
-                all.extend(numbers.map(|(number, replicate)| {
+                for (number, replicate) in numbers {
                     let id = SceneId { stratum, seed, number };
-                    (id, self.experiment(id, replicate, suite, tracker))
-                }));
+                    let one = self.experiment(id, replicate, suite, tracker);
+                    let replaced = self.replaced().into_iter();
+                    all.extend(replaced.map(|replaced| (id, Experiment { replaced, ..one.clone() })));
+                }
             }
         }
         all
@@ -88,16 +93,13 @@ impl StrataArgs {
 
     fn experiment(&self, id: SceneId, replicate: u32, suite: Suite, tracker: TrackerName) -> Experiment {
         let recordings = (suite == Suite::OpenLoop).then(|| self.recordings.clone());
-        let (motchallenge, replaced) = (self.motchallenge.clone(), self.replace.clone());
-        let elements = self.elements.clone();
-        Experiment {
-            elements,
-            replicate,
-            recordings,
-            replaced,
-            motchallenge,
-            ..id.experiment(suite, tracker)
-        }
+        let (motchallenge, elements) = (self.motchallenge.clone(), self.elements.clone());
+        Experiment { elements, replicate, recordings, motchallenge, ..id.experiment(suite, tracker) }
+    }
+
+    /// What is replaced by the truth, one after the other.
+    fn replaced(&self) -> Vec<Vec<Stage>> {
+        if self.by_stage { stages::sets() } else { vec![self.replace.clone()] }
     }
 }
 

@@ -7,7 +7,7 @@ use std::{fmt::Write, path::Path};
 use super::{Endpoints, SceneId, Stratum};
 use crate::{
     metrics::mean,
-    open_loop::{generator, pointing_error},
+    open_loop::{Stage, generator, pointing_error},
     record::{Run, Suite, TrackerName},
     report::{self, ReportError, csv},
 };
@@ -45,6 +45,8 @@ pub struct SceneRun {
     pub id: SceneId,
     /// Which recording of it, from 1.
     pub replicate: u32,
+    /// What was replaced by the truth.
+    pub replaced: Vec<Stage>,
     /// What came out.
     pub run: Run,
 }
@@ -70,7 +72,7 @@ pub(crate) fn heading() -> String {
 }
 
 fn line(one: &SceneRun) -> Vec<String> {
-    let SceneRun { id, replicate, run } = one;
+    let SceneRun { id, replicate, run, .. } = one;
     let endpoints = Endpoints::of(run);
     let losses = crate::metrics::losses(&run.frames).len();
     vec![
@@ -143,7 +145,8 @@ fn worth(runs: &[&SceneRun]) -> f64 {
     mean(&runs.iter().filter_map(|one| Endpoints::of(&one.run).held).collect::<Vec<_>>()).unwrap_or(f64::MAX)
 }
 
-fn cells(runs: &[&SceneRun]) -> [String; 6] {
+/// Scenes, held, off by, changes a minute, pursuits an hour, scenes with a loss.
+pub(super) fn cells(runs: &[&SceneRun]) -> [String; 6] {
     let endpoints: Vec<_> = runs.iter().map(|one| Endpoints::of(&one.run)).collect();
     let of =
         |value: fn(&Endpoints) -> Option<f64>| mean(&endpoints.iter().filter_map(value).collect::<Vec<_>>());
@@ -176,7 +179,7 @@ mod tests {
     fn scene(stratum: Stratum, frames: usize) -> SceneRun {
         let tracked = made_up::tracked((80, 60));
         let run = Run { suite: Suite::OpenLoop, ..made_up::run(vec![tracked; frames]) };
-        SceneRun { id: SceneId { stratum, seed: 2, number: 3 }, replicate: 1, run }
+        SceneRun { id: SceneId { stratum, seed: 2, number: 3 }, replicate: 1, replaced: Vec::new(), run }
     }
 
     #[test]

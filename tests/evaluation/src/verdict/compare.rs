@@ -10,7 +10,7 @@ use std::{
 
 use super::{
     read::{CompareError, ENDPOINTS, Figures, Key, Report},
-    statistics::{Detectable, clopper_pearson, detectable, holm, sign_flip},
+    statistics::{Detectable, clopper_pearson, detectable, holm, sign_flip, signed_ranks},
 };
 use crate::metrics::mean;
 
@@ -132,13 +132,15 @@ fn column(pairs: &[(Figures, Figures)], index: usize) -> Vec<f64> {
     differences(pairs).into_iter().filter_map(|row| row[index]).collect()
 }
 
+/// An endpoint is told only where its mean difference goes the way that most of its ranks go: one person lost is not made up for by
+/// many who are held a little better.
 fn verdict(pairs: &[(Figures, Figures)], probabilities: &[f64; ENDPOINTS]) -> Verdict {
-    let told = (0..ENDPOINTS).filter(|index| probabilities[*index] <= LEVEL);
-    let better = told.map(|index| {
-        let difference = mean(&column(pairs, index)).unwrap_or(0.0);
-        (difference > 0.0) == ENDPOINT[index].more_is_better
+    let told = (0..ENDPOINTS).filter(|index| probabilities[*index] <= LEVEL).filter_map(|index| {
+        let differences = column(pairs, index);
+        let (mean, ranks) = (mean(&differences)?, signed_ranks(&differences).iter().sum::<f64>());
+        (mean * ranks > 0.0).then_some((mean > 0.0) == ENDPOINT[index].more_is_better)
     });
-    let better: BTreeSet<bool> = better.collect();
+    let better: BTreeSet<bool> = told.collect();
     match (better.contains(&true), better.contains(&false)) {
         (_, true) => Verdict::Worse,
         (true, false) => Verdict::Better,

@@ -14,18 +14,22 @@ const ROUNDING: f64 = 1e-9;
 /// How surely the smallest difference would have been seen.
 const POWER: f64 = 0.8;
 
-/// The test by sign flips (R. A. Fisher, "The Design of Experiments", 1935, section 21): the probability that differences as large
-/// in the mean come about when nothing but chance decides which of a pair is which.
+/// The test by sign flips (R. A. Fisher, "The Design of Experiments", 1935, section 21) of signed ranks (F. Wilcoxon, "Individual
+/// comparisons by ranking methods", 1945): the probability that differences that go one way as far as these come about when nothing
+/// but chance decides which of a pair is which. Ranks instead of the differences themselves, as a person who is lost in one scene
+/// would else hide a small difference in all the others.
 ///
 /// A row is a scene, a column an endpoint; `None` where a scene does not have it. All endpoints of a scene are flipped
 /// together, and each is set against the largest of all (P. H. Westfall and S. S. Young, "Resampling-Based Multiple Testing",
 /// 1993, section 2.3), so that the least of the probabilities given, one for each endpoint, needs no correction for their number. An
 /// endpoint without any difference has 1.
 pub fn sign_flip<const N: usize>(differences: &[[Option<f64>; N]]) -> [f64; N] {
-    let rows: Vec<[f64; N]> = differences
-        .iter()
-        .map(|row| row.map(|difference| difference.unwrap_or(0.0)))
-        .filter(|row| row.iter().any(|difference| *difference != 0.0))
+    let columns: [Vec<f64>; N] = std::array::from_fn(|column| {
+        signed_ranks(&differences.iter().map(|row| row[column].unwrap_or(0.0)).collect::<Vec<_>>())
+    });
+    let rows: Vec<[f64; N]> = (0..differences.len())
+        .map(|row| std::array::from_fn(|column| columns[column][row]))
+        .filter(|row: &[f64; N]| row.iter().any(|rank| *rank != 0.0))
         .collect();
     let squares: [f64; N] =
         std::array::from_fn(|column| rows.iter().map(|row| row[column] * row[column]).sum());
@@ -64,6 +68,20 @@ pub fn sign_flip<const N: usize>(differences: &[[Option<f64>; N]]) -> [f64; N] {
         }
     }
     as_large.map(|as_large| f64::from(as_large) / f64::from(tried))
+}
+
+/// Of each difference its rank by size, from 1, with its sign; equal ones share theirs, and none has 0.
+pub(super) fn signed_ranks(differences: &[f64]) -> Vec<f64> {
+    let differs = |one: &f64| one.abs() > ROUNDING;
+    let mut sizes: Vec<f64> = differences.iter().filter(|one| differs(one)).map(|one| one.abs()).collect();
+    sizes.sort_by(f64::total_cmp);
+    let rank = |size: f64| {
+        let smaller = sizes.partition_point(|other| *other < size - ROUNDING);
+        let up_to = sizes.partition_point(|other| *other <= size + ROUNDING);
+        (smaller + up_to + 1) as f64 / 2.0
+    };
+    let signed = |one: &f64| if differs(one) { rank(one.abs()).copysign(*one) } else { 0.0 };
+    differences.iter().map(signed).collect()
 }
 
 /// Probabilities corrected for their number (S. Holm, "A simple sequentially rejective multiple test procedure", 1979), in their
