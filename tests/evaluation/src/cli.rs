@@ -9,9 +9,9 @@ use clap::Parser;
 use crate::{
     experiment::{Experiment, Scene},
     footage::{SceneError, Whom},
-    record::{Codec, Delays, FirstBox, Suite, TestId, TrackerName},
+    record::{Codec, Delays, FirstBox, TestId, TrackerName},
     strata::options::StrataArgs,
-    suite::{hard, photo::PhotosError},
+    suite::photo::PhotosError,
     trackers::missing,
 };
 
@@ -19,13 +19,9 @@ use crate::{
 #[derive(Debug, Clone, Parser)]
 #[command(name = "evaluate", version, after_help = EXAMPLES)]
 pub struct Args {
-    /// Tests by number, or ways through photographs, `7` or `1-6`; all of the suite unless given
+    /// Tests by number, or ways through photographs, `7` or `1-6`; all unless given
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',')]
     pub test: Vec<Tests>,
-    /// Instead of the 72 tests, a suite of others: hard (several people, nobody at all, cameras with faults); its tests, numbered
-    /// too, have codecs, sizes and delays of their own
-    #[arg(long, value_parser = suite, conflicts_with_all = ["footage", "still_recording", "real_time"])]
-    pub suite: Option<Suite>,
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
     pub tracker: Vec<Trackers>,
@@ -69,7 +65,7 @@ pub struct Args {
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
     pub record: bool,
-    /// Instead of running tests, write pictures of the room, of the hard tests or of the photographs, to look at: every
+    /// Instead of running tests, write pictures of the room or of the photographs, to look at: every
     /// subject, light and occlusion, from far and near
     #[arg(long, conflicts_with_all = ["test", "footage", "still_recording", "real_time", "record"])]
     pub gallery: bool,
@@ -121,7 +117,7 @@ pub struct Args {
 const EXAMPLES: &str = "\
 Examples:
   evaluate                                           all 72 tests in a simulated room
-  evaluate --suite hard --seed 1-3                   38 hard tests: several people, nobody, cameras with faults
+  evaluate --open-loop --seed 1-10                   scenes of all strata, from recordings, in open loop
   evaluate --test 1-6 --tracker ptztrack,oracle --record
   evaluate --footage walk.mp4 --truth walk.csv --tracker ptztrack,thesis,csrt
                                                      a camera that turns within a recording, in closed loop
@@ -182,15 +178,6 @@ impl FromStr for Trackers {
     }
 }
 
-fn suite(text: &str) -> Result<Suite, String> {
-    let suite: Suite = text.parse()?;
-    if suite == Suite::Hard {
-        Ok(suite)
-    } else {
-        Err(format!("`{suite}` is run without --suite; there is hard"))
-    }
-}
-
 fn size(text: &str) -> Result<(u32, u32), String> {
     let sides =
         text.split_once('x').and_then(|(width, height)| Some((width.parse().ok()?, height.parse().ok()?)));
@@ -230,9 +217,6 @@ impl Args {
     /// Where photographs cannot be used.
     pub fn gallery(&self) -> Result<Vec<Experiment>, SceneError> {
         let Some(&seed) = self.seeds().first().filter(|_| self.gallery) else { return Ok(Vec::new()) };
-        if self.suite == Some(Suite::Hard) {
-            return Ok(self.hard(&[TrackerName::Still]));
-        }
         // The first quarter of the tests has all lights, occlusions and subjects.
         let rooms = || (1..=18).filter_map(|test| Scene::room(TestId(test), seed)).collect();
         let scenes: Vec<Scene> = self.photographs(seed).transpose()?.unwrap_or_else(rooms);
@@ -330,19 +314,6 @@ impl Args {
         experiments
     }
 
-    fn hard(&self, trackers: &[TrackerName]) -> Vec<Experiment> {
-        let mut experiments = Vec::new();
-        for (&name, seed) in
-            trackers.iter().flat_map(|name| self.seeds().into_iter().map(move |seed| (name, seed)))
-        {
-            let Some(scene) = Scene::room(TestId(1), seed) else { continue };
-            let all = (1..).zip(hard::experiments(name, seed, &self.experiment(scene, name, seed)));
-            let asked = |(number, _): &(u32, Experiment)| self.asks_for(*number);
-            experiments.extend(all.filter(asked).map(|(_, experiment)| experiment));
-        }
-        experiments
-    }
-
     /// Everything asked for, tracker after tracker.
     ///
     /// # Errors
@@ -350,9 +321,6 @@ impl Args {
     pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
         if self.matrix {
             return Ok(self.matrix(trackers));
-        }
-        if self.suite == Some(Suite::Hard) {
-            return Ok(self.hard(trackers));
         }
         let scenes = self.scenes()?;
         let mut experiments = Vec::new();
@@ -381,19 +349,6 @@ mod tests {
         assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
         assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
         assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
-    }
-
-    #[test]
-    fn hard_tests_have_numbers_and_seeds() {
-        let args = parse("--suite hard --test 1-3 --seed 2,4").unwrap();
-        let experiments = args.experiments(&[TrackerName::Ptztrack]).unwrap();
-        let seeds: Vec<_> = experiments.iter().map(|one| one.seed).collect();
-        assert_eq!(seeds, [2, 2, 2, 4, 4, 4]);
-        assert!(experiments.iter().all(|one| one.scene.suite == Suite::Hard));
-        assert!(parse("--suite room").is_err());
-        let gallery = parse("--suite hard --gallery").unwrap().gallery().unwrap();
-        assert_eq!(gallery.len(), 38);
-        assert!(gallery.iter().all(|one| one.scene.suite == Suite::Hard));
     }
 
     #[test]

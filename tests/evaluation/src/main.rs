@@ -76,11 +76,6 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     for note in &report.notes {
         tell(io::stderr(), format_args!("evaluate: {note}"))?;
     }
-    let hard = suite::summary::summary(&runs);
-    if !hard.is_empty() {
-        std::fs::write(args.out.join("hard.md"), &hard)?;
-        tell(io::stdout(), format_args!("{hard}"))?;
-    }
     let photos = suite::photo::summary(&runs);
     if !photos.is_empty() {
         std::fs::write(args.out.join("photos.md"), &photos)?;

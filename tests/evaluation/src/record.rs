@@ -115,8 +115,6 @@ named! {
         Room = "room",
         /// People cut out of film, in photographs of rooms.
         Photo = "photo",
-        /// What is hard in reality: several people, nobody at all, cameras with faults.
-        Hard = "hard",
         /// Recordings of real people.
         Recording = "recording",
         /// Strata of scenes, recorded once and shown to detector and tracker alone.

@@ -9,7 +9,7 @@ use virtual_camera::{RoomSettings, Seeded, Settings, World};
 use super::SceneId;
 use crate::{
     experiment::{Experiment, Place, Scene, Target},
-    record::{Codec, FirstBox, Suite, TrackerName},
+    record::{Codec, Delays, FirstBox, Suite, TrackerName},
 };
 
 /// How long a scene is.
@@ -21,6 +21,7 @@ pub(super) struct Draft {
     /// All of the camera but its world.
     pub camera: Settings,
     pub codec: Codec,
+    pub delays: Delays,
     /// When the first picture is taken, since the world's start.
     pub begin: Duration,
     /// For so long before the first picture the camera is on the person already.
@@ -40,6 +41,7 @@ impl Draft {
             room: RoomSettings::test(number, seed).unwrap_or_default(),
             camera,
             codec: chance.pick(&[Codec::Mjpeg, Codec::Mjpeg, Codec::Mpeg4, Codec::H264]),
+            delays: Delays::default(),
             begin: Duration::ZERO,
             lead: Duration::ZERO,
             target: Target::Person(1),
@@ -60,7 +62,7 @@ impl Draft {
             duration: self.begin + LENGTH,
             target: self.target,
         };
-        let (codec, first_box) = (self.codec, self.first_box);
-        Experiment { codec, first_box, ..Experiment::new(scene, tracker, id.seed) }
+        let (codec, delays, first_box) = (self.codec, self.delays, self.first_box);
+        Experiment { codec, delays, first_box, ..Experiment::new(scene, tracker, id.seed) }
     }
 }

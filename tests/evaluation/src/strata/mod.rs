@@ -6,6 +6,7 @@
 mod builders;
 mod draft;
 mod endpoints;
+mod faults;
 pub mod options;
 pub mod stages;
 pub mod table;
@@ -55,6 +56,8 @@ named! {
         Faint = "faint",
         /// One person who holds their hands into the view for a while before they walk in, where other things move too.
         Reaching = "reaching",
+        /// One person before a camera with a fault, or one that is late, slow or not as told.
+        Faults = "faults",
     }
 }
 
@@ -75,6 +78,7 @@ impl Stratum {
             Self::Turning => builders::turning,
             Self::Faint => builders::faint,
             Self::Reaching => builders::reaching,
+            Self::Faults => faults::faults,
         }
     }
 }

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Sets of tests besides the thesis' 72.
+//! Sets of tests besides the thesis' 72 and the strata.
 
-pub mod hard;
 pub mod photo;
-pub mod summary;
