@@ -18,7 +18,7 @@ mod servo;
 mod settings;
 
 pub use control::{Access, Actuation, ActuatorStatus, Home, Mode};
-pub use estimation::{Estimates, Measurement, Mounting, Prediction, Visibility};
+pub use estimation::{AxisFinding, Estimates, Measurement, Mounting, Prediction, Visibility};
 pub use model::{
     CameraModel, Capabilities, CommandHistory, Delays, HardLimits, Lens, PanTilt, Position, Presets, Range,
     SoftLimits, SpeedCurve, SpeedMap, TableRow, View, around_deg, is_endless, magnified, narrower,

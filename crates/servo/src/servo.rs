@@ -10,7 +10,8 @@ use crate::control::{
     Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, PointToPoint, ZoomDrive,
 };
 use crate::estimation::{
-    AxisEstimator, Estimates, Measurement, Mounting, SelfCalibration, TargetEstimator, Visibility,
+    AxisEstimator, AxisFinding, Estimates, Measurement, Mounting, SelfCalibration, TargetEstimator,
+    Visibility,
 };
 use crate::model::{
     CameraModel, Capabilities, CommandHistory, Delays, Lens, PanTilt, SpeedMap, View, magnified,
@@ -25,8 +26,8 @@ pub struct Servo {
     camera: CameraModel,
     calibration: SelfCalibration,
     axes: AxisEstimator,
-    /// An axis was found to turn the picture the other way, and nobody was told yet.
-    found_inverted: bool,
+    /// What was found out about the axes, and nobody was told yet.
+    axis_finding: Option<AxisFinding>,
     estimator: TargetEstimator,
     controller: Controller,
     limits: LimitEnforcer,
@@ -61,7 +62,7 @@ impl Servo {
             camera: CameraModel::new(settings.speed_map()),
             calibration: SelfCalibration::new(settings.latency),
             axes: AxisEstimator::default(),
-            found_inverted: false,
+            axis_finding: None,
             estimator: TargetEstimator::new(settings.prediction),
             controller: Controller::default(),
             limits: LimitEnforcer::default(),
@@ -137,13 +138,13 @@ impl Servo {
         self.axes.mounting(self.settings.mounting)
     }
 
-    /// Whether an axis was found to turn the picture the other way since this was last asked.
-    pub fn take_found_inverted(&mut self) -> bool {
-        mem::take(&mut self.found_inverted)
+    /// What was found out about the axes since this was last asked.
+    pub fn take_axis_finding(&mut self) -> Option<AxisFinding> {
+        self.axis_finding.take()
     }
 
     /// Learns of the camera what the picture shows, if nothing else moves it. Returns whether an axis is now taken to turn
-    /// the picture the other way.
+    /// the picture otherwise.
     fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Duration) -> bool {
         let zooms = self.zoom.moves(measurement.taken_at, &self.calibration.delays(), now);
         if !self.settings.learn || actuator.access != Access::Ours || zooms {
@@ -153,15 +154,15 @@ impl Servo {
         let view = self.view(measurement);
         let turn = self.calibration.see(measurement, &view, &self.camera.history, maps);
         let fov_deg = view.horizontal_fov_deg;
-        let inverted = self.settings.learn_axes
-            && turn.is_some_and(|turn| self.axes.see(&turn, &self.camera.history, fov_deg));
-        if inverted {
-            self.found_inverted = true;
+        let turn = turn.filter(|_| self.settings.learn_axes);
+        let finding = turn.and_then(|turn| self.axes.see(&turn, &self.camera.history, fov_deg));
+        if finding.is_some() {
+            self.axis_finding = finding;
             self.calibration = SelfCalibration::new(self.settings.latency);
             self.assume_speeds();
         }
         self.revise();
-        inverted
+        finding.is_some()
     }
 
     /// Finds how tall the target is, to zoom by.
@@ -189,6 +190,11 @@ impl Servo {
 
     /// What the camera is to do now.
     pub fn control(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+        let actuation = self.decide(actuator, now);
+        self.exchanged_actuation(actuation)
+    }
+
+    fn decide(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
         if actuator.access == Access::Others {
             // What moves it is theirs; what we last said must not outlive our hold on it.
             return Actuation::Rest;

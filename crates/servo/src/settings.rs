@@ -19,8 +19,6 @@ pub struct ServoSettings {
     pub max_speed_deg_s: f64,
     /// Degrees per second that either axis' speed changes by in a second; a stop is at once.
     pub max_acceleration_deg_s2: f64,
-    /// Commands per second at most; a stop does not wait for its turn.
-    pub max_rate_hz: f64,
     /// From sending a command to the motion, and from light on the sensor to the picture's timestamp, together.
     pub latency: Duration,
     /// Horizontal field of view in degrees; `None`: what the camera says.
@@ -49,8 +47,6 @@ pub struct ServoSettings {
     pub home_timeout: Duration,
     /// ... and as soon as it was met, unless somebody is there.
     pub home_at_start: bool,
-    /// An operator who moves the camera keeps it until it was not moved for this long; zero: he is not looked for.
-    pub override_timeout: Duration,
 }
 
 impl ServoSettings {
@@ -68,7 +64,6 @@ impl Default for ServoSettings {
             dead_zone: 0.03,
             max_speed_deg_s: 100.0,
             max_acceleration_deg_s2: 600.0,
-            max_rate_hz: 10.0,
             latency: Duration::from_millis(200),
             fov_deg: None,
             mounting: Mounting::default(),
@@ -83,7 +78,6 @@ impl Default for ServoSettings {
             home: None,
             home_timeout: Duration::from_secs(10),
             home_at_start: false,
-            override_timeout: Duration::from_secs(10),
         }
     }
 }

@@ -4,10 +4,10 @@
 
 use std::time::Duration;
 
-use servo::{Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, ServoSettings};
+use servo::{AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo};
 
 use crate::session::Session;
-use crate::{Command, Error, Next, Protocol, Request, Response, SessionEvent};
+use crate::{Command, Error, LoopSettings, Next, Protocol, Request, Response, SessionEvent};
 
 /// A servo and the session it speaks by. Has no clock and sends nothing itself: both are the caller's.
 #[derive(Debug)]
@@ -27,8 +27,8 @@ pub enum LoopEvent {
     Session(SessionEvent),
     /// The target lies beyond the camera's range.
     AtLimit,
-    /// An axis turns the picture the other way than was set: it is steered accordingly from now on.
-    AxisInverted,
+    /// An axis turns the picture otherwise than was set: it is steered accordingly from now on.
+    Axes(AxisFinding),
     /// The camera swung to and fro about the target: from now on only this part of the gain is used.
     Oscillating(f64),
 }
@@ -56,16 +56,18 @@ pub struct Status {
 
 impl ControlLoop {
     /// Knows nothing of the camera yet.
-    pub fn new(settings: ServoSettings, protocol: &Protocol) -> Self {
-        let session = Session::new(settings.mode, protocol);
-        Self { servo: Servo::new(settings), session, overtaken: 0, at_limit: false, events: Vec::new() }
+    pub fn new(settings: impl Into<LoopSettings>, protocol: &Protocol) -> Self {
+        let LoopSettings { servo, session } = settings.into();
+        let session = Session::new(servo.mode, session, protocol);
+        Self { servo: Servo::new(servo), session, overtaken: 0, at_limit: false, events: Vec::new() }
     }
 
     /// Takes new settings.
-    pub fn configure(&mut self, settings: ServoSettings) {
+    pub fn configure(&mut self, settings: impl Into<LoopSettings>) {
+        let LoopSettings { servo, session } = settings.into();
         let before = self.servo.settings().clone();
-        self.servo.configure(settings);
-        self.session.reconfigured(&before, &self.servo);
+        self.servo.configure(servo);
+        self.session.configure(session, &before, &self.servo);
     }
 
     /// Takes the newest picture of the target.
@@ -77,7 +79,10 @@ impl ControlLoop {
         let gain_scale = self.servo.measure(measurement, &actuator, now);
         self.overtaken += u64::from(overtakes && self.servo.holds_target());
         self.events.extend(gain_scale.map(LoopEvent::Oscillating));
-        self.events.extend(self.servo.take_found_inverted().then_some(LoopEvent::AxisInverted));
+        if let Some(finding) = self.servo.take_axis_finding() {
+            self.session.reorient();
+            self.events.push(LoopEvent::Axes(finding));
+        }
     }
 
     /// Forgets the target; the camera is to be stopped, whatever it does.
@@ -109,6 +114,10 @@ impl ControlLoop {
         sent: Duration,
         now: Duration,
     ) {
+        let response = match response {
+            Ok(Response::Position(position)) => Ok(Response::Position(self.servo.along_picture(position))),
+            other => other,
+        };
         self.session.on_response(request, response, &mut self.servo, (sent, now));
     }
 

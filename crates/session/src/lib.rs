@@ -18,6 +18,7 @@ mod error;
 mod exchange;
 pub mod http;
 pub mod session;
+mod settings;
 pub mod task;
 pub mod watchdog;
 
@@ -28,3 +29,4 @@ pub use error::Error;
 pub use exchange::{
     Attributes, Next, Parameters, Query, QueuePlace, QueueRequest, Request, Response, SessionEvent,
 };
+pub use settings::{LoopSettings, SessionSettings};

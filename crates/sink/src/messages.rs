@@ -5,6 +5,7 @@
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use ptztrack_contract::{CameraChange, CameraMessage, Times};
+use servo::AxisFinding;
 
 use session::session::{ConnectionChange, ControlOwner};
 use session::task::{Event, Outbox};
@@ -50,7 +51,12 @@ pub trait Telling: PtzSink {
                 gst::ResourceError::Settings,
                 ("the camera does not report its position, so `pan-min`, `pan-max`, `tilt-min` and `tilt-max` cannot be enforced. Set limits in the camera itself")
             ),
-            Event::Loop(LoopEvent::AxisInverted) => gst::element_imp_info!(
+            Event::Loop(LoopEvent::Axes(AxisFinding::Exchanged)) => gst::element_imp_info!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera tilts where it is told to pan, and pans where it is told to tilt: it is steered accordingly from here on")
+            ),
+            Event::Loop(LoopEvent::Axes(AxisFinding::Inverted)) => gst::element_imp_info!(
                 self,
                 gst::ResourceError::Settings,
                 ("an axis of the camera turns the picture the other way than is set: it is steered accordingly from here on. `invert-pan` or `invert-tilt` would have it known from the start")

@@ -251,7 +251,7 @@ pub trait Plumbing: PtzSink {
         })?;
         let watchdog = watchdog(&settings, &Self::PARTICULARS, self.obj().upcast_ref());
         let task =
-            CameraTask::start::<Self::Client>(client, settings.servo(), clock, watchdog, move |event| {
+            CameraTask::start::<Self::Client>(client, settings.control(), clock, watchdog, move |event| {
                 if let Some(element) = element.upgrade() {
                     Self::from_obj(&element).happened(event, &outbox);
                 }

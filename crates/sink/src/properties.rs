@@ -166,7 +166,7 @@ impl<'a> Table<'a> {
             t.number("dead-zone", AtOnce, "Offset from the middle that does not start a move, as a fraction of the picture's width; in mode=velocity, while the camera pans, a third of it for tilt", 0.0..=0.5, |s| &mut s.servo.dead_zone),
             t.number("max-speed", AtOnce, "Highest speed of pan and tilt, in degrees per second", 0.1..=1000.0, |s| &mut s.servo.max_speed_deg_s),
             t.number("max-acceleration", AtOnce, "Greatest change of pan and tilt speed, in degrees per second per second; a stop is immediate", 1.0..=10_000.0, |s| &mut s.servo.max_acceleration_deg_s2),
-            t.number("max-rate", AtOnce, "Commands per second at most; a stop is sent immediately", 0.1..=50.0, |s| &mut s.servo.max_rate_hz),
+            t.number("max-rate", AtOnce, "Commands per second at most; a stop is sent immediately", 0.1..=50.0, |s| &mut s.session.max_rate_hz),
             t.duration("latency", AtOnce, "Delay from sending a command until a picture that shows its effect arrives, in nanoseconds, up to 5 s", Duration::ZERO..=millis(5000), |s| &mut s.servo.latency),
             t.optional_number("field-of-view", AtOnce, "Horizontal field of view when zoomed out, in degrees (0: as the camera reports)", 0.0..=179.0, |s| &mut s.servo.fov_deg),
             t.switch("invert-pan", AtOnce, "Panning right moves the view left, for example because the camera hangs upside down", |s| &mut s.servo.mounting.invert_pan),
@@ -192,7 +192,7 @@ impl<'a> Table<'a> {
             ),
             t.duration("home-timeout", AtOnce, "The camera goes home when there has been no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
             t.switch("home-at-start", AtStart, "Go home on start-up too, without waiting for `home-timeout`", |s| &mut s.servo.home_at_start),
-            t.duration("override-timeout", AtOnce, "After somebody else has moved the camera, steering resumes once it has not been moved for this long, in nanoseconds, up to a day (0: never give way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.override_timeout),
+            t.duration("override-timeout", AtOnce, "After somebody else has moved the camera, steering resumes once it has not been moved for this long, in nanoseconds, up to a day (0: never give way)", Duration::ZERO..=millis(86_400_000), |s| &mut s.session.override_timeout),
             t.switch("dead-man", AtStart, "Have another process stop the camera if this one dies or hangs while the camera moves; not with `lockstep`", |s| &mut s.dead_man),
             special(
                 text("dead-man-socket", AtStart, &format!("Socket of a running `{} --listen` to use as that process (unset: one is started)", particulars.watchdog)),

@@ -25,13 +25,13 @@ pub trait Setting: PtzSink {
             match (property.takes, mailbox) {
                 // Until both are set, a pair of limits may well be crossed: it is judged when a camera task starts.
                 (Takes::AtStart, _) | (_, None) => {}
-                (Takes::AtOnce, Some(mailbox)) => mailbox.configure(settings.servo()),
+                (Takes::AtOnce, Some(mailbox)) => mailbox.configure(settings.control()),
                 (Takes::AsLimit, Some(mailbox)) => {
                     refused.extend(settings.judge_limits());
-                    mailbox.configure(settings.servo());
+                    mailbox.configure(settings.control());
                 }
                 (Takes::AsSteering, Some(mailbox)) => {
-                    mailbox.configure(settings.servo());
+                    mailbox.configure(settings.control());
                     // Whoever waits for the rest is told of it on the bus.
                     drop(mailbox.rest());
                 }
@@ -48,7 +48,7 @@ pub trait Setting: PtzSink {
         let refused = {
             let mut settings = lock(&self.core().settings);
             let refused = settings.judge_limits();
-            task.mailbox().configure(settings.servo());
+            task.mailbox().configure(settings.control());
             let credentials = settings.credentials(environment);
             if credentials != before.credentials(environment) {
                 task.mailbox().set_credentials(credentials);

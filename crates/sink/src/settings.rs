@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use servo::{Range, ServoSettings, SoftLimits};
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::{LoopSettings, SessionSettings};
 
 /// To what the camera is steered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -53,6 +54,8 @@ pub struct Settings {
     pub target_height: f64,
     /// All that the servo is to know but `target_height`, which is zoomed by only with `auto_zoom`.
     pub servo: ServoSettings,
+    /// How the camera is spoken with.
+    pub session: SessionSettings,
     /// The limits as they were when they were last judged.
     kept_limits: SoftLimits,
     /// What the environment variables of the sink begin with.
@@ -80,12 +83,13 @@ impl Settings {
             target_height: 0.4,
             kept_limits: servo.limits,
             environment,
+            session: SessionSettings::default(),
             servo,
         }
     }
 
-    /// What the servo is to know.
-    pub fn servo(&self) -> ServoSettings {
+    /// What the control loop is to know.
+    pub fn control(&self) -> LoopSettings {
         let mut servo = ServoSettings {
             target_height: self.auto_zoom.then_some(self.target_height),
             ..self.servo.clone()
@@ -95,7 +99,7 @@ impl Settings {
             Steering::Home => servo.home_timeout = Duration::ZERO,
             Steering::Off => servo.home = None,
         }
-        servo
+        LoopSettings { servo, session: self.session }
     }
 
     /// Each pair of limits of which the lower is the higher becomes what it was when it was last judged; returns what

@@ -5,11 +5,25 @@ use std::time::Duration;
 use super::{Mounting, ObservedRotation};
 use crate::model::{CommandHistory, PanTilt};
 
-/// Learns which way each axis turns the picture: cameras hang, and some makes have an axis the wrong way round.
+/// Learns which way each axis turns the picture: cameras hang, and some makes have an axis the wrong way round, or each in
+/// the other's place.
 #[derive(Debug, Default)]
 pub struct AxisEstimator {
+    /// Whether pan tilts and tilt pans: as unlikely as an axis that is the wrong way round, and found by the same evidence.
+    exchange: AxisSense,
     pan: AxisSense,
     tilt: AxisSense,
+    /// Until it is known whether they are exchanged, one of them is moved at a time: whether it is pan, and since when.
+    alone: Option<(bool, Duration)>,
+}
+
+/// What was found out about an axis.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum AxisFinding {
+    /// It turns the picture the other way.
+    Inverted,
+    /// Pan tilts, and tilt pans.
+    Exchanged,
 }
 
 /// What is known of one axis.
@@ -54,6 +68,12 @@ impl AxisEstimator {
     /// for all that time is compared.
     const LONGEST_DELAY: Duration = Duration::from_millis(900);
 
+    /// One axis is moved alone for so long, that a picture may show what it does.
+    const ALONE: Duration = Duration::from_millis(1500);
+
+    /// A turn is along one axis where it is so many times faster than along the other.
+    const ALONG_ONE: f64 = 2.0;
+
     /// What a background at rest seems to turn by in a second, in fields of view.
     const NOISE_FIELDS_S: f64 = 0.02;
 
@@ -66,27 +86,64 @@ impl AxisEstimator {
         }
     }
 
-    /// Takes a turn that the background shows; returns whether an axis is now taken to turn the other way.
-    pub fn see(&mut self, turn: &ObservedRotation, history: &CommandHistory, fov_deg: f64) -> bool {
+    /// What is along the picture's sides along the camera's axes, or back: each in the other's place where they are exchanged.
+    pub fn exchanged<T>(&self, (pan, tilt): (T, T)) -> (T, T) {
+        if self.exchange.inverted { (tilt, pan) } else { (pan, tilt) }
+    }
+
+    /// Takes a turn that the background shows; returns what is now taken to be otherwise.
+    pub fn see(
+        &mut self,
+        turn: &ObservedRotation,
+        history: &CommandHistory,
+        fov_deg: f64,
+    ) -> Option<AxisFinding> {
         let since = turn.from.saturating_sub(Self::LONGEST_DELAY);
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
         let noise = Self::NOISE_FIELDS_S * fov_deg;
+        if turn.rate.largest() > noise
+            && let (Some(told), Some(seen)) = (along_one(told.iter().copied()), along_one([turn.rate]))
+            && self.exchange.see(1.0, if told == seen { 1.0 } else { -1.0 })
+        {
+            (self.pan, self.tilt) = (AxisSense::default(), AxisSense::default());
+            return Some(AxisFinding::Exchanged);
+        }
+        if !self.exchange.is_known() {
+            return None;
+        }
         let pan = one_way(told.iter().map(|rate| rate.pan));
         let tilt = one_way(told.iter().map(|rate| rate.tilt));
         let see = |axis: &mut AxisSense, told: Option<f64>, seen: f64| {
             told.is_some_and(|told| seen.abs() > noise && axis.see(told, seen))
         };
         let changed = see(&mut self.pan, pan, turn.rate.pan);
-        see(&mut self.tilt, tilt, turn.rate.tilt) || changed
+        (see(&mut self.tilt, tilt, turn.rate.tilt) || changed).then_some(AxisFinding::Inverted)
     }
 
-    /// A rate bounded by what is known of the axes.
-    pub fn cautious(&self, rate: PanTilt) -> PanTilt {
+    /// A rate bounded by what is known of the axes. Of two that are exchanged and move at once, nobody can tell from the picture
+    /// that they are not both the wrong way round.
+    pub fn cautious(&mut self, mut rate: PanTilt, now: Duration) -> PanTilt {
+        if !self.exchange.is_known() {
+            let since = self.alone.filter(|(_, since)| now < *since + Self::ALONE);
+            let (pans, _) = *self.alone.insert(since.unwrap_or((rate.pan.abs() >= rate.tilt.abs(), now)));
+            rate = if pans { PanTilt::new(rate.pan, 0.0) } else { PanTilt::new(0.0, rate.tilt) };
+        }
         let bounded = |axis: AxisSense, rate: f64| {
             if axis.is_known() { rate } else { rate.clamp(-Self::CAUTIOUS_DEG_S, Self::CAUTIOUS_DEG_S) }
         };
         PanTilt::new(bounded(self.pan, rate.pan), bounded(self.tilt, rate.tilt))
     }
+}
+
+/// Whether turns are all along one axis: `Some(true)` along pan, `Some(false)` along tilt.
+fn along_one(turns: impl IntoIterator<Item = PanTilt>) -> Option<bool> {
+    let (mut pan, mut tilt) = (true, true);
+    for turn in turns {
+        let (x, y) = (turn.pan.abs(), turn.tilt.abs());
+        pan &= x > AxisEstimator::ALONG_ONE * y;
+        tilt &= y > AxisEstimator::ALONG_ONE * x;
+    }
+    (pan != tilt).then_some(pan)
 }
 
 /// The first of rates that all have one sign.
@@ -104,50 +161,73 @@ mod tests {
     }
 
     /// Twelve pictures a second of a camera told to pan at `told`, which the background shows to do `seen`.
-    fn watch(axes: &mut AxisEstimator, told: PanTilt, seen: PanTilt, pictures: u64) -> bool {
+    fn watch(axes: &mut AxisEstimator, told: PanTilt, seen: PanTilt, pictures: u64) -> Option<AxisFinding> {
         let mut history = CommandHistory::default();
         history.push(ms(0), told);
-        let mut changed = false;
+        let mut found = None;
         for picture in 0..pictures {
             let from = ms(2000 + 80 * picture);
             let turn = ObservedRotation { from, to: from + ms(80), rate: seen };
-            changed |= axes.see(&turn, &history, 55.0);
+            found = axes.see(&turn, &history, 55.0).or(found);
         }
-        changed
+        found
+    }
+
+    /// Of a camera whose axes are known not to be exchanged.
+    fn straight() -> AxisEstimator {
+        let mut axes = AxisEstimator::default();
+        axes.exchange.with = AxisSense::DECISIVE;
+        axes
+    }
+
+    #[test]
+    fn exchanged_axes_are_found_and_then_told_in_each_others_place() {
+        let mut axes = AxisEstimator::default();
+        let slanted = PanTilt::new(5.0, 4.0);
+        assert_eq!(watch(&mut axes, slanted, slanted, 100), None, "nothing can be told by that");
+        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(6.0, 0.0));
+        let (told, seen) = (PanTilt::new(5.0, 0.5), PanTilt::new(0.3, -4.0));
+        assert_eq!(watch(&mut axes, told, seen, 5), None);
+        assert_eq!(watch(&mut axes, told, seen, 1), Some(AxisFinding::Exchanged));
+        assert_eq!(axes.exchanged((1, 2)), (2, 1));
+        let seen = PanTilt::new(4.0, 0.3);
+        assert_eq!(watch(&mut axes, told, seen, 100), None);
+        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(40.0, 0.0));
     }
 
     #[test]
     fn an_axis_that_turns_as_it_is_told_is_known_so() {
         let mut axes = AxisEstimator::default();
         let fast = PanTilt::new(40.0, -40.0);
-        assert_eq!(axes.cautious(fast), PanTilt::new(6.0, -6.0));
-        assert!(!watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(4.0, 3.0), 6));
-        assert_eq!(axes.cautious(fast), PanTilt::new(40.0, -6.0), "tilt was never told to turn");
+        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(6.0, 0.0), "one at a time");
+        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(4.0, 1.0), 12), None);
+        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(40.0, -6.0), "tilt was never told to turn");
         assert_eq!(axes.mounting(Mounting::default()), Mounting::default());
     }
 
     #[test]
     fn one_that_turns_the_other_way_is_found_and_then_known() {
-        let mut axes = AxisEstimator::default();
-        assert!(!watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 5));
-        assert!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 1));
+        let mut axes = straight();
+        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 5), None);
+        let found = watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 1);
+        assert_eq!(found, Some(AxisFinding::Inverted));
         let mirrored = Mounting { invert_pan: true, ..Mounting::default() };
         assert_eq!(axes.mounting(Mounting::default()), mirrored);
         assert_eq!(axes.mounting(mirrored), Mounting::default(), "as it was set");
-        assert!(!watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(4.0, 4.0), 100));
-        assert_eq!(axes.cautious(PanTilt::new(40.0, 40.0)), PanTilt::new(40.0, 40.0));
+        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(4.0, 4.0), 100), None);
+        assert_eq!(axes.cautious(PanTilt::new(40.0, 40.0), ms(0)), PanTilt::new(40.0, 40.0));
     }
 
     #[test]
     fn noise_and_moves_to_and_fro_tell_nothing() {
-        let mut axes = AxisEstimator::default();
-        assert!(!watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(-1.0, 0.0), 100));
+        let mut axes = straight();
+        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(-1.0, 0.0), 100), None);
         let mut history = CommandHistory::default();
         for picture in 0..100 {
             let from = ms(500 * picture);
             history.push(from, PanTilt::new(if picture % 2 == 0 { 9.0 } else { -9.0 }, 0.0));
             let turn = ObservedRotation { from, to: from + ms(80), rate: PanTilt::new(9.0, 0.0) };
-            assert!(!axes.see(&turn, &history, 55.0));
+            assert_eq!(axes.see(&turn, &history, 55.0), None);
         }
     }
 }

@@ -27,7 +27,7 @@ mod speed_map;
 mod target;
 mod zoom;
 
-pub use axes::AxisEstimator;
+pub use axes::{AxisEstimator, AxisFinding};
 use calibration::ObservedRotation;
 pub use calibration::{Estimates, SelfCalibration};
 use field_of_view::FieldOfViewEstimator;

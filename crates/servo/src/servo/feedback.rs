@@ -13,7 +13,8 @@ impl Servo {
     pub fn accepted(&mut self, actuation: &Actuation, sent: Duration, now: Duration) {
         match actuation {
             Actuation::Velocity { pan, tilt, zoom } => {
-                self.camera.history.push_steps(sent, (*pan, *tilt), &self.camera.speed_map);
+                let steps = self.axes.exchanged((*pan, *tilt));
+                self.camera.history.push_steps(sent, steps, &self.camera.speed_map);
                 if let Some(zoom) = zoom {
                     self.zoom.commanded(sent, *zoom);
                 }

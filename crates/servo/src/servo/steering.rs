@@ -9,7 +9,7 @@ use ptztrack_contract::Point;
 use super::{Access, Actuation, ActuatorStatus, Servo};
 use crate::control::{ControlLaw, Jump, Mode, ZoomGoal};
 use crate::estimation::Measurement;
-use crate::model::{PanTilt, View, around_deg, narrower};
+use crate::model::{PanTilt, Position, View, around_deg, narrower};
 
 impl Servo {
     /// The part of the dead zone that tilt keeps while the camera pans.
@@ -30,7 +30,7 @@ impl Servo {
         let offset = self.estimator.offset(now, history, &delays);
         let wanted = self.controller.rate(&offset, history.rate_at(now), &law);
         let position = self.limits.position(history, delays.command, now);
-        let wanted = if self.settings.learn_axes { self.axes.cautious(wanted) } else { wanted };
+        let wanted = if self.settings.learn_axes { self.axes.cautious(wanted, now) } else { wanted };
         let rate = self.limited(wanted, position, (delays.sum() + actuator.interval).as_secs_f64());
         let (pan, tilt) = self.controller.quantise(rate, &self.camera.speed_map);
         let zoom = self.zoom_speed(measurement, now);
@@ -58,7 +58,36 @@ impl Servo {
     /// What of a motion from `position` the limits leave, if it goes on for so long.
     fn limited(&mut self, motion: PanTilt, position: Option<PanTilt>, lasting_s: f64) -> PanTilt {
         let hard = self.camera.capabilities.limits;
-        self.limits.apply(motion, position, (&hard, &self.settings.limits), lasting_s)
+        let (motion, position) = (self.exchanged(motion), position.map(|position| self.exchanged(position)));
+        let limited = self.limits.apply(motion, position, (&hard, &self.settings.limits), lasting_s);
+        self.exchanged(limited)
+    }
+
+    /// An angle along the picture's sides along the camera's axes, or back.
+    fn exchanged(&self, angle: PanTilt) -> PanTilt {
+        let (pan, tilt) = self.axes.exchanged((angle.pan, angle.tilt));
+        PanTilt::new(pan, tilt)
+    }
+
+    /// The same of what is to be done.
+    pub(super) fn exchanged_actuation(&self, actuation: Actuation) -> Actuation {
+        match actuation {
+            Actuation::Velocity { pan, tilt, zoom } => {
+                let (pan, tilt) = self.axes.exchanged((pan, tilt));
+                Actuation::Velocity { pan, tilt, zoom }
+            }
+            Actuation::Absolute { pan_deg, tilt_deg, speed, zoom } => {
+                let (pan_deg, tilt_deg) = self.axes.exchanged((pan_deg, tilt_deg));
+                Actuation::Absolute { pan_deg, tilt_deg, speed, zoom }
+            }
+            other => other,
+        }
+    }
+
+    /// A position as the camera tells it, along the picture's sides: only so do positions compare to what was commanded.
+    pub fn along_picture(&self, position: Position) -> Position {
+        let (pan_deg, tilt_deg) = self.axes.exchanged((position.pan_deg, position.tilt_deg));
+        Position { pan_deg, tilt_deg, ..position }
     }
 
     fn control_law(&self, view: &View, interval: Duration, now: Duration) -> ControlLaw {
@@ -145,7 +174,7 @@ impl Servo {
 
     /// Whether this command takes the camera home.
     pub fn leads_home(&self, actuation: &Actuation) -> bool {
-        self.home.leads(actuation, self.move_speed())
+        self.home.leads(&self.exchanged_actuation(*actuation), self.move_speed())
     }
 
     /// Speed step of moves to a position.

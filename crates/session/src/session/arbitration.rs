@@ -129,6 +129,11 @@ impl Arbitration {
         self.queue.forget();
     }
 
+    /// Positions are told along other axes from here on.
+    pub fn reorient(&mut self) {
+        self.watch.forget();
+    }
+
     /// The camera was asked where it looks, and did not say.
     pub fn undecided(&mut self) {
         self.watch.undecided();

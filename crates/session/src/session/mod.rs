@@ -34,7 +34,7 @@ use scheduler::Scheduler;
 use servo::{Access, ActuatorStatus, Mode, Servo, ServoSettings};
 use stop_confirmation::{StopConfirmation, StopFinding};
 
-use crate::{Command, Protocol, SessionEvent};
+use crate::{Command, Protocol, SessionEvent, SessionSettings};
 
 /// A camera that did not answer a move is not expected to act on it later than this.
 pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
@@ -43,6 +43,7 @@ pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
 /// clock: both are the caller's.
 #[derive(Debug)]
 pub struct Session {
+    settings: SessionSettings,
     connection: Connection,
     discovery: Discovery,
     description: Description,
@@ -62,8 +63,9 @@ pub struct Session {
 
 impl Session {
     /// Knows nothing of the camera yet, which is to be moved like this and speaks this protocol.
-    pub fn new(mode: Mode, protocol: &Protocol) -> Self {
+    pub fn new(mode: Mode, settings: SessionSettings, protocol: &Protocol) -> Self {
         Self {
+            settings,
             connection: Connection::default(),
             discovery: Discovery::new(protocol.questions),
             description: Description::default(),
@@ -78,8 +80,9 @@ impl Session {
         }
     }
 
-    /// The servo has taken new settings in place of these.
-    pub fn reconfigured(&mut self, before: &ServoSettings, servo: &Servo) {
+    /// Takes new settings; the servo has taken new ones in place of those `before`.
+    pub fn configure(&mut self, settings: SessionSettings, before: &ServoSettings, servo: &Servo) {
+        self.settings = settings;
         let now = servo.settings();
         if now.mode != before.mode {
             self.modes.want(now.mode);
@@ -95,6 +98,11 @@ impl Session {
         self.discovery.renew();
         self.arbitration.queue.permitted();
         self.next_poll = Duration::ZERO;
+    }
+
+    /// The axes are known to be otherwise: where the camera was before says nothing of who moved it since.
+    pub fn reorient(&mut self) {
+        self.arbitration.reorient();
     }
 
     /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.
@@ -149,7 +157,7 @@ impl Session {
             mode: self.mode(servo, now),
             may_move: self.scheduler.may_move(),
             in_doubt: self.scheduler.in_doubt(),
-            interval: min_interval(servo).max(self.scheduler.round_trip()),
+            interval: self.settings.min_interval().max(self.scheduler.round_trip()),
         }
     }
 
@@ -216,9 +224,4 @@ impl Session {
     pub fn take_events(&mut self) -> Vec<SessionEvent> {
         mem::take(&mut self.events)
     }
-}
-
-/// From one command to the next, at least.
-fn min_interval(servo: &Servo) -> Duration {
-    Duration::from_secs_f64(1.0 / servo.settings().max_rate_hz)
 }

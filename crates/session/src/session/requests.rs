@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use servo::{Actuation, Servo};
 
-use super::{Session, StopConfirmation, min_interval};
+use super::{Session, StopConfirmation};
 use crate::{Command, Next, Query, Request, SessionEvent};
 
 impl Session {
@@ -24,7 +24,7 @@ impl Session {
         }
         self.repeat_unseen_stop(now);
         let actuation = servo.control(&self.actuator(servo, now), now);
-        let (command, due) = self.command(actuation, min_interval(servo), now);
+        let (command, due) = self.command(actuation, self.settings.min_interval(), now);
         let (query, query_due) = self.question(servo, now);
         let query_due = query_due.max(self.connection.retry_at());
         let patience = self.patience(&query, servo, now);

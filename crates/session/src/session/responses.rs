@@ -303,7 +303,7 @@ impl Session {
         if servo.is_under_way() {
             self.arbitration.excuse(now);
         }
-        let give_way = servo.settings().override_timeout;
+        let give_way = self.settings.override_timeout;
         // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
         let commands = CommandedMotion { pan_tilt: &servo.camera().history, zoom: servo.zoom_commands() };
         let finding = self.arbitration.positioned(place, (asked, now), commands, give_way);

@@ -11,17 +11,17 @@ use std::time::Duration;
 use tokio::sync::Notify;
 
 use ptztrack_contract::lock::lock;
-use servo::{Measurement, ServoSettings};
+use servo::Measurement;
 
 use super::Clock;
-use crate::Command;
 use crate::http::Credentials;
+use crate::{Command, LoopSettings};
 
 /// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
 #[derive(Debug, Default)]
 pub struct Mail {
     pub credentials: Option<Option<Credentials>>,
-    pub servo: Option<ServoSettings>,
+    pub settings: Option<LoopSettings>,
     /// What ends the move in which a predecessor left the camera.
     pub orphan: Option<Command>,
     /// Forget the target and stop; before `measurement`.
@@ -143,9 +143,9 @@ impl Mailbox {
         mail.settling.clear();
     }
 
-    /// The servo is to go by these from here on.
-    pub fn configure(&self, servo: ServoSettings) {
-        self.mail().servo = Some(servo);
+    /// The control loop is to go by these from here on.
+    pub fn configure(&self, settings: impl Into<LoopSettings>) {
+        self.mail().settings = Some(settings.into());
         self.arrived.notify_one();
     }
 

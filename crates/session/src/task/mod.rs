@@ -29,9 +29,8 @@ use self::state::TaskState;
 
 use crate::http::{ClientSettings, Credentials, Location};
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
-use crate::{Client, Command, ControlLoop, Error, LoopEvent, Next, Request, Status};
+use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
 use ptztrack_contract::lock::lock;
-use servo::ServoSettings;
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
 pub const STOP_GRACE: Duration = Duration::from_millis(500);
@@ -115,17 +114,17 @@ impl CameraTask {
     /// What keeps the client or the runtime from being made, in words.
     pub fn start<C: Client>(
         client: ClientSettings,
-        servo: ServoSettings,
+        settings: impl Into<LoopSettings>,
         clock: Clock,
         watchdog: Option<Arc<Watchdog>>,
         observer: impl Fn(Event) + Clone + Send + Sync + 'static,
     ) -> Result<Self, String> {
         let camera = (client.location.clone(), client.channel.clone());
-        let settings = Arc::new(Mutex::new(client.clone()));
+        let spoken_to = Arc::new(Mutex::new(client.clone()));
         let client = C::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let mailbox = Arc::new(Mailbox::new(clock));
-        let control = ControlLoop::new(servo, &C::PROTOCOL);
+        let control = ControlLoop::new(settings, &C::PROTOCOL);
         let (status, estimates, stop) =
             (control.status(Duration::ZERO), Some(control.estimates()), Some(control.stop()));
         let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
@@ -133,7 +132,7 @@ impl CameraTask {
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
         let task = Task {
             client,
-            settings: settings.clone(),
+            settings: spoken_to.clone(),
             dead_man: DeadMan::new(watchdog),
             state,
             former: None,
@@ -147,7 +146,7 @@ impl CameraTask {
             if let Err(err) = running.await {
                 mailbox.close();
                 observer(Event::Died(err.to_string()));
-                let settings = lock(&settings).clone();
+                let settings = lock(&spoken_to).clone();
                 predecessor.stop::<C>(settings, &mailbox).await;
             }
         });

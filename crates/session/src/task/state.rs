@@ -78,12 +78,12 @@ impl<O: Fn(Event)> TaskState<O> {
     }
 
     pub fn take_mail(&mut self) {
-        let Mail { credentials, servo, orphan, rest, measurement, waiting, settling, finish, quit } =
+        let Mail { credentials, settings, orphan, rest, measurement, waiting, settling, finish, quit } =
             self.mailbox.take();
         let now = self.mailbox.now();
         self.credentials = credentials.or(self.credentials.take());
-        if let Some(servo) = servo {
-            self.control.configure(servo);
+        if let Some(settings) = settings {
+            self.control.configure(settings);
         }
         if let Some(stop) = orphan {
             self.control.session_mut().inherit(stop, now);
@@ -240,7 +240,7 @@ impl<O: Fn(Event)> TaskState<O> {
 mod tests {
     use super::*;
     use crate::task::{Clock, FINISH_BUDGET};
-    use crate::{Command, Next, Protocol, Query};
+    use crate::{Command, LoopSettings, Next, Protocol, Query, SessionSettings};
     use proptest::prelude::*;
     use servo::{Measurement, Position, ServoSettings, Visibility};
     use std::sync::mpsc::{Receiver, TryRecvError};
@@ -367,7 +367,7 @@ mod tests {
                     4 => state.mailbox.accept_measurements(false),
                     5 => state.mailbox.accept_measurements(true),
                     6 => state.mailbox.inherit(Command::Stop),
-                    7 => state.mailbox.configure(ServoSettings { max_rate_hz: 5.0, ..ServoSettings::default() }),
+                    7 => state.mailbox.configure(LoopSettings { session: SessionSettings { max_rate_hz: 5.0, ..SessionSettings::default() }, ..LoopSettings::default() }),
                     8 => state.mailbox.set_credentials(None),
                     _ => waiting.push(state.mailbox.finish(FINISH_BUDGET)),
                 }

@@ -21,11 +21,12 @@ use proptest::prelude::*;
 use servo::{HardLimits, Measurement, Mode, Position, Range, ServoSettings, TableRow, Visibility};
 use session::session::{ConnectionChange, ControlOwner};
 use session::{
-    Attributes, Client, Command, ControlLoop, Error, LoopEvent, Next, Query, Request, Response, SessionEvent,
+    Attributes, Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Query, Request, Response,
+    SessionEvent, SessionSettings,
 };
 
 /// A loop that speaks VAPIX.
-fn control_loop(settings: ServoSettings) -> ControlLoop {
+fn control_loop(settings: impl Into<LoopSettings>) -> ControlLoop {
     ControlLoop::new(settings, &vapix::Client::PROTOCOL)
 }
 
@@ -41,7 +42,7 @@ struct Rig {
 }
 
 impl Rig {
-    fn new(settings: ServoSettings) -> Self {
+    fn new(settings: impl Into<LoopSettings>) -> Self {
         let mut rig = Self { control: control_loop(settings), now: ms(1000), sent: Vec::new() };
         rig.run(|_| Ok(Response::Accepted));
         assert_eq!(rig.sent, [], "a camera just met is asked, not moved");
@@ -182,7 +183,8 @@ fn a_predicted_target_is_followed_no_longer_than_a_stale_one() {
 
 #[test]
 fn commands_keep_to_the_rate() {
-    let mut rig = Rig::new(ServoSettings { max_rate_hz: 5.0, ..ServoSettings::default() });
+    let session = SessionSettings { max_rate_hz: 5.0, ..SessionSettings::default() };
+    let mut rig = Rig::new(LoopSettings { session, ..LoopSettings::default() });
     let mut commands = 0;
     for frame in 0..250u32 {
         rig.see(0.7 + f64::from(frame % 7) * 0.04, 0.5);

@@ -74,6 +74,8 @@ quirks! {
     PanMirrored = "pan-mirrored", "Hikvision DS-2DF5220S: obs-ptz pull request 94";
     /// Tilting goes the other way
     TiltMirrored = "tilt-mirrored", "thingino issue 237";
+    /// Pan tilts, and tilt pans
+    AxesExchanged = "axes-exchanged", "supposed: no report is at hand";
     /// Neither spaces nor timeouts are told
     NoOptions = "no-options", "TP-Link: onvifsim";
     /// Only the second profile has PTZ

@@ -37,10 +37,11 @@ pub(crate) fn answer(camera: &Camera, onvif: &OnvifSettings, request: Node, host
     let name = request.tag_name().name();
     let known_profile = || {
         let token = child(request, "ProfileToken").and_then(|token| token.text()).unwrap_or_default();
-        let ptz_profile = if onvif.has(Quirk::SecondProfile) { "profile_2" } else { "profile_1" };
         match token.trim() {
-            token if token == ptz_profile => Ok(()),
-            "profile_1" | "profile_2" => Err(Refusal::Fault("NoPTZProfile", "no PTZ in this profile".into())),
+            token if has_ptz(onvif, token) => Ok(()),
+            "profile_1" | "profile_2" | "profile_3" => {
+                Err(Refusal::Fault("NoPTZProfile", "no PTZ in this profile".into()))
+            }
             _ => Err(Refusal::Fault("NoProfile", "no such profile".into())),
         }
     };
@@ -52,7 +53,7 @@ pub(crate) fn answer(camera: &Camera, onvif: &OnvifSettings, request: Node, host
         "GetDeviceInformation" => Ok(
             "<tds:GetDeviceInformationResponse><tds:Manufacturer>ptztrack</tds:Manufacturer><tds:Model>virtual camera</tds:Model><tds:FirmwareVersion>1</tds:FirmwareVersion><tds:SerialNumber>1</tds:SerialNumber><tds:HardwareId>1</tds:HardwareId></tds:GetDeviceInformationResponse>".into(),
         ),
-        "GetProfiles" if is_media2(request) => Ok(profiles2(camera)),
+        "GetProfiles" if is_media2(request) => Ok(profiles2(camera, onvif)),
         "GetProfiles" => Ok(profiles(camera, onvif)),
         "GetStreamUri" => stream_uri(camera, request, host),
         "GetConfigurationOptions" if onvif.has(Quirk::NoOptions) => {
@@ -130,13 +131,33 @@ fn is_media2(request: Node) -> bool {
     request.tag_name().namespace() == Some("http://www.onvif.org/ver20/media/wsdl")
 }
 
-/// Media 2 lists the one of H.265 only.
-fn profiles2(camera: &Camera) -> String {
-    let (token, _, size) = streams(camera)[2];
-    let encoder = encoder("tr2:VideoEncoder", "H265", size);
-    format!(
-        "<tr2:GetProfilesResponse><tr2:Profiles token=\"{token}\" fixed=\"true\"><tr2:Name>Profile 3</tr2:Name><tr2:Configurations>{encoder}</tr2:VideoEncoder></tr2:Configurations></tr2:Profiles></tr2:GetProfilesResponse>"
-    )
+/// What a PTZ configuration consists of.
+const PTZ_CONFIGURATION: &str =
+    "<tt:Name>ptz</tt:Name><tt:UseCount>1</tt:UseCount><tt:NodeToken>node_1</tt:NodeToken>";
+
+fn has_ptz(onvif: &OnvifSettings, token: &str) -> bool {
+    token == if onvif.has(Quirk::SecondProfile) { "profile_2" } else { "profile_1" }
+}
+
+/// By Media 2, which knows H.265.
+fn profiles2(camera: &Camera, onvif: &OnvifSettings) -> String {
+    let profiles = streams(camera).map(|(token, codec, size)| {
+        let encoding = match codec {
+            "h264" => "H264",
+            "h265" => "H265",
+            _ => "MPV4-ES",
+        };
+        let encoder = encoder("tr2:VideoEncoder", encoding, size);
+        let ptz = if has_ptz(onvif, token) {
+            format!("<tr2:PTZ token=\"ptz_1\">{PTZ_CONFIGURATION}</tr2:PTZ>")
+        } else {
+            String::new()
+        };
+        format!(
+            "<tr2:Profiles token=\"{token}\" fixed=\"true\"><tr2:Name>{token}</tr2:Name><tr2:Configurations>{encoder}</tr2:VideoEncoder>{ptz}</tr2:Configurations></tr2:Profiles>"
+        )
+    });
+    format!("<tr2:GetProfilesResponse>{}</tr2:GetProfilesResponse>", profiles.concat())
 }
 
 fn stream_uri(camera: &Camera, request: Node, host: &str) -> Answer {
@@ -161,10 +182,9 @@ fn stream_uri(camera: &Camera, request: Node, host: &str) -> Answer {
 
 fn profiles(camera: &Camera, onvif: &OnvifSettings) -> String {
     let streams = streams(camera);
-    let ptz = "<tt:PTZConfiguration token=\"ptz_1\"><tt:Name>ptz</tt:Name><tt:UseCount>1</tt:UseCount><tt:NodeToken>node_1</tt:NodeToken></tt:PTZConfiguration>";
+    let ptz = format!("<tt:PTZConfiguration token=\"ptz_1\">{PTZ_CONFIGURATION}</tt:PTZConfiguration>");
     let profile = |number: u32, encoding: &str, size: (u32, u32)| {
-        let has_ptz = (number == 2) == onvif.has(Quirk::SecondProfile);
-        let ptz = if has_ptz { ptz } else { "" };
+        let ptz = if has_ptz(onvif, &format!("profile_{number}")) { ptz.as_str() } else { "" };
         let encoder = encoder("tt:VideoEncoderConfiguration", encoding, size);
         format!(
             "<trt:Profiles token=\"profile_{number}\" fixed=\"true\"><tt:Name>Profile {number}</tt:Name>{encoder}<tt:Multicast><tt:Address><tt:Type>IPv4</tt:Type><tt:IPv4Address>0.0.0.0</tt:IPv4Address></tt:Address><tt:Port>0</tt:Port><tt:TTL>1</tt:TTL><tt:AutoStart>false</tt:AutoStart></tt:Multicast><tt:SessionTimeout>PT60S</tt:SessionTimeout></tt:VideoEncoderConfiguration>{ptz}</trt:Profiles>"
@@ -256,6 +276,7 @@ fn continuous_move(camera: &Camera, onvif: &OnvifSettings, request: Node) -> Ans
         if x.abs() > 1.0 || y.abs() > 1.0 {
             return refused("InvalidVelocity", "beyond -1 to 1");
         }
+        let (x, y) = if onvif.has(Quirk::AxesExchanged) { (y, x) } else { (x, y) };
         let (x, y) = (x * sign(Quirk::PanMirrored), y * sign(Quirk::TiltMirrored));
         motions.push(Motion::PanTilt { pan: stepped(x) * 100.0, tilt: stepped(y) * 100.0 });
     }
