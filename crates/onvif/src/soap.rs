@@ -75,13 +75,17 @@ fn fault(fault: &Element) -> Answer {
     fault.gather("Value", &mut codes);
     // SOAP 1.1 has it otherwise.
     fault.gather("faultcode", &mut codes);
-    let has = |word: &str| codes.iter().any(|code| code.to_ascii_lowercase().contains(word));
-    if has("notauthorized") || has("failedauthentication") || has("invalidsecurity") {
-        return Answer::NotAuthorized;
-    }
     let mut reasons = Vec::new();
     fault.gather("Text", &mut reasons);
     fault.gather("faultstring", &mut reasons);
+    // Not all have a code for it: one that is asked again and again for this locks the account.
+    let refuses_us = |text: &&str| {
+        let text = text.to_ascii_lowercase();
+        ["authoriz", "authenticat", "security"].iter().any(|word| text.contains(word))
+    };
+    if codes.iter().chain(&reasons).any(refuses_us) {
+        return Answer::NotAuthorized;
+    }
     let said: Vec<_> = reasons.into_iter().chain(codes.into_iter().next_back()).collect();
     let said = excerpt(&said.join(", "));
     Answer::Fault(if said.is_empty() { "a fault without a reason".to_owned() } else { said })

@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Independent clients: FFmpeg plays the streams, three libraries from PyPI steer the camera.
+//! Independent clients: FFmpeg plays the streams, three libraries from PyPI and one from npm steer the camera.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod common;
 
-use std::{ffi::OsStr, path::Path, process::Command};
+use std::{ffi::OsStr, fs, path::Path, process::Command};
 
 use common::{PATIENCE, settings};
 use virtual_camera::{Auth, OnvifSettings, Settings, VirtualCamera};
@@ -117,4 +117,33 @@ fn libraries_from_pypi_read_and_steer() {
             "{client}: {statuses:?}"
         );
     }
+}
+
+#[test]
+fn a_library_from_npm_finds_and_steers() {
+    if !has("npm", "--version") {
+        return;
+    }
+    let clients = Path::new(env!("CARGO_MANIFEST_DIR")).join("clients");
+    let modules = Path::new(env!("CARGO_TARGET_TMPDIR")).join("onvif-client");
+    fs::create_dir_all(&modules).unwrap();
+    for file in ["package.json", "steer_with_onvif.js"] {
+        fs::copy(clients.join(file), modules.join(file)).unwrap();
+    }
+    let mut install = limited("npm");
+    install.args(["install", "--no-audit", "--no-fund", "--no-package-lock", "--prefer-offline"]);
+    if let Err(error) = try_run(install.current_dir(&modules)) {
+        let unreachable = ["ENOTFOUND", "ETIMEDOUT", "ECONNREFUSED", "EAI_AGAIN", "exit status: 124"];
+        assert!(unreachable.iter().any(|sign| error.contains(sign)), "{error}");
+        eprintln!("SKIPPED: npm's registry cannot be reached:\n{error}");
+        return;
+    }
+    let onvif = Some(OnvifSettings { discoverable: true, ..OnvifSettings::default() });
+    let camera =
+        VirtualCamera::start(Settings { auth: Auth::Digest { qop: true }, onvif, ..settings() }).unwrap();
+    let address = camera.http_address().to_string();
+    let text =
+        run(limited("node").args(["steer_with_onvif.js", &address, "root", "pass"]).current_dir(&modules));
+    assert!(text.contains("steered"), "{text}");
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "it left the camera moving");
 }
