@@ -3,6 +3,7 @@
 //! `bgavgdetect` in a harness and in pipelines: what it reports, when it does not, and what it leaves alone.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use gst::glib::ParamSpec;
 use gst::prelude::*;
 use gst_check::Harness;
 use gst_video::prelude::*;
@@ -710,4 +711,76 @@ fn drops_before_frames_without_timestamps_do_not_keep_it_learning() {
         })
         .collect();
     assert_eq!(found, [None, None, Some(0), Some(0)]);
+}
+
+/// All that leaves a detector of these properties, told in words: caps, regions, messages. It is shown a walker beside a speck and a
+/// large box, who all leave, a camera that moves and stops, and an interruption of one and a half seconds.
+fn told(properties: &[(&str, &str)]) -> String {
+    let mut detector = Detector::new(&grey());
+    for (name, value) in properties {
+        detector.element.set_property_from_str(name, value);
+    }
+    let mut told = String::new();
+    for n in 0..60 {
+        let x = 4 + 2 * n;
+        let walker = [(x, 40, 20, 18), (x, 62, 20, 30), (120, 10, 3, 3), (10, 100, 60, 16)];
+        match n {
+            20 => detector.camera(true),
+            22 => detector.camera(false),
+            45 => detector.frame += 15,
+            _ => (),
+        }
+        let boxes = if (10..40).contains(&n) { &walker[..] } else { &[] };
+        let mut buffer = detector.buffer(boxes);
+        if n == 45 {
+            buffer.get_mut().unwrap().set_flags(gst::BufferFlags::DISCONT);
+        }
+        let buffer = detector.push(buffer);
+        told += &format!("{:?} {:?}\n", buffer.size(), MotionMeta::of(&buffer).map(Result::unwrap));
+    }
+    told + &format!("{:?} {:?}", detector.messages(), detector.harness.sinkpad().unwrap().current_caps())
+}
+
+/// A property, another value, and what it counts with.
+type Change = (&'static str, &'static str, &'static [(&'static str, &'static str)]);
+
+/// A property that does nothing is a promise that is not kept.
+#[test]
+fn every_property_changes_something() {
+    const THESIS: (&str, &str) = ("profile", "thesis");
+    const SPREAD: &[(&str, &str)] = &[THESIS, ("test", "spread"), ("alpha", "0.05")];
+    let changes: &[Change] = &[
+        ("alpha", "0.02", &[THESIS]),
+        ("analysis-width", "60", &[]),
+        ("close-size", "41", &[]),
+        ("confirm-frames", "7", &[]),
+        ("end-delay", "0", &[]),
+        ("exclude-zones", "0,0 0.5,0 0.5,1 0,1", &[]),
+        ("max-area", "0.04", &[]),
+        ("max-gap", "5000000000", &[]),
+        ("min-area", "0.03", &[]),
+        ("open-size", "25", &[]),
+        ("output", "mask", &[]),
+        ("post-messages", "false", &[]),
+        ("profile", "thesis", &[]),
+        ("selection", "largest-perimeter", &[]),
+        ("settle-time", "0", &[THESIS]),
+        ("spread-factor", "0.1", SPREAD),
+        ("test", "spread", &[THESIS]),
+        ("threshold", "0.9", &[THESIS]),
+        ("warm-up", "12", &[]),
+        ("window", "3", SPREAD),
+        ("zones", "0,0 0.5,0 0.5,1 0,1", &[]),
+    ];
+    let own = |property: &&ParamSpec| property.owner_type().name() == "GstBgAvgDetect";
+    let element = Detector::new(&grey()).element;
+    let mut names: Vec<_> =
+        element.list_properties().iter().filter(own).map(|property| property.name().to_owned()).collect();
+    names.sort();
+    let mut listed: Vec<_> = changes.iter().map(|(name, ..)| *name).collect();
+    listed.sort_unstable();
+    assert_eq!(names, listed, "a property is missing here");
+    for (name, value, with) in changes {
+        assert_ne!(told(with), told(&[*with, &[(*name, *value)]].concat()), "{name}={value} changes nothing");
+    }
 }

@@ -37,7 +37,7 @@ static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
 pub struct BgAvgDetect {
     #[property(
         name = "profile", get, set, type = Profile, member = profile, mutable_playing,
-        blurb = "Which steps are taken; `thesis` overrides analysis-width, alpha-interval, noise-floor, shed-trail, relearn-fraction and confirm-frames",
+        blurb = "Which steps are taken; `thesis` overrides analysis-width, selection and confirm-frames",
         builder(Settings::default().profile)
     )]
     #[property(
@@ -48,38 +48,27 @@ pub struct BgAvgDetect {
     #[property(
         name = "alpha", get, set, type = f64, member = alpha, mutable_playing,
         default = Settings::default().alpha, minimum = 0.0, maximum = 1.0,
-        blurb = "Weight of a new picture in the running mean, for pictures alpha-interval apart"
-    )]
-    #[property(
-        name = "alpha-interval", get, type = u64, member = alpha_interval_ns, mutable_playing,
-        set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "alpha-interval", value) { lock(&imp.settings).alpha_interval_ns = value },
-        default = Settings::default().alpha_interval_ns, maximum = 3_600_000_000_000,
-        blurb = "Distance of pictures that alpha is for, in nanoseconds; for others it is scaled (0 = alpha for every picture)"
+        blurb = "With profile=thesis: weight of a new picture in the running mean"
     )]
     #[property(
         name = "test", get, set, type = Test, member = test, mutable_playing,
-        blurb = "How foreground is told from background",
+        blurb = "With profile=thesis: how foreground is told from background",
         builder(Settings::default().test)
     )]
     #[property(
         name = "threshold", get, set, type = f64, member = threshold, mutable_playing,
         default = Settings::default().threshold, minimum = 0.0, maximum = 0.99,
-        blurb = "With test=relative: difference from the mean that is foreground, as a fraction of the mean"
-    )]
-    #[property(
-        name = "noise-floor", get, set, type = f64, member = noise_floor, mutable_playing,
-        default = Settings::default().noise_floor, minimum = 0.0, maximum = 255.0,
-        blurb = "Difference from the mean below which nothing is foreground, in grey levels of 256"
+        blurb = "With profile=thesis and test=relative: difference from the mean that is foreground, as a fraction of the mean"
     )]
     #[property(
         name = "spread-factor", get, set, type = f64, member = spread_factor, mutable_playing,
         default = Settings::default().spread_factor, minimum = 0.0, maximum = 100.0,
-        blurb = "With test=spread: difference from the mean that is foreground, in standard deviations"
+        blurb = "With profile=thesis and test=spread: difference from the mean that is foreground, in standard deviations"
     )]
     #[property(
         name = "window", get, set, type = u32, member = window, mutable_playing,
         default = Settings::default().window, minimum = 2, maximum = 255,
-        blurb = "With test=spread: how many of the last pictures the standard deviation is taken over"
+        blurb = "With profile=thesis and test=spread: how many of the last pictures the standard deviation is taken over"
     )]
     #[property(
         name = "open-size", get, set, type = i32, member = open_size, mutable_playing,
@@ -90,11 +79,6 @@ pub struct BgAvgDetect {
         name = "close-size", get, set, type = i32, member = close_size, mutable_playing,
         default = Settings::default().close_size, minimum = -1, maximum = 999,
         blurb = "Side of the square for closing, in pixels of the frame: smaller gaps are filled (0 or 1 = none, -1 = an upright rectangle chosen by the frame's height)"
-    )]
-    #[property(
-        name = "shed-trail", get, set, type = bool, member = shed_trail, mutable_playing,
-        default = Settings::default().shed_trail,
-        blurb = "Cut regions to where the picture still changes, so that the trail of the mean does not count"
     )]
     #[property(
         name = "selection", get, set, type = RegionSelection, member = selection, mutable_playing,
@@ -125,11 +109,6 @@ pub struct BgAvgDetect {
         name = "warm-up", get, set, type = u32, member = warm_up, mutable_playing,
         default = Settings::default().warm_up, minimum = 1, maximum = 10_000,
         blurb = "Frames from which the background is learned before anything is reported"
-    )]
-    #[property(
-        name = "relearn-fraction", get, set, type = f64, member = relearn_fraction, mutable_playing,
-        default = Settings::default().relearn_fraction, minimum = 0.0, maximum = 1.0,
-        blurb = "When more than this fraction of the picture is foreground, the background is learned anew (1 = never)"
     )]
     #[property(
         name = "confirm-frames", get, set, type = u32, member = confirm_frames, mutable_playing,
@@ -426,7 +405,7 @@ impl BgAvgDetect {
                     stream.skip();
                     return Seen::default();
                 }
-                let found = stream.look(buffer, elapsed, &settings);
+                let found = stream.look(buffer, &settings);
                 found.map(|regions| Seen {
                     motion: regions.map(|regions| MotionMeta { regions, ..MotionMeta::default() }),
                     scene: None,

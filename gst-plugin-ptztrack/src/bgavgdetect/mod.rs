@@ -50,7 +50,7 @@
 //! ```
 //! See what the detector sees, while tuning it:
 //! ```text
-//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=mask threshold=0.1 noise-floor=8 ! videoconvert ! autovideosink
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect output=mask profile=thesis threshold=0.1 ! videoconvert ! autovideosink
 //! ```
 //! Only the moving region, the rest transparent (before a chequered ground):
 //! ```text
@@ -101,7 +101,7 @@ pub enum Profile {
     /// With all that makes it find people in noise, at any frame rate.
     #[default]
     #[enum_value(
-        name = "With noise floor, upright closing, shed trails, confirmation and learning anew",
+        name = "With a background that travels with the camera, upright closing and confirmation",
         nick = "robust"
     )]
     Robust,

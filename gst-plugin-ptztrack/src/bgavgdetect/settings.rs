@@ -1,10 +1,9 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::sync::Arc;
-use std::time::Duration;
 
 use super::{Output, Profile, RegionSelection, Test};
-use crate::vision::{Criterion, DetectorConfig, ForegroundTest, RegionChoice, ZoneError, Zones};
+use crate::vision::{DetectorConfig, ForegroundTest, RegionChoice, ZoneError, Zones};
 
 /// Polygons as written and as read.
 #[derive(Debug, Clone, Default)]
@@ -26,22 +25,18 @@ pub(super) struct Settings {
     pub profile: Profile,
     pub analysis_width: u32,
     pub alpha: f64,
-    pub alpha_interval_ns: u64,
     pub test: Test,
     pub threshold: f64,
-    pub noise_floor: f64,
     pub spread_factor: f64,
     pub window: u32,
     pub open_size: i32,
     pub close_size: i32,
-    pub shed_trail: bool,
     pub selection: RegionSelection,
     pub min_area: f64,
     pub max_area: f64,
     pub zones: ZoneSetting,
     pub exclude_zones: ZoneSetting,
     pub warm_up: u32,
-    pub relearn_fraction: f64,
     pub confirm_frames: u32,
     pub settle_time_ns: u64,
     pub max_gap_ns: u64,
@@ -56,22 +51,18 @@ impl Default for Settings {
             profile: Profile::default(),
             analysis_width: 400,
             alpha: 0.5,
-            alpha_interval_ns: 200_000_000,
             test: Test::default(),
             threshold: 0.15,
-            noise_floor: 12.0,
             spread_factor: 3.0,
             window: 25,
             open_size: -1,
             close_size: -1,
-            shed_trail: true,
             selection: RegionSelection::default(),
             min_area: 0.001,
             max_area: 0.8,
             zones: ZoneSetting::default(),
             exclude_zones: ZoneSetting::default(),
             warm_up: 10,
-            relearn_fraction: 0.5,
             confirm_frames: 3,
             settle_time_ns: 500_000_000,
             max_gap_ns: 1_000_000_000,
@@ -94,11 +85,9 @@ impl Settings {
         let config = DetectorConfig {
             analysis_width: self.analysis_width as usize,
             alpha: self.alpha,
-            alpha_interval: Duration::from_nanos(self.alpha_interval_ns),
-            criterion: Criterion { test, noise_floor: self.noise_floor },
+            test,
             open_size: usize::try_from(self.open_size).ok(),
             close_size: usize::try_from(self.close_size).ok(),
-            shed_trail: self.shed_trail,
             choice: match self.selection {
                 RegionSelection::LargestPerimeter => RegionChoice::LargestPerimeter,
                 RegionSelection::All => RegionChoice::All,
@@ -108,7 +97,6 @@ impl Settings {
             zones: self.zones.zones.clone(),
             exclude_zones: self.exclude_zones.zones.clone(),
             warm_up: self.warm_up,
-            relearn_fraction: self.relearn_fraction,
             confirm_pictures: self.confirm_frames,
         };
         match self.profile {
@@ -121,17 +109,13 @@ impl Settings {
 /// Side of the square that the thesis opens and closes with, in pixels; it names none, so the smallest there is.
 const THESIS_SQUARE: usize = 3;
 
-/// Thesis 3.2 to 3.4 and no more: every picture weighs the same and is looked at as it comes, any difference of the
-/// threshold counts, both elements are square, and a region counts as soon as and as far as it is seen.
+/// Thesis 3.2 to 3.4 and no more: every picture is looked at as it comes, both elements are square, and a region counts as soon as it
+/// is seen.
 fn as_in_the_thesis(config: DetectorConfig) -> DetectorConfig {
     DetectorConfig {
         analysis_width: 0,
-        alpha_interval: Duration::ZERO,
-        criterion: Criterion { noise_floor: 0.0, ..config.criterion },
         open_size: config.open_size.or(Some(THESIS_SQUARE)),
         close_size: config.close_size.or(Some(THESIS_SQUARE)),
-        shed_trail: false,
-        relearn_fraction: 1.0,
         confirm_pictures: 1,
         choice: RegionChoice::LargestPerimeter,
         ..config
@@ -145,11 +129,9 @@ mod tests {
     #[test]
     fn the_thesis_has_none_of_our_steps_and_keeps_what_it_leaves_open() {
         let thesis = Settings { profile: Profile::Thesis, threshold: 0.2, ..Settings::default() }.detector();
-        assert_eq!((thesis.analysis_width, thesis.alpha_interval), (0, Duration::ZERO));
+        assert_eq!((thesis.analysis_width, thesis.confirm_pictures), (0, 1));
         assert_eq!((thesis.open_size, thesis.close_size), (Some(3), Some(3)));
-        assert_eq!((thesis.shed_trail, thesis.relearn_fraction, thesis.confirm_pictures), (false, 1.0, 1));
-        let test = ForegroundTest::Relative { threshold: 0.2 };
-        assert_eq!(thesis.criterion, Criterion { test, noise_floor: 0.0 });
+        assert_eq!(thesis.test, ForegroundTest::Relative { threshold: 0.2 });
         let larger = Settings { profile: Profile::Thesis, close_size: 9, ..Settings::default() };
         assert_eq!(larger.detector().close_size, Some(9));
         assert_ne!(Settings::default().detector(), thesis);

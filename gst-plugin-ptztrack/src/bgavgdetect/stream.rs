@@ -154,13 +154,12 @@ impl Stream {
     pub fn look(
         &mut self,
         buffer: &gst::BufferRef,
-        elapsed: Duration,
         settings: &Settings,
     ) -> Result<Option<Vec<Region>>, StreamError> {
         let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
             .map_err(|_| StreamError::Buffer)?;
         let luma = self.source.luma(&frame)?;
-        Ok(self.detector.process(&luma, elapsed, &settings.detector())?)
+        Ok(self.detector.process(&luma, &settings.detector())?)
     }
 
     /// The moving regions of a frame, the camera at rest or not (`None` while it learns), and what everybody can

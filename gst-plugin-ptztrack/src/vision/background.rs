@@ -23,16 +23,6 @@ pub enum ForegroundTest {
 /// Half a grey level, 8.8: less is rounding, and no difference. A fraction of a black mean is less still.
 const ROUNDING: u16 = 128;
 
-/// What one picture is tested with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Criterion {
-    /// The test.
-    pub test: ForegroundTest,
-    /// Grey levels (0 to 255) below which no difference counts: a fraction of a dark mean is less
-    /// than the camera's noise.
-    pub noise_floor: f64,
-}
-
 /// The averaging background model of thesis 3.2.1: the running mean (3.1) of every pixel, the windowed
 /// variance (3.2) where the test asks for it, and the foreground (3.3).
 ///
@@ -56,7 +46,7 @@ impl Background {
     /// Marks in `mask` (255 foreground, 0 background; one byte a pixel, rows packed) what in `luma`
     /// differs from the mean of the pictures before, then takes `luma` into the mean with weight
     /// `weight` (0 to 1; the α of thesis 3.1). A picture of another size than the last one starts anew.
-    pub fn update(&mut self, luma: &Luma, weight: f64, criterion: Criterion, mask: &mut [u8]) {
+    pub fn update(&mut self, luma: &Luma, weight: f64, test: ForegroundTest, mask: &mut [u8]) {
         let pixels = luma.width() * luma.height();
         if pixels == 0 {
             return;
@@ -68,21 +58,20 @@ impl Background {
             self.spread = None;
         }
         let weights = Weights::new(if first { 1.0 } else { weight });
-        let floor = ((criterion.noise_floor * 256.0) as u16).max(ROUNDING);
-        match criterion.test {
+        match test {
             ForegroundTest::Relative { threshold } => {
                 self.spread = None;
                 let fraction = (threshold * 65536.0).round() as u16;
                 let rows = self.mean.chunks_exact_mut(self.width).zip(mask.chunks_exact_mut(self.width));
                 for (y, (mean, mask)) in rows.enumerate() {
-                    relative_row(luma.row(y), mean, mask, weights, fraction, floor);
+                    relative_row(luma.row(y), mean, mask, weights, fraction);
                 }
             }
             ForegroundTest::Spread { factor, window } => {
                 let window = window.clamp(2, 255);
                 let spread = self.spread.take().filter(|spread| spread.window == window);
                 let mut spread = spread.unwrap_or_else(|| Spread::new(window, pixels));
-                spread.update(luma, &mut self.mean, mask, weights, factor, floor);
+                spread.update(luma, &mut self.mean, mask, weights, factor);
                 self.spread = Some(spread);
             }
         }
@@ -121,10 +110,10 @@ fn high(number: u16, fraction: u16) -> u16 {
 }
 
 /// (3.3) and (3.1) for one row.
-fn relative_row(luma: &[u8], mean: &mut [u16], mask: &mut [u8], weights: Weights, fraction: u16, floor: u16) {
+fn relative_row(luma: &[u8], mean: &mut [u16], mask: &mut [u8], weights: Weights, fraction: u16) {
     for ((&pixel, mean), mask) in luma.iter().zip(mean).zip(mask) {
         let pixel = u16::from(pixel) << 8;
-        let limit = high(*mean, fraction).max(floor);
+        let limit = high(*mean, fraction).max(ROUNDING);
         *mask = if pixel.abs_diff(*mean) >= limit { 255 } else { 0 };
         *mean = weights.mean(*mean, pixel);
     }
@@ -159,20 +148,12 @@ impl Spread {
         }
     }
 
-    fn update(
-        &mut self,
-        luma: &Luma,
-        mean: &mut [u16],
-        mask: &mut [u8],
-        weights: Weights,
-        factor: f64,
-        floor: u16,
-    ) {
+    fn update(&mut self, luma: &Luma, mean: &mut [u16], mask: &mut [u8], weights: Weights, factor: f64) {
         let (width, pixels) = (luma.width(), self.sum.len());
         let count = self.filled as u32;
         // Of fewer than two pictures there is no spread to exceed.
         let factor = if count < 2 { f32::INFINITY } else { factor as f32 };
-        let limits = SpreadLimits { count, factor_squared: factor * factor, floor };
+        let limits = SpreadLimits { count, factor_squared: factor * factor };
         let oldest = &mut self.pictures[self.next * pixels..][..pixels];
         let rows = mean
             .chunks_exact_mut(width)
@@ -196,7 +177,6 @@ impl Spread {
 struct SpreadLimits {
     count: u32,
     factor_squared: f32,
-    floor: u16,
 }
 
 impl SpreadLimits {
@@ -210,7 +190,7 @@ impl SpreadLimits {
             let square = f32::from(difference) * f32::from(difference) * scale;
             // In this order an infinite factor times no spread (not a number) is background.
             let exceeds = square > self.factor_squared * spread;
-            *mask = if exceeds & (difference >= self.floor) { 255 } else { 0 };
+            *mask = if exceeds & (difference >= ROUNDING) { 255 } else { 0 };
         }
     }
 }
@@ -230,13 +210,12 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const RELATIVE: Criterion =
-        Criterion { test: ForegroundTest::Relative { threshold: 0.25 }, noise_floor: 0.0 };
+    const RELATIVE: ForegroundTest = ForegroundTest::Relative { threshold: 0.25 };
 
-    fn feed(background: &mut Background, picture: &[u8], weight: f64, criterion: Criterion) -> Vec<u8> {
+    fn feed(background: &mut Background, picture: &[u8], weight: f64, test: ForegroundTest) -> Vec<u8> {
         let luma = Luma::new(picture, picture.len(), 1, picture.len()).unwrap();
         let mut mask = vec![7; picture.len()];
-        background.update(&luma, weight, criterion, &mut mask);
+        background.update(&luma, weight, test, &mut mask);
         mask
     }
 
@@ -284,17 +263,6 @@ mod tests {
     }
 
     #[test]
-    fn noise_floor_guards_dark_pixels() {
-        let criterion = Criterion { noise_floor: 10.0, ..RELATIVE };
-        let mut background = Background::default();
-        feed(&mut background, &[4, 4, 4, 100], 0.5, criterion);
-        assert_eq!(feed(&mut background, &[5, 13, 15, 115], 0.5, criterion), [0, 0, 255, 0]);
-        background.restart();
-        feed(&mut background, &[4], 0.5, RELATIVE);
-        assert_eq!(feed(&mut background, &[5], 0.5, RELATIVE), [255]);
-    }
-
-    #[test]
     fn first_picture_and_new_size_are_background() {
         let mut background = Background::default();
         assert_eq!(feed(&mut background, &[9, 200], 0.5, RELATIVE), [0, 0]);
@@ -305,8 +273,7 @@ mod tests {
 
     #[test]
     fn spread_is_that_of_the_preceding_window() {
-        let spread =
-            |factor| Criterion { test: ForegroundTest::Spread { factor, window: 4 }, noise_floor: 0.0 };
+        let spread = |factor| ForegroundTest::Spread { factor, window: 4 };
         let mut background = Background::default();
         // 250 leaves the window before the test; of 8, 12, 8, 12 the variance is 4 (3.2), σ = 2.
         for pixel in [250, 8, 12, 8, 12] {
@@ -324,14 +291,13 @@ mod tests {
 
     #[test]
     fn other_window_starts_its_spread_anew() {
-        let criterion =
-            |window| Criterion { test: ForegroundTest::Spread { factor: 1.0, window }, noise_floor: 0.0 };
+        let test = |window| ForegroundTest::Spread { factor: 1.0, window };
         let mut background = Background::default();
         for _ in 0..5 {
-            feed(&mut background, &[50], 0.5, criterion(4));
+            feed(&mut background, &[50], 0.5, test(4));
         }
-        assert_eq!(feed(&mut background, &[60], 0.5, criterion(4)), [255]);
-        assert_eq!(feed(&mut background, &[200], 0.5, criterion(8)), [0]);
+        assert_eq!(feed(&mut background, &[60], 0.5, test(4)), [255]);
+        assert_eq!(feed(&mut background, &[200], 0.5, test(8)), [0]);
     }
 
     proptest! {
@@ -353,12 +319,12 @@ mod tests {
         fn spread_follows_its_definition(
             pixels in proptest::collection::vec(any::<u8>(), 3..30), window in 2usize..9, factor in 0.5f64..4.0,
         ) {
-            let criterion =
-                Criterion { test: ForegroundTest::Spread { factor, window }, noise_floor: 0.0 };
+            let test =
+                ForegroundTest::Spread { factor, window };
             let mut background = Background::default();
             let (last, before) = pixels.split_last().unwrap();
             for pixel in before {
-                feed(&mut background, &[*pixel], 0.5, criterion);
+                feed(&mut background, &[*pixel], 0.5, test);
             }
             let samples: Vec<f64> = before.iter().rev().take(window).map(|p| f64::from(*p)).collect();
             let count = samples.len() as f64;
@@ -367,37 +333,31 @@ mod tests {
             let difference = (f64::from(*last) - means(&background)[0]).abs();
             // Too close to the limit, rounding decides.
             prop_assume!((difference - factor * sigma).abs() > 0.05);
-            let foreground = feed(&mut background, &[*last], 0.5, criterion)[0] == 255;
+            let foreground = feed(&mut background, &[*last], 0.5, test)[0] == 255;
             prop_assert_eq!(foreground, difference > factor * sigma);
         }
 
         #[test]
         fn relative_test_follows_its_definition(
-            before in any::<u8>(), now in any::<u8>(), threshold in 0.0f64..0.99, floor in 0u8..40,
+            before in any::<u8>(), now in any::<u8>(), threshold in 0.0f64..0.99,
         ) {
-            let criterion = Criterion {
-                test: ForegroundTest::Relative { threshold },
-                noise_floor: f64::from(floor),
-            };
+            let test = ForegroundTest::Relative { threshold };
             let mut background = Background::default();
-            feed(&mut background, &[before], 0.5, criterion);
+            feed(&mut background, &[before], 0.5, test);
             let difference = f64::from(before.abs_diff(now));
-            let limit = (f64::from(before) * threshold).max(f64::from(floor));
+            let limit = (f64::from(before) * threshold).max(0.5);
             prop_assume!((difference - limit).abs() > 0.02);
-            prop_assert_eq!(feed(&mut background, &[now], 0.5, criterion)[0] == 255, difference > limit);
+            prop_assert_eq!(feed(&mut background, &[now], 0.5, test)[0] == 255, difference > limit);
         }
 
         #[test]
         fn extremes_never_overflow(
             pixels in proptest::collection::vec(prop_oneof![Just(0u8), Just(255u8)], 1..600),
         ) {
-            let criterion = Criterion {
-                test: ForegroundTest::Spread { factor: 100.0, window: 255 },
-                noise_floor: 255.0,
-            };
+            let test = ForegroundTest::Spread { factor: 100.0, window: 255 };
             let mut background = Background::default();
             for pixel in pixels {
-                feed(&mut background, &[pixel], 0.001, criterion);
+                feed(&mut background, &[pixel], 0.001, test);
             }
         }
     }

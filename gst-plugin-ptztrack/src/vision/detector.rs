@@ -1,14 +1,12 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::iter;
-use std::time::Duration;
 
 use opencv::core::{self, CV_8UC1, Mat, Scalar};
 use opencv::prelude::*;
 use ptztrack_contract::{MotionMeta, Region};
 
-use super::afterimage::Afterimage;
-use super::background::{Background, Criterion, ForegroundTest};
+use super::background::{Background, ForegroundTest};
 use super::carried_zones::CarriedZones;
 use super::contours::{Grid, fill_regions, find_regions};
 use super::extremes::Extremes;
@@ -43,18 +41,14 @@ pub enum RegionChoice {
 pub struct DetectorConfig {
     /// Pictures wider than this many pixels are reduced before they are looked at; 0: never.
     pub analysis_width: usize,
-    /// Weight of a new picture in the running mean (thesis 3.1), 0 to 1, ...
+    /// Weight of a new picture in the running mean (thesis 3.1), 0 to 1.
     pub alpha: f64,
-    /// ... of pictures that are this far apart; scaled for others. Zero: whatever their distance.
-    pub alpha_interval: Duration,
     /// What makes a pixel foreground.
-    pub criterion: Criterion,
+    pub test: ForegroundTest,
     /// Side of the opening's square in pixels of the whole picture; `None` chooses.
     pub open_size: Option<usize>,
     /// Side of the closing's square in pixels of the whole picture; `None` chooses an upright rectangle.
     pub close_size: Option<usize>,
-    /// Whether regions are cut to where the picture changes.
-    pub shed_trail: bool,
     /// Which regions are reported.
     pub choice: RegionChoice,
     /// Smallest area that counts, as a fraction of the picture.
@@ -67,21 +61,8 @@ pub struct DetectorConfig {
     pub exclude_zones: Zones,
     /// Pictures from which the background is learned before anything is reported.
     pub warm_up: u32,
-    /// When more than this fraction of the picture is foreground, the background is learned anew.
-    pub relearn_fraction: f64,
     /// A region is reported once it has been seen in this many pictures in a row.
     pub confirm_pictures: u32,
-}
-
-impl DetectorConfig {
-    /// The weight of a picture that comes `elapsed` after the one before: (3.1) applied as often as
-    /// `alpha_interval` fits into that time.
-    fn weight(&self, elapsed: Duration) -> f64 {
-        if self.alpha_interval.is_zero() {
-            return self.alpha;
-        }
-        1.0 - (1.0 - self.alpha).powf(elapsed.as_secs_f64() / self.alpha_interval.as_secs_f64())
-    }
 }
 
 /// A picture that could not be looked at.
@@ -122,7 +103,6 @@ impl RegionChoice {
 #[derive(Debug, Default)]
 pub struct Detector {
     background: Background,
-    afterimage: Afterimage,
     persistence: Persistence,
     /// Pictures learned since the last start.
     learned: u32,
@@ -152,18 +132,15 @@ impl Detector {
     /// Forgets the background: the next pictures are learned before anything is reported.
     pub fn relearn(&mut self) {
         self.background.restart();
-        self.afterimage.restart();
         self.persistence.restart();
         self.learned = 0;
         self.mask = Mat::default();
     }
 
-    /// Looks at the next picture, `elapsed` after the one before. Gives the moving regions, longest
-    /// perimeter first, or `None` while it learns.
+    /// Looks at the next picture. Gives the moving regions, longest perimeter first, or `None` while it learns.
     pub fn process(
         &mut self,
         luma: &Luma,
-        elapsed: Duration,
         config: &DetectorConfig,
     ) -> Result<Option<Vec<Region>>, DetectorError> {
         let frame = (luma.width(), luma.height());
@@ -176,7 +153,7 @@ impl Detector {
             return Ok(None);
         }
         let mut kept = std::mem::take(&mut self.reduced);
-        let found = with_reduced(luma, divisor, &mut kept, |small| self.look(small, elapsed, config));
+        let found = with_reduced(luma, divisor, &mut kept, |small| self.look(small, config));
         self.reduced = kept;
         found
     }
@@ -221,43 +198,30 @@ impl Detector {
     }
 
     /// The same of the reduced picture.
-    fn look(
-        &mut self,
-        luma: &Luma,
-        elapsed: Duration,
-        config: &DetectorConfig,
-    ) -> Result<Option<Vec<Region>>, DetectorError> {
-        if self.subtract(luma, elapsed, config)? > config.relearn_fraction {
-            self.relearn();
-        }
+    fn look(&mut self, luma: &Luma, config: &DetectorConfig) -> Result<Option<Vec<Region>>, DetectorError> {
+        self.subtract(luma, config)?;
         if self.learned < config.warm_up.max(1) {
             self.learned += 1;
             self.mask = Mat::default();
             return Ok(None);
         }
-        self.find(luma, elapsed, config).map(Some)
+        self.find(config).map(Some)
     }
 
-    /// Updates the background; leaves the foreground in `mask` and gives its fraction of the picture.
-    fn subtract(
-        &mut self,
-        luma: &Luma,
-        elapsed: Duration,
-        config: &DetectorConfig,
-    ) -> Result<f64, DetectorError> {
+    /// Updates the background; leaves the foreground in `mask`.
+    fn subtract(&mut self, luma: &Luma, config: &DetectorConfig) -> Result<(), DetectorError> {
         let (width, height) = (luma.width(), luma.height());
-        if let ForegroundTest::Spread { window, .. } = config.criterion.test
+        if let ForegroundTest::Spread { window, .. } = config.test
             && window * width * height > MAX_WINDOW_BYTES
         {
             return Err(DetectorError::Window { window, width, height });
         }
-        let (rows, columns) = (height as i32, width as i32);
         self.fit_mask(width, height)?;
         // While it learns, the mean is the plain average of all pictures.
         let average = if self.learned < config.warm_up { 1.0 / f64::from(self.learned + 1) } else { 0.0 };
-        let weight = config.weight(elapsed).max(average);
-        self.background.update(luma, weight, config.criterion, self.mask.data_bytes_mut()?);
-        Ok(f64::from(core::count_non_zero(&self.mask)?) / (f64::from(rows) * f64::from(columns)))
+        let weight = config.alpha.max(average);
+        self.background.update(luma, weight, config.test, self.mask.data_bytes_mut()?);
+        Ok(())
     }
 
     /// Sees to it that `mask` has that size.
@@ -269,22 +233,12 @@ impl Detector {
         Ok(())
     }
 
-    /// The regions of the foreground in `mask`, which was computed from `luma`.
-    fn find(
-        &mut self,
-        luma: &Luma,
-        elapsed: Duration,
-        config: &DetectorConfig,
-    ) -> Result<Vec<Region>, DetectorError> {
+    /// The regions of the foreground in `mask`.
+    fn find(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
         self.look_in_zones(config)?;
         let (open_size, close_size) = self.sizes(config);
-        let width = luma.width();
+        let width = self.mask.cols() as usize;
         clean(self.mask.data_bytes_mut()?, width, open_size, close_size, &mut self.extremes);
-        if config.shed_trail {
-            self.afterimage.shed(luma, elapsed, config.criterion.noise_floor, &mut self.mask)?;
-        } else {
-            self.afterimage.restart();
-        }
         let mut found = Vec::new();
         self.find_regions(config, &mut found)?;
         Ok(self.chosen(found, config))
@@ -388,30 +342,25 @@ impl Detector {
 
 #[cfg(test)]
 mod tests {
-    use super::super::background::ForegroundTest;
     use super::*;
     use proptest::prelude::*;
 
     const WIDTH: usize = 160;
     const HEIGHT: usize = 120;
-    const STEP: Duration = Duration::from_millis(40);
 
     fn config() -> DetectorConfig {
         DetectorConfig {
             analysis_width: 640,
-            alpha: 0.5,
-            alpha_interval: Duration::from_millis(400),
-            criterion: Criterion { test: ForegroundTest::Relative { threshold: 0.15 }, noise_floor: 12.0 },
+            alpha: 0.1,
+            test: ForegroundTest::Relative { threshold: 0.15 },
             open_size: None,
             close_size: None,
-            shed_trail: true,
             choice: RegionChoice::LargestPerimeter,
             min_area: 0.001,
             max_area: 0.8,
             zones: Zones::default(),
             exclude_zones: Zones::default(),
             warm_up: 4,
-            relearn_fraction: 0.5,
             confirm_pictures: 2,
         }
     }
@@ -435,7 +384,7 @@ mod tests {
 
     fn look(detector: &mut Detector, picture: &[u8], config: &DetectorConfig) -> Option<Vec<Region>> {
         let luma = Luma::new(picture, WIDTH, HEIGHT, WIDTH).unwrap();
-        detector.process(&luma, STEP, config).unwrap()
+        detector.process(&luma, config).unwrap()
     }
 
     /// A detector that has learned the empty picture.
@@ -478,22 +427,6 @@ mod tests {
         assert_eq!(largest.len(), 1);
         assert!(largest[0].bounds.width > 0.4);
         assert_eq!(found(&DetectorConfig { choice: RegionChoice::All, ..config() }, &boxes).len(), 2);
-    }
-
-    #[test]
-    fn a_walker_is_found_without_the_trail() {
-        let width = |shed_trail| {
-            let config = DetectorConfig { shed_trail, ..config() };
-            let mut detector = learned(&config);
-            let walk = (0..12).map(|step| picture(&[(20 + step * 4, 30, 16, 60)]));
-            let found: Vec<_> = walk.filter_map(|picture| look(&mut detector, &picture, &config)).collect();
-            let [region] = found[11].as_slice() else { panic!("{:?}", found[11]) };
-            // 4 pixels in each of the three pictures of the last 100 ms.
-            assert!(!shed_trail || region.bounds.x * 160.0 > 51.5, "{:?}", region.bounds);
-            region.bounds.width * 160.0
-        };
-        assert!(width(true) < 29.0, "{}", width(true));
-        assert!(width(false) > 34.0, "{}", width(false));
     }
 
     #[test]
@@ -545,26 +478,12 @@ mod tests {
     }
 
     #[test]
-    fn light_switched_on_is_learned_anew_and_found_nowhere() {
-        let config = config();
-        let mut detector = learned(&config);
-        let bright: Vec<u8> = picture(&[]).iter().map(|pixel| pixel + 80).collect();
-        for _ in 0..config.warm_up {
-            assert_eq!(look(&mut detector, &bright, &config), None);
-        }
-        for _ in 0..20 {
-            assert_eq!(look(&mut detector, &bright, &config).unwrap_or_default(), []);
-        }
-        assert_eq!(look(&mut detector, &bright, &config), Some(vec![]));
-    }
-
-    #[test]
     fn another_size_is_learned_anew() {
         let config = config();
         let mut detector = learned(&config);
         let data = picture(&[]);
         let narrow = Luma::new(&data, WIDTH - 1, HEIGHT, WIDTH).unwrap();
-        assert_eq!(detector.process(&narrow, STEP, &config).unwrap(), None);
+        assert_eq!(detector.process(&narrow, &config).unwrap(), None);
     }
 
     #[test]
@@ -576,19 +495,6 @@ mod tests {
             (centre.x - 60.0 / 160.0).abs() < 0.02 && (centre.y - 62.0 / 120.0).abs() < 0.03,
             "{centre:?}"
         );
-    }
-
-    #[test]
-    fn weight_depends_on_the_time_that_passed() {
-        let config = config();
-        let after = |milliseconds| config.weight(Duration::from_millis(milliseconds));
-        assert!((after(400) - 0.5).abs() < 1e-12);
-        assert!((after(800) - 0.75).abs() < 1e-12);
-        assert_eq!(after(0), 0.0);
-        // Twice 200 ms weigh as much as once 400 ms.
-        assert!(((1.0 - after(200)).powi(2) - 0.5).abs() < 1e-12);
-        let thesis = DetectorConfig { alpha_interval: Duration::ZERO, ..config.clone() };
-        assert_eq!(thesis.weight(Duration::from_millis(7)), 0.5);
     }
 
     #[test]
@@ -631,7 +537,7 @@ mod tests {
         ) {
             let config = DetectorConfig {
                 analysis_width, open_size: Some(open_size), close_size: Some(close_size),
-                choice: RegionChoice::All, min_area: 0.0, warm_up: 1, relearn_fraction: 1.0,
+                choice: RegionChoice::All, min_area: 0.0, warm_up: 1,
                 confirm_pictures: 1, ..config()
             };
             let mut detector = Detector::default();
@@ -641,7 +547,7 @@ mod tests {
                     .map(|i| (seed.wrapping_mul(i as u64 * 31 + step + 1) >> 56) as u8)
                     .collect();
                 let luma = Luma::new(&data, width, height, stride).unwrap();
-                for region in detector.process(&luma, STEP, &config).unwrap().unwrap_or_default() {
+                for region in detector.process(&luma, &config).unwrap().unwrap_or_default() {
                     prop_assert!(region.bounds.x >= 0.0 && region.bounds.x + region.bounds.width <= 1.0 + 1e-9);
                     prop_assert!(region.bounds.contains(region.centroid));
                 }

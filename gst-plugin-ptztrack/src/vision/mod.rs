@@ -35,7 +35,6 @@
 //! Equation 3.16 as printed averages centroids, which would lag half a second behind; the text beside it speaks of "the
 //! object's speed and direction", so rates are averaged.
 
-mod afterimage;
 mod background;
 mod camera_motion;
 mod camera_moves;
@@ -66,7 +65,7 @@ mod trail;
 mod travelling;
 mod zones;
 
-pub use background::{Background, Criterion, ForegroundTest};
+pub use background::{Background, ForegroundTest};
 pub use camera_motion::CameraMotionEstimator;
 pub use camera_moves::CameraMoves;
 pub use carried_zones::{CarriedZones, View};

@@ -5,7 +5,7 @@
 
 use divan::Bencher;
 use gstptztrack::vision::{
-    Background, CameraMotionEstimator, Chroma, Criterion, ForegroundTest, Luma, Picture, Reduced, Samples,
+    Background, CameraMotionEstimator, Chroma, ForegroundTest, Luma, Picture, Reduced, Samples,
     SceneModel, TravellingBackground,
 };
 use ptztrack_benchmarks::{Camera, Footage};
@@ -116,7 +116,7 @@ fn scene_turning(bencher: Bencher, size: (usize, usize)) {
 #[divan::bench(args = SIZES)]
 fn running_mean(bencher: Bencher, size: (usize, usize)) {
     let (mut film, mut background) = (Film::new(size, Camera::Still), Background::default());
-    let criterion = Criterion { test: ForegroundTest::Relative { threshold: 0.15 }, noise_floor: 12.0 };
+    let test = ForegroundTest::Relative { threshold: 0.15 };
     let mut mask = vec![0; size.0 * size.1];
-    bencher.bench_local(|| film.show(|picture| background.update(&picture.luma, 0.1, criterion, &mut mask)));
+    bencher.bench_local(|| film.show(|picture| background.update(&picture.luma, 0.1, test, &mut mask)));
 }

@@ -143,14 +143,6 @@ impl ColourModel {
         self.anyone.log_odds(&self.figure, colour, lower)
     }
 
-    /// How alike somebody else's figure is by brightness and tint, 0 to 1: the Bhattacharyya coefficient, the mean of upper
-    /// and lower body; 0 where nothing of them is seen.
-    pub fn likeness(&self, other: &[Option<Histogram>; 2]) -> f32 {
-        let [upper, lower] =
-            [0, 1].map(|half| other[half].as_ref().map_or(0.0, |seen| self.figure[half].likeness(seen)));
-        0.5 * (upper + lower)
-    }
-
     /// Learns what is figure (upper and lower body) and ground now; what was not seen stays as it is.
     pub fn learn(
         &mut self,
@@ -286,16 +278,6 @@ mod tests {
         }
         assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(WALL, 0.0) < -1.0);
         assert!(model.log_odds((90, None), 0.0) > 1.0, "brightness still counts");
-    }
-
-    #[test]
-    fn likeness_is_of_both_halves_and_of_what_is_seen() {
-        let alike =
-            |upper: Option<Colour>, lower: Option<Colour>| model().likeness(&[upper.map(of), lower.map(of)]);
-        assert!(alike(Some(RED), Some(DARK)) > 0.99);
-        assert!((alike(Some(RED), None) - 0.5).abs() < 0.01);
-        assert!(alike(Some(WALL), Some(WALL)) < 0.1 && alike(None, None) == 0.0);
-        assert!(alike(Some((90, None)), Some((40, None))) > 0.99, "grey video is told apart by brightness");
     }
 
     #[test]

@@ -202,14 +202,6 @@ pub(super) struct Evidence {
 }
 
 impl Evidence {
-    /// Index of the cell in a column and row; `None` beyond those there are.
-    #[inline]
-    fn index(&self, column: i32, row: i32) -> Option<usize> {
-        let inside = |place: i32, count: usize| (0..count as i32).contains(&place);
-        (inside(column, self.grid.columns) && inside(row, self.grid.rows))
-            .then(|| row as usize * self.grid.columns + column as usize)
-    }
-
     /// The cells of a row from a column on, and how many columns before the first cell there are.
     fn row(&self, column: i32, row: i32) -> (&[f32], usize) {
         let Some(cells) =
@@ -219,26 +211,6 @@ impl Evidence {
         };
         let first = usize::try_from(column).unwrap_or(0).min(cells.len());
         (&cells[first..], usize::try_from(-column).unwrap_or(0))
-    }
-
-    /// How likely the strips just beyond the left, upper, right and lower side of the box are figure, by motion and
-    /// colour alone.
-    pub fn beyond(&self) -> [f32; 4] {
-        // In half sizes of the box from its middle, along the side and away from it.
-        const ALONG: f32 = 0.6;
-        const AWAY: std::ops::Range<f32> = 1.05..1.3;
-        let mut sums = [(0.0_f32, 0.0_f32); 4];
-        for (index, odds) in self.odds.iter().enumerate() {
-            let (x, y) = normalised(index, self.grid);
-            let strips = [(-x, y), (-y, x), (x, y), (y, x)];
-            for ((sum, count), (away, along)) in sums.iter_mut().zip(strips) {
-                if AWAY.contains(&away) && along.abs() <= ALONG {
-                    *sum += 1.0 / (1.0 + (-odds).exp());
-                    *count += 1.0;
-                }
-            }
-        }
-        sums.map(|(sum, count)| sum / count.max(1.0))
     }
 }
 
@@ -260,29 +232,10 @@ impl Halves {
         0.5 * self.sum()
     }
 
-    /// One of them.
-    pub fn half(self, lower: bool) -> f32 {
-        if lower { self.lower } else { self.upper }
-    }
-
-    /// One of them, to be changed.
-    pub fn half_mut(&mut self, lower: bool) -> &mut f32 {
-        if lower { &mut self.lower } else { &mut self.upper }
-    }
-
     /// Each by itself with that of `other`.
     pub fn with(self, other: Self, combine: impl Fn(f32, f32) -> f32) -> Self {
         Self { upper: combine(self.upper, other.upper), lower: combine(self.lower, other.lower) }
     }
-}
-
-/// How much of a silhouette stands out from the background, 0 to 1.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Level {
-    /// By motion and colour.
-    pub figure: Halves,
-    /// By motion alone.
-    pub moving: Halves,
 }
 
 /// The silhouette that the target had until now: how likely each cell around the box belongs to it.
@@ -349,30 +302,6 @@ impl Shape {
         let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
         let norm = Halves { upper: norm(upper), lower: norm(lower) };
         *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
-    }
-
-    /// How much of the silhouette, moved by so many cells, stands out. Where nothing is known of the background that is as much
-    /// as is `usual`.
-    pub fn level(&self, evidence: &Evidence, moved: (i32, i32), usual: Level) -> Level {
-        let Grid { columns, rows } = self.grid;
-        let mut level = Level::default();
-        let mut weights = Halves::default();
-        for (index, share) in self.share.iter().enumerate().filter(|(_, share)| **share > 0.5) {
-            let (x, y) = ((index % columns) as i32 + moved.0, (index / columns) as i32 + moved.1);
-            let Some(cell) = evidence.index(x, y) else { continue };
-            let lower = 2 * (index / columns) >= rows;
-            let motion = evidence.motion[cell];
-            let (figure, moving) = if motion == 0.0 {
-                (usual.figure.half(lower), usual.moving.half(lower))
-            } else {
-                (1.0 / (1.0 + (-evidence.odds[cell]).exp()), (motion / MOVES).clamp(0.0, 1.0))
-            };
-            *level.figure.half_mut(lower) += share * figure;
-            *level.moving.half_mut(lower) += share * moving;
-            *weights.half_mut(lower) += share;
-        }
-        let mean = |sum: f32, weight: f32| sum / weight.max(f32::EPSILON);
-        Level { figure: level.figure.with(weights, mean), moving: level.moving.with(weights, mean) }
     }
 
     /// Logarithm of the odds that a cell belongs to the target by its place alone.
@@ -601,27 +530,6 @@ mod tests {
         let (own, other) = (fit(60, 0.5), fit(220, 0.5));
         assert!(own > 0.4 && other < 0.5 * own, "{own} {other}");
         assert!(fit(220, f32::INFINITY) > 0.4, "alone, whoever moves is the target");
-    }
-
-    #[test]
-    fn where_no_background_is_known_the_silhouette_is_as_likely_as_usual() {
-        let figure = Halves { upper: 0.8, lower: 0.7 };
-        let usual = Level { figure, moving: Halves { upper: 0.6, lower: 0.5 } };
-        let level = |seen_to_move| {
-            let cells = Scene::new(BOX, 60, seen_to_move).cells(BOX);
-            Shape::upright(GRID).level(&cells.evidence(None), (0, 0), usual)
-        };
-        let off = |level: Halves, usual: Halves| {
-            (level.upper - usual.upper).abs().max((level.lower - usual.lower).abs())
-        };
-        let unknown = level(128);
-        assert!(
-            off(unknown.figure, figure) < 0.01 && off(unknown.moving, usual.moving) < 0.01,
-            "{unknown:?}"
-        );
-        let (wall, mover) = (level(0), level(255));
-        assert!(wall.figure.upper < 0.3 && mover.figure.upper > 0.8, "{wall:?} {mover:?}");
-        assert!(wall.moving.upper < 0.01 && mover.moving.upper > 0.9, "{wall:?} {mover:?}");
     }
 
     #[test]

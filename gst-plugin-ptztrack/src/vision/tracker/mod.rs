@@ -11,16 +11,14 @@
 //! | Lucas-Kanade in a patch around it | 3.5.2 | `patch`, `flow` |
 //! | points that leave and join; those on the wall do not count | beyond | `points` |
 //! | what it looks like, the wall left out | beyond | `correlation_filter` |
-//! | whether it is there at all | beyond | `presence` |
 //! | centre of mass | 3.5.3 | `figure`; `grey_histogram` by mean-shift, as the thesis has it |
 //! | how long it is followed and stands | beyond | `dwell_time` |
-//! | who is not taken again | beyond | `suppressed_regions` |
 //!
-//! [`Tracker`] is the state machine around one `target`, which is the number of a track. Its pixels are followed by all cues
-//! (`target/robust.rs`) or as the thesis does it (`target/thesis.rs`). What is followed by all cues is where its track is seen, or
-//! nowhere: the pixels tell where in its region it is, and help the track on where no region shows it.
+//! [`Tracker`] is the state machine around one `target`, which is the number of a track and is where that is. Its pixels help the track
+//! on (`target/robust.rs`), or are all that counts, as in the thesis (`target/thesis.rs`).
 
 mod colour;
+mod config;
 mod corners;
 mod correlation_filter;
 mod dwell_time;
@@ -32,15 +30,16 @@ mod grey_histogram;
 mod patch;
 mod points;
 mod policy;
-mod presence;
+mod report;
 mod sample;
 mod state;
-mod suppressed_regions;
 #[cfg(test)]
 mod synthetic;
 mod target;
 mod tracks;
 
+pub use config::{Config, Profile, TargetRequest};
 pub use dwell_time::TimeLimits;
 pub use policy::Choice;
-pub use state::{Config, Detection, Profile, TargetRequest, Tracked, Tracker};
+pub use report::{Detection, Tracked};
+pub use state::Tracker;

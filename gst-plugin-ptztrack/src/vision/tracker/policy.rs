@@ -5,8 +5,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, centre, grown, length, overlap};
-use super::suppressed_regions::SuppressedRegions;
+use super::geometry::{Frame, breadth, centre, grown, length, overlap};
 use super::tracks::{Track, Tracks};
 
 /// A track at the edge may be half a person: how long it may take to walk in, seconds.
@@ -16,6 +15,10 @@ const RELEASE_HOLD_S: f64 = 3.0;
 /// What lies by more than this where much changed for nothing may be a part of that, as somebody in a film, however far it
 /// goes: it has to leave.
 const RESTLESS: f32 = 0.5;
+/// Most places at which somebody stood that are remembered: the oldest goes.
+const MAX_PARKED: usize = 16;
+/// Who is so many times as tall as when they stood has come nearer.
+const NEARER: f32 = 1.3;
 /// How far beside somebody a click may be, pixels.
 const CLICK_REACH: f32 = 12.0;
 
@@ -33,39 +36,11 @@ pub enum Choice {
     Manual,
 }
 
-/// Somebody who is seen in this picture, in pixels.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub(super) struct Sighting {
-    pub bounds: Rect2f,
-    /// Polygon around it; empty where only the box is known.
-    pub contour: Vec<Point2f>,
-    /// Pixels per second against the background.
-    pub velocity: Point2f,
-    /// Whose it is.
-    pub owner: Owner,
-    /// Whether all of whose it is is seen, and by itself.
-    pub is_whole: bool,
-}
-
-/// Whose a sighting is.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) enum Owner {
-    /// The target's alone.
-    Target,
-    /// That of somebody who was seen beside the target, and so is somebody else.
-    Another,
-    /// That of several people.
-    Several,
-    /// That of somebody who may be anybody.
-    #[default]
-    Anybody,
-}
-
 /// Chooses the target.
 #[derive(Debug, Default)]
 pub(super) struct Policy {
-    /// Who is not chosen until they move.
-    pub suppressed: SuppressedRegions,
+    /// Who stood, and where, in the newest picture: the place goes with the background.
+    parked: Vec<(u64, Rect2f)>,
     released: Option<(u64, f64)>,
 }
 
@@ -75,9 +50,17 @@ impl Policy {
         *self = Self::default();
     }
 
-    /// The track in `bounds` is followed from now on.
-    pub fn take(&mut self, bounds: Rect2f, tracks: &Tracks) {
-        self.suppressed.free(bounds, tracks.seen().map(Track::seen_bounds));
+    /// The track of that number is followed from now on.
+    pub fn take(&mut self, id: u64) {
+        self.parked.retain(|(parked, _)| *parked != id);
+    }
+
+    /// That track was let go because it stands: nobody is chosen there until it moves.
+    pub fn park(&mut self, id: u64, bounds: Rect2f) {
+        if self.parked.len() == MAX_PARKED {
+            self.parked.remove(0);
+        }
+        self.parked.push((id, bounds));
     }
 
     /// That track was let go on purpose: it is not chosen again for a while.
@@ -85,9 +68,14 @@ impl Policy {
         self.released = Some((id, RELEASE_HOLD_S));
     }
 
-    /// So much time passes, in which the background moves as `ego`.
-    pub fn pass(&mut self, ego: Option<EgoMotion>, dt_s: f64) {
-        self.suppressed.carry(ego);
+    /// So much time passes, in which the background moves as `ego`. Where nobody knows how it moves, nobody knows any more where
+    /// somebody stood.
+    pub fn pass(&mut self, tracks: &Tracks, ego: Option<EgoMotion>, dt_s: f64) {
+        self.parked.retain_mut(|(id, place)| {
+            let Some(ego) = ego else { return false };
+            *place = ego.apply_to(*place);
+            tracks.get(*id).is_none_or(|track| stands_at(*place, track.seen_bounds()))
+        });
         self.released = self.released.filter(|(_, left)| *left > dt_s).map(|(id, left)| (id, left - dt_s));
     }
 
@@ -111,7 +99,7 @@ impl Policy {
                     })
                     && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
                     && self.released.is_none_or(|(released, _)| released != track.id)
-                    && !self.suppressed.holds(bounds)
+                    && !self.parked.iter().any(|(_, place)| stands_at(*place, bounds))
                     && (!must_travel || track.travels())
             })
         };
@@ -134,6 +122,15 @@ impl Policy {
     }
 }
 
+/// Whether who is seen in `bounds` has not moved from a place, sideways by a width or nearer: an arm or a leg is there as well.
+fn stands_at(place: Rect2f, bounds: Rect2f) -> bool {
+    let offset = centre(bounds) - centre(place);
+    let sideways = breadth(place);
+    offset.x.abs() < sideways
+        && offset.y.abs() < sideways.max(place.height / 2.0)
+        && bounds.height < NEARER * place.height
+}
+
 /// Whether somebody is still coming into view, or leaving: a leg goes before the body.
 fn is_entering(tracks: &Tracks, bounds: Rect2f, frame: Frame) -> bool {
     let parts = tracks.seen().map(Track::seen_bounds).filter(|part| may_be_one(bounds, *part));
@@ -148,35 +145,13 @@ pub(super) fn clicked(tracks: &Tracks, point: Point2f) -> Option<&Track> {
         .min_by(|a, b| a.seen_bounds().area().total_cmp(&b.seen_bounds().area()))
 }
 
-/// Leaves in `sightings` what is seen in this picture, for who follows the target.
-pub(super) fn sight(tracks: &Tracks, target: u64, confirm_pictures: u32, sightings: &mut Vec<Sighting>) {
-    let of = |track: &Track| Sighting {
-        // Of the target all that is known of its size.
-        bounds: if track.id == target { track.bounds() } else { track.seen_bounds() },
-        contour: Vec::new(),
-        velocity: track.velocity(),
-        is_whole: track.is_seen_whole(),
-        owner: if track.is_shared() {
-            Owner::Several
-        } else if track.id == target && target > 0 {
-            Owner::Target
-        } else if track.beside_target >= confirm_pictures.max(1) {
-            Owner::Another
-        } else {
-            Owner::Anybody
-        },
-    };
-    sightings.clear();
-    sightings.extend(tracks.seen().map(of));
-}
-
 /// The target is seen at `bounds`: who is seen beside it is somebody else, wherever they go from then on. What is above or below
 /// may be a part of it.
-pub(super) fn tell_apart(tracks: &mut Tracks, target: u64, bounds: Rect2f) {
+pub(super) fn tell_apart(tracks: &mut Tracks, target: u64, bounds: Rect2f, dt_s: f64) {
     for track in tracks.seen_mut().filter(|track| track.id != target) {
         let seen = track.seen_bounds();
         if overlap(bounds, seen) <= 0.0 && !may_be_one(bounds, seen) {
-            track.beside_target += 1;
+            track.beside_target_s += dt_s;
         }
     }
 }
@@ -211,8 +186,8 @@ mod tests {
 
     impl Chain {
         fn see(&mut self, regions: &[Rect2f], ego: Option<EgoMotion>) {
-            self.policy.pass(ego, DT);
             seen_in(&mut self.tracks, regions, ego, DT);
+            self.policy.pass(&self.tracks, ego, DT);
         }
 
         fn choose(&self, choice: Choice, must_travel: bool) -> Option<&Track> {
@@ -333,6 +308,36 @@ mod tests {
     }
 
     #[test]
+    fn who_stood_is_not_chosen_until_they_move_or_come_nearer() {
+        let moved = |x: f32, growth: f32| at(300.0 + x, 200.0, 40.0 * growth, 90.0 * growth);
+        for (bounds, chosen) in [
+            (moved(-30.0, 1.0), false),
+            (moved(45.0, 1.0), true),
+            (moved(0.0, 1.4), true),
+            (at(285.0, 205.0, 30.0, 15.0), false),
+        ] {
+            let still = Some(EgoMotion::default());
+            let mut chain = seen(4, &[moved(0.0, 1.0)]);
+            let id = chain.choose(Choice::Largest, false).expect("confirmed").id;
+            chain.policy.park(id, moved(0.0, 1.0));
+            chain.see(&[moved(0.0, 1.0)], still);
+            assert_eq!(chain.chosen(), None);
+            for n in 1..=40 {
+                let mix = |from: f32, to: f32| from + (to - from) * (n as f32 / 10.0).min(1.0);
+                let from = moved(0.0, 1.0);
+                let step = at(
+                    mix(from.x, bounds.x),
+                    mix(from.y, bounds.y),
+                    mix(from.width, bounds.width),
+                    mix(from.height, bounds.height),
+                );
+                chain.see(&[step], still);
+            }
+            assert_eq!(chain.chosen().is_some(), chosen, "{bounds:?}");
+        }
+    }
+
+    #[test]
     fn a_click_means_the_smallest_track_there() {
         let chain = seen(1, &[at(100.0, 40.0, 240.0, 400.0), at(400.0, 200.0, 30.0, 60.0)]);
         let x = |x, y| clicked(&chain.tracks, Point2f::new(x, y)).map(|track| track.seen_bounds().x);
@@ -342,22 +347,16 @@ mod tests {
     }
 
     #[test]
-    fn who_was_seen_beside_the_target_stays_somebody_else() {
+    fn who_was_seen_beside_the_target_is_somebody_else() {
         let target = at(300.0, 100.0, 40.0, 90.0);
-        let mut chain = Chain::default();
-        let mut walk = |frames: std::ops::Range<usize>| {
-            for n in frames {
-                chain.see(&[target, at(10.0 * n as f32, 100.0, 40.0, 90.0)], STILL);
-                let id = clicked(&chain.tracks, centre(target)).map_or(0, |track| track.id);
-                tell_apart(&mut chain.tracks, id, target);
-            }
+        let mut chain = seen(4, &[target, at(60.0, 100.0, 40.0, 90.0)]);
+        for is_another in [false, false, true] {
+            let beside: Vec<_> = chain.tracks.seen().map(Track::is_another).collect();
+            assert_eq!(beside.contains(&true), is_another);
             let id = clicked(&chain.tracks, centre(target)).map_or(0, |track| track.id);
-            let mut seen = Vec::new();
-            sight(&chain.tracks, id, 3, &mut seen);
-            seen.iter().map(|one| one.owner).collect::<Vec<_>>()
-        };
-        assert_eq!(walk(0..2), [Owner::Anybody, Owner::Anybody], "not yet confirmed");
-        assert_eq!(walk(2..6), [Owner::Target, Owner::Another]);
+            tell_apart(&mut chain.tracks, id, target, DT / 2.0);
+        }
+        assert!(clicked(&chain.tracks, centre(target)).is_some_and(|track| !track.is_another()));
     }
 
     #[test]

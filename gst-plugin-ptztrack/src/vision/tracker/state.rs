@@ -1,16 +1,16 @@
 // SPDX-License-Identifier: MPL-2.0
 
-mod reconcile;
+//! The state machine around one target.
 
 use opencv::core::{Point2f, Rect2f};
-use ptztrack_contract::{
-    Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
-};
+use ptztrack_contract::{Feature, ReleaseReason, TargetChange, TargetState};
 
-use super::dwell_time::{DwellTime, TimeLimits};
+use super::config::{Config, Profile, TargetRequest};
+use super::dwell_time::DwellTime;
 use super::ego_motion::EgoMotion;
 use super::geometry::{ASPECT, Frame, around};
-use super::policy::{Choice, Policy, Sighting, clicked, sight, tell_apart};
+use super::policy::{Policy, clicked, tell_apart};
+use super::report::{Detection, Tracked, reported, tracked_of};
 use super::target::{Follow, Robust, Sight, Thesis};
 use super::tracks::{Region, Rules, Track, Tracks, people};
 use crate::vision::Observation;
@@ -24,80 +24,6 @@ const DECAY_S: f64 = 3.0;
 /// For how long somebody who is not seen is told of, seconds.
 const TOLD_S: f64 = 0.5;
 
-/// How a target is followed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Profile {
-    /// Thesis 3.5 as written: corners, optical flow, mean of the points, mean-shift.
-    Thesis,
-    /// With all that tells a person from the wall behind: see [`super`].
-    #[default]
-    Robust,
-}
-
-/// How a [`Tracker`] works. Changes hold from the next target or frame on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Config {
-    /// Which steps are taken.
-    pub profile: Profile,
-    /// How the target is chosen.
-    pub choice: Choice,
-    /// Frames that a detection must be seen in before it is chosen.
-    pub confirm_frames: u32,
-    /// Seconds that a hidden target is coasted and looked for, and after which nobody is where nobody is seen.
-    pub coast_s: f64,
-    /// Seconds for which who is gone is remembered: whoever comes back within them has their old number.
-    pub memory_s: f64,
-    /// Height, in frame heights, of the box that is made around a place selected by hand.
-    pub manual_size: f64,
-    /// Whether a detection is chosen only once it has travelled across the background: right for a motion detector,
-    /// wrong for one that finds people who stand.
-    pub must_travel: bool,
-    /// The longest that the detector may take from one look to the next, seconds; 0 for one that sees every frame.
-    pub detector_pause_s: f64,
-    /// How long a target is followed at most.
-    pub limits: TimeLimits,
-}
-
-/// Something that a detector saw, in frame sizes.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Detection {
-    /// Its box.
-    pub bounds: Rect,
-    /// Polygon around it; empty where only the box is known.
-    pub contour: Vec<Point>,
-    /// Whether it lies outside of the detector's zones: nobody is chosen there.
-    pub outside: bool,
-}
-
-/// What the tracker knows after one frame, in frame sizes (per second).
-#[derive(Debug, Clone, PartialEq)]
-pub struct Tracked {
-    /// What it does.
-    pub state: TargetState,
-    /// What happened in this frame, in order.
-    pub changes: Vec<TargetChange>,
-    /// Why the target was released, where it was.
-    pub released: Option<ReleaseReason>,
-    /// Number of the target, from 1; 0 where there is none.
-    pub id: u64,
-    /// Box of the target; predicted while it is hidden.
-    pub bounds: Rect,
-    /// Its centre of mass (3.15).
-    pub centroid: Point,
-    /// Its motion in the picture, camera motion included.
-    pub velocity: Vector,
-    /// Motion of the background at its place, where that could be seen.
-    pub ego_velocity: Option<Vector>,
-    /// 0 to 1.
-    pub confidence: f64,
-    /// The feature points, kept and rejected.
-    pub features: Vec<Feature>,
-    /// Everybody who is seen.
-    pub tracks: Vec<ptztrack_contract::Track>,
-    /// Who came and went in this frame, by number; who merged, with the number that they go on under.
-    pub track_changes: Vec<(TrackChange, u64, Option<u64>)>,
-}
-
 /// The track that is followed.
 struct Target {
     /// Number of its track.
@@ -106,10 +32,6 @@ struct Target {
     dwell: DwellTime,
     /// Its box when it was last seen, carried along with the background.
     seen_at: Rect2f,
-    /// Whether more than its looks said in the last picture that it is where it is followed.
-    is_borne_out: bool,
-    /// For how long its pixels were followed elsewhere than where its track is seen, seconds.
-    astray_s: f64,
 }
 
 enum Phase {
@@ -117,19 +39,6 @@ enum Phase {
     Tracking(Target),
     /// And for how many seconds.
     Occluded(Target, f64),
-}
-
-/// What an operator or the application asked for; carried out with the next frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum TargetRequest {
-    /// Follow what is at this place: the track there, or else a box of [`Config::manual_size`] around it.
-    Select(Point),
-    /// Follow the track of that number, if there is one.
-    SelectTrack(u64),
-    /// Follow the track of the next number, or that of the first after the last.
-    Next,
-    /// Let the target go.
-    Release,
 }
 
 /// Keeps account of everybody who is seen, chooses one of them and follows it. The same pictures always give the same answers.
@@ -144,10 +53,9 @@ pub struct Tracker {
     lost: Option<u64>,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
-    /// Memory for the next frame's features, tracks and sightings.
+    /// Memory for the next frame's features, tracks and regions.
     features: Vec<Feature>,
     reported: Vec<ptztrack_contract::Track>,
-    sightings: Vec<Sighting>,
     regions: Vec<Region>,
     people: Vec<Rect2f>,
 }
@@ -166,7 +74,6 @@ impl Tracker {
             size: None,
             features: Vec::new(),
             reported: Vec::new(),
-            sightings: Vec::new(),
             regions: Vec::new(),
             people: Vec::new(),
         }
@@ -225,7 +132,7 @@ impl Tracker {
         tracked.features.clear();
         if !same_stream {
             if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
-                tracked = tracked_of(TargetState::Lost, target, frame, tracked.features);
+                tracked = tracked_of(TargetState::Lost, target.id, &*target.follow, frame, tracked.features);
                 changes.push(TargetChange::Lost);
                 phase = Phase::Searching;
             }
@@ -284,8 +191,8 @@ impl Tracker {
         let coast_s = coast_s.max(DECAY_S);
         let rules = Rules { confirm_pictures: confirm_frames, coast_s, memory_s, detector_pause_s };
         let ego = self.ego_motion(seen);
-        self.policy.pass(ego, dt_s);
         self.tracks.update(seen, regions.drain(..), ego, dt_s, rules);
+        self.policy.pass(&self.tracks, ego, dt_s);
         self.regions = regions;
     }
 
@@ -304,17 +211,12 @@ impl Tracker {
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
         target.id = self.tracks.number_now(target.id);
-        let Config { coast_s, confirm_frames, .. } = self.config;
-        let coast_s = if self.config.profile == Profile::Robust { coast_s } else { 0.0 };
-        sight(&self.tracks, target.id, confirm_frames, &mut self.sightings);
-        let sight = match hidden_s {
-            None => target.follow.follow(seen, dt_s as f32, &self.sightings)?,
-            Some(_) => target.follow.coast(seen, dt_s as f32, &self.sightings)?,
-        };
-        let sight = match self.config.profile {
-            Profile::Thesis => sight,
-            Profile::Robust => self.reconcile(&mut target, sight, seen, dt_s)?,
-        };
+        let coast_s = self.config.coast_s;
+        let sight = target.follow.follow(seen, dt_s as f32, &mut self.tracks, target.id)?;
+        if !target.follow.estimate().is_borne_out {
+            self.tracks.find_again(target.id, self.config.must_travel);
+            target.id = self.tracks.number_now(target.id);
+        }
         let state = match sight {
             Sight::Seen => TargetState::Tracking,
             Sight::Hidden if hidden_s.unwrap_or(0.0) < coast_s => TargetState::Occluded,
@@ -327,9 +229,9 @@ impl Tracker {
             _ => {}
         }
         target.dwell.pass(dt_s);
-        let is_sure = target.is_borne_out && target.follow.estimate().is_sure();
+        let is_sure = target.follow.estimate().is_sure();
         if sight == Sight::Seen && is_sure && !target.dwell.is_on_trial() {
-            tell_apart(&mut self.tracks, target.id, target.follow.estimate().bounds);
+            tell_apart(&mut self.tracks, target.id, target.follow.estimate().bounds, dt_s);
         }
         let ego = self.ego_motion(seen);
         let bounds = target.follow.estimate().bounds;
@@ -341,11 +243,22 @@ impl Tracker {
             (_, Some(ego)) => ego.apply_to(target.seen_at),
             _ => target.seen_at,
         };
-        *tracked = tracked_of(state, &target, frame, std::mem::take(&mut tracked.features));
+        *tracked =
+            tracked_of(state, target.id, &*target.follow, frame, std::mem::take(&mut tracked.features));
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
-            self.policy.suppressed.add(target.follow.estimate().bounds);
+            self.policy.park(target.id, target.follow.estimate().bounds);
             return Ok(self.let_go(Phase::Tracking(target), reason, frame, tracked, changes));
+        }
+        if self.is_outdone(&target, frame) {
+            self.policy.park(target.id, target.seen_at);
+            return Ok(self.let_go(
+                Phase::Tracking(target),
+                ReleaseReason::Stationary,
+                frame,
+                tracked,
+                changes,
+            ));
         }
         Ok(match state {
             TargetState::Tracking => Phase::Tracking(target),
@@ -359,6 +272,18 @@ impl Tracker {
                 Phase::Searching
             }
         })
+    }
+
+    /// Whether a target that has yet to go somewhere does not, while somebody else does.
+    fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
+        let Config { choice, must_travel, .. } = self.config;
+        let track = self.tracks.get(target.id);
+        target.dwell.is_on_trial()
+            && track.is_none_or(|track| track.region().is_none() || track.goes_nowhere())
+            && self
+                .policy
+                .choose(&self.tracks, choice, None, must_travel, frame)
+                .is_some_and(|track| track.id != target.id)
     }
 
     /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
@@ -418,8 +343,13 @@ impl Tracker {
                 // It may move, and would be taken again at once.
                 self.policy.release(target.id);
             }
-            *tracked =
-                tracked_of(TargetState::Searching, &target, frame, std::mem::take(&mut tracked.features));
+            *tracked = tracked_of(
+                TargetState::Searching,
+                target.id,
+                &*target.follow,
+                frame,
+                std::mem::take(&mut tracked.features),
+            );
             tracked.features.clear();
             tracked.released = Some(reason);
             changes.push(TargetChange::Released);
@@ -450,35 +380,19 @@ impl Tracker {
 
     /// Takes up the track of that number; `None` where it cannot be followed.
     fn acquire(&mut self, seen: &Observation, id: u64) -> opencv::Result<Option<Target>> {
-        let sighting = self.tracks.get(id).map(|track| Sighting {
-            bounds: track.seen_bounds(),
-            contour: self.tracks.region(track).map_or_else(Vec::new, |region| region.contour.clone()),
-            velocity: track.velocity(),
-            ..Sighting::default()
-        });
-        let Some(sighting) = sighting else { return Ok(None) };
-        let Some(follow) = self.follow_anew(seen, &sighting)? else { return Ok(None) };
+        let Some(track) = self.tracks.get(id) else { return Ok(None) };
+        let follow: Option<Box<dyn Follow>> = match self.config.profile {
+            Profile::Thesis => {
+                let contour = self.tracks.region(track).map_or(&[][..], |region| &region.contour);
+                Thesis::acquire(&seen.luma, track, contour)?.map(|target| Box::new(target) as _)
+            }
+            Profile::Robust => Robust::acquire(seen, track)?.map(|target| Box::new(target) as _),
+        };
+        let seen_at = track.seen_bounds();
+        let Some(follow) = follow else { return Ok(None) };
         self.lost = None;
         self.tracks.target(id);
-        Ok(Some(Target {
-            id,
-            follow,
-            dwell: DwellTime::default(),
-            seen_at: sighting.bounds,
-            is_borne_out: true,
-            astray_s: 0.0,
-        }))
-    }
-
-    fn follow_anew(
-        &self,
-        seen: &Observation,
-        sighting: &Sighting,
-    ) -> opencv::Result<Option<Box<dyn Follow>>> {
-        Ok(match self.config.profile {
-            Profile::Thesis => Thesis::acquire(&seen.luma, sighting)?.map(|target| Box::new(target) as _),
-            Profile::Robust => Robust::acquire(seen, sighting)?.map(|target| Box::new(target) as _),
-        })
+        Ok(Some(Target { id, follow, dwell: DwellTime::default(), seen_at }))
     }
 
     fn begin(
@@ -488,74 +402,16 @@ impl Tracker {
         tracked: &mut Tracked,
         changes: &mut Vec<TargetChange>,
     ) -> Phase {
-        self.policy.take(target.follow.estimate().bounds, &self.tracks);
+        self.policy.take(target.id);
         changes.push(TargetChange::Acquired);
-        *tracked = tracked_of(TargetState::Tracking, &target, frame, std::mem::take(&mut tracked.features));
+        *tracked = tracked_of(
+            TargetState::Tracking,
+            target.id,
+            &*target.follow,
+            frame,
+            std::mem::take(&mut tracked.features),
+        );
         Phase::Tracking(target)
-    }
-}
-
-/// What is told of a track.
-fn reported(track: &Track, target: u64, frame: Frame) -> ptztrack_contract::Track {
-    ptztrack_contract::Track {
-        id: track.id,
-        bounds: frame.rect(track.bounds()),
-        velocity: frame.vector(track.velocity()),
-        state: if track.is_alone() {
-            TrackState::Seen
-        } else if track.is_shared() {
-            TrackState::Shared
-        } else {
-            TrackState::Hidden
-        },
-        confidence: f64::from(track.confidence()),
-        is_target: track.id == target,
-    }
-}
-
-/// `features` is memory.
-fn tracked_of(state: TargetState, target: &Target, frame: Frame, mut features: Vec<Feature>) -> Tracked {
-    let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
-    let points = target.follow.points();
-    let kept = points.members().map(feature(true));
-    let rejected = points.rejected().iter().copied().map(feature(false));
-    features.clear();
-    features.extend(kept.chain(rejected));
-    let estimate = target.follow.estimate();
-    let ego = estimate.ego_velocity;
-    Tracked {
-        state,
-        changes: Vec::new(),
-        released: None,
-        id: target.id,
-        bounds: frame.rect(estimate.bounds),
-        centroid: frame.point(estimate.centroid),
-        velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
-        ego_velocity: ego.map(|ego| frame.vector(ego)),
-        confidence: f64::from(estimate.confidence),
-        features,
-        tracks: Vec::new(),
-        track_changes: Vec::new(),
-    }
-}
-
-impl Default for Tracked {
-    /// There is no target.
-    fn default() -> Self {
-        Self {
-            state: TargetState::Searching,
-            changes: Vec::new(),
-            released: None,
-            id: 0,
-            bounds: Rect::default(),
-            centroid: Point::default(),
-            velocity: Vector::default(),
-            ego_velocity: None,
-            confidence: 0.0,
-            features: Vec::new(),
-            tracks: Vec::new(),
-            track_changes: Vec::new(),
-        }
     }
 }
 

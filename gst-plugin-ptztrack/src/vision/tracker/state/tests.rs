@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use super::super::dwell_time::TimeLimits;
+use super::super::policy::Choice;
 use super::super::synthetic::{Picture, Scene};
 use super::*;
 use crate::vision::{self, SceneModel};
@@ -369,4 +371,84 @@ fn whoever_walks_while_hidden_does_not_stand() {
         there.iter().any(|tracked| tracked.released == Some(ReleaseReason::Stationary)),
         "they stand now"
     );
+}
+
+/// The scenes below begin with nobody, as a camera sees them.
+fn watching(config: Config) -> Chain {
+    let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config) };
+    for _ in 0..10 {
+        step(&mut chain, &street((0.0, 0.0), &[]));
+    }
+    chain
+}
+
+/// How much of the target's box is that of `person`, intersection over union.
+fn is_on(tracked: &Tracked, person: Rect2f) -> f32 {
+    let frame = Frame { width: SIZE.0 as f32, height: SIZE.1 as f32 };
+    super::super::geometry::overlap(frame.rect_to_pixels(tracked.bounds), person)
+}
+
+/// Somebody who comes in shows a hand first, which is a region of its own and is taken; then all of them walks in.
+#[test]
+fn a_hand_that_was_taken_first_is_the_whole_person_half_a_second_later() {
+    let mut chain = watching(Config { must_travel: true, ..config() });
+    let mut last = Tracked::default();
+    for n in 0..30 {
+        let person = Rect2f::new(6.0 * n as f32 - 30.0, 90.0, 60.0, 150.0);
+        let hand = Rect2f::new(person.x + 45.0, 150.0, 18.0, 14.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        let region = if n < 15 { hand } else { person };
+        picture.paint(region, 7);
+        last = chain.process(&picture, DT, &[detection(region)]);
+        assert!((10..15).contains(&n) <= (last.state == TargetState::Tracking), "the hand is taken: {n}");
+        if n >= 20 {
+            assert!(is_on(&last, person) > 0.6, "picture {n}: {:?}", last.bounds);
+        }
+    }
+    assert_eq!(last.id, 1);
+}
+
+/// Somebody walks in past a rack, which sways from the touch and is taken; then it hangs still, and they are a region of their own.
+#[test]
+fn a_rack_that_was_taken_first_is_given_up_for_the_person_within_half_a_second() {
+    let mut chain = watching(Config { must_travel: true, ..config() });
+    let mut since = None;
+    for n in 0..40 {
+        let rack = Rect2f::new(60.0 + 6.0 * (n.min(7) as f32), 100.0, 50.0, 80.0);
+        let person = Rect2f::new(140.0 + 7.0 * (n as f32 - 10.0), 80.0, 60.0, 150.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(rack, 50);
+        let mut detections = vec![];
+        if n < 8 {
+            detections.push(detection(rack));
+        }
+        if n >= 10 {
+            picture.paint(person, 7);
+            detections.push(detection(person));
+        }
+        let last = chain.process(&picture, DT, &detections);
+        assert!(n != 7 || is_on(&last, rack) > 0.6, "the rack is taken: {last:?}");
+        let is_person = last.state == TargetState::Tracking && is_on(&last, person) > 0.6;
+        since = since.or(is_person.then_some(n));
+        assert!(since.is_none() || is_person, "picture {n}: {:?} {:?}", last.state, last.bounds);
+    }
+    assert!(since.is_some_and(|since| since <= 10 + 5), "{since:?}");
+}
+
+/// A poster flickers for a second: its points and its looks are there for ever, and nobody is.
+#[test]
+fn nobody_is_tracked_three_seconds_after_a_poster_flickered() {
+    let poster = Rect2f::new(200.0, 60.0, 50.0, 90.0);
+    let mut chain = watching(config());
+    let picture = street((0.0, 0.0), &[]);
+    let mut taken = false;
+    for n in 0..50 {
+        let detections = if n < 10 { vec![detection(poster)] } else { vec![] };
+        let last = chain.process(&picture, DT, &detections);
+        taken |= last.changes == [TargetChange::Acquired];
+        if n > 40 {
+            assert_eq!(last.state, TargetState::Searching, "picture {n}");
+        }
+    }
+    assert!(taken);
 }

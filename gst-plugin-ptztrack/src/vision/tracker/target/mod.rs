@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! One target and how it is followed: with all cues, or as the thesis does it.
+//! One target and how it is followed: as its track is, with the help of its pixels, or as the thesis does it.
 
-mod course;
+mod appearance;
+mod point_flow;
 mod robust;
 mod thesis;
 mod usual;
@@ -14,7 +15,7 @@ pub(super) use thesis::Thesis;
 
 use super::geometry::{Frame, share_inside};
 use super::points::Points;
-use super::policy::Sighting;
+use super::tracks::Tracks;
 use crate::vision::{Luma, Observation};
 
 /// While it is this young, seconds, a target's box is still the detector's: half of a person may have come into view.
@@ -47,6 +48,8 @@ pub(super) struct Estimate {
     pub centroid: Point2f,
     /// 0 to 1.
     pub confidence: f32,
+    /// Whether more than its looks says that it is there.
+    pub is_borne_out: bool,
     /// Motion against the background, pixels per second.
     pub own_velocity: Point2f,
     /// Motion of the background at the target, pixels per second; `None` where it could not be seen.
@@ -56,20 +59,20 @@ pub(super) struct Estimate {
 impl Estimate {
     /// Whether it is seen so well that it is nowhere else.
     pub fn is_sure(&self) -> bool {
-        self.confidence >= SURE
+        self.is_borne_out && self.confidence >= SURE
     }
 }
 
 /// A way to follow one target from picture to picture.
 pub(super) trait Follow: Send {
-    /// Follows the target into the next picture, `dt_s` later; `sightings` are what the detector saw in it.
-    fn follow(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
-
-    /// Looks for a hidden target where it should be by now, and where the detector saw something.
-    fn coast(&mut self, seen: &Observation, dt_s: f32, sightings: &[Sighting]) -> opencv::Result<Sight>;
-
-    /// It is not where it was followed to, but here, if anywhere, and moves like this against the background.
-    fn expect(&mut self, bounds: Rect2f, velocity: Point2f);
+    /// Follows the target, which is the track of number `id`, into the next picture, `dt_s` later.
+    fn follow(
+        &mut self,
+        seen: &Observation,
+        dt_s: f32,
+        tracks: &mut Tracks,
+        id: u64,
+    ) -> opencv::Result<Sight>;
 
     /// What is known of the target now.
     fn estimate(&self) -> &Estimate;

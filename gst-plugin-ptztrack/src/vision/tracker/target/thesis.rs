@@ -11,7 +11,7 @@ use crate::vision::tracker::geometry::{around, centre, mean};
 use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::Points;
-use crate::vision::tracker::policy::Sighting;
+use crate::vision::tracker::tracks::{Track, Tracks};
 use crate::vision::{Luma, Observation};
 
 /// Standard deviations that a first corner may lie from the mean of all: "a 20% range from the standard deviation".
@@ -33,15 +33,15 @@ pub(in super::super) struct Thesis {
 }
 
 impl Thesis {
-    /// Takes up what was sighted; `None` where it has no corner.
-    pub fn acquire(luma: &Luma, sighting: &Sighting) -> opencv::Result<Option<Self>> {
-        let bounds = sighting.bounds;
+    /// Takes up a track, whose `contour` may be empty; `None` where it has no corner.
+    pub fn acquire(luma: &Luma, track: &Track, contour: &[Point2f]) -> opencv::Result<Option<Self>> {
+        let bounds = track.seen_bounds();
         let patch = Patch::cut(luma, cut_around(luma, bounds), GROWN_WINDOW)?;
         if patch.is_empty() {
             return Ok(None);
         }
         let ellipse = corners::ellipse(bounds);
-        let contour = if sighting.contour.len() >= 3 { &sighting.contour } else { &ellipse[..] };
+        let contour = if contour.len() >= 3 { contour } else { &ellipse[..] };
         let search = Search { contour, taken: &[], count: MAX_POINTS, distance: spacing(bounds) };
         let mut corners = Vec::new();
         corners::find(&patch, &search, &mut corners)?;
@@ -56,7 +56,8 @@ impl Thesis {
             bounds,
             centroid: centre(bounds),
             confidence: 1.0,
-            own_velocity: sighting.velocity,
+            is_borne_out: true,
+            own_velocity: track.velocity(),
             ego_velocity: None,
         };
         let mut target = Self { estimate, points, patch, greys, followed: Followed::default() };
@@ -73,7 +74,7 @@ impl Thesis {
 }
 
 impl Follow for Thesis {
-    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &[Sighting]) -> opencv::Result<Sight> {
+    fn follow(&mut self, seen: &Observation, dt_s: f32, _: &mut Tracks, _: u64) -> opencv::Result<Sight> {
         let luma = &seen.luma;
         let expected = self.estimate.own_velocity * dt_s;
         let start = centre(self.estimate.bounds);
@@ -97,7 +98,8 @@ impl Follow for Thesis {
             return Ok(Sight::Gone);
         }
         if consensus.is_none() {
-            return Ok(Sight::Hidden);
+            // The thesis loses what it does not see.
+            return Ok(Sight::Gone);
         }
         let own = (centre(bounds) - start) / dt_s;
         self.estimate.own_velocity += (own - self.estimate.own_velocity) * (dt_s / (dt_s + VELOCITY_TIME_S));
@@ -110,15 +112,6 @@ impl Follow for Thesis {
         }
         self.estimate.centroid = self.centre_of_mass()?;
         Ok(Sight::Seen)
-    }
-
-    /// The thesis loses what it does not see.
-    fn coast(&mut self, _: &Observation, _: f32, _: &[Sighting]) -> opencv::Result<Sight> {
-        Ok(Sight::Gone)
-    }
-
-    fn expect(&mut self, bounds: Rect2f, velocity: Point2f) {
-        (self.estimate.bounds, self.estimate.own_velocity) = (bounds, velocity);
     }
 
     fn estimate(&self) -> &Estimate {

@@ -5,6 +5,13 @@
 /// Deviations from which a side is not the track's own: it is hidden, or it is somebody else's.
 const GATE: f32 = 3.0;
 
+/// Deviations from which what is seen has another size than the box: one of its sides is hidden, or is not its own.
+const ANOTHER_SIZE: f32 = 1.5;
+/// The deviation of that side then, in differences of the size: what hides somebody often does so for a second, what is seen beside
+/// them is sooner their own.
+const HIDDEN: f32 = 4.0;
+const WIDER: f32 = 1.0;
+
 /// A side of the box along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
@@ -98,6 +105,31 @@ impl Axis {
         }
     }
 
+    /// Takes both sides, seen at `low` and `high`. Where they are farther apart or nearer than they can be, the one that is farther
+    /// from where it was expected says little.
+    pub fn measure_both(&mut self, low: f32, high: f32, deviation: f32) {
+        let change = high - low - self.size;
+        let likely = ANOTHER_SIZE * (self.covariance[2][2] + 2.0 * deviation * deviation).sqrt();
+        let doubtful = if change.abs() <= likely {
+            deviation
+        } else if change < 0.0 {
+            -HIDDEN * change
+        } else {
+            WIDER * change
+        };
+        let off = |side: Side, place: f32| (place - self.side(side)).abs();
+        let (near, far) = ((Side::Low, low), (Side::High, high));
+        let (near, far) = if off(near.0, near.1) <= off(far.0, far.1) { (near, far) } else { (far, near) };
+        self.measure(near.0, near.1, deviation);
+        self.measure(far.0, far.1, doubtful.max(deviation));
+    }
+
+    /// Takes the place of its middle.
+    pub fn measure_middle(&mut self, place: f32, deviation: f32) {
+        let gain: [f32; 3] = std::array::from_fn(|row| self.covariance[row][0]);
+        self.correct(gain, place - self.middle, gain[0] + deviation * deviation);
+    }
+
     /// Takes a rate, pixels per second.
     pub fn measure_rate(&mut self, rate: f32, deviation: f32) {
         let gain: [f32; 3] = std::array::from_fn(|row| self.covariance[row][1]);
@@ -152,6 +184,30 @@ mod tests {
         }
         assert!((axis.side(Side::Low) - 80.0 - 60.0 * DT * 49.0).abs() < 2.0, "{axis:?}");
         assert!((axis.size - 40.0).abs() < 6.0, "{axis:?}");
+    }
+
+    /// Somebody walks behind a pillar, whose edge their right side seems to stay at.
+    #[test]
+    fn a_side_that_a_pillar_hides_holds_nobody_back() {
+        let mut axis = axis();
+        let at = |n: usize| 80.0 + 60.0 * DT * n as f32;
+        for n in 1..=50 {
+            axis.predict(DT, NOISE);
+            axis.measure_both(at(n), (at(n) + 40.0).min(at(30) + 40.0), 3.0);
+        }
+        assert!((axis.side(Side::Low) - at(50)).abs() < 4.0 && axis.rate > 45.0, "{axis:?}");
+    }
+
+    #[test]
+    fn what_stays_smaller_or_larger_is_so() {
+        for high in [105.0, 160.0] {
+            let mut axis = axis();
+            for _ in 0..300 {
+                axis.predict(DT, NOISE);
+                axis.measure_both(80.0, high, 3.0);
+            }
+            assert!((axis.size - (high - 80.0)).abs() < 5.0, "{axis:?}");
+        }
     }
 
     #[test]

@@ -114,5 +114,5 @@ fn exchange(tracks: &mut [Track], one: usize, other: usize) {
     std::mem::swap(&mut one.id, &mut other.id);
     std::mem::swap(&mut one.views, &mut other.views);
     std::mem::swap(&mut one.companions, &mut other.companions);
-    std::mem::swap(&mut one.beside_target, &mut other.beside_target);
+    std::mem::swap(&mut one.beside_target_s, &mut other.beside_target_s);
 }

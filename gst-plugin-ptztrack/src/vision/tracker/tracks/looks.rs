@@ -10,7 +10,8 @@ use crate::vision::{Luma, Observation};
 
 /// Samples across and down a region.
 const GRID: (usize, usize) = (12, 24);
-/// Likelihood of foreground from which a sample counts as person; 128 is where the background is not known.
+/// Likelihood of foreground where the background is not known, and from which a sample counts as person.
+const UNKNOWN: u8 = 128;
 const PERSON: u8 = 129;
 /// Share of the samples of a half that must be person for its colours to be known.
 const LEAST_SHARE: f32 = 0.15;
@@ -59,12 +60,14 @@ impl Viewer {
         }))
     }
 
-    /// How much of what is in `bounds` stands out from the background, 0 to 1; a half where that is not known.
-    pub fn stands_out(&mut self, seen: &Observation, bounds: Rect2f) -> f32 {
-        let Some(scene) = seen.scene else { return 0.5 };
+    /// How much of what is in `bounds` stands out from the background, 0 to 1; `None` where that is hardly known.
+    pub fn stands_out(&mut self, seen: &Observation, bounds: Rect2f) -> Option<f32> {
+        let scene = seen.scene?;
         let [samples, ..] = &mut self.planes;
         self.sampler.sample(&scene.foreground, in_plane(&scene.foreground, seen, bounds), GRID, samples);
-        samples.iter().map(|likelihood| f32::from(*likelihood) / 255.0).sum::<f32>() / samples.len() as f32
+        let known = samples.iter().filter(|likelihood| **likelihood != UNKNOWN);
+        let (sum, count) = known.fold((0, 0), |(sum, count), one| (sum + u32::from(*one), count + 1));
+        (2 * count >= samples.len()).then(|| sum as f32 / (255.0 * count as f32))
     }
 }
 

@@ -11,10 +11,11 @@ use super::groups::owners_of_sides;
 use super::track::Track;
 use crate::vision::tracker::geometry::{Frame, length};
 
-/// Who was seen alone for so long, seconds, is no part of another; where they are less than this part of their height, it takes
-/// longer.
+/// Who is taller than this part of another is no part of them, nor who was seen alone for so long, seconds; where they are still
+/// smaller, that takes longer.
+const PART: f32 = 0.8;
 const APART_S: f64 = 0.3;
-const PART: f32 = 0.6;
+const SMALL: f32 = 0.6;
 const SMALL_APART_S: f64 = 2.0;
 /// Trunk and legs seen apart are each at least this broad beside their height, both together at most so broad; for so long, seconds,
 /// they were seen, and by so many heights per second they part at most.
@@ -94,8 +95,9 @@ impl Tracks {
     fn is_part(&self, part: usize, whole: usize, region: Rect2f) -> bool {
         let (part, whole) = (&self.tracks[part], &self.tracks[whole]);
         let is_body = region.width <= BODY_ASPECT * region.height;
-        let is_small = part.height() < PART * whole.height();
-        (is_small && part.journey.alone_s < SMALL_APART_S) || (is_body && part.journey.alone_s < APART_S)
+        let is_smaller = |share: f32| part.height() < share * whole.height();
+        (is_smaller(SMALL) && part.journey.alone_s < SMALL_APART_S)
+            || (is_smaller(PART) && is_body && part.journey.alone_s < APART_S)
     }
 
     /// What one track was belongs to another from now on, under the number of who was seen alone for longer.

@@ -25,7 +25,7 @@ mod places;
 mod region;
 mod track;
 
-use opencv::core::{Point2f, Rect2f};
+use opencv::core::Rect2f;
 use ptztrack_contract::TrackChange;
 
 use association::Association;
@@ -40,7 +40,7 @@ pub(super) use region::Region;
 pub(super) use track::Track;
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, centre, length, share_inside};
+use super::geometry::{Frame, centre, length, overlap, share_inside};
 use crate::vision::Observation;
 
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are nobody.
@@ -50,6 +50,8 @@ const MAX_SHARE: f32 = 0.9;
 const LEFT: f32 = 0.35;
 /// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second.
 const REACH: (f32, f32) = (0.5, 2.3);
+/// Intersection over union with somebody else from which it is they who are seen.
+const TAKEN: f32 = 0.4;
 /// How alike in colours somebody new must be to be who is not seen, and what part of their height must have come out.
 const ALIKE: f32 = 0.6;
 const REAPPEARED: f32 = 0.5;
@@ -160,17 +162,21 @@ impl Tracks {
         self.regions.get(track.region()?)
     }
 
-    /// How much of what is in `bounds` stands out from the background, 0 to 1; a half where that is not known.
-    pub fn stands_out(&mut self, seen: &Observation, bounds: Rect2f) -> f32 {
+    /// How much of what is in `bounds` stands out from the background, 0 to 1; `None` where that is hardly known.
+    pub fn stands_out(&mut self, seen: &Observation, bounds: Rect2f) -> Option<f32> {
         self.viewer.stands_out(seen, bounds)
     }
 
-    /// Lets a track that is not seen alone follow what its pixels say of it: for that share of the time after which nobody is there
-    /// for certain, as much as they stand out from the background.
-    pub fn support(&mut self, id: u64, bounds: Rect2f, velocity: Point2f, stands_out: f32, share: f64) {
-        if let Some(track) = self.get_mut(id).filter(|track| !track.is_alone()) {
-            track.follow(bounds, velocity, stands_out, share);
-        }
+    /// Whether somebody else than the target is in `area`.
+    pub fn is_another_in(&self, area: Rect2f) -> bool {
+        self.seen().any(|other| other.is_another() && (other.seen_bounds() & area).area() > 0.0)
+    }
+
+    /// Whether what is in `bounds` is somebody else than the target.
+    pub fn is_anothers(&self, bounds: Rect2f) -> bool {
+        self.iter().any(|other| {
+            other.is_alone() && other.is_another() && overlap(bounds, other.seen_bounds()) >= TAKEN
+        })
     }
 
     /// The number of who is seen in exactly `bounds`; where nobody is, of somebody new who is there by an operator's word.
@@ -195,16 +201,16 @@ impl Tracks {
     /// That track is the target from now on: it is there, and the others are yet to be told apart from it.
     pub fn target(&mut self, id: u64) {
         for track in &mut self.tracks {
-            track.beside_target = 0;
+            track.beside_target_s = 0.0;
             if track.id == id {
                 track.establish();
             }
         }
     }
 
-    /// Where the target is not seen, and somebody new goes about near where it should be and looks like it, it is they: however they
-    /// sat, stooped or turned before. Who was seen beside it is somebody else.
-    pub fn find_again(&mut self, id: u64) {
+    /// Where the target is not seen, and somebody new is near where it should be, going about where that is asked for, and looks like it,
+    /// it is they: however they sat, stooped or turned before. Who was seen beside it is somebody else.
+    pub fn find_again(&mut self, id: u64, must_travel: bool) {
         let Some(lost) = self.tracks.iter().position(|track| track.id == id && track.region().is_none())
         else {
             return;
@@ -219,11 +225,11 @@ impl Tracks {
             };
             other.is_alone()
                 && other.is_confirmed()
-                && other.beside_target == 0
+                && !other.is_another()
                 && other.journey.age_s <= unseen_s
                 && other.height() >= REAPPEARED * bounds.height
                 && length(centre(other.bounds()) - centre(bounds)) <= reach
-                && other.travels()
+                && (!must_travel || other.travels())
                 && alike().is_none_or(|alike| alike >= ALIKE)
         });
         if let Some(found) = found {

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::vision::Luma;
+use opencv::core::Point2f;
 use proptest::prelude::*;
 
 const DT: f64 = 0.1;

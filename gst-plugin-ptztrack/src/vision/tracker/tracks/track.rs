@@ -29,8 +29,10 @@ const CUT_SIZE: f32 = 0.6;
 const FIRST_EXISTENCE: f32 = 0.4;
 const MOST_EXISTENCE: f32 = 3.0;
 const SEEN_PER_S: f32 = 6.0;
-/// How much it counts beside that what somebody's pixels follow stands out from the background, where a half is not known.
-const STANDS_OUT_GAIN: f32 = 2.0;
+/// What it adds in a second that as much of it stands out from the background as usual.
+const STANDS_OUT_PER_S: f32 = 2.0;
+/// Deviation of where somebody is by their looks, in heights.
+const LOOKS_NOISE: f32 = 0.08;
 /// Intersection over union below which what is seen has another size than the track, and for how long it must be so, seconds, until
 /// that is its size: what is larger shows more of it, what is smaller may be what something hides.
 const UNLIKE: f32 = 0.5;
@@ -38,6 +40,8 @@ const GROWS_S: f64 = 0.4;
 const SHRINKS_S: f64 = 5.0;
 /// How much of the height must be seen for looks to be learned.
 const WHOLE: f32 = 0.7;
+/// Who was seen beside the target for so long, seconds, is somebody else.
+const TOLD_APART_S: f64 = 0.1;
 /// Somebody hidden by others is missed less.
 const HIDDEN_SHARE: f32 = 0.4;
 /// What has been seen for so long, seconds, and has come less far than this part of its own size, goes nowhere.
@@ -94,8 +98,8 @@ pub(in super::super) struct Track {
     pub(super) views: Views,
     /// Whom it shared a region with and has not been told apart from since.
     pub companions: Vec<u64>,
-    /// Pictures in which it was seen beside the target, and so is somebody else.
-    pub beside_target: u32,
+    /// For how long it was seen beside the target, seconds: then it is somebody else.
+    pub beside_target_s: f64,
 }
 
 impl Track {
@@ -131,7 +135,7 @@ impl Track {
             },
             views: Views::default(),
             companions: Vec::new(),
-            beside_target: 0,
+            beside_target_s: 0.0,
         }
     }
 
@@ -177,6 +181,11 @@ impl Track {
     /// Whether it is seen in a region with others.
     pub fn is_shared(&self) -> bool {
         matches!(self.evidence, Evidence::Shared(..))
+    }
+
+    /// Whether it was seen beside the target, and so is somebody else.
+    pub fn is_another(&self) -> bool {
+        self.beside_target_s >= TOLD_APART_S
     }
 
     /// Whether anything of it was seen by itself.
@@ -238,16 +247,8 @@ impl Track {
         let down = DOWN_NOISE * height + PIXEL_NOISE;
         let end = bounds.br();
         let [left, top, right, bottom] = sides;
-        for (own, side, place) in [(left, Side::Low, bounds.x), (right, Side::High, end.x)] {
-            if own {
-                self.across.measure(side, place, across);
-            }
-        }
-        for (own, side, place) in [(top, Side::Low, bounds.y), (bottom, Side::High, end.y)] {
-            if own {
-                self.down.measure(side, place, down);
-            }
-        }
+        take(&mut self.across, [left, right], [bounds.x, end.x], across);
+        take(&mut self.down, [top, bottom], [bounds.y, end.y], down);
     }
 
     /// Was seen in a region of its own.
@@ -288,15 +289,23 @@ impl Track {
         self.existence = 0.0;
     }
 
-    /// Takes the word of who follows its pixels for where it is. How much of it stands out there, 0 to 1, says for that share of
-    /// the time after which nobody is there for certain whether it is there at all.
-    pub fn follow(&mut self, bounds: Rect2f, velocity: Point2f, stands_out: f32, share: f64) {
-        let evidence = (2.0 * STANDS_OUT_GAIN * stands_out).min(2.0) * MOST_EXISTENCE * share as f32;
-        self.existence = (self.existence + evidence).min(MOST_EXISTENCE);
-        self.measure(bounds, [true; 4]);
-        let deviation = 0.2 * self.height();
+    /// Takes its motion against the background, pixels per second, with that deviation.
+    pub fn measure_velocity(&mut self, velocity: Point2f, deviation: f32) {
         self.across.measure_rate(velocity.x, deviation);
         self.down.measure_rate(velocity.y, deviation);
+    }
+
+    /// Takes the place at which it is by its looks: the less sure they are of it, 0 to 1, the less that counts.
+    pub fn measure_place(&mut self, middle: Point2f, sureness: f32) {
+        let deviation = (LOOKS_NOISE * self.height() + PIXEL_NOISE) / sureness.clamp(0.1, 1.0);
+        self.across.measure_middle(middle.x, deviation);
+        self.down.measure_middle(middle.y, deviation);
+    }
+
+    /// No region shows it alone, but where its looks say that it is so much stands out, as a share of what usually does, for `dt_s`.
+    pub fn stand_out(&mut self, share: f32, dt_s: f32) {
+        let evidence = STANDS_OUT_PER_S * share.min(1.0);
+        self.existence = (self.existence + evidence * dt_s).min(MOST_EXISTENCE);
     }
 
     /// What is seen of it alone is `whole`: where that is much larger or smaller for long, this is its size.
@@ -356,6 +365,16 @@ impl Track {
                 && bottom * right > 0.0;
             moved.x.abs() >= least || moved.y.abs() >= least || nearer
         })
+    }
+}
+
+/// Takes the sides of an axis that are its `own`.
+fn take(axis: &mut Axis, own: [bool; 2], [low, high]: [f32; 2], deviation: f32) {
+    match own {
+        [true, true] => axis.measure_both(low, high, deviation),
+        [true, false] => axis.measure(Side::Low, low, deviation),
+        [false, true] => axis.measure(Side::High, high, deviation),
+        [false, false] => (),
     }
 }
 

@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What goes into a tracker and what comes out of it, in frame sizes.
+
+use opencv::core::Point2f;
+use ptztrack_contract::{
+    Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
+};
+
+use super::geometry::Frame;
+use super::target::Follow;
+use super::tracks::Track;
+
+/// Something that a detector saw, in frame sizes.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Detection {
+    /// Its box.
+    pub bounds: Rect,
+    /// Polygon around it; empty where only the box is known.
+    pub contour: Vec<Point>,
+    /// Whether it lies outside of the detector's zones: nobody is chosen there.
+    pub outside: bool,
+}
+
+/// What the tracker knows after one frame, in frame sizes (per second).
+#[derive(Debug, Clone, PartialEq)]
+pub struct Tracked {
+    /// What it does.
+    pub state: TargetState,
+    /// What happened in this frame, in order.
+    pub changes: Vec<TargetChange>,
+    /// Why the target was released, where it was.
+    pub released: Option<ReleaseReason>,
+    /// Number of the target, from 1; 0 where there is none.
+    pub id: u64,
+    /// Box of the target; predicted while it is hidden.
+    pub bounds: Rect,
+    /// Its centre of mass (3.15).
+    pub centroid: Point,
+    /// Its motion in the picture, camera motion included.
+    pub velocity: Vector,
+    /// Motion of the background at its place, where that could be seen.
+    pub ego_velocity: Option<Vector>,
+    /// 0 to 1.
+    pub confidence: f64,
+    /// The feature points, kept and rejected.
+    pub features: Vec<Feature>,
+    /// Everybody who is seen.
+    pub tracks: Vec<ptztrack_contract::Track>,
+    /// Who came and went in this frame, by number; who merged, with the number that they go on under.
+    pub track_changes: Vec<(TrackChange, u64, Option<u64>)>,
+}
+
+/// What is told of a track.
+pub(super) fn reported(track: &Track, target: u64, frame: Frame) -> ptztrack_contract::Track {
+    ptztrack_contract::Track {
+        id: track.id,
+        bounds: frame.rect(track.bounds()),
+        velocity: frame.vector(track.velocity()),
+        state: if track.is_alone() {
+            TrackState::Seen
+        } else if track.is_shared() {
+            TrackState::Shared
+        } else {
+            TrackState::Hidden
+        },
+        confidence: f64::from(track.confidence()),
+        is_target: track.id == target,
+    }
+}
+
+/// What is told of a target of that number; `features` is memory.
+pub(super) fn tracked_of(
+    state: TargetState,
+    id: u64,
+    target: &dyn Follow,
+    frame: Frame,
+    mut features: Vec<Feature>,
+) -> Tracked {
+    let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
+    let points = target.points();
+    let kept = points.members().map(feature(true));
+    let rejected = points.rejected().iter().copied().map(feature(false));
+    features.clear();
+    features.extend(kept.chain(rejected));
+    let estimate = target.estimate();
+    let ego = estimate.ego_velocity;
+    Tracked {
+        state,
+        changes: Vec::new(),
+        released: None,
+        id,
+        bounds: frame.rect(estimate.bounds),
+        centroid: frame.point(estimate.centroid),
+        velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
+        ego_velocity: ego.map(|ego| frame.vector(ego)),
+        confidence: f64::from(estimate.confidence),
+        features,
+        tracks: Vec::new(),
+        track_changes: Vec::new(),
+    }
+}
+
+impl Default for Tracked {
+    /// There is no target.
+    fn default() -> Self {
+        Self {
+            state: TargetState::Searching,
+            changes: Vec::new(),
+            released: None,
+            id: 0,
+            bounds: Rect::default(),
+            centroid: Point::default(),
+            velocity: Vector::default(),
+            ego_velocity: None,
+            confidence: 0.0,
+            features: Vec::new(),
+            tracks: Vec::new(),
+            track_changes: Vec::new(),
+        }
+    }
+}
