@@ -11,6 +11,7 @@
 use std::error::Error;
 
 use gst::prelude::*;
+use pipeline_supervisor::LogIn;
 use ptztrack_contract::TargetMessage;
 
 /// A source that hears nothing for a second fails, so that it is started anew.
@@ -22,23 +23,23 @@ fn main() -> Result<(), Box<dyn Error>> {
     let camera = arguments.next().ok_or("usage: follow http://CAMERA [USER]")?;
     let user = arguments.next();
     gst::init()?;
+    let log_in = LogIn::new(std::env::var("CAMERA_PASSWORD").unwrap_or_default());
     // The sink has stopped the camera when this is over.
-    pipeline_supervisor::run(move || pipeline(&camera, user.as_deref()), show)
+    pipeline_supervisor::run(move || pipeline(&camera, user.as_deref(), &log_in), show)
 }
 
-fn pipeline(camera: &str, user: Option<&str>) -> Result<gst::Pipeline, Box<dyn Error>> {
+fn pipeline(camera: &str, user: Option<&str>, log_in: &LogIn) -> Result<gst::Pipeline, Box<dyn Error>> {
     let pipeline = gst::parse::launch(PIPELINE)?.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
     let source = pipeline.by_name("source").ok_or("no source")?;
     let servo = pipeline.by_name("servo").ok_or("no servo")?;
     source.set_property("location", format!("{camera}/axis-cgi/mjpg/video.cgi"));
     servo.set_property("location", camera);
     if let Some(user) = user {
-        let password = std::env::var("CAMERA_PASSWORD").unwrap_or_default();
         source.set_property("user-id", user);
-        source.set_property("user-pw", &password);
         servo.set_property("user", user);
-        servo.set_property("password", &password);
     }
+    // The source would tell a password to anybody who asks for it in the camera's place.
+    log_in.apply(&pipeline)?;
     Ok(pipeline)
 }
 

@@ -259,6 +259,36 @@ async fn a_restarted_application_takes_over_from_the_old_watchdog() {
     ends(&program);
 }
 
+/// The other's watchdog has the camera, and knows nothing of this one's move.
+#[tokio::test]
+async fn of_two_applications_with_one_camera_each_has_its_move_stopped() {
+    let mut application = Application::new("one-of-two").moving().await;
+    let other = Application::before("two-of-two", VirtualCamera::start(Settings::default()).unwrap());
+    let mut lease = Lease::new(other.watchdog.clone());
+    let order = order(application.client.identity(), false);
+    // The lock is taken in this time, and both go on.
+    for _ in 0..10 {
+        lease.hold(order.clone());
+        lease.settled().await;
+        application.hold(false).await;
+        tokio::time::sleep(MOMENT).await;
+    }
+    let (camera, program) = application.die();
+    let begin = Instant::now();
+    while process(&program).is_some() {
+        assert!(begin.elapsed() < PATIENCE, "it never ends");
+        lease.hold(order.clone());
+        tokio::time::sleep(MOMENT).await;
+    }
+    // Not by the other's lease, which is not over by then.
+    assert!(camera.wait_for(Duration::from_secs(1), |status| !status.moving), "{:?}", moves(&camera));
+    lease.release();
+    let (_, others) = other.die();
+    drop(lease);
+    ends(&program);
+    ends(&others);
+}
+
 #[tokio::test]
 async fn without_a_camera_to_stop_it_can_be_ended_and_is_started_anew() {
     let mut application = Application::new("ended").moving().await;
@@ -383,6 +413,34 @@ async fn one_that_runs_elsewhere_serves_whoever_connects() {
     service.kill().unwrap();
     service.wait().unwrap();
     fs::remove_file(socket).unwrap();
+}
+
+/// Many connect, and it has a descriptor left for none of them.
+#[tokio::test]
+async fn one_without_descriptors_goes_on_once_it_has_some() {
+    let socket =
+        PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("watchdog-{}-few.sock", std::process::id()));
+    let mut service = Process::new("sh")
+        .args(["-c", "ulimit -n 16; exec \"$@\"", "sh", env!("CARGO_BIN_EXE_vapix-watchdog"), "--listen"])
+        .arg(&socket)
+        .spawn()
+        .unwrap();
+    wait_until("it does not listen", || socket.metadata().is_ok_and(|found| found.file_type().is_socket()));
+    let many: Vec<_> = (0..32).map_while(|_| std::os::unix::net::UnixStream::connect(&socket).ok()).collect();
+    assert!(many.len() > 16, "{}", many.len());
+    let last = format!("/proc/{}/fd/15", service.id());
+    wait_until("it has descriptors left", || fs::symlink_metadata(&last).is_ok());
+    drop(many);
+    let mut application = Application::new("few");
+    application.watchdog = Watchdog::new(WatchdogAddress::Socket(socket.clone()));
+    application.lease = Lease::new(application.watchdog.clone());
+    let (camera, program) = application.moving().await.die();
+    rests(&camera);
+    for file in [program, socket] {
+        fs::remove_file(file).unwrap();
+    }
+    service.kill().unwrap();
+    service.wait().unwrap();
 }
 
 #[test]

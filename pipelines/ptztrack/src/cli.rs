@@ -57,6 +57,12 @@ pub enum Task {
     },
     /// Print a file with everything in it, commented
     ExampleConfig,
+    /// Be the process of one camera, for a `ptztrack` that is on the other side of standard input
+    #[command(hide = true)]
+    Camera {
+        /// Its name, for lists of processes
+        name: String,
+    },
     /// Write the manual pages into a folder
     #[command(hide = true)]
     Man {

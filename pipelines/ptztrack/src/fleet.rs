@@ -14,40 +14,43 @@ use crate::log::Log;
 #[derive(Debug)]
 pub struct Fleet {
     cameras: Mutex<BTreeMap<String, Camera>>,
+    /// Those that were told to end and have no successor.
+    ending: Mutex<Vec<Camera>>,
     had: ControlFile,
     log: Arc<Log>,
 }
 
 impl Fleet {
     pub fn new(log: Arc<Log>) -> Self {
-        Self { cameras: Mutex::default(), had: ControlFile::new(), log }
+        Self { cameras: Mutex::default(), ending: Mutex::default(), had: ControlFile::new(), log }
     }
 
-    /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits
-    /// until the others have ended.
+    /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits for
+    /// none that ends: who takes a camera over does.
     pub fn apply(&self, wanted: Vec<CameraSettings>) {
         // Who has a camera has it whatever becomes of its entry.
         let mut had = self.had.load();
         had.extend(self.control());
         let mut cameras = lock(&self.cameras);
         let stays = |camera: &Camera| !camera.is_over() && wanted.contains(&camera.settings);
-        let (stay, go): (BTreeMap<_, _>, BTreeMap<_, _>) =
+        let (stay, mut go): (BTreeMap<_, _>, BTreeMap<_, _>) =
             std::mem::take(&mut *cameras).into_iter().partition(|(_, camera)| stays(camera));
         *cameras = stay;
-        drop(cameras);
-        end(go.into_values());
+        go.values().for_each(Camera::end);
         for settings in wanted {
-            let mut cameras = lock(&self.cameras);
             if cameras.contains_key(&settings.name) {
                 continue;
             }
             let name = settings.name.clone();
             let control = had.get(&name).copied().unwrap_or_default();
-            match Camera::start(settings, control, self.log.clone()) {
+            match Camera::start(settings, control, self.log.clone(), go.remove(&name)) {
                 Ok(camera) => drop(cameras.insert(name, camera)),
                 Err(err) => self.log.error("not-started", format!("{name} cannot be started: {err}")),
             }
         }
+        let mut ending = lock(&self.ending);
+        ending.retain(|camera| !camera.is_over());
+        ending.extend(go.into_values());
     }
 
     fn control(&self) -> BTreeMap<String, Control> {
@@ -64,7 +67,10 @@ impl Fleet {
     /// Ends all, and waits until their cameras rest.
     pub fn end(&self) {
         let cameras = std::mem::take(&mut *lock(&self.cameras));
-        end(cameras.into_values());
+        let ending = std::mem::take(&mut *lock(&self.ending));
+        // All at once: each may take seconds.
+        let all: Vec<Camera> = cameras.into_values().chain(ending).inspect(Camera::end).collect();
+        all.into_iter().for_each(Camera::join);
     }
 
     /// What is known of each.
@@ -87,10 +93,4 @@ impl Fleet {
     pub fn is_over(&self) -> bool {
         lock(&self.cameras).values().all(Camera::is_over)
     }
-}
-
-/// All at once: each may take seconds.
-fn end(cameras: impl Iterator<Item = Camera>) {
-    let cameras: Vec<Camera> = cameras.inspect(Camera::end).collect();
-    cameras.into_iter().for_each(Camera::join);
 }

@@ -20,7 +20,8 @@ pub enum Format {
 /// Where everything that happens is told.
 #[derive(Debug)]
 pub struct Log {
-    format: Format,
+    /// None where it is written by somebody else.
+    format: Option<Format>,
     /// What stands below the log in a terminal.
     status: Mutex<Vec<String>>,
     /// For whoever tells it elsewhere too.
@@ -32,23 +33,29 @@ const WAITING: usize = 256;
 
 impl Log {
     pub fn new(format: Format) -> Self {
-        Self { format, status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
+        Self { format: Some(format), status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
+    }
+
+    /// One for those alone who subscribe.
+    pub fn unwritten() -> Self {
+        Self { format: None, status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
     }
 
     /// Whether there is somebody to show a status to.
     pub fn has_terminal(&self) -> bool {
-        self.format == Format::Text && stderr().is_terminal()
+        self.format == Some(Format::Text) && stderr().is_terminal()
     }
 
     /// Tells it.
     pub fn tell(&self, event: &Event) {
-        let line = match self.format {
+        let line = self.format.map(|format| match format {
             Format::Text => event.to_string(),
             Format::Json => serde_json::to_string(event).unwrap_or_default(),
-        };
-        let status = lock(&self.status);
-        write(&format!("{}{line}\n{}", above(&status), below(&status)));
-        drop(status);
+        });
+        if let Some(line) = line {
+            let status = lock(&self.status);
+            write(&format!("{}{line}\n{}", above(&status), below(&status)));
+        }
         // Where nobody listens, that is no fault.
         let _ = self.events.send(event.clone());
     }

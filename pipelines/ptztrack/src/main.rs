@@ -88,6 +88,12 @@ fn run(options: Options) -> Result<(), Failure> {
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }
+        Task::Camera { .. } => {
+            let runtime = begin()?;
+            let result = runtime.block_on(camera::process::child::run());
+            runtime.shutdown_background();
+            Ok(result.map_err(|err| err.to_string())?)
+        }
         Task::Man { folder } => {
             Ok(clap_mangen::generate_to(Options::command(), folder).map_err(|err| err.to_string())?)
         }
@@ -108,6 +114,14 @@ fn allow_descriptors() {
     );
 }
 
+/// No core dump holds passwords: of 1 byte there is neither a file nor, as of 0 there may be, one that goes to a program
+/// (core(5), `do_coredump` of Linux).
+fn keep_secrets() {
+    let none = rustix::process::Rlimit { current: Some(1), maximum: Some(1) };
+    // Where it is refused, it is less than that already.
+    let _ = rustix::process::setrlimit(rustix::process::Resource::Core, none);
+}
+
 fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failure> {
     let mut config = origin.read()?;
     if let Some(listen) = serving.http {
@@ -117,13 +131,23 @@ fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failur
         http.check()?;
         config.http = Some(http);
     }
+    let runtime = begin()?;
+    let result = runtime.block_on(service::run(Arc::new(origin), config, log));
+    // Whoever hangs is not waited for.
+    runtime.shutdown_background();
+    Ok(result?)
+}
+
+/// What a process needs that follows with cameras.
+fn begin() -> Result<tokio::runtime::Runtime, Failure> {
     allow_descriptors();
+    keep_secrets();
     // Libraries below GStreamer, GIO for one, count on somebody who runs the default main context.
     std::thread::Builder::new()
         .name("main-context".to_owned())
         .spawn(|| glib::MainLoop::new(None, false).run())
         .map_err(|err| err.to_string())?;
-    Ok(runtime(2)?.block_on(service::run(origin, config, log))?)
+    Ok(runtime(2)?)
 }
 
 fn runtime(threads: usize) -> Result<tokio::runtime::Runtime, String> {

@@ -21,6 +21,8 @@ use crate::shard::Shard;
 
 /// Between two tries to have the page's address.
 const LISTEN_AGAIN: Duration = Duration::from_secs(5);
+/// For cameras to end: the end of a stream is waited for 10 s, and stopping a camera that does not answer takes some more.
+const LONGEST_END: Duration = Duration::from_secs(20);
 /// Between two looks for a password that could not be read.
 const LOOK_AGAIN: Duration = Duration::from_secs(10);
 
@@ -58,7 +60,7 @@ impl Origin {
 ///
 /// # Errors
 /// Why it cannot start; or, of one camera from the command line, why it was given up.
-pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), String> {
+pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(), String> {
     let said = |err: std::io::Error| err.to_string();
     let mut ends = [SignalKind::terminate(), SignalKind::interrupt()].map(signal).into_iter();
     let (Some(terminate), Some(interrupt)) = (ends.next(), ends.next()) else { return Ok(()) };
@@ -69,24 +71,34 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     if let Some(http) = config.http.clone() {
         tokio::spawn(serve(http, fleet.clone(), log.clone()));
     }
-    let publisher =
-        config.mqtt.as_ref().map(|mqtt| Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone()));
-    apply(&fleet, config.clone()).await;
+    let publisher = config.mqtt.as_ref().and_then(|mqtt| {
+        let started = Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone());
+        let tell = |err: &session::Error| log.error("mqtt-not-started", format!("no MQTT: {err}"));
+        started.inspect_err(tell).ok()
+    });
+    fleet.apply(config.cameras.clone());
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
     let mut second = interval(Duration::from_secs(1));
     let mut passwords = interval(LOOK_AGAIN);
     let mut keeping = None;
     let mut current = config;
+    // Elsewhere: a disk may hang, and whoever waits for us to be alive waits.
+    let mut reading: Option<JoinHandle<Option<Config>>> = None;
+    let read = |current: &Config, only_changes| {
+        let (origin, current, fleet, log) = (origin.clone(), current.clone(), fleet.clone(), log.clone());
+        Some(tokio::task::spawn_blocking(move || read_again(&origin, &current, only_changes, &fleet, &log)))
+    };
     loop {
         tokio::select! {
             () = end(&mut terminate, &mut interrupt) => break,
-            _ = hangup.recv() => current = read_again(&origin, current, &fleet, &log).await,
-            _ = passwords.tick() => if current.cameras.iter().any(|camera| camera.no_password.is_some())
-                && origin.read().is_ok_and(|config| config.cameras != current.cameras)
-            {
-                current = read_again(&origin, current, &fleet, &log).await;
-            },
+            config = finished(&mut reading) => current = config.unwrap_or(current),
+            _ = hangup.recv(), if reading.is_none() => reading = read(&current, false),
+            _ = passwords.tick(), if reading.is_none() => {
+                if current.cameras.iter().any(|camera| camera.no_password.is_some()) {
+                    reading = read(&current, true);
+                }
+            }
             () = tick(&mut alive) => if fleet.stuck().is_empty() {
                 notify(&[NotifyState::Watchdog]);
             },
@@ -95,7 +107,7 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
                 if log.has_terminal() {
                     log.show_status(fleet.known().iter().map(|known| format!("{}: {}", known.name, known.in_words())).collect());
                 }
-                if matches!(origin, Origin::CommandLine(_)) && fleet.is_over() {
+                if matches!(*origin, Origin::CommandLine(_)) && fleet.is_over() {
                     return Err("Nothing is left to follow with.".to_owned());
                 }
             }
@@ -105,7 +117,10 @@ pub async fn run(origin: Origin, config: Config, log: Arc<Log>) -> Result<(), St
     log.show_status(Vec::new());
     log.info("ending", "ends: every camera is brought to rest");
     let ending = fleet.clone();
-    let _ = tokio::task::spawn_blocking(move || ending.end()).await;
+    let ended = tokio::task::spawn_blocking(move || ending.end());
+    if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
+        log.error("not-ended", "a camera's pipeline hangs: its watchdog stops the camera");
+    }
     if let Some(publisher) = publisher {
         publisher.end().await;
     }
@@ -142,17 +157,27 @@ fn keep_control(fleet: &Arc<Fleet>, keeping: &mut Option<JoinHandle<()>>) {
     }
 }
 
-async fn apply(fleet: &Arc<Fleet>, config: Config) {
-    let fleet = fleet.clone();
+/// What was read, where something was; never where nothing is being read.
+async fn finished(reading: &mut Option<JoinHandle<Option<Config>>>) -> Option<Config> {
+    let Some(task) = reading else { return pending().await };
     // A panic in there has been said.
-    let _ = tokio::task::spawn_blocking(move || fleet.apply(config.cameras)).await;
+    let config = task.await.ok().flatten();
+    *reading = None;
+    config
 }
 
-/// A file with mistakes changes nothing. What GStreamer lacked may be there now.
-async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &Log) -> Config {
+/// Has what the file says now count; a file with mistakes changes nothing. What GStreamer lacked may be there now.
+fn read_again(
+    origin: &Origin,
+    current: &Config,
+    only_changes: bool,
+    fleet: &Fleet,
+    log: &Log,
+) -> Option<Config> {
     // Its reason to fail would be that no plugin can be read, and the cameras say what they lack.
     let _ = gst::Registry::update();
     match origin.read() {
+        Ok(config) if only_changes && config.cameras == current.cameras => None,
         Ok(config) => {
             log.info("read-again", "the configuration was read again");
             if config.http != current.http || config.mqtt != current.mqtt {
@@ -161,12 +186,13 @@ async fn read_again(origin: &Origin, current: Config, fleet: &Arc<Fleet>, log: &
                     "what changed in [http] and [mqtt] counts from the next start on",
                 );
             }
-            apply(fleet, config.clone()).await;
-            config
+            fleet.apply(config.cameras.clone());
+            Some(config)
         }
+        Err(_) if only_changes => None,
         Err(failure) => {
             log.error("not-read", format!("everything stays as it was: {}", failure.reason()));
-            current
+            None
         }
     }
 }

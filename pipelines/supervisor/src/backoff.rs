@@ -7,28 +7,31 @@ use std::time::Duration;
 #[derive(Debug)]
 pub struct Backoff {
     pause: Duration,
+    shortest: Duration,
+    longest: Duration,
+    well: Duration,
 }
 
 impl Default for Backoff {
+    /// For pipelines: one that ran for 5 s had a picture.
     fn default() -> Self {
-        Self { pause: Self::SHORTEST }
+        Self::new(Duration::from_millis(100), Duration::from_millis(400), Duration::from_secs(5))
     }
 }
 
 impl Backoff {
-    const SHORTEST: Duration = Duration::from_millis(100);
-    const LONGEST: Duration = Duration::from_millis(400);
+    /// Pauses from the shortest to the longest; what ran for as long as `well` was no failure.
+    pub fn new(shortest: Duration, longest: Duration, well: Duration) -> Self {
+        Self { pause: shortest, shortest, longest, well }
+    }
 
-    /// A pipeline that ran for so long had a picture.
-    const WELL: Duration = Duration::from_secs(5);
-
-    /// The pause after a pipeline that ran for this long.
+    /// The pause after what ran for this long.
     pub fn after(&mut self, ran: Duration) -> Duration {
-        if ran >= Self::WELL {
-            self.pause = Self::SHORTEST;
+        if ran >= self.well {
+            self.pause = self.shortest;
         }
         let pause = self.pause;
-        self.pause = (pause * 2).min(Self::LONGEST);
+        self.pause = (pause * 2).min(self.longest);
         pause
     }
 }

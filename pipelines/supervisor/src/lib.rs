@@ -6,11 +6,15 @@
 //! That nothing comes any more is for the pipeline to tell: by `souphttpsrc timeout=1`, or the element `watchdog`.
 
 mod backoff;
+mod log_in;
 pub mod reach;
 mod supervisor;
+pub mod video;
 
 use std::error::Error;
 
+pub use backoff::Backoff;
+pub use log_in::LogIn;
 pub use supervisor::Supervisor;
 
 /// SIGHUP, SIGINT and SIGTERM.
@@ -18,7 +22,7 @@ const ENDS: [i32; 3] = [1, 2, 15];
 
 /// Runs what `build` makes, again and again, until the process is told to end; `on_message` hears every message. To be
 /// called in the main thread: it runs the default main context. Nothing is started while nobody accepts the connection of a
-/// `souphttpsrc`; standard error says why.
+/// `souphttpsrc`, or `build` ends with a [`video::Failure`] that may pass; standard error says why.
 ///
 /// # Errors
 /// Those of [`Supervisor::run`].
@@ -35,7 +39,15 @@ pub fn run(
         })
     });
     let reached = || {
-        let pipeline = build()?;
+        let pipeline = match build().map_err(|err| err.downcast::<video::Failure>()) {
+            Ok(pipeline) => pipeline,
+            Err(Ok(failure)) if !failure.refused => {
+                eprintln!("{failure}");
+                return Ok(None);
+            }
+            Err(Ok(refused)) => return Err(refused.into()),
+            Err(Err(err)) => return Err(err),
+        };
         let reached = reach::check_sources(&pipeline).inspect_err(|reason| eprintln!("{reason}"));
         Ok(reached.is_ok().then_some(pipeline))
     };

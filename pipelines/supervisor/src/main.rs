@@ -6,17 +6,16 @@
 //! ```sh
 //! CAMERA_PASSWORD=... ptztrack-launch souphttpsrc user-id=operator location=... ! ... ! vapixptzsink user=operator location=...
 //! ```
-//! Elements that are given a user get the password in the environment variable `CAMERA_PASSWORD`, so that no list of
-//! processes shows it. `{run}` in an argument is nothing in the first run, then `-2`, `-3` and so on.
+//! Whoever is given a user is logged in with the password in the environment variable `CAMERA_PASSWORD`, so that no list of
+//! processes shows it. A `souphttpsrc` or `rtspsrc` is not told it, and an `appsrc` takes the place of the first: they would tell it to
+//! anybody who asks for it in the camera's place. `{run}` in an argument is nothing in the first run, then `-2`, `-3` and so on.
 
 use std::cell::Cell;
 use std::error::Error;
 use std::process::ExitCode;
 
 use gst::prelude::*;
-
-/// What elements call a user, and the user's password.
-const CREDENTIALS: [(&str, &str); 2] = [("user", "password"), ("user-id", "user-pw")];
+use pipeline_supervisor::LogIn;
 
 fn main() -> ExitCode {
     match run() {
@@ -31,34 +30,26 @@ fn main() -> ExitCode {
 fn run() -> Result<(), Box<dyn Error>> {
     gst::init()?;
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let password = std::env::var("CAMERA_PASSWORD").unwrap_or_default();
+    let log_in = LogIn::new(std::env::var("CAMERA_PASSWORD").unwrap_or_default());
     let runs = Cell::new(0);
     let next = || {
         runs.set(runs.get() + 1);
         if runs.get() > 1 {
             eprintln!("The picture is gone; starting anew.");
         }
-        pipeline(&arguments, runs.get(), &password)
+        pipeline(&arguments, runs.get(), &log_in)
     };
     pipeline_supervisor::run(next, print)
 }
 
-fn pipeline(arguments: &[String], run: u32, password: &str) -> Result<gst::Pipeline, Box<dyn Error>> {
+fn pipeline(arguments: &[String], run: u32, log_in: &LogIn) -> Result<gst::Pipeline, Box<dyn Error>> {
     let run = if run == 1 { String::new() } else { format!("-{run}") };
     let arguments: Vec<String> = arguments.iter().map(|argument| argument.replace("{run}", &run)).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let pipeline = gst::parse::launchv(&arguments)?
         .downcast::<gst::Pipeline>()
         .map_err(|_| "a pipeline has more than one element")?;
-    for element in pipeline.iterate_recurse().into_iter().flatten() {
-        for (user, property) in CREDENTIALS {
-            let given = element.has_property_with_type(user, glib::Type::STRING)
-                && element.property::<Option<String>>(user).is_some_and(|user| !user.is_empty());
-            if given && element.has_property_with_type(property, glib::Type::STRING) {
-                element.set_property(property, password);
-            }
-        }
-    }
+    log_in.apply(&pipeline)?;
     Ok(pipeline)
 }
 

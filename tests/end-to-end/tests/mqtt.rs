@@ -22,17 +22,19 @@ struct Broker {
 }
 
 impl Broker {
-    /// `None`, and a line that says so, where there is none to be had.
-    fn start() -> Option<Self> {
+    fn start() -> Self {
+        Self::start_with("")
+    }
+
+    /// With more settings.
+    fn start_with(more: &str) -> Self {
         let program = MOSQUITTO.into_iter().find(|program| Command::new(program).arg("-h").output().is_ok());
-        let Some(program) = program else {
-            eprintln!("SKIPPED: mosquitto is not installed (`make test` installs it)");
-            return None;
-        };
+        let program = program.expect("mosquitto is not installed: `make test` installs it");
         // It cannot choose a port itself.
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
         let settings = plugin_folder().join(format!("mosquitto-{port}.conf"));
-        std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\n")).unwrap();
+        std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\n{more}"))
+            .unwrap();
         let child = Command::new(program).arg("-c").arg(&settings).spawn().unwrap();
         let broker = Self { child, settings, port };
         let begin = Instant::now();
@@ -40,7 +42,7 @@ impl Broker {
             assert!(begin.elapsed() < PATIENCE, "mosquitto does not listen");
             std::thread::sleep(Duration::from_millis(20));
         }
-        Some(broker)
+        broker
     }
 
     /// A line for each message, topic and payload: what is kept there, then what comes.
@@ -78,7 +80,7 @@ fn payload(line: &str) -> Value {
 
 #[test]
 fn events_states_and_discovery_reach_a_broker() {
-    let Some(broker) = Broker::start() else { return };
+    let broker = Broker::start();
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let mut events = broker.listen("ptztrack/camera/door/event");
     let program = broker.program("mqtt", &camera);
@@ -102,7 +104,7 @@ fn events_states_and_discovery_reach_a_broker() {
 
 #[test]
 fn a_broker_hears_that_the_program_has_died() {
-    let Some(broker) = Broker::start() else { return };
+    let broker = Broker::start();
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
     let program = broker.program("mqtt-dies", &camera);
     let mut availability = broker.listen("ptztrack/availability");
@@ -113,7 +115,7 @@ fn a_broker_hears_that_the_program_has_died() {
 
 #[test]
 fn a_camera_that_is_gone_from_the_file_is_gone_from_the_broker() {
-    let Some(broker) = Broker::start() else { return };
+    let broker = Broker::start();
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
     let mut program = broker.program("mqtt-removed", &camera);
     let mut states = broker.listen("ptztrack/camera/door/state");
@@ -127,4 +129,31 @@ fn a_camera_that_is_gone_from_the_file_is_gone_from_the_broker() {
     states.wait_for_line("ptztrack/camera/door/state (null)");
     broker.listen("ptztrack/camera/hall/state").wait_for_line("\"picture\":\"ON\"");
     program.end("TERM");
+}
+
+/// One whose certificate is believed is told, and nobody else.
+#[test]
+fn a_broker_is_spoken_to_over_tls() {
+    let certificates =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
+    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
+    let (certificate, key) = (of("camera.pem"), of("camera.key.pem"));
+    let broker =
+        Broker::start_with(&format!("certfile {}\nkeyfile {}\n", certificate.display(), key.display()));
+    let camera = VirtualCamera::start(scene::nobody()).unwrap();
+    for (authority, said) in [
+        ("authority.pem", "connected to the MQTT broker 127.0.0.1"),
+        ("self-signed.pem", "no connection to the MQTT broker 127.0.0.1"),
+    ] {
+        let file = |folder: &Path| {
+            let door = Program::entry("door", &camera.url(), &folder.join("password"));
+            let (port, authority) = (broker.port, of(authority));
+            format!(
+                "{door}[mqtt]\nhost = \"127.0.0.1\"\nport = {port}\ntls = true\nca-file = {authority:?}\n"
+            )
+        };
+        let mut program = Program::start(&format!("mqtt-{authority}"), file, &[]);
+        program.launch.wait_for_line(said);
+        program.end("TERM");
+    }
 }

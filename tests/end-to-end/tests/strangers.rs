@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use end_to_end::following::Network;
 use end_to_end::{PATIENCE, Program, Way, scene};
-use virtual_camera::VirtualCamera;
+use virtual_camera::{Auth, Settings, Tls, VirtualCamera};
 
 /// Whoever answers in a camera's place, always the same; and what it has heard.
 struct Stranger {
@@ -21,7 +21,8 @@ struct Stranger {
 }
 
 impl Stranger {
-    fn answering(answer: String) -> Self {
+    fn answering(answer: impl Into<Vec<u8>>) -> Self {
+        let answer = answer.into();
         let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
         let address = listener.local_addr().unwrap();
         let (hears, heard) = channel();
@@ -32,7 +33,7 @@ impl Stranger {
                     let mut bytes = [0; 4096];
                     while let Ok(read @ 1..) = client.read(&mut bytes) {
                         let _ = hears.send(String::from_utf8_lossy(&bytes[..read]).into_owned());
-                        if client.write_all(answer.as_bytes()).is_err() {
+                        if client.write_all(&answer).is_err() {
                             return;
                         }
                     }
@@ -210,4 +211,147 @@ fn a_password_that_cannot_be_read_keeps_no_other_camera_down() {
     scene::wait_until_following(&other);
     program.end("TERM");
     [good, other].iter().for_each(scene::assert_left_at_rest);
+}
+
+/// Whoever answers in a camera's place claims a picture of gigabytes, progressive: a decoder takes the memory for it at once.
+#[test]
+fn a_picture_that_claims_to_be_huge_takes_nothing_from_anybody() {
+    let mut jpeg = vec![0xff, 0xd8, 0xff, 0xc2, 0, 17, 8, 0x75, 0x30, 0x75, 0x30];
+    jpeg.extend([3, 1, 0x22, 0, 2, 0x11, 0, 3, 0x11, 0, 0xff, 0xda, 0, 12, 3, 1, 0, 2, 0, 3, 0, 0, 0, 0]);
+    jpeg.resize(4096, 0);
+    let head = "HTTP/1.1 200 OK\r\nContent-Type: multipart/x-mixed-replace; boundary=b\r\n\r\n";
+    let part = "--b\r\nContent-Type: image/jpeg\r\n\r\n";
+    let answer =
+        [head.as_bytes(), part.as_bytes(), &jpeg, b"\r\n", part.as_bytes(), &jpeg, b"\r\n--b\r\n"].concat();
+    let stranger = Stranger::answering(answer);
+    let address = stranger.address;
+    let file = |folder: &Path| Program::entry("door", &format!("http://{address}"), &folder.join("password"));
+    let mut program = Program::start("huge", file, &[]);
+    program.launch.wait_for_line("door: error: a picture of 30000x30000 is announced");
+    let status = fs::read_to_string(format!("/proc/{}/status", program.launch.id())).unwrap();
+    let peak = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+    let peak: u64 = peak.trim_end_matches("kB").trim().parse().unwrap();
+    assert!(peak < 500_000, "{peak} kB");
+    program.end("TERM");
+}
+
+/// The process of a camera that has one of its own.
+#[track_caller]
+fn process_of(program: &Program, camera: &str) -> u32 {
+    let wanted = format!("ptztrack\0camera\0{camera}\0");
+    let parent = format!("PPid:\t{}", program.launch.id());
+    let is = |process: &u32| {
+        let read = |file: &str| fs::read_to_string(format!("/proc/{process}/{file}")).unwrap_or_default();
+        read("cmdline") == wanted && read("status").lines().any(|line| line == parent)
+    };
+    let begin = Instant::now();
+    loop {
+        let processes = fs::read_dir("/proc").unwrap();
+        let numbers = processes.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+        if let Some(found) = numbers.into_iter().find(is) {
+            return found;
+        }
+        assert!(begin.elapsed() < PATIENCE, "no process for {camera}");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+/// A decoder that crashes, as far as the system can tell.
+#[test]
+fn a_camera_with_a_process_of_its_own_dies_alone_and_comes_back() {
+    let [good, door] = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    let network = Network::before(&good);
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        Program::entry("good", &network.url(), &password)
+            + &Program::entry("door", &door.url(), &password)
+            + "isolation = \"process\"\n"
+    };
+    let mut program = Program::start("isolated", file, &[]);
+    [&good, &door].into_iter().for_each(scene::wait_until_following);
+    let process = process_of(&program, "door");
+    let requests = network.http.video_requests();
+    end_to_end::signal(process, "ABRT");
+    let line = program.launch.wait_for_line("door: error: its process ended: signal: 6");
+    assert!(line.contains("it is started again"), "{line}");
+    program.launch.wait_for_line("door: the picture is there");
+    assert_ne!(process_of(&program, "door"), process);
+    scene::wait_until_following(&door);
+    assert_eq!(network.http.video_requests(), requests, "the other one is touched");
+
+    // It is shown and steered as any other.
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"door\"} 1.0"));
+    program.wait_for("/metrics", |metrics| {
+        metrics.contains("ptztrack_camera_state{camera=\"door\",state=\"moving\"} 1.0")
+    });
+    assert_eq!(program.ask("GET", "/cameras/door/picture").0, 200);
+    assert_eq!(program.ask("POST", "/cameras/door/hand-over").0, 204);
+    scene::assert_left_at_rest(&door);
+    let last = process_of(&program, "door");
+    end_to_end::signal(last, "KILL");
+    program.launch.wait_for_line("door: the picture is there");
+    program.wait_for("/cameras", |cameras| cameras.contains("the camera is handed over"));
+    assert_eq!(program.ask("POST", "/cameras/door/take-back").0, 204);
+    scene::wait_until_following(&door);
+    let last = process_of(&program, "door");
+    let said = program.end("TERM");
+    assert!(!Path::new(&format!("/proc/{last}")).exists(), "{said}");
+    assert!(said.contains("door: has stopped"), "{said}");
+    [good, door].iter().for_each(scene::assert_left_at_rest);
+}
+
+/// The password goes in clear over TLS, to whom we believe; who shows another certificate gets nothing.
+#[test]
+fn pictures_and_commands_go_over_verified_tls() {
+    let certificates =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
+    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
+    let tls = Tls { certificate: of("camera.pem"), key: of("camera.key.pem") };
+    for (codec, auth) in [("mjpeg", Auth::Basic), ("h264", Auth::Digest { qop: true })] {
+        let settings = Settings { tls: Some(tls.clone()), auth, ..scene::walking_person() };
+        let camera = VirtualCamera::start(settings).unwrap();
+        let [https, rtsps] = camera.tls_urls().unwrap();
+        let file = |authority: &str| {
+            let more = format!("codec = {codec:?}\nrtsp = {rtsps:?}\nca-file = {:?}\n", of(authority));
+            let https = https.clone();
+            move |folder: &Path| Program::entry("door", &https, &folder.join("password")) + &more
+        };
+        let mut program = Program::start(&format!("distrusts-{codec}"), file("self-signed.pem"), &[]);
+        program.launch.wait_for_line("door: error: ");
+        program.end("TERM");
+        assert_eq!(camera.status().requests, 0);
+
+        let program = Program::start(&format!("tls-{codec}"), file("authority.pem"), &[]);
+        scene::wait_until_following(&camera);
+        program.end("TERM");
+        scene::assert_left_at_rest(&camera);
+    }
+}
+
+/// Neither in what GStreamer tells of everything it does, nor in what is said of it.
+#[test]
+fn the_password_is_in_no_log_of_the_video_elements() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    for codec in ["mjpeg", "h264"] {
+        let log = end_to_end::plugin_folder().join(format!("video-{codec}-{}.log", std::process::id()));
+        let file = |folder: &Path| {
+            Program::entry("door", &camera.url(), &folder.join("password"))
+                + &format!("codec = {codec:?}\nrtsp = {:?}\n", camera.rtsp_url())
+        };
+        let debug = Path::new("*:6");
+        let environment = [("GST_DEBUG", debug), ("GST_DEBUG_FILE", log.as_path())];
+        let mut program = Program::start_in(&format!("logs-{codec}"), file, &[], &environment);
+        program.launch.wait_for_line("door: the picture is there");
+        let said = program.end("TERM");
+        let text = fs::read(&log).unwrap();
+        fs::remove_file(&log).unwrap();
+        let text = String::from_utf8_lossy(&text) + said.as_str();
+        assert!(
+            text.contains(if codec == "mjpeg" { "multipartdemux" } else { "rtspsrc" }),
+            "of something else"
+        );
+        let secrets = [scene::PASSWORD.to_owned(), in_clear(), "Authorization: Digest".to_owned()];
+        let told = text.lines().find(|line| secrets.iter().any(|secret| line.contains(secret)));
+        assert_eq!(told, None);
+    }
 }

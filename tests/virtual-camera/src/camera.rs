@@ -13,7 +13,7 @@ use std::{
 };
 
 use crate::{
-    Clock, Error, Fault, ReceivedCommand, Settings, Status,
+    Clock, Error, Fault, ReceivedCommand, Settings, Status, Tls,
     clock::Time,
     geometry::Matrix,
     http::HttpServer,
@@ -23,6 +23,7 @@ use crate::{
     picture::Picture,
     rtsp::RtspServer,
     sync::lock,
+    tls::TlsDoors,
     truth::{GroundTruth, Mask, Sighting},
     vapix::{Args, CgiResponse, device::Device, parse_args},
     world::{self, Exposure, FootageError, LONGEST_SHUTTER, World},
@@ -434,6 +435,7 @@ pub struct VirtualCamera {
     http: HttpServer,
     rtsp: RtspServer,
     discovery: Option<Discovery>,
+    tls: Option<TlsDoors>,
     pulse: Option<JoinHandle<()>>,
 }
 
@@ -454,7 +456,9 @@ impl VirtualCamera {
             .name("camera-pulse".into())
             .spawn(move || pulsing.pulse())
             .map_err(|source| Error::Thread { source })?;
-        Ok(Self { camera, http, rtsp, discovery, pulse: Some(pulse) })
+        let doors = |tls: &Tls| TlsDoors::open(tls, http.address(), rtsp.address());
+        let tls = camera.settings.tls.as_ref().map(doors).transpose()?;
+        Ok(Self { camera, http, rtsp, discovery, tls, pulse: Some(pulse) })
     }
 
     /// Where HTTP is served.
@@ -480,6 +484,13 @@ impl VirtualCamera {
     /// `rtsp://127.0.0.1:port`, without a slash at its end.
     pub fn rtsp_url(&self) -> String {
         format!("rtsp://{}", self.rtsp_address())
+    }
+
+    /// `https://127.0.0.1:port` and `rtsps://127.0.0.1:port`, if it speaks TLS.
+    pub fn tls_urls(&self) -> Option<[String; 2]> {
+        self.tls
+            .as_ref()
+            .map(|doors| [format!("https://{}", doors.https), format!("rtsps://{}", doors.rtsps)])
     }
 
     /// How late it is for the camera, since its start.

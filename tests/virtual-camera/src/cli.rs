@@ -8,7 +8,7 @@ use clap::{Parser, ValueEnum};
 use virtual_camera::{
     Action, Auth, Event, FootageSettings, Imaging, Kinematics, Moves, OnvifSettings, PhotoPerson, PhotoPlace,
     PhotoSettings, Place, Pose, PtzApi, Quirk, RoomSettings, Settings, SpeedMap, Stall, Subject,
-    SyntheticSettings, Video, World,
+    SyntheticSettings, Tls, Video, World,
 };
 
 /// From one stall of the pictures to the next.
@@ -217,6 +217,12 @@ pub struct Options {
     /// Speak nothing but ONVIF, and RTSP
     #[arg(long, requires = "onvif")]
     onvif_alone: bool,
+    /// Speak HTTPS and RTSPS too, at ports of their own, with the certificate in this file of PEM
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    tls_certificate: Option<PathBuf>,
+    /// The key to it
+    #[arg(long, value_name = "FILE", requires = "tls_certificate")]
+    tls_key: Option<PathBuf>,
     /// Differ from the ONVIF specification as some camera does (docs/onvif.md lists them); can be given again
     #[arg(long, value_enum, value_name = "QUIRK", value_delimiter = ',', requires = "onvif")]
     onvif_quirk: Vec<Quirk>,
@@ -320,6 +326,10 @@ impl TryFrom<Options> for Settings {
                 discoverable: true,
                 ..OnvifSettings::with(&options.onvif_quirk)
             }),
+            tls: options
+                .tls_certificate
+                .zip(options.tls_key)
+                .map(|(certificate, key)| Tls { certificate, key }),
             presets: options.presets,
             user: options.user,
             password: options.password,

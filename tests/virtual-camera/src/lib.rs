@@ -32,6 +32,7 @@ mod settings;
 mod status;
 mod sync;
 mod threads;
+mod tls;
 mod truth;
 mod vapix;
 mod wish;
@@ -50,6 +51,7 @@ pub use picture::{Picture, Plane};
 pub use seeded::Seeded;
 pub use settings::{Auth, Clock, FootageSettings, Moves, PtzApi, Settings, Stall, Video, World};
 pub use status::{Fault, ReceivedCommand, Status};
+pub use tls::Tls;
 pub use truth::{Bounds, GroundTruth, Kind, Mask, Sighting, Silhouette};
 pub use world::{
     Action, Change, Event, FootageError, Lane, Lighting, MotError, Occlusion, People, Person, PhotoError,
@@ -84,6 +86,12 @@ pub enum Error {
     Discovery {
         /// What the system says.
         source: std::io::Error,
+    },
+    /// TLS cannot be spoken.
+    #[error("cannot speak TLS: {reason}")]
+    Tls {
+        /// What is wrong with the certificate, the key or a port.
+        reason: String,
     },
     /// The system gives no thread.
     #[error("cannot start a thread: {source}")]

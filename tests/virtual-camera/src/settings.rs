@@ -9,6 +9,7 @@ use crate::{
     kinematics::{Kinematics, Pose},
     onvif::OnvifSettings,
     seeded::Seeded,
+    tls::Tls,
     world::{PhotoSettings, RoomSettings, SyntheticSettings},
 };
 
@@ -260,6 +261,8 @@ pub struct Settings {
     pub clock: Clock,
     /// How it speaks ONVIF, if it does.
     pub onvif: Option<OnvifSettings>,
+    /// Whether it speaks TLS too, at ports of its own.
+    pub tls: Option<Tls>,
 }
 
 impl Default for Settings {
@@ -287,6 +290,7 @@ impl Default for Settings {
             turning: (0.0, 0.0),
             clock: Clock::Real,
             onvif: None,
+            tls: None,
         }
     }
 }

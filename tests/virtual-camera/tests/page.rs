@@ -26,9 +26,7 @@ fn with_a_person() -> Settings {
 
 #[test]
 fn the_page_shows_the_camera_and_steers_it() {
-    let Some(mut browser) = Browser::start("chromium-steering") else {
-        return;
-    };
+    let mut browser = Browser::start("chromium-steering");
     let auth = virtual_camera::Auth::Digest { qop: true };
     let camera = VirtualCamera::start(Settings { auth, ..with_a_person() }).unwrap();
     browser.open(&camera.url());
@@ -80,9 +78,7 @@ fn the_page_shows_the_camera_and_steers_it() {
 
 #[test]
 fn the_room_is_shown_with_the_truth_if_the_address_asks_for_it() {
-    let Some(mut browser) = Browser::start("chromium-room") else {
-        return;
-    };
+    let mut browser = Browser::start("chromium-room");
     let world = World::Room(RoomSettings::test(7, 1).unwrap());
     let settings = Settings { world, clock: Clock::Stepped, ..Settings::default() };
     let camera = VirtualCamera::start(settings).unwrap();

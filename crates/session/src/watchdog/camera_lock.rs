@@ -5,6 +5,7 @@ use std::os::unix::ffi::OsStringExt;
 use std::path::PathBuf;
 use std::time::Duration;
 
+use sha2::{Digest, Sha256};
 use tokio::io::AsyncReadExt;
 use tokio::net::{UnixListener, UnixStream};
 use tokio::time::timeout;
@@ -72,9 +73,13 @@ impl CameraLock {
 fn name(camera: &ClientSettings) -> PathBuf {
     // SAFETY: has no preconditions.
     let user = unsafe { libc::geteuid() };
-    let mut name = format!("\0vapix-watchdog {user} {} {}", camera.channel, camera.location).into_bytes();
-    name.truncate(CameraLock::LONGEST_NAME);
-    PathBuf::from(OsString::from_vec(name))
+    let owner = format!("\0vapix-watchdog {user} ");
+    let mut name = format!("{} {}", camera.channel, camera.location);
+    // Cut, two cameras could have one name.
+    if owner.len() + name.len() > CameraLock::LONGEST_NAME {
+        name = format!("{:x}", Sha256::digest(name));
+    }
+    PathBuf::from(OsString::from_vec((owner + &name).into_bytes()))
 }
 
 #[cfg(test)]
@@ -117,8 +122,9 @@ mod tests {
     async fn one_camera_is_no_other() {
         let (one, other) = (camera("one"), camera("other"));
         let second_channel = ClientSettings { channel: "2".to_owned(), ..one.clone() };
+        let [long, as_long] = ["a", "b"].map(|end| camera(&("a".repeat(60) + "." + &"a".repeat(60) + end)));
         let mut locks = Vec::new();
-        for camera in [one, other, second_channel] {
+        for camera in [one, other, second_channel, long, as_long] {
             let lock = CameraLock::take(&camera).await;
             assert!(lock.listener.is_some());
             locks.push(lock);

@@ -66,7 +66,8 @@ impl Connection {
         thread::Builder::new().name("vapix-watchdog".to_owned()).spawn(move || {
             let end = match (&address, its) {
                 (WatchdogAddress::Program(program), Some(its)) => run(program, its, &stream, &report),
-                _ => hear(&stream, &report),
+                _ => hear(&stream, &report)
+                    .and_then(|heard| if heard { Ok(()) } else { Err(not_understood()) }),
             };
             if let Err(err) = end {
                 report.send_modify(|heard| heard.end = Some(address.unavailable(&err)));
@@ -156,7 +157,7 @@ fn run(
         return Err(io::Error::other(how));
     }
     stream.set_read_timeout(None)?;
-    hear(stream, report)
+    hear(stream, report).map(drop)
 }
 
 /// Waits for something to be said; `false`: nothing will be.
@@ -182,16 +183,26 @@ fn reap(child: &mut Child) -> Option<ExitStatus> {
     child.wait().ok()
 }
 
-/// Until the watchdog ends, or the connection.
-fn hear(stream: &UnixStream, report: &watch::Sender<Heard>) -> io::Result<()> {
+/// A watchdog ends a connection over which something comes that it does not know.
+fn not_understood() -> io::Error {
+    io::Error::other(
+        "it does not answer, as one of another version does; start it anew (ptztrack-watchdog.service)",
+    )
+}
+
+/// Until the watchdog ends, or the connection; whether it has said anything.
+fn hear(stream: &UnixStream, report: &watch::Sender<Heard>) -> io::Result<bool> {
     let mut lines = BufReader::new(stream);
-    let mut line = Vec::new();
+    let (mut line, mut heard) = (Vec::new(), false);
     loop {
         line.clear();
         (&mut lines).take(MAX_LINE_BYTES).read_until(b'\n', &mut line)?;
         match Answer::of_line(&line) {
-            Ok(answer) => report.send_modify(|heard| heard.add(answer)),
-            Err(_) if line.is_empty() => return Ok(()),
+            Ok(answer) => {
+                heard = true;
+                report.send_modify(|heard| heard.add(answer));
+            }
+            Err(_) if line.is_empty() => return Ok(heard),
             // What a newer one has to say beyond that.
             Err(_) => {}
         }

@@ -45,13 +45,18 @@ pub async fn guard<C: Client>(mut lease: LeaseReceiver, armed: &Armed) {
             Some(held) => {
                 let _armed = armed.begin();
                 let lock = CameraLock::take(&held.stop.identity.settings).await;
-                tokio::select! {
+                let end = tokio::select! {
                     end = watch_over::<C>(&mut lease) => end,
                     successor = lock.taken() => {
                         drop(lock);
                         drop(successor);
                         End::TakenOver
                     }
+                };
+                match end {
+                    // An application that lives may go on moving the camera, beside whoever has it now.
+                    End::TakenOver if is_kept(&lease) => watch_over::<C>(&mut lease).await,
+                    end => end,
                 }
             }
             None => End::Released,
@@ -59,13 +64,19 @@ pub async fn guard<C: Client>(mut lease: LeaseReceiver, armed: &Armed) {
         let heard = match end {
             End::Gone => return,
             End::Released | End::RanOut => lease.changed().await.is_ok(),
-            // What the application still says of this move is not for us any more.
+            // It was started anew: what the one before still says of this move is not for us any more.
             End::TakenOver => lease.wait_for(Option::is_none).await.is_ok(),
         };
         if !heard {
             return;
         }
     }
+}
+
+/// Whether there is still an application that renews it.
+fn is_kept(lease: &LeaseReceiver) -> bool {
+    let in_time = |held: &Held| held.until > Instant::now();
+    lease.has_changed().is_ok() && lease.borrow().as_ref().is_some_and(in_time)
 }
 
 async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
@@ -91,7 +102,13 @@ async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
 /// Stops the camera until it says yes; and again where it may act on a move after that.
 async fn stop<C: Client>(order: &StopOrder) {
     let tries = async {
-        let mut client = C::in_place_of(order.identity.clone()).ok()?;
+        let mut client = loop {
+            match C::in_place_of(order.identity.clone()) {
+                Ok(client) => break client,
+                // Out of file descriptors, for instance: there may be some later.
+                Err(_) => sleep(PAUSE).await,
+            }
+        };
         let begin = Instant::now();
         until_accepted(&mut client, &order.command).await?;
         if order.in_doubt {

@@ -7,12 +7,17 @@ use std::os::unix::fs::{FileTypeExt, PermissionsExt};
 use std::os::unix::net::{UnixListener as StdUnixListener, UnixStream as StdUnixStream};
 use std::path::Path;
 use std::process::ExitCode;
+use std::time::Duration;
 
 use tokio::net::{UnixListener, UnixStream};
 use tokio::runtime::{Builder, Runtime};
+use tokio::time::sleep;
 
 use super::{Armed, process, serve};
 use crate::Client;
+
+/// After no connection could be taken.
+const ACCEPT_AGAIN: Duration = Duration::from_millis(200);
 
 /// Whoever ends all processes of a service or container must leave this one until the cameras rest.
 static ARMED: Armed = Armed::new(process::ignore_termination);
@@ -72,8 +77,11 @@ fn listen<C: Client>(socket: &Path) -> io::Result<()> {
     runtime()?.block_on(async {
         let listener = UnixListener::from_std(listener)?;
         loop {
-            let (application, _) = listener.accept().await?;
-            tokio::spawn(serve::<C>(application, &ARMED));
+            match listener.accept().await {
+                Ok((application, _)) => drop(tokio::spawn(serve::<C>(application, &ARMED))),
+                // Out of file descriptors, for instance: there may be some later, and cameras wait for their stop.
+                Err(_) => sleep(ACCEPT_AGAIN).await,
+            }
         }
     })
 }

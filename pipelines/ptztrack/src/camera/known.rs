@@ -1,17 +1,17 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
+use pipeline_supervisor::video::Ended;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
-use super::pipeline::Elements;
+use super::running::Running;
 use super::stopwatch::Stopwatch;
-use super::video::Ended;
 
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
@@ -27,7 +27,7 @@ pub struct Known {
     begin: Instant,
     pub state: Mutex<State>,
     /// What runs now.
-    pub elements: Mutex<Option<Elements>>,
+    pub running: Mutex<Option<Arc<dyn Running>>>,
     pub pictures: AtomicU64,
     pub processed: AtomicU64,
     /// By the pipelines before this one; between two, more than there can be.
@@ -50,7 +50,7 @@ pub struct Known {
 }
 
 /// What its messages told.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default, Serialize, Deserialize)]
 pub struct State {
     /// Pictures come.
     pub picture: bool,
@@ -96,7 +96,7 @@ impl Known {
             name: name.to_owned(),
             begin: Instant::now(),
             state: Mutex::new(State { target: SEARCHING.to_owned(), ..State::default() }),
-            elements: Mutex::default(),
+            running: Mutex::default(),
             pictures: AtomicU64::default(),
             processed: AtomicU64::default(),
             processed_before: AtomicU64::default(),
@@ -163,6 +163,12 @@ impl Known {
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 
+    /// The last picture came so long ago.
+    pub fn last_picture_was(&self, ago: Duration) {
+        let ago = u64::try_from(ago.as_nanos()).unwrap_or(u64::MAX);
+        self.last_picture.store(self.now().saturating_sub(ago), Ordering::Relaxed);
+    }
+
     /// The pipeline that runs now has had one.
     pub fn has_picture(&self) -> bool {
         self.processed.load(Ordering::Relaxed) > self.processed_before.load(Ordering::Relaxed)
@@ -192,7 +198,13 @@ impl Known {
 
     /// What the sink says of itself, where one runs.
     pub fn servo(&self) -> Option<gst::Structure> {
-        lock(&self.elements).as_ref()?.servo_stats()
+        let running = lock(&self.running).clone();
+        running?.servo_stats()
+    }
+
+    /// Whether the camera rests.
+    pub fn is_at_rest(&self) -> bool {
+        self.servo().and_then(|servo| servo.get::<String>("state").ok()).as_deref() == Some("at-rest")
     }
 
     /// Its state in words.

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! One camera: a thread in which its pipeline runs, is watched, and comes back.
+//! One camera: a thread in which its pipeline runs, is watched, and comes back, in this process or in one of its own.
 
+mod bounds;
 mod known;
 mod messages;
 mod pipeline;
+pub mod process;
 mod recording;
 mod refusals;
+mod running;
 mod stopwatch;
 mod video;
 
@@ -22,14 +25,16 @@ pub use known::{Control, Known, Steering};
 use messages::Listener;
 use pipeline::NotBuilt;
 use pipeline_supervisor::Supervisor;
+use pipeline_supervisor::video::Failure;
+use process::Processes;
 use ptztrack_contract::lock::lock;
 use recording::Recorder;
 use refusals::Refusals;
+use running::Running;
 pub use stopwatch::Stopwatch;
 use tokio::sync::watch;
-use video::Failure;
 
-use crate::config::CameraSettings;
+use crate::config::{CameraSettings, Isolation};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
@@ -46,34 +51,88 @@ const LONGEST_WAY_HOME: Duration = Duration::from_secs(30);
 pub struct Camera {
     pub settings: CameraSettings,
     pub known: Arc<Known>,
-    supervisor: Supervisor,
+    runner: Runner,
     thread: JoinHandle<()>,
 }
 
+/// Who runs it, in the camera's thread.
+#[derive(Debug, Clone)]
+enum Runner {
+    Pipelines(Supervisor),
+    Processes(Arc<Processes>),
+}
+
 impl Camera {
-    /// Starts it, with who had it before.
+    /// Starts it, with who had it before, once its predecessor has ended. Waits for nothing.
     ///
     /// # Errors
     /// Where the system has no thread left.
-    pub fn start(settings: CameraSettings, control: Control, log: Arc<Log>) -> std::io::Result<Self> {
-        let known = Arc::new(Known::new(&settings.name));
-        known.take_control(control);
+    pub fn start(
+        settings: CameraSettings,
+        control: Control,
+        log: Arc<Log>,
+        predecessor: Option<Self>,
+    ) -> std::io::Result<Self> {
+        if settings.isolation == Isolation::None {
+            return Self::start_here(settings, control, log, predecessor);
+        }
+        let processes = Arc::new(Processes::default());
+        let runner = Runner::Processes(processes.clone());
+        let run = move |settings: &CameraSettings, known: &Arc<Known>| processes.run(settings, known, &log);
+        Self::spawn(settings, control, runner, predecessor, run)
+    }
+
+    /// The same, in this process in any case.
+    ///
+    /// # Errors
+    /// Those of [`Self::start`].
+    pub fn start_here(
+        settings: CameraSettings,
+        control: Control,
+        log: Arc<Log>,
+        predecessor: Option<Self>,
+    ) -> std::io::Result<Self> {
         let context = glib::MainContext::new();
         let supervisor = Supervisor::new(&context);
-        let run = {
-            let (settings, known, supervisor) = (settings.clone(), known.clone(), supervisor.clone());
+        let runner = Runner::Pipelines(supervisor.clone());
+        let run = move |settings: &CameraSettings, known: &Arc<Known>| {
+            // The context is new, so nobody else has it.
+            let _ = context.with_thread_default(|| run(settings, known, &supervisor, &log));
+        };
+        Self::spawn(settings, control, runner, predecessor, run)
+    }
+
+    fn spawn(
+        settings: CameraSettings,
+        control: Control,
+        runner: Runner,
+        predecessor: Option<Self>,
+        run: impl FnOnce(&CameraSettings, &Arc<Known>) + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let known = Arc::new(Known::new(&settings.name));
+        known.take_control(control);
+        let in_thread = {
+            let (settings, known) = (settings.clone(), known.clone());
             move || {
-                // The context is new, so nobody else has it.
-                let _ = context.with_thread_default(|| run(&settings, &known, &supervisor, &log));
+                if let Some(predecessor) = predecessor {
+                    predecessor.join();
+                }
+                run(&settings, &known);
             }
         };
-        let thread = std::thread::Builder::new().name(settings.name.clone()).spawn(run)?;
-        Ok(Self { settings, known, supervisor, thread })
+        let thread = std::thread::Builder::new().name(settings.name.clone()).spawn(in_thread)?;
+        Ok(Self { settings, known, runner, thread })
     }
 
     /// Ends it, without waiting.
     pub fn end(&self) {
-        self.supervisor.end();
+        match &self.runner {
+            Runner::Pipelines(supervisor) => supervisor.end(),
+            Runner::Processes(processes) => {
+                processes.end();
+                self.thread.thread().unpark();
+            }
+        }
     }
 
     /// Waits until it has ended; the camera rests then.
@@ -133,7 +192,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             }
             Err(NotBuilt::Pipeline(err)) => return Err(err),
             Err(NotBuilt::Video(failure)) => {
-                lock(&known.elements).take();
+                lock(&known.running).take();
                 if failure.refused && !refusals.wait(known.processed.load(Ordering::Relaxed)) {
                     return Err(failure.reason.into());
                 }
@@ -148,7 +207,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
         recordings.wait();
     }
     timer.abort();
-    lock(&known.elements).take();
+    lock(&known.running).take();
     let mut state = lock(&known.state);
     state.picture = false;
     if let Err(err) = result {
@@ -172,13 +231,13 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
 /// Once a second.
 fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     known.beat();
-    let elements = lock(&known.elements).clone();
-    let Some(elements) = elements else { return };
-    elements.look(known.looking.load(Ordering::Relaxed) > 0);
+    let running = lock(&known.running).clone();
+    let Some(running) = running else { return };
+    running.look(known.looking.load(Ordering::Relaxed) > 0);
     let steering = *lock(&known.steering);
     let over = match steering {
         Steering::GoHome(since) => {
-            let there = since.elapsed() > SETS_OUT && elements.at_rest();
+            let there = since.elapsed() > SETS_OUT && known.is_at_rest();
             there || since.elapsed() > LONGEST_WAY_HOME
         }
         Steering::Operator(until) => until <= Instant::now(),
@@ -199,17 +258,17 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
 impl Known {
     /// Follows who is at this place of the picture, 0 to 1.
     pub fn select(&self, x: f64, y: f64) {
-        self.with(|elements| elements.select(x, y));
+        self.with(|running| running.select(x, y));
     }
 
     pub fn release(&self) {
-        self.with(pipeline::Elements::release);
+        self.with(|running| running.release());
     }
 
     /// Lets it follow, or hands it over.
     pub fn steer(&self, steering: Steering) {
         *lock(&self.steering) = steering;
-        self.with(|elements| elements.steer(steering));
+        self.with(|running| running.steer(steering));
     }
 
     /// Lets the target go, and sends the camera home.
@@ -220,21 +279,21 @@ impl Known {
 
     /// Whether the camera can be sent home, and whether it can be handed over.
     pub fn abilities(&self) -> (bool, bool) {
-        let abilities = |elements: &pipeline::Elements| (elements.has_home(), elements.can_hand_over());
-        lock(&self.elements).as_ref().map(abilities).unwrap_or_default()
+        let running = lock(&self.running).clone();
+        running.map(|running| running.abilities()).unwrap_or_default()
     }
 
     /// Pictures are made while this is held.
     pub fn look(self: &Arc<Self>) -> Look {
         self.looking.fetch_add(1, Ordering::Relaxed);
-        self.with(|elements| elements.look(true));
+        self.with(|running| running.look(true));
         Look { pictures: self.view.subscribe(), known: self.clone() }
     }
 
-    fn with(&self, what: impl FnOnce(&pipeline::Elements)) {
-        let elements = lock(&self.elements).clone();
-        if let Some(elements) = elements {
-            what(&elements);
+    fn with(&self, what: impl FnOnce(&dyn Running)) {
+        let running = lock(&self.running).clone();
+        if let Some(running) = running {
+            what(&*running);
         }
     }
 }

@@ -10,11 +10,14 @@ use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 use gst::prelude::*;
+use pipeline_supervisor::video::{Failure, Video};
 use ptztrack_contract::lock::lock;
 
+use super::bounds;
 use super::known::{Known, Steering};
 use super::recording::{self, Recorder};
-use super::video::{self, Failure, Video};
+use super::running::Running;
+use super::video;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol};
 
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
@@ -111,14 +114,17 @@ pub fn build(
     known: &Arc<Known>,
     recorder: Option<Recorder>,
 ) -> Result<gst::Pipeline, NotBuilt> {
-    let open = || Video::open(camera, known.ended.clone());
+    let open = || video::open(camera, known.ended.clone());
     let video = camera.pipeline.is_none().then(open).transpose()?;
     let pipeline = parse(camera).map_err(NotBuilt::Pipeline)?;
     for element in pipeline.iterate_recurse().into_iter().flatten() {
         configure(&element, camera);
         known.times.iter().for_each(|stopwatch| stopwatch.watch(&element));
     }
-    if let Some(source) = pipeline.by_name("source") {
+    let source = pipeline.by_name("source");
+    // `rtspsrc` has no pad yet.
+    bounds::keep(&pipeline, pipeline.by_name("received").or_else(|| source.clone()).as_ref());
+    if let Some(source) = source {
         // Of a pipeline of one's own it is not known before.
         let fed = of_factory(&pipeline, "appsrc").is_some() || of_factory(&pipeline, "rtspsrc").is_some();
         let video = if video.is_none() && fed { Some(open()?) } else { video };
@@ -135,7 +141,7 @@ pub fn build(
     elements.show_to(known);
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
     elements.steer(known.steering_at_start(elements.override_timeout()));
-    *lock(&known.elements) = Some(elements);
+    *lock(&known.running) = Some(Arc::new(elements));
     Ok(pipeline)
 }
 
@@ -158,25 +164,17 @@ fn configure(element: &gst::Element, camera: &CameraSettings) {
 
 /// Gives the pictures to the pipeline, by whatever its source is.
 fn connect(source: &gst::Element, camera: &CameraSettings, video: Option<Video>) {
-    match (source.downcast_ref::<gst_app::AppSrc>(), video) {
-        (Some(source), Some(Video::Http(hand_over))) => {
-            source.set_block(true);
-            // Before it runs, it takes nothing.
-            let hand_over = move |source: &gst_app::AppSrc, _| drop(hand_over.try_send(source.clone()));
-            source.set_callbacks(gst_app::AppSrcCallbacks::builder().need_data(hand_over).build());
-        }
-        (None, Some(Video::Rtsp(location))) => source.set_property("location", location),
+    if let Some(video) = video {
+        video.connect(source);
+    } else if source.has_property_with_type("location", glib::Type::STRING) {
         // Of a pipeline of one's own, for which the password was allowed to be seen.
-        (None, None) if source.has_property_with_type("location", glib::Type::STRING) => {
-            source.set_property("location", format!("{}{}", camera.address, video::target(camera)));
-            if source.has_property_with_type("user-id", glib::Type::STRING) {
-                log_in(source, camera.credentials.as_ref(), ["user-id", "user-pw"]);
-            }
-            if source.has_property_with_type("automatic-redirect", glib::Type::BOOL) {
-                source.set_property("automatic-redirect", false);
-            }
+        source.set_property("location", format!("{}{}", camera.address, video::target(camera)));
+        if source.has_property_with_type("user-id", glib::Type::STRING) {
+            log_in(source, camera.credentials.as_ref(), ["user-id", "user-pw"]);
         }
-        _ => {}
+        if source.has_property_with_type("automatic-redirect", glib::Type::BOOL) {
+            source.set_property("automatic-redirect", false);
+        }
     }
 }
 
@@ -301,38 +299,38 @@ impl Elements {
         picture.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(show).build());
     }
 
-    /// Makes pictures for who looks, or none.
-    pub fn look(&self, somebody: bool) {
+    /// How long a camera is left to who has moved it.
+    fn override_timeout(&self) -> Duration {
+        let of = |servo: &gst::Element| servo.property::<u64>("override-timeout");
+        Duration::from_nanos(self.servo.as_ref().map_or(0, of))
+    }
+}
+
+impl Running for Elements {
+    fn look(&self, somebody: bool) {
         if let Some(view) = &self.view {
             view.set_property("drop", !somebody);
         }
     }
 
-    /// Follows who is at this place of the picture, 0 to 1.
-    pub fn select(&self, x: f64, y: f64) {
+    fn select(&self, x: f64, y: f64) {
         if let Some(tracker) = &self.tracker {
             tracker.emit_by_name::<()>("select-target", &[&x, &y]);
         }
     }
 
-    pub fn release(&self) {
+    fn release(&self) {
         if let Some(tracker) = &self.tracker {
             tracker.emit_by_name::<()>("release-target", &[]);
         }
     }
 
-    /// Whether there is a home to go to.
-    pub fn has_home(&self) -> bool {
-        self.servo.as_ref().is_some_and(|servo| servo.property::<Option<String>>("home").is_some())
+    fn abilities(&self) -> (bool, bool) {
+        let has_home = |servo: &gst::Element| servo.property::<Option<String>>("home").is_some();
+        (self.servo.as_ref().is_some_and(has_home), self.servo.is_some())
     }
 
-    /// Whether the camera can be handed over.
-    pub fn can_hand_over(&self) -> bool {
-        self.servo.is_some()
-    }
-
-    /// Lets the camera follow, sends it home, or leaves it to somebody else.
-    pub fn steer(&self, steering: Steering) {
+    fn steer(&self, steering: Steering) {
         let Some(servo) = &self.servo else { return };
         let to = match steering {
             Steering::Follow => "follow",
@@ -342,19 +340,7 @@ impl Elements {
         servo.set_property_from_str("steering", to);
     }
 
-    /// How long a camera is left to who has moved it.
-    fn override_timeout(&self) -> Duration {
-        let of = |servo: &gst::Element| servo.property::<u64>("override-timeout");
-        Duration::from_nanos(self.servo.as_ref().map_or(0, of))
-    }
-
-    /// Whether the camera rests.
-    pub fn at_rest(&self) -> bool {
-        self.servo_stats().and_then(|stats| stats.get::<String>("state").ok()).as_deref() == Some("at-rest")
-    }
-
-    /// What the sink says of itself.
-    pub fn servo_stats(&self) -> Option<gst::Structure> {
+    fn servo_stats(&self) -> Option<gst::Structure> {
         self.servo.as_ref().map(|servo| servo.property("stats"))
     }
 }

@@ -35,6 +35,12 @@ impl Stopwatch {
         (total.pictures.load(Ordering::Relaxed), total.nanoseconds.load(Ordering::Relaxed) as f64 / 1e9)
     }
 
+    /// As it was read elsewhere.
+    pub fn set(&self, (pictures, seconds): (u64, f64)) {
+        self.total.pictures.store(pictures, Ordering::Relaxed);
+        self.total.nanoseconds.store((seconds * 1e9).round() as u64, Ordering::Relaxed);
+    }
+
     /// Times this element too, if it is of that kind.
     pub fn watch(&self, element: &gst::Element) {
         let of_kind = element.factory().is_some_and(|factory| factory.name() == self.factory);

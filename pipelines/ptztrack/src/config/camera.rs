@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use gst::prelude::*;
 use onvif::Encoding;
+use pipeline_supervisor::video::rtsp_host;
+use serde::{Deserialize, Serialize};
 use session::http::{Authentication, Trust};
 
 use super::credentials::{self, Credentials};
@@ -19,7 +21,7 @@ const LIBAV: &str = "gstreamer1.0-libav";
 const UGLY: &str = "gstreamer1.0-plugins-ugly";
 
 /// One camera.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraSettings {
     pub name: String,
     /// What it is spoken to by.
@@ -42,10 +44,21 @@ pub struct CameraSettings {
     pub pipeline: Option<String>,
     /// In a window, too.
     pub show: bool,
+    pub isolation: Isolation,
+}
+
+/// What a camera shares with the others.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Isolation {
+    /// A process.
+    #[default]
+    None,
+    /// Nothing: it has a process of its own.
+    Process,
 }
 
 /// How pictures come.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 pub enum Codec {
     /// MJPEG over HTTP: the shortest delay, the most bandwidth
     Mjpeg,
@@ -58,7 +71,7 @@ pub enum Codec {
 }
 
 /// What is kept.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
     pub folder: PathBuf,
     /// Length of one file.
@@ -124,6 +137,18 @@ impl Codec {
     }
 }
 
+impl Read for Isolation {
+    const WHAT: &'static str = "\"none\" or \"process\"";
+
+    fn read(value: &toml::de::DeValue) -> Option<Self> {
+        match value.as_str()? {
+            "none" => Some(Self::None),
+            "process" => Some(Self::Process),
+            _ => None,
+        }
+    }
+}
+
 impl CameraSettings {
     /// One at an address, with everything else as it is by default.
     ///
@@ -155,7 +180,11 @@ impl CameraSettings {
         let Some(socket) = watchdogs.of(self.protocol) else { return };
         let (element, name) = (self.protocol.sink(), "dead-man-socket");
         if !self.properties.iter().any(|property| property.element == element && property.name == name) {
-            self.properties.push(Property { element, name: name.to_owned(), value: format!("{socket:?}") });
+            self.properties.push(Property {
+                element: element.to_owned(),
+                name: name.to_owned(),
+                value: format!("{socket:?}"),
+            });
         }
     }
 
@@ -232,6 +261,7 @@ impl CameraSettings {
             Ok(credentials) => camera.credentials = credentials,
             Err(reason) => camera.no_password = Some(reason),
         }
+        camera.isolation = table.get("isolation").unwrap_or_default();
         camera.recording = table.table("recording").and_then(Recording::read);
         camera.properties = zones(&mut table);
         camera.properties.extend(security(&mut table, protocol.sink()));
@@ -280,6 +310,7 @@ impl CameraSettings {
             recording: None,
             pipeline: None,
             show: false,
+            isolation: Isolation::default(),
         }
     }
 }
@@ -306,22 +337,6 @@ fn host(address: &str) -> Option<&str> {
     };
     let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
     rest.get(..end).filter(|host| !host.is_empty() && !rest.contains(wrong))
-}
-
-/// Host and port of an address of RTSP, and whether it is by TLS.
-pub fn rtsp_host(address: &str) -> Option<(String, u16, bool)> {
-    let (rest, tls) = match address.strip_prefix("rtsp://") {
-        Some(rest) => (rest, false),
-        None => (address.strip_prefix("rtsps://")?, true),
-    };
-    let rest = rest.trim_end_matches('/');
-    let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
-    let colon = rest.rfind(':').filter(|colon| rest.rfind(']').is_none_or(|end| end < *colon));
-    let (host, port) = match colon {
-        Some(colon) => (rest.get(..colon)?, rest.get(colon + 1..)?.parse().ok()?),
-        None => (rest, if tls { RTSPS_PORT } else { RTSP_PORT }),
-    };
-    (!host.is_empty() && !rest.contains(wrong)).then(|| (host.to_owned(), port, tls))
 }
 
 /// Width and height, from `640x480`.

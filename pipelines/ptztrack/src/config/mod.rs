@@ -17,7 +17,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-pub use camera::{CameraSettings, Codec, RTSP_PORT, Recording, rtsp_host, size};
+pub use camera::{CameraSettings, Codec, Isolation, RTSP_PORT, Recording, size};
 pub use credentials::{Credentials, Secret};
 pub use mqtt::Mqtt;
 pub use problem::Problems;

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use session::http::Trust;
+
 use super::credentials::{self, Credentials};
 use super::table::{Read, Table, whole};
 
@@ -8,6 +10,8 @@ use super::table::{Read, Table, whole};
 pub struct Mqtt {
     pub host: String,
     pub port: u16,
+    /// Whose certificates are believed; `None`: it is spoken to in clear.
+    pub tls: Option<Trust>,
     pub credentials: Option<Credentials>,
     /// What all topics of ours begin with.
     pub topic: String,
@@ -16,22 +20,34 @@ pub struct Mqtt {
 }
 
 impl Mqtt {
-    /// MQTT without TLS, as IANA has it.
+    /// MQTT without TLS and with it, as IANA has them.
     const PORT: u16 = 1883;
+    const TLS_PORT: u16 = 8883;
 
     pub(super) fn read(mut table: Table) -> Option<Self> {
         let host: Option<String> = table.need("host");
         let port = table.get_with("port", "a port, a whole number from 1 to 65535", |value| {
             whole(value).and_then(|port| u16::try_from(port).ok()).filter(|port| *port > 0)
         });
+        let tls = tls(&mut table);
         let credentials = credentials::read(&mut table);
         let topic = topic(&mut table, "topic").unwrap_or_else(|| "ptztrack".to_owned());
         let prefix =
             self::topic(&mut table, "discovery-prefix").unwrap_or_else(|| "homeassistant".to_owned());
         let discovery = table.get("discovery").unwrap_or(true).then_some(prefix);
         table.no_more();
-        Some(Self { host: host?, port: port.unwrap_or(Self::PORT), credentials, topic, discovery })
+        let port = port.unwrap_or(if tls.is_some() { Self::TLS_PORT } else { Self::PORT });
+        Some(Self { host: host?, port, tls, credentials, topic, discovery })
     }
+}
+
+fn tls(table: &mut Table) -> Option<Trust> {
+    let wanted = table.get("tls").unwrap_or(false);
+    let authority = table.get::<String>("ca-file");
+    if authority.is_some() && !wanted {
+        table.wrong("`ca-file` is for a broker with `tls = true`");
+    }
+    wanted.then(|| authority.map_or(Trust::System, |file| Trust::Authority(file.into())))
 }
 
 /// The beginning of topics (MQTT 3.1.1, 4.7): no wildcards, and no `$`, which is the broker's own.

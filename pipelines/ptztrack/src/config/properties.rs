@@ -3,6 +3,7 @@
 //! Properties of elements, by their names.
 
 use gst::prelude::*;
+use serde::{Deserialize, Serialize};
 use toml::de::DeValue;
 
 use super::table::Table;
@@ -16,15 +17,15 @@ pub const ELEMENTS: [&str; 5] =
 const OURS: [&str; 5] = ["name", "parent", "location", "user", "password"];
 
 /// One property of one element, as text that was understood by the element.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Property {
-    pub element: &'static str,
+    pub element: String,
     pub name: String,
     pub value: String,
 }
 
 /// The properties of an element in its table.
-pub fn read(factory: &'static str, table: &Table) -> Vec<Property> {
+pub fn read(factory: &str, table: &Table) -> Vec<Property> {
     let Ok(element) = gst::ElementFactory::make(factory).build() else {
         table.wrong(format!(
             "GStreamer has no element {factory}: is its plugin installed? gst-inspect-1.0 {factory}"
@@ -34,7 +35,9 @@ pub fn read(factory: &'static str, table: &Table) -> Vec<Property> {
     let mut found = Vec::new();
     for (name, value) in table.entries() {
         match check(&element, name, value.get_ref()) {
-            Ok(text) => found.push(Property { element: factory, name: name.to_owned(), value: text }),
+            Ok(text) => {
+                found.push(Property { element: factory.to_owned(), name: name.to_owned(), value: text })
+            }
             Err(reason) => table.source.wrong(value.span(), reason),
         }
     }
@@ -42,11 +45,11 @@ pub fn read(factory: &'static str, table: &Table) -> Vec<Property> {
 }
 
 /// One property from text, as `zones` of a camera.
-pub fn of(factory: &'static str, name: &str, text: &str) -> Result<Property, String> {
+pub fn of(factory: &str, name: &str, text: &str) -> Result<Property, String> {
     let element = gst::ElementFactory::make(factory).build().map_err(|err| err.to_string())?;
     let spec = writable(&element, name)?;
     accepted(&element, &spec, text)?;
-    Ok(Property { element: factory, name: name.to_owned(), value: text.to_owned() })
+    Ok(Property { element: factory.to_owned(), name: name.to_owned(), value: text.to_owned() })
 }
 
 impl Property {

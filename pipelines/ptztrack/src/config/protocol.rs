@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use serde::{Deserialize, Serialize};
+
 use super::table::Read;
 
 /// What a camera is spoken to by.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum, Serialize, Deserialize)]
 pub enum Protocol {
     /// Axis' own
     #[default]

@@ -2,6 +2,8 @@
 
 use std::time::Duration;
 
+use pipeline_supervisor::video::rtsp_host;
+
 use super::*;
 use session::http::{Authentication, Trust};
 

@@ -9,7 +9,9 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use rumqttc::{AsyncClient, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS};
+use rumqttc::{
+    AsyncClient, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS, TlsConfiguration, Transport,
+};
 use tokio::sync::broadcast::error::RecvError;
 use tokio::task::JoinHandle;
 use topics::{OFFLINE, ONLINE, Topics};
@@ -41,7 +43,15 @@ pub struct Publisher {
 
 impl Publisher {
     /// Connects, and tells from now on what happens.
-    pub fn start(settings: &Mqtt, shard: Option<Shard>, fleet: Arc<Fleet>, log: Arc<Log>) -> Self {
+    ///
+    /// # Errors
+    /// Where the certificates that are to be believed cannot be read.
+    pub fn start(
+        settings: &Mqtt,
+        shard: Option<Shard>,
+        fleet: Arc<Fleet>,
+        log: Arc<Log>,
+    ) -> Result<Self, session::Error> {
         let topics = Topics::new(settings, shard);
         let id = format!("ptztrack-{}-{}", glib::host_name(), std::process::id());
         let mut options = MqttOptions::new(id, &settings.host, settings.port);
@@ -50,15 +60,19 @@ impl Publisher {
         if let Some(credentials) = &settings.credentials {
             options.set_credentials(&credentials.user, credentials.password.reveal());
         }
+        if let Some(trust) = &settings.tls {
+            let tls = TlsConfiguration::Rustls(Arc::new(trust.client_config(true)?));
+            options.set_transport(Transport::tls_with_config(tls));
+        }
         let (client, events) = AsyncClient::new(options, WAITING);
         let connected = Arc::new(AtomicBool::default());
         let broker = format!("{}:{}", settings.host, settings.port);
-        Self {
+        Ok(Self {
             availability: topics.availability(),
             connection: tokio::spawn(keep_connected(events, connected.clone(), broker, log.clone())),
             publishing: tokio::spawn(publish(client.clone(), connected, topics, fleet, log)),
             client,
-        }
+        })
     }
 
     /// Says that we are gone.

@@ -13,6 +13,10 @@ pub(super) enum Codec {
     Jpeg,
 }
 
+/// Sequence numbers and timestamps of RTP begin anywhere (RFC 3550, 5.1), and begin anew once in hours: here after some dozen
+/// packets and a second, so that everybody who watches sees it.
+const WRAPS_SOON: &str = "seqnum-offset=65500 timestamp-offset=4294877296";
+
 impl Codec {
     pub fn parse(name: &str) -> Option<Self> {
         match name {
@@ -48,7 +52,7 @@ impl Codec {
         };
         format!(
             "( appsrc name=video is-live=true format=time max-buffers=4 max-bytes=0 leaky-type=downstream \
-             ! {encoder} name=pay0 )"
+             ! {encoder} name=pay0 {WRAPS_SOON} )"
         )
     }
 

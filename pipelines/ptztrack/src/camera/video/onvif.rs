@@ -6,7 +6,8 @@ use ::onvif::{Client, VideoStream};
 use session::Client as _;
 use session::http::ClientSettings;
 
-use super::Failure;
+use pipeline_supervisor::video::Failure;
+
 use crate::config::CameraSettings;
 
 /// Address of the RTSP server, and path and query of the stream of the codec that is set, nearest to the size that is.

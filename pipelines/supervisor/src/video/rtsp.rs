@@ -3,11 +3,10 @@
 //! RTSP, between an `rtspsrc` on this machine and the camera: `rtspsrc` knows no password, and what it asks for is signed here.
 
 use std::io;
-use std::sync::Arc;
 use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, PoisonError};
 
-use axum::http::{HeaderMap, HeaderValue, header};
-use ptztrack_contract::lock::lock;
+use http::{HeaderMap, HeaderValue, header};
 use rustls::pki_types::ServerName;
 use session::Error;
 use session::http::{Authenticator, ClientSettings};
@@ -21,7 +20,10 @@ use tokio_rustls::TlsConnector;
 
 use super::rtsp_message::{Item, Message};
 use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
-use crate::config::rtsp_host;
+
+/// RFC 7826, section 4.2; IANA.
+const PORT: u16 = 554;
+const TLS_PORT: u16 = 322;
 
 /// Of an address that somebody else wrote.
 const LONGEST_SHOWN: usize = 200;
@@ -72,8 +74,24 @@ pub async fn carry(
         result = answer(BufReader::new(from_camera), &mut to_source, &asking) => result,
     };
     if let Err(failure) = result {
-        *lock(ended) = Some(failure);
+        *ended.lock().unwrap_or_else(PoisonError::into_inner) = Some(failure);
     }
+}
+
+/// Host and port of an address of RTSP, and whether it is by TLS.
+pub fn host(address: &str) -> Option<(String, u16, bool)> {
+    let (rest, tls) = match address.strip_prefix("rtsp://") {
+        Some(rest) => (rest, false),
+        None => (address.strip_prefix("rtsps://")?, true),
+    };
+    let rest = rest.trim_end_matches('/');
+    let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
+    let colon = rest.rfind(':').filter(|colon| rest.rfind(']').is_none_or(|end| end < *colon));
+    let (host, port) = match colon {
+        Some(colon) => (rest.get(..colon)?, rest.get(colon + 1..)?.parse().ok()?),
+        None => (rest, if tls { TLS_PORT } else { PORT }),
+    };
+    (!host.is_empty() && !rest.contains(wrong)).then(|| (host.to_owned(), port, tls))
 }
 
 /// 128 random bits: others on this machine must not find the camera behind the open door.
@@ -85,7 +103,7 @@ fn word() -> io::Result<String> {
 
 async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Connection>, bool), Failure> {
     let (host, port, over_tls) =
-        rtsp_host(camera).ok_or_else(|| Failure::new(format!("{camera} names no host")))?;
+        host(camera).ok_or_else(|| Failure::new(format!("{camera} names no host")))?;
     let bare = host.trim_matches(['[', ']']);
     let said = |err: io::Error| Failure::new(format!("{host}, port {port}: {err}"));
     let late = |_| said(io::ErrorKind::TimedOut.into());

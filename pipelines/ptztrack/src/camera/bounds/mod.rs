@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What whoever answers in a camera's place can make us hold in memory. A decoder believes the size that a stream announces, and
+//! takes the memory for it before there is a picture; an element that waits for the end of a picture keeps what comes until
+//! then. So both are looked at on their way.
+
+mod sizes;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use gst::prelude::*;
+use sizes::{Codec, Size};
+
+/// The most pixels that are decoded: those of 8K, as cinemas have it.
+const MOST_PIXELS: u64 = 8192 * 4320;
+
+/// The most bytes of one encoded picture: one that large of poorly compressed JPEG.
+const MOST_BYTES: usize = 64 * 1024 * 1024;
+
+/// Ends the pipeline with an error before one of its decoders gets a picture that is too large, or what comes from `source` grows
+/// without end before there is one.
+pub fn keep(pipeline: &gst::Pipeline, source: Option<&gst::Element>) {
+    let waiting = Arc::new(AtomicUsize::new(0));
+    for decoder in pipeline.iterate_recurse().into_iter().flatten() {
+        let decodes = |factory: gst::ElementFactory| factory.has_type(gst::ElementFactoryType::DECODER);
+        if decoder.factory().is_some_and(decodes)
+            && let Some(pad) = decoder.static_pad("sink")
+        {
+            look_at_sizes(&pad, waiting.clone());
+        }
+    }
+    if let Some(pad) =
+        source.and_then(|source| source.static_pad("src").or_else(|| source.static_pad("sink")))
+    {
+        count(&pad, waiting);
+    }
+}
+
+/// What comes is counted until a decoder gets a picture.
+fn count(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
+    pad.add_probe(gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST, move |pad, info| {
+        let bytes = match &info.data {
+            Some(gst::PadProbeData::Buffer(buffer)) => buffer.size(),
+            Some(gst::PadProbeData::BufferList(list)) => list.calculate_size(),
+            _ => 0,
+        };
+        if waiting.fetch_add(bytes, Ordering::Relaxed) + bytes > MOST_BYTES {
+            return refuse(pad, &format!("{MOST_BYTES} bytes came without a picture"));
+        }
+        gst::PadProbeReturn::Ok
+    });
+}
+
+/// Nothing reaches a decoder that announces more than is to be decoded.
+fn look_at_sizes(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
+    let kinds =
+        gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST | gst::PadProbeType::EVENT_DOWNSTREAM;
+    pad.add_probe(kinds, move |pad, info| {
+        let largest = match &info.data {
+            Some(gst::PadProbeData::Event(event)) => of_event(event),
+            Some(gst::PadProbeData::Buffer(buffer)) => of_buffers(pad, [&**buffer]),
+            Some(gst::PadProbeData::BufferList(list)) => of_buffers(pad, list.iter()),
+            _ => Ok(None),
+        };
+        if info.event().is_none() {
+            waiting.store(0, Ordering::Relaxed);
+        }
+        match largest {
+            Ok(Some(size)) if size.pixels() > MOST_PIXELS => {
+                let Size { width, height } = size;
+                refuse(pad, &format!("a picture of {width}x{height} is announced, which is not decoded"))
+            }
+            Ok(_) => gst::PadProbeReturn::Ok,
+            // Its size cannot be read: no decoder is to guess it. Not `Drop`: on a sink pad GStreamer 1.22 then lets go of data that
+            // the bindings have taken.
+            Err(sizes::Unreadable) => gst::PadProbeReturn::Handled,
+        }
+    });
+}
+
+/// Caps hold what a stream begins with.
+fn of_event(event: &gst::Event) -> Result<Option<Size>, sizes::Unreadable> {
+    let gst::EventView::Caps(caps) = event.view() else { return Ok(None) };
+    let Some((codec, data)) = Codec::of(caps.caps()).zip(sizes::codec_data(caps.caps())) else {
+        return Ok(None);
+    };
+    let Ok(data) = data.map_readable() else { return Ok(None) };
+    codec.size_in_head(&data)
+}
+
+fn of_buffers<'a>(
+    pad: &gst::Pad,
+    buffers: impl IntoIterator<Item = &'a gst::BufferRef>,
+) -> Result<Option<Size>, sizes::Unreadable> {
+    let caps = pad.current_caps();
+    let Some(codec) = caps.as_deref().and_then(Codec::of) else { return Ok(None) };
+    let mut largest = None;
+    for buffer in buffers {
+        if let Ok(data) = buffer.map_readable() {
+            largest = sizes::larger(largest, codec.size_in(&data)?);
+        }
+    }
+    Ok(largest)
+}
+
+fn refuse(pad: &gst::Pad, why: &str) -> gst::PadProbeReturn {
+    if let Some(element) = pad.parent_element() {
+        gst::element_error!(element, gst::StreamError::Decode, ("{why}"));
+    }
+    gst::PadProbeReturn::Handled
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A decoder for what a harness is given; what the pipeline says of it.
+    fn error_of(decoder: &str, caps: &str, data: &[u8]) -> Option<String> {
+        gst::init().unwrap();
+        let caps: gst::Caps = caps.parse().unwrap();
+        let pipeline =
+            gst::parse::launch(&format!("appsrc name=source format=time ! {decoder} ! fakesink")).unwrap();
+        let pipeline = pipeline.downcast::<gst::Pipeline>().unwrap();
+        let source = pipeline.by_name("source").unwrap();
+        keep(&pipeline, Some(&source));
+        let source = source.downcast::<gst_app::AppSrc>().unwrap();
+        source.set_caps(Some(&caps));
+        source.push_buffer(gst::Buffer::from_slice(data.to_vec())).unwrap();
+        source.end_of_stream().unwrap();
+        let _ = pipeline.set_state(gst::State::Playing);
+        let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+        let message =
+            pipeline.bus().unwrap().timed_pop_filtered(gst::ClockTime::from_seconds(60), &kinds).unwrap();
+        pipeline.set_state(gst::State::Null).unwrap();
+        match message.view() {
+            gst::MessageView::Error(error) => Some(error.error().message().to_owned()),
+            _ => None,
+        }
+    }
+
+    /// Peak of the memory of this process, in kilobytes.
+    fn peak() -> u64 {
+        let status = std::fs::read_to_string("/proc/self/status").unwrap();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:")).unwrap();
+        line.trim_end_matches("kB").trim().parse().unwrap()
+    }
+
+    /// Progressive: of these, libjpeg takes the memory before it hands anything out.
+    #[test]
+    fn a_picture_that_claims_to_be_huge_takes_no_memory() {
+        let mut jpeg = vec![0xff, 0xd8, 0xff, 0xc2, 0, 17, 8];
+        jpeg.extend([30000_u16, 30000].map(u16::to_be_bytes).concat());
+        jpeg.extend([3, 1, 0x22, 0, 2, 0x11, 0, 3, 0x11, 0, 0xff, 0xda, 0, 12, 3, 1, 0, 2, 0, 3, 0, 0, 0, 0]);
+        jpeg.resize(4096, 0);
+        let before = peak();
+        let error = error_of("jpegdec", "image/jpeg", &jpeg);
+        assert!(error.as_ref().is_some_and(|error| error.contains("30000x30000")), "{error:?}");
+        assert!(peak() < before + 200_000, "{before}, then {}", peak());
+    }
+
+    #[test]
+    fn what_never_becomes_a_picture_is_not_kept() {
+        let error =
+            error_of("multipartdemux ! jpegdec", "multipart/x-mixed-replace", &vec![b'x'; MOST_BYTES + 1]);
+        assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
+    }
+}

@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The process of one camera: does what a thread does for it, is told what to do, and tells what is known.
+
+use std::io;
+use std::os::fd::AsFd;
+use std::os::unix::net::UnixStream as StdUnixStream;
+use std::sync::Arc;
+use std::time::Duration;
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use rustix::process::{Resource, Rlimit, setrlimit};
+use serde::de::DeserializeOwned;
+use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
+use tokio::net::UnixStream;
+use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::time::interval;
+
+use super::protocol::{Order, Report, Start, Word};
+use crate::camera::{Camera, Look};
+use crate::log::Log;
+
+/// Between two reports.
+const EVERY: Duration = Duration::from_millis(500);
+
+/// A camera of 4K takes a quarter of that. Who asks for more ends here, and not the machine.
+const MOST_MEMORY: u64 = 2 * 1024 * 1024 * 1024;
+
+/// Runs the camera that the socket on standard input names, until that closes.
+///
+/// # Errors
+/// Where nothing on standard input says which camera.
+pub async fn run() -> io::Result<()> {
+    let most = Rlimit { current: Some(MOST_MEMORY), maximum: Some(MOST_MEMORY) };
+    setrlimit(Resource::Data, most)?;
+    let socket = StdUnixStream::from(io::stdin().as_fd().try_clone_to_owned()?);
+    socket.set_nonblocking(true)?;
+    let (orders, words) = UnixStream::from_std(socket)?.into_split();
+    let mut orders = BufReader::new(orders).lines();
+    let start: Start = next(&mut orders).await?.ok_or(io::ErrorKind::UnexpectedEof)?;
+    let log = Arc::new(Log::unwritten());
+    let mut events = log.subscribe();
+    let camera = Camera::start_here(start.settings, start.control, log, None)?;
+    let known = camera.known.clone();
+    let mut process = Child { words, heard: 0 };
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    let mut timer = interval(EVERY);
+    let mut look: Option<Look> = None;
+    while !camera.is_over() {
+        tokio::select! {
+            order = next(&mut orders) => {
+                let Ok(Some(order)) = order else { break };
+                process.heard += 1;
+                match order {
+                    Order::Select { x, y } => known.select(x, y),
+                    Order::Release => known.release(),
+                    Order::Steer(hand) => known.steer(hand.into()),
+                    Order::Look(somebody) => look = somebody.then(|| known.look()),
+                }
+            }
+            Ok(event) = events.recv() => process.say(&Word::Event(event)).await?,
+            picture = next_picture(&mut look) => {
+                process.say(&Word::Picture(BASE64_STANDARD.encode(picture))).await?;
+            }
+            _ = timer.tick() => process.report(&camera).await?,
+            _ = terminate.recv() => break,
+            _ = interrupt.recv() => break,
+        }
+    }
+    drop(look);
+    camera.end();
+    while !camera.is_over() {
+        process.report(&camera).await?;
+        timer.tick().await;
+    }
+    while let Ok(event) = events.try_recv() {
+        process.say(&Word::Event(event)).await?;
+    }
+    process.report(&camera).await
+}
+
+async fn next<T: DeserializeOwned>(lines: &mut Lines<BufReader<OwnedReadHalf>>) -> io::Result<Option<T>> {
+    let Some(line) = lines.next_line().await? else { return Ok(None) };
+    Ok(Some(serde_json::from_str(&line)?))
+}
+
+/// Never where nobody looks.
+async fn next_picture(look: &mut Option<Look>) -> axum::body::Bytes {
+    if let Some(look) = look
+        && let Some(picture) = look.next().await
+    {
+        return picture;
+    }
+    std::future::pending().await
+}
+
+struct Child {
+    words: OwnedWriteHalf,
+    /// Orders so far.
+    heard: u64,
+}
+
+impl Child {
+    async fn report(&mut self, camera: &Camera) -> io::Result<()> {
+        self.say(&Word::Report(Box::new(Report::of(&camera.known, self.heard)))).await
+    }
+
+    async fn say(&mut self, word: &Word) -> io::Result<()> {
+        let mut line = serde_json::to_vec(word)?;
+        line.push(b'\n');
+        self.words.write_all(&line).await
+    }
+}

@@ -1,0 +1,249 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! A camera in a process of its own, which is started again where it dies or hangs: a decoder that crashes, a leak or a driver
+//! that never returns costs that camera alone. What is said of it here is what that process tells; its own watchdog stops the
+//! camera where it dies.
+//!
+//! ```text
+//! this process: Known, Remote ─ socket pair, lines of JSON ─▶ child: the camera, as a thread has it elsewhere
+//! ```
+
+pub mod child;
+mod protocol;
+
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::net::Shutdown;
+use std::os::fd::OwnedFd;
+use std::os::unix::net::UnixStream;
+use std::os::unix::process::CommandExt;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use base64::Engine;
+use base64::prelude::BASE64_STANDARD;
+use pipeline_supervisor::Backoff;
+use protocol::{Order, Report, Start, Word};
+use ptztrack_contract::lock::lock;
+use serde::Serialize;
+use socket2::SockRef;
+
+use super::known::{Known, SEARCHING, Steering};
+use super::running::Running;
+use crate::config::CameraSettings;
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// It reports twice a second, in its last ones too. One that says nothing for so long hangs.
+const LONGEST_SILENCE: Duration = Duration::from_secs(10);
+
+/// Between its last word and its end.
+const LONGEST_END: Duration = Duration::from_secs(5);
+
+/// To start one costs half a second of a processor, so it is not tried as often as a pipeline; one that lasted for so long
+/// was well.
+const SHORTEST_PAUSE: Duration = Duration::from_millis(500);
+const LONGEST_PAUSE: Duration = Duration::from_secs(30);
+const WELL: Duration = Duration::from_secs(60);
+
+/// More than any picture.
+const MOST_BYTES: u64 = 64 * 1024 * 1024;
+
+/// Runs processes for one camera, one after the other.
+#[derive(Debug, Default)]
+pub struct Processes {
+    told_to_end: AtomicBool,
+    /// To the one that runs.
+    socket: Mutex<Option<UnixStream>>,
+}
+
+impl Processes {
+    /// Runs them in this thread until told to end, or until the camera is given up.
+    pub fn run(&self, settings: &CameraSettings, known: &Known, log: &Log) {
+        let mut backoff = Backoff::new(SHORTEST_PAUSE, LONGEST_PAUSE, WELL);
+        while !self.told_to_end.load(Ordering::SeqCst) {
+            let begin = Instant::now();
+            let Err(reason) = self.run_one(settings, known, log) else { return };
+            let mut state = lock(&known.state);
+            (state.picture, state.target, state.target_id) = (false, SEARCHING.to_owned(), None);
+            state.trouble = Some(reason.clone());
+            drop(state);
+            known.failures.fetch_add(1, Ordering::Relaxed);
+            let detail = format!("{reason}; it is started again");
+            log.tell(&Event::new(Level::Error, Some(&known.name), "process-ended", detail));
+            self.pause(known, backoff.after(begin.elapsed()));
+        }
+    }
+
+    /// Ends it; who runs in [`Self::run`] is to be woken.
+    pub fn end(&self) {
+        self.told_to_end.store(true, Ordering::SeqCst);
+        if let Some(socket) = &*lock(&self.socket) {
+            // One that is gone needs no end.
+            let _ = socket.shutdown(Shutdown::Write);
+        }
+    }
+
+    fn pause(&self, known: &Known, pause: Duration) {
+        let until = Instant::now() + pause;
+        while !self.told_to_end.load(Ordering::SeqCst) && Instant::now() < until {
+            known.beat();
+            thread::park_timeout(until.saturating_duration_since(Instant::now()));
+        }
+    }
+
+    /// `Ok`: there is to be no other.
+    fn run_one(&self, settings: &CameraSettings, known: &Known, log: &Log) -> Result<(), String> {
+        let said = |err: io::Error| format!("its process cannot be started: {err}");
+        let (ours, its) = UnixStream::pair().map_err(said)?;
+        // This very program, whatever lies in its place by now.
+        let mut child = Command::new("/proc/self/exe")
+            .arg0("ptztrack")
+            .args(["camera", &settings.name])
+            .stdin(OwnedFd::from(its))
+            .stdout(Stdio::null())
+            .spawn()
+            .map_err(said)?;
+        let heard = self.talk(ours, settings, known, log);
+        lock(&self.socket).take();
+        lock(&known.running).take();
+        let status = end(&mut child, heard.is_ok());
+        if self.told_to_end.load(Ordering::SeqCst) || lock(&known.state).given_up {
+            return Ok(());
+        }
+        Err(heard.err().map_or_else(|| format!("its process ended: {status}"), |err| err.to_string()))
+    }
+
+    /// Until it says nothing any more.
+    fn talk(
+        &self,
+        socket: UnixStream,
+        settings: &CameraSettings,
+        known: &Known,
+        log: &Log,
+    ) -> io::Result<()> {
+        socket.set_read_timeout(Some(LONGEST_SILENCE))?;
+        socket.set_write_timeout(Some(LONGEST_SILENCE))?;
+        (&socket).write_all(&line(&Start { settings: settings.clone(), control: known.control() })?)?;
+        let remote = Arc::new(Remote::new(socket.try_clone()?));
+        *lock(&self.socket) = Some(socket.try_clone()?);
+        *lock(&known.running) = Some(remote.clone());
+        if self.told_to_end.load(Ordering::SeqCst) {
+            self.end();
+        }
+        let mut words = BufReader::new(&socket);
+        let mut word = Vec::new();
+        loop {
+            word.clear();
+            match (&mut words).take(MOST_BYTES).read_until(b'\n', &mut word) {
+                // One that died may have been at a word.
+                Ok(_) if !word.ends_with(b"\n") => return Ok(()),
+                Ok(_) => {}
+                Err(err) if err.kind() == io::ErrorKind::WouldBlock => return Err(hangs()),
+                Err(err) if err.kind() == io::ErrorKind::ConnectionReset => return Ok(()),
+                Err(err) => return Err(err),
+            }
+            match serde_json::from_slice(&word)? {
+                Word::Event(event) => log.tell(&event),
+                Word::Report(report) if report.stuck => return Err(hangs()),
+                Word::Report(report) => remote.hear(*report, known),
+                Word::Picture(picture) => {
+                    if let Ok(picture) = BASE64_STANDARD.decode(picture) {
+                        known.view.send_replace(picture.into());
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn hangs() -> io::Error {
+    io::Error::other("its process hangs")
+}
+
+fn line(value: &impl Serialize) -> io::Result<Vec<u8>> {
+    let mut line = serde_json::to_vec(value)?;
+    line.push(b'\n');
+    Ok(line)
+}
+
+/// Waits for its end where it may come by itself, and sees to it otherwise.
+fn end(child: &mut Child, by_itself: bool) -> String {
+    let begin = Instant::now();
+    while by_itself && begin.elapsed() < LONGEST_END {
+        match child.try_wait() {
+            Ok(None) => thread::sleep(Duration::from_millis(20)),
+            Ok(Some(status)) => return status.to_string(),
+            Err(err) => return err.to_string(),
+        }
+    }
+    // It may have ended by now.
+    let _ = child.kill();
+    child.wait().map_or_else(|err| err.to_string(), |status: ExitStatus| status.to_string())
+}
+
+/// A camera's process, as others see it.
+#[derive(Debug)]
+struct Remote {
+    socket: UnixStream,
+    /// Orders so far.
+    given: AtomicU64,
+    somebody_looks: AtomicBool,
+    last: Mutex<Option<Report>>,
+}
+
+impl Remote {
+    fn new(socket: UnixStream) -> Self {
+        Self {
+            socket,
+            given: AtomicU64::new(0),
+            somebody_looks: AtomicBool::new(false),
+            last: Mutex::default(),
+        }
+    }
+
+    /// Waits for nothing: one that reads nothing hangs, and hears of it no more.
+    fn order(&self, order: &Order) {
+        self.given.fetch_add(1, Ordering::SeqCst);
+        if let Ok(line) = line(order) {
+            let _ =
+                SockRef::from(&self.socket).send_with_flags(&line, libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL);
+        }
+    }
+
+    fn hear(&self, report: Report, known: &Known) {
+        report.tell(known, self.given.load(Ordering::SeqCst));
+        *lock(&self.last) = Some(report);
+        self.look(known.looking.load(Ordering::Relaxed) > 0);
+    }
+}
+
+impl Running for Remote {
+    fn look(&self, somebody: bool) {
+        if self.somebody_looks.swap(somebody, Ordering::SeqCst) != somebody {
+            self.order(&Order::Look(somebody));
+        }
+    }
+
+    fn select(&self, x: f64, y: f64) {
+        self.order(&Order::Select { x, y });
+    }
+
+    fn release(&self) {
+        self.order(&Order::Release);
+    }
+
+    fn steer(&self, steering: Steering) {
+        self.order(&Order::Steer(steering.into()));
+    }
+
+    fn abilities(&self) -> (bool, bool) {
+        lock(&self.last).as_ref().map(|report| report.abilities).unwrap_or_default()
+    }
+
+    fn servo_stats(&self) -> Option<gst::Structure> {
+        lock(&self.last).as_ref()?.servo_stats()
+    }
+}

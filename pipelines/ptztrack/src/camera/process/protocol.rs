@@ -1,0 +1,169 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! What a camera's process and the one that started it tell each other: one object of JSON on a line. Both are the same program.
+
+use std::sync::atomic::Ordering;
+use std::time::{Duration, Instant};
+
+use ptztrack_contract::lock::lock;
+use serde::{Deserialize, Serialize};
+
+use crate::camera::known::{Control, Known, State, Steering};
+use crate::config::CameraSettings;
+use crate::event::Event;
+
+/// The first line, to the process of a camera.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Start {
+    pub settings: CameraSettings,
+    /// Who had the camera before.
+    pub control: Control,
+}
+
+/// All further ones.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Order {
+    Select { x: f64, y: f64 },
+    Release,
+    Steer(Hand),
+    Look(bool),
+}
+
+/// What the process of a camera says.
+#[derive(Debug, Serialize, Deserialize)]
+pub enum Word {
+    Event(Event),
+    Report(Box<Report>),
+    /// For who looks, JPEG in base64.
+    Picture(String),
+}
+
+/// In whose hand a camera is; a [`Steering`] without its times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Hand {
+    Follow,
+    GoHome,
+    HandedOver,
+    Operator,
+}
+
+/// All that is known of a camera.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Report {
+    state: State,
+    hand: Hand,
+    operator: bool,
+    pictures: u64,
+    processed: u64,
+    rebuilt: u64,
+    failures: u64,
+    since_picture: Duration,
+    times: Vec<(u64, f64)>,
+    /// As text, which a structure is read from again.
+    servo: Option<String>,
+    pub abilities: (bool, bool),
+    /// How many orders had been heard.
+    orders: u64,
+    pub stuck: bool,
+}
+
+impl From<Steering> for Hand {
+    fn from(steering: Steering) -> Self {
+        match steering {
+            Steering::Follow => Self::Follow,
+            Steering::GoHome(_) => Self::GoHome,
+            Steering::HandedOver => Self::HandedOver,
+            Steering::Operator(_) => Self::Operator,
+        }
+    }
+}
+
+impl From<Hand> for Steering {
+    /// From now on.
+    fn from(hand: Hand) -> Self {
+        match hand {
+            Hand::Follow => Self::Follow,
+            Hand::GoHome => Self::GoHome(Instant::now()),
+            Hand::HandedOver => Self::HandedOver,
+            Hand::Operator => Self::Operator(Instant::now()),
+        }
+    }
+}
+
+impl Report {
+    /// After so many orders.
+    pub fn of(known: &Known, orders: u64) -> Self {
+        let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Ordering::Relaxed);
+        Self {
+            state: lock(&known.state).clone(),
+            hand: (*lock(&known.steering)).into(),
+            operator: known.operator.load(Ordering::Relaxed),
+            pictures: count(&known.pictures),
+            processed: count(&known.processed),
+            rebuilt: count(&known.rebuilt),
+            failures: count(&known.failures),
+            since_picture: known.since_picture(),
+            times: known.times.iter().map(super::super::Stopwatch::read).collect(),
+            servo: known.servo().map(|servo| servo.to_string()),
+            abilities: known.abilities(),
+            orders,
+            stuck: known.is_stuck(),
+        }
+    }
+
+    /// What `vapixptzsink` said of itself.
+    pub fn servo_stats(&self) -> Option<gst::Structure> {
+        self.servo.as_ref()?.parse().ok()
+    }
+
+    /// Makes it known here, where so many orders were given.
+    pub fn tell(&self, known: &Known, orders: u64) {
+        *lock(&known.state) = self.state.clone();
+        // Before it has heard them all, it knows less of that than we do.
+        if self.orders == orders {
+            *lock(&known.steering) = self.hand.into();
+            known.operator.store(self.operator, Ordering::Relaxed);
+        }
+        let counters = [
+            (&known.pictures, self.pictures),
+            (&known.processed, self.processed),
+            (&known.rebuilt, self.rebuilt),
+            (&known.failures, self.failures),
+        ];
+        for (counter, value) in counters {
+            counter.store(value, Ordering::Relaxed);
+        }
+        known.last_picture_was(self.since_picture);
+        for (stopwatch, time) in known.times.iter().zip(&self.times) {
+            stopwatch.set(*time);
+        }
+        if !self.stuck {
+            known.beat();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_there_is_known_here() {
+        gst::init().unwrap();
+        let there = Known::new("door");
+        lock(&there.state).picture = true;
+        there.pictures.store(7, Ordering::Relaxed);
+        *lock(&there.steering) = Steering::HandedOver;
+        there.times[0].set((3, 0.5));
+        let line = serde_json::to_string(&Word::Report(Box::new(Report::of(&there, 2)))).unwrap();
+        let Ok(Word::Report(report)) = serde_json::from_str(&line) else { panic!("{line}") };
+        let here = Known::new("door");
+        report.tell(&here, 3);
+        assert_eq!(here.control(), Control::Ours, "an order is on its way");
+        report.tell(&here, 2);
+        assert_eq!(here.control(), Control::HandedOver);
+        assert!(lock(&here.state).picture);
+        assert_eq!((here.pictures.load(Ordering::Relaxed), here.times[0].read()), (7, (3, 0.5)));
+        assert!(!here.is_stuck());
+    }
+}
