@@ -212,7 +212,8 @@ impl TargetEstimator {
     /// twice; one that is faster shows in the expected error.
     ///
     /// Where the background is seen, pictures show how far the camera really turned, and its speeds are learned: a reckoning by
-    /// the speeds it began with would end the seek early.
+    /// the speeds it began with would end the seek early. The more steeply below the camera somebody is, the less a picture tells
+    /// of pan, and the reckoning counts again.
     fn reckoned(
         &self,
         expected: PanTilt,
@@ -225,15 +226,15 @@ impl TargetEstimator {
         if since > Self::RECKONED {
             return None;
         }
-        if self.background_seen {
-            return Some(self.in_picture(expected));
-        }
+        let expected = self.in_picture(expected);
         let walked = self.walked(self.pace() * (since + delays.sum()).as_secs_f64());
         let left = self.in_picture(first + walked - history.rotation(delays.sent_by(first_at), now));
         let common = |one: f64, other: f64| {
             if one * other > 0.0 { one.abs().min(other.abs()).copysign(one) } else { 0.0 }
         };
-        Some(self.in_picture(expected).each(left, common))
+        let reckoned = expected.each(left, common);
+        let trust = if self.background_seen { 1.0 - self.steepness() } else { 0.0 };
+        Some(reckoned + (expected - reckoned) * trust)
     }
 
     /// The same error with what tilt alone is to do about it: while pan is under way, to look already as high as the target
