@@ -320,7 +320,54 @@ fn rbsp(unit: &[u8], head: NonZeroUsize) -> BitReader<impl BufRead + Clone> {
 
 #[cfg(test)]
 mod tests {
+    use gst::prelude::*;
+
     use super::*;
+
+    /// Caps, codec data and first buffer of a stream that an encoder of GStreamer makes; `None` without that encoder.
+    fn encoded(encoder: &str, caps: &str) -> Option<(gst::Caps, gst::Buffer)> {
+        gst::init().unwrap();
+        // An encoder may wait for what comes next.
+        let text = format!(
+            "videotestsrc num-buffers=9 ! video/x-raw,format=I420,width=320,height=176 ! {encoder} ! {caps} \
+             ! appsink name=sink sync=false"
+        );
+        let pipeline = gst::parse::launch(&text).ok()?.downcast::<gst::Pipeline>().unwrap();
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let sink = pipeline.by_name("sink").unwrap().downcast::<gst_app::AppSink>().unwrap();
+        let sample =
+            sink.try_pull_sample(gst::ClockTime::from_seconds(20)).unwrap_or_else(|| panic!("{text}"));
+        pipeline.set_state(gst::State::Null).unwrap();
+        Some((sample.caps_owned().unwrap(), sample.buffer_owned().unwrap()))
+    }
+
+    #[test]
+    fn sizes_are_those_that_encoders_wrote() {
+        let size = Some(Size { width: 320, height: 176 });
+        for (encoder, caps, in_head) in [
+            ("jpegenc", "image/jpeg", false),
+            ("avenc_mpeg4", "video/mpeg", true),
+            ("x264enc", "video/x-h264,stream-format=byte-stream,profile=high", false),
+            ("x264enc", "video/x-h264,stream-format=avc,profile=main", true),
+            ("x265enc", "video/x-h265,stream-format=byte-stream", false),
+        ] {
+            let Some((caps, buffer)) = encoded(encoder, caps) else {
+                assert_eq!(encoder, "x265enc", "a plugin is missing");
+                continue;
+            };
+            let codec = Codec::of(&caps).unwrap();
+            let data = buffer.map_readable().unwrap();
+            let head = codec_data(&caps).filter(|_| in_head);
+            let found = match &head {
+                Some(head) => codec.size_in_head(&head.map_readable().unwrap()),
+                None => codec.size_in(&data),
+            };
+            assert_eq!(found, Ok(size), "{caps}");
+            // Half of what announces it is no announcement.
+            let cut = &data[..12.min(data.len())];
+            assert_ne!(codec.size_in(cut), Ok(size), "{caps}");
+        }
+    }
 
     #[test]
     fn the_largest_of_several_counts_and_half_a_picture_is_none() {
