@@ -26,7 +26,7 @@ fn warnings(bus: &gst::Bus) -> Vec<String> {
 fn a_duration_below_a_millisecond_is_refused_and_the_unit_named() {
     gst::init().unwrap();
     gstptztrack::plugin_register_static().unwrap();
-    for (factory, count) in [("bgavgdetect", 4), ("lkfeaturetrack", 5), ("ptzoverlay", 1)] {
+    for (factory, count) in [("bgavgdetect", 3), ("lkfeaturetrack", 5), ("ptzoverlay", 1)] {
         let element = gst::ElementFactory::make(factory).build().unwrap();
         let bus = gst::Bus::new();
         element.set_bus(Some(&bus));
