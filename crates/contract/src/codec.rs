@@ -117,6 +117,16 @@ impl<'a> Reader<'a> {
         self.get::<gst::ArrayRef>(field).map(|list| list.as_slice())
     }
 
+    /// The values of a list of structures.
+    pub fn structures(
+        &self,
+        field: &str,
+    ) -> Result<impl ExactSizeIterator<Item = Result<&'a gst::StructureRef, ContractError>>, ContractError>
+    {
+        let values = self.list(field)?.iter();
+        Ok(values.map(move |value| value.get().map_err(|err| self.field_error(field, err))))
+    }
+
     /// As many finite numbers as there are in `values`, which are `N`.
     fn tuple<const N: usize>(
         &self,

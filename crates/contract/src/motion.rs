@@ -91,15 +91,10 @@ impl MotionMeta {
     fn read_in_place(&mut self, structure: &gst::StructureRef) -> Result<(), ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
         for (field, regions) in [(REGIONS, &mut self.regions), (OUTSIDE, &mut self.outside)] {
-            let values = reader.list(field)?;
-            regions.resize_with(values.len(), Region::default);
-            for (region, value) in regions.iter_mut().zip(values) {
-                let structure = value.get::<&gst::StructureRef>().map_err(|err| ContractError::Field {
-                    structure: Self::NAME.to_owned(),
-                    field: field.to_owned(),
-                    reason: err.to_string(),
-                })?;
-                region.refill(structure)?;
+            let structures = reader.structures(field)?;
+            regions.resize_with(structures.len(), Region::default);
+            for (region, structure) in regions.iter_mut().zip(structures) {
+                region.refill(structure?)?;
             }
         }
         Ok(())

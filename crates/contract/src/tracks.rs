@@ -83,15 +83,8 @@ impl BufferMeta for TracksMeta {
 
     fn read(structure: &gst::StructureRef) -> Result<Self, ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let read = |value: &glib::SendValue| {
-            let structure = value.get::<&gst::StructureRef>().map_err(|err| ContractError::Field {
-                structure: Self::NAME.to_owned(),
-                field: TRACKS.to_owned(),
-                reason: err.to_string(),
-            })?;
-            Track::read(&Reader::new(structure, Track::NAME)?)
-        };
-        let tracks = reader.list(TRACKS)?.iter().map(read).collect::<Result<_, _>>()?;
+        let read = |structure: Result<_, _>| Track::read(&Reader::new(structure?, Track::NAME)?);
+        let tracks = reader.structures(TRACKS)?.map(read).collect::<Result<_, _>>()?;
         Ok(Self { tracks })
     }
 }

@@ -13,7 +13,7 @@ use opencv::core::{Point2f, Rect2f};
 pub(super) use robust::Robust;
 pub(super) use thesis::Thesis;
 
-use super::geometry::{Frame, share_inside};
+use super::geometry::{Frame, centre, share_inside};
 use super::points::Points;
 use super::tracks::Tracks;
 use crate::vision::{Luma, Observation};
@@ -57,6 +57,18 @@ pub(super) struct Estimate {
 }
 
 impl Estimate {
+    /// Of a target that was just seen, and goes so many pixels per second.
+    fn begun(bounds: Rect2f, own_velocity: Point2f) -> Self {
+        Self {
+            bounds,
+            centroid: centre(bounds),
+            confidence: 1.0,
+            is_borne_out: true,
+            own_velocity,
+            ego_velocity: None,
+        }
+    }
+
     /// Whether it is seen so well that it is nowhere else.
     pub fn is_sure(&self) -> bool {
         self.is_borne_out && self.confidence >= SURE

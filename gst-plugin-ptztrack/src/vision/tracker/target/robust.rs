@@ -61,14 +61,7 @@ impl Robust {
         let bounds = track.seen_bounds();
         let appearance = Appearance::new(seen, bounds)?;
         let Some(flow) = PointFlow::new(&seen.luma, bounds, appearance.map())? else { return Ok(None) };
-        let estimate = Estimate {
-            bounds,
-            centroid: centre(bounds),
-            confidence: 1.0,
-            is_borne_out: true,
-            own_velocity: track.velocity(),
-            ego_velocity: None,
-        };
+        let estimate = Estimate::begun(bounds, track.velocity());
         Ok(Some(Self {
             estimate,
             flow,

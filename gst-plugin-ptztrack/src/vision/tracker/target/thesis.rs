@@ -52,14 +52,7 @@ impl Thesis {
         let greys = GreyHistogram::new(&patch, &found.kept)?;
         let mut points = Points::on_target(found.kept);
         points.reject(found.rejected);
-        let estimate = Estimate {
-            bounds,
-            centroid: centre(bounds),
-            confidence: 1.0,
-            is_borne_out: true,
-            own_velocity: track.velocity(),
-            ego_velocity: None,
-        };
+        let estimate = Estimate::begun(bounds, track.velocity());
         let mut target = Self { estimate, points, patch, greys, followed: Followed::default() };
         target.estimate.centroid = target.centre_of_mass()?;
         Ok(Some(target))

@@ -18,6 +18,7 @@ use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::time::interval;
 
+use super::line;
 use super::protocol::{Order, Report, Start, Word};
 use crate::camera::{Camera, Look};
 use crate::log::Log;
@@ -109,8 +110,6 @@ impl Child {
     }
 
     async fn say(&mut self, word: &Word) -> io::Result<()> {
-        let mut line = serde_json::to_vec(word)?;
-        line.push(b'\n');
-        self.words.write_all(&line).await
+        self.words.write_all(&line(word)?).await
     }
 }
