@@ -47,6 +47,8 @@ pub struct GstLaunch {
     child: Child,
     lines: mpsc::Receiver<String>,
     seen: Vec<String>,
+    /// How many of them were waited for.
+    waited: usize,
 }
 
 impl GstLaunch {
@@ -74,24 +76,30 @@ impl GstLaunch {
                 }
             });
         }
-        Self { child, lines, seen: Vec::new() }
+        Self { child, lines, seen: Vec::new(), waited: 0 }
     }
 
-    /// Waits for a line that contains `text`, and gives it.
+    /// Waits for a line that contains `text` after the one that was last waited for, and gives it.
     #[track_caller]
     pub fn wait_for_line(&mut self, text: &str) -> String {
         let deadline = Instant::now() + crate::PATIENCE;
         loop {
-            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
-                Ok(line) => {
-                    self.seen.push(line.clone());
-                    if line.contains(text) {
-                        return line;
-                    }
+            while let Some(line) = self.seen.get(self.waited) {
+                self.waited += 1;
+                if line.contains(text) {
+                    return line.clone();
                 }
+            }
+            match self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
+                Ok(line) => self.seen.push(line),
                 Err(_) => panic!("`{text}` never came; output so far:\n{}", self.seen.join("\n")),
             }
         }
+    }
+
+    /// Waits for the next line from the first on again: for what is said at the start in no certain order.
+    pub fn rewind(&mut self) {
+        self.waited = 0;
     }
 
     /// Its number.
@@ -133,6 +141,7 @@ impl GstLaunch {
         while let Ok(line) = self.lines.recv_timeout(deadline.saturating_duration_since(Instant::now())) {
             self.seen.push(line);
         }
+        self.waited = self.seen.len();
     }
 }
 

@@ -44,6 +44,8 @@ impl Program {
         command.envs(environment.iter().copied());
         let mut launch = GstLaunch::spawn(command);
         let line = launch.wait_for_line("/healthz at http://");
+        // A camera may have spoken before the page.
+        launch.rewind();
         let page = line.split("http://").nth(1).and_then(|page| page.split('/').next()).unwrap().to_owned();
         Self { launch, folder, page }
     }
