@@ -289,6 +289,11 @@ impl Servo {
         &mut self.home
     }
 
+    /// When the camera is to be asked for its presets, where it is.
+    pub fn presets_due(&self) -> Option<Duration> {
+        self.home.presets_due()
+    }
+
     /// Whether a move to a position is under way.
     pub fn is_under_way(&self) -> bool {
         self.moves.under_way()

@@ -4,9 +4,9 @@
 
 use std::time::Duration;
 
-use servo::{AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo};
+use servo::{Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo};
 
-use crate::session::Session;
+use crate::session::{CommandedMotion, Fact, Session, Steering};
 use crate::{Command, Error, LoopSettings, Next, Protocol, Request, Response, SessionEvent};
 
 /// A servo and the session it speaks by. Has no clock and sends nothing itself: both are the caller's.
@@ -17,6 +17,8 @@ pub struct ControlLoop {
     /// Measurements that came while a request was in flight, and were followed by newer ones in that time.
     overtaken: u64,
     at_limit: bool,
+    /// It was told that the limits of pan and tilt cannot be kept.
+    limits_unkept: bool,
     events: Vec<LoopEvent>,
 }
 
@@ -27,6 +29,10 @@ pub enum LoopEvent {
     Session(SessionEvent),
     /// The target lies beyond the camera's range.
     AtLimit,
+    /// The camera does not tell where it looks: the limits of pan and tilt that are set cannot be kept.
+    LimitsUnkept,
+    /// The camera has no preset of the name that is to be its home.
+    NoSuchPreset(String),
     /// An axis turns the picture otherwise than was set: it is steered accordingly from now on.
     Axes(AxisFinding),
     /// The camera swung to and fro about the target: from now on only this part of the gain is used.
@@ -59,22 +65,30 @@ impl ControlLoop {
     pub fn new(settings: impl Into<LoopSettings>, protocol: &Protocol) -> Self {
         let LoopSettings { servo, session } = settings.into();
         let session = Session::new(servo.mode, session, protocol);
-        Self { servo: Servo::new(servo), session, overtaken: 0, at_limit: false, events: Vec::new() }
+        let events = Vec::new();
+        Self {
+            servo: Servo::new(servo),
+            session,
+            overtaken: 0,
+            at_limit: false,
+            limits_unkept: false,
+            events,
+        }
     }
 
     /// Takes new settings.
     pub fn configure(&mut self, settings: impl Into<LoopSettings>) {
         let LoopSettings { servo, session } = settings.into();
-        let before = self.servo.settings().clone();
+        self.session.configure(session, servo.mode);
         self.servo.configure(servo);
-        self.session.configure(session, &before, &self.servo);
+        self.judge_limits();
     }
 
     /// Takes the newest picture of the target.
     pub fn measure(&mut self, measurement: Measurement, now: Duration) {
         let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y));
         self.session.see_background(shown, measurement.taken_at, now);
-        let actuator = self.session.actuator(&self.servo, now);
+        let actuator = self.session.actuator(now);
         let overtakes = self.servo.is_behind();
         let gain_scale = self.servo.measure(measurement, &actuator, now);
         self.overtaken += u64::from(overtakes && self.servo.holds_target());
@@ -92,13 +106,28 @@ impl ControlLoop {
 
     /// What to send now, if anything.
     pub fn next_request(&mut self, now: Duration) -> Next {
-        let next = self.session.next_request(&mut self.servo, now);
+        if self.session.halted() {
+            return Next::Wait(None);
+        }
+        self.session.catch_up(now);
+        let actuation = self.servo.control(&self.session.actuator(now), now);
+        self.tell_limit();
+        match self.session.next_request(actuation, &steering(&self.servo, None, now), now) {
+            Next::Wait(until) => {
+                self.check_invariants();
+                let reasons = [until, self.servo.stale_at(), self.servo.undecided_until(now)];
+                Next::Wait(reasons.into_iter().flatten().min())
+            }
+            next => next,
+        }
+    }
+
+    fn tell_limit(&mut self) {
         let at_limit = self.servo.at_limit();
         if at_limit && !self.at_limit {
             self.events.push(LoopEvent::AtLimit);
         }
         self.at_limit = at_limit;
-        next
     }
 
     /// Something is being sent.
@@ -118,17 +147,80 @@ impl ControlLoop {
             Ok(Response::Position(position)) => Ok(Response::Position(self.servo.along_picture(position))),
             other => other,
         };
-        self.session.on_response(request, response, &mut self.servo, (sent, now));
+        let steering = steering(&self.servo, Some(request), now);
+        for fact in self.session.on_response(request, response, &steering, (sent, now)) {
+            self.take(fact, now);
+        }
+        self.judge_limits();
+        self.check_invariants();
     }
 
     /// The answer is waited for no longer.
     pub fn abandoned(&mut self, request: &Request, now: Duration) {
-        self.session.abandoned(request, &mut self.servo, now);
+        for fact in self.session.abandoned(request, now) {
+            self.take(fact, now);
+        }
+    }
+
+    /// Has the servo take notice.
+    fn take(&mut self, fact: Fact, now: Duration) {
+        match fact {
+            Fact::Accepted { actuation, sent } => self.servo.accepted(&actuation, sent, now),
+            Fact::Unanswered(actuation) => self.servo.unanswered(&actuation, now),
+            Fact::Position { position, at } => {
+                self.take_position(Some(position), at, now);
+                self.session.positioned(&steering(&self.servo, None, now), now);
+            }
+            Fact::NoPosition => {
+                self.take_position(None, now, now);
+                self.session.not_positioned(&steering(&self.servo, None, now), now);
+            }
+            Fact::Superseded => self.servo.accepted(&Actuation::Rest, now, now),
+            Fact::Operator => self.servo.home().strayed(),
+            Fact::Capabilities(capabilities) => self.servo.told_capabilities(capabilities),
+            Fact::Presets(presets) => {
+                let missing = self.servo.home().told_presets(&presets);
+                self.events.extend(missing.map(LoopEvent::NoSuchPreset));
+            }
+            Fact::PresetsNotBefore(at) => self.servo.home().ask_presets_at(at),
+            Fact::HomeRefused => self.servo.home().settled(),
+        }
+    }
+
+    fn take_position(&mut self, position: Option<Position>, at: Duration, now: Duration) {
+        let actuator = self.session.actuator(now);
+        if self.servo.told_position(position, at, &actuator, now) {
+            self.session.arrived();
+        }
+    }
+
+    /// Whether the limits can be kept is known after the last question.
+    fn judge_limits(&mut self) {
+        if !self.session.is_discovered() {
+            return;
+        }
+        let unkept = !self.session.tells_position() && self.servo.settings().limits.bound_turns();
+        let known = std::mem::replace(&mut self.limits_unkept, unkept);
+        if unkept && !known {
+            self.events.push(LoopEvent::LimitsUnkept);
+        }
+    }
+
+    /// What holds whatever is seen, said and answered; asked after every step where debug assertions are on.
+    fn check_invariants(&self) {
+        if cfg!(debug_assertions) {
+            self.session.check_invariants();
+            self.servo.check_invariants();
+        }
     }
 
     /// Whether there is something to do that a stop need not hurry for.
     pub fn has_errand(&self, now: Duration) -> bool {
-        self.session.has_errand(&self.servo, now)
+        if self.session.is_deaf() {
+            return true;
+        }
+        let homeward = || self.servo.is_homeward(&self.session.actuator(now), now);
+        !self.session.is_taken_over(now) && (self.servo.has_target(now) || homeward())
     }
 
     /// When the target will not have been seen for too long, where there is one.
@@ -184,7 +276,23 @@ impl ControlLoop {
             limits: camera.capabilities.limits,
             rate: camera.history.rate_at(now),
             fov_deg: servo.known_fov_deg(),
-            mode: Some(session.actuator(servo, now).mode),
+            mode: Some(session.actuator(now).mode),
         }
+    }
+}
+
+/// How the camera is being steered, as it answers this.
+fn steering<'a>(servo: &'a Servo, answered: Option<&Request>, now: Duration) -> Steering<'a> {
+    Steering {
+        // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
+        commands: CommandedMotion { pan_tilt: &servo.camera().history, zoom: servo.zoom_commands() },
+        holds_target: servo.holds_target(),
+        is_under_way: servo.is_under_way(),
+        is_zooming: servo.is_zooming(now),
+        leads_home: answered.is_some_and(|request| match request {
+            Request::Command(command) => servo.leads_home(&command.actuation()),
+            Request::Query(_) => false,
+        }),
+        presets_due: servo.presets_due(),
     }
 }

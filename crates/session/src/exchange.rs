@@ -136,8 +136,6 @@ pub enum SessionEvent {
     Moving,
     /// The camera has accepted a stop, or arrived.
     Stopped,
-    /// The camera does not tell where it looks: the limits of pan and tilt that are set cannot be kept.
-    LimitsUnkept,
     /// Somebody else moves the camera: it is left to him.
     TakenOver(ControlOwner),
     /// Nobody else does any more: it is moved again.
@@ -146,8 +144,6 @@ pub enum SessionEvent {
     StopInVain,
     /// The camera moved when it was met, and is being stopped.
     Orphan,
-    /// The camera has no preset of the name that is to be its home.
-    NoSuchPreset(String),
     /// The camera will not go home.
     HomeRefused(Error),
     /// It is moved otherwise than before, or than is set, as it does not take the words for that.

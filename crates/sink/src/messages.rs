@@ -46,7 +46,7 @@ pub trait Telling: PtzSink {
                     "the target is beyond the camera's pan or tilt range, or beyond `pan-min`, `pan-max`, `tilt-min` or `tilt-max`",
                 );
             }
-            Event::Loop(LoopEvent::Session(SessionEvent::LimitsUnkept)) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::LimitsUnkept) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera does not report its position, so `pan-min`, `pan-max`, `tilt-min` and `tilt-max` cannot be enforced. Set limits in the camera itself")
@@ -86,7 +86,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Session(SessionEvent::Orphan)) => {
                 gst::warning!(Self::category(), imp = self, "the camera was already moving when the connection was made: stopping it");
             }
-            Event::Loop(LoopEvent::Session(SessionEvent::NoSuchPreset(name))) => gst::element_imp_warning!(
+            Event::Loop(LoopEvent::NoSuchPreset(name)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
                 ("the camera has no preset `{name}`; it stays where it is. Correct `home`")

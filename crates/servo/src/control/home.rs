@@ -168,11 +168,6 @@ impl HomeReturn {
         self.preset.is_none().then(|| name.clone())
     }
 
-    /// The camera would not tell its presets.
-    pub fn no_presets(&mut self) -> Option<String> {
-        self.told_presets(&Presets::default())
-    }
-
     /// The command to go home, at this speed step, if it is time for it.
     pub fn due(&self, now: Duration, speed: u8) -> Option<Actuation> {
         let wait = if self.at_start { Duration::ZERO } else { self.timeout };

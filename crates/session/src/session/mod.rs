@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! The session with one camera: who may move it, what to ask and say next, what its answers mean. Sees no picture: what
-//! the camera is to do it is told by the [`Servo`].
+//! The session with one camera: who may move it, what to ask and say next, what its answers mean. Sees no picture and knows
+//! no servo: it takes an [`Actuation`](servo::Actuation), and returns [`Fact`]s.
 //!
 //! ```text
-//! Actuation ─ Session ─ next_request ─▶ Request ─▶ (client) ─▶ Response ─ on_response ─ Session ─▶ Servo
+//! Actuation ─ next_request ─▶ Request ─▶ (client) ─▶ Response ─ on_response ─▶ Facts
 //! ```
 
 mod arbitration;
@@ -12,6 +12,7 @@ mod connection;
 mod control_queue;
 mod description;
 mod discovery;
+mod facts;
 mod mode_support;
 mod operator;
 mod requests;
@@ -21,6 +22,8 @@ mod stop_confirmation;
 
 pub use arbitration::ControlOwner;
 pub use connection::ConnectionChange;
+pub use facts::{Fact, Steering};
+pub use operator::CommandedMotion;
 
 use std::mem;
 use std::time::Duration;
@@ -31,7 +34,7 @@ use description::Description;
 use discovery::Discovery;
 use mode_support::ModeSupport;
 use scheduler::Scheduler;
-use servo::{Access, ActuatorStatus, Mode, Servo, ServoSettings};
+use servo::{Access, ActuatorStatus, Mode, Position};
 use stop_confirmation::{StopConfirmation, StopFinding};
 
 use crate::{Command, Protocol, SessionEvent, SessionSettings};
@@ -39,8 +42,8 @@ use crate::{Command, Protocol, SessionEvent, SessionSettings};
 /// A camera that did not answer a move is not expected to act on it later than this.
 pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
 
-/// Speaks with one camera for a servo: says what to send, hears what is answered. Sends nothing itself, and has no
-/// clock: both are the caller's.
+/// Speaks with one camera: says what to send, hears what is answered. Sends nothing itself, and has no clock: both are the
+/// caller's.
 #[derive(Debug)]
 pub struct Session {
     settings: SessionSettings,
@@ -52,12 +55,12 @@ pub struct Session {
     modes: ModeSupport,
     /// Of a camera whose yes to a stop is not to be trusted.
     stop_confirmation: Option<StopConfirmation>,
+    /// Where the camera last said it looks.
+    position: Position,
     /// When to ask next where the camera looks.
     next_poll: Duration,
     /// When the camera last answered a question, or did not.
     asked_at: Duration,
-    /// It was told that the limits cannot be kept.
-    limits_unkept: bool,
     events: Vec<SessionEvent>,
 }
 
@@ -73,23 +76,17 @@ impl Session {
             arbitration: Arbitration::new(protocol.has_control_queue),
             modes: ModeSupport::new(mode),
             stop_confirmation: protocol.confirms_stops.then(StopConfirmation::default),
+            position: Position::default(),
             next_poll: Duration::ZERO,
             asked_at: Duration::ZERO,
-            limits_unkept: false,
             events: Vec::new(),
         }
     }
 
-    /// Takes new settings; the servo has taken new ones in place of those `before`.
-    pub fn configure(&mut self, settings: SessionSettings, before: &ServoSettings, servo: &Servo) {
+    /// Takes new settings, and how the camera is to be moved.
+    pub fn configure(&mut self, settings: SessionSettings, mode: Mode) {
         self.settings = settings;
-        let now = servo.settings();
-        if now.mode != before.mode {
-            self.modes.want(now.mode);
-        }
-        if now.limits != before.limits {
-            self.judge_limits(servo);
-        }
+        self.modes.want(mode);
     }
 
     /// The camera may be asked anew: who we are has changed.
@@ -150,15 +147,20 @@ impl Session {
         }
     }
 
-    /// What the servo is to know of the camera.
-    pub fn actuator(&self, servo: &Servo, now: Duration) -> ActuatorStatus {
+    /// What is to be known of the camera to decide what it is to do.
+    pub fn actuator(&self, now: Duration) -> ActuatorStatus {
         ActuatorStatus {
             access: self.access(now),
-            mode: self.mode(servo, now),
+            mode: self.mode(now),
             may_move: self.scheduler.may_move(),
             in_doubt: self.scheduler.in_doubt(),
-            interval: self.settings.min_interval().max(self.scheduler.round_trip()),
+            interval: self.interval(),
         }
+    }
+
+    /// From one command to the next.
+    fn interval(&self) -> Duration {
+        self.settings.min_interval().max(self.scheduler.round_trip())
     }
 
     fn access(&self, now: Duration) -> Access {
@@ -172,8 +174,23 @@ impl Session {
     }
 
     /// How to move the camera: as is set, if it takes that.
-    fn mode(&self, servo: &Servo, now: Duration) -> Mode {
-        self.modes.choose(servo.settings().mode, servo.camera().pan_tilt().is_some(), now)
+    fn mode(&self, now: Duration) -> Mode {
+        self.modes.choose(self.tells_position(), now)
+    }
+
+    /// Whether the camera told which way it looks.
+    pub fn tells_position(&self) -> bool {
+        self.position.pan_tilt().is_some()
+    }
+
+    /// Whether the camera was asked all there is to ask of one just met.
+    pub fn is_discovered(&self) -> bool {
+        self.discovery.next().is_none()
+    }
+
+    /// Whether a stop would not be heard; the answer under way may make it so.
+    pub fn is_deaf(&self) -> bool {
+        self.arbitration.queue.is_deaf()
     }
 
     /// Whether the camera does not move on our behalf, as far as can be known.

@@ -9,6 +9,8 @@ use crate::{Command, Error, Parameters};
 /// Which modes a camera supports: by what it tells of itself, and by what it refuses.
 #[derive(Debug)]
 pub struct ModeSupport {
+    /// How the camera is to be moved.
+    wanted: Mode,
     /// How the camera is moved as far as anybody was told.
     told: Mode,
     /// Modes that its parameters deny.
@@ -44,13 +46,15 @@ pub enum Refusal {
 impl ModeSupport {
     /// Nothing is known of the camera, which is to be moved like this.
     pub fn new(wanted: Mode) -> Self {
-        Self { told: wanted, denied: Vec::new(), refused: Vec::new(), doubt: None }
+        Self { wanted, told: wanted, denied: Vec::new(), refused: Vec::new(), doubt: None }
     }
 
-    /// Another mode is wanted from here on.
+    /// This mode is wanted from here on.
     pub fn want(&mut self, mode: Mode) {
-        self.forget_refusals();
-        self.told = mode;
+        if mode != self.wanted {
+            self.forget_refusals();
+            (self.wanted, self.told) = (mode, mode);
+        }
     }
 
     /// The camera accepted a move towards the target by this mode; returns it where that is another than was told.
@@ -69,7 +73,8 @@ impl ModeSupport {
 
     /// The mode to move it by: the wanted one, or the best of the others where that is not to be had. A camera that
     /// does not tell its position is not sent from one to another.
-    pub fn choose(&self, wanted: Mode, tells_position: bool, now: Duration) -> Mode {
+    pub fn choose(&self, tells_position: bool, now: Duration) -> Mode {
+        let wanted = self.wanted;
         let possible = |mode: &Mode| tells_position || *mode != Mode::Absolute || wanted == Mode::Absolute;
         let mut modes = std::iter::once(wanted).chain(Self::ORDER);
         modes.find(|mode| possible(mode) && !self.lacks(*mode, now)).unwrap_or(wanted)
@@ -186,6 +191,12 @@ mod tests {
         refuse(modes, command)
     }
 
+    /// What is chosen where this is wanted.
+    fn choose(modes: &mut ModeSupport, wanted: Mode, tells_position: bool, now: Duration) -> Mode {
+        modes.wanted = wanted;
+        modes.choose(tells_position, now)
+    }
+
     #[test]
     fn refusals_at_nearly_the_same_time_are_one() {
         let mut modes = ModeSupport::new(Mode::Velocity);
@@ -207,7 +218,7 @@ mod tests {
     #[test]
     fn a_camera_that_says_nothing_is_moved_as_wanted() {
         for mode in ModeSupport::ORDER {
-            assert_eq!(ModeSupport::new(Mode::Velocity).choose(mode, false, SOON), mode);
+            assert_eq!(choose(&mut ModeSupport::new(Mode::Velocity), mode, false, SOON), mode);
         }
     }
 
@@ -215,11 +226,11 @@ mod tests {
     fn what_its_parameters_deny_is_not_tried() {
         let mut modes = ModeSupport::new(Mode::Velocity);
         modes.told(&Parameters { continuous_pan: Some(false), ..Parameters::default() });
-        assert_eq!(modes.choose(Mode::Velocity, true, SOON), Mode::Absolute);
-        assert_eq!(modes.choose(Mode::Velocity, false, SOON), Mode::Centre);
-        assert_eq!(modes.choose(Mode::Centre, true, SOON), Mode::Centre);
+        assert_eq!(choose(&mut modes, Mode::Velocity, true, SOON), Mode::Absolute);
+        assert_eq!(choose(&mut modes, Mode::Velocity, false, SOON), Mode::Centre);
+        assert_eq!(choose(&mut modes, Mode::Centre, true, SOON), Mode::Centre);
         modes.told(&Parameters { absolute_pan: Some(false), ..Parameters::default() });
-        assert_eq!(modes.choose(Mode::Absolute, true, SOON), Mode::Velocity);
+        assert_eq!(choose(&mut modes, Mode::Absolute, true, SOON), Mode::Velocity);
     }
 
     #[test]
@@ -231,12 +242,12 @@ mod tests {
         modes.obeyed();
         modes.accepted(&MOVE);
         assert_eq!(refuse_twice(&mut modes, &MOVE), Refusal::OfMode(Mode::Velocity));
-        assert_eq!(modes.choose(Mode::Velocity, true, SOON), Mode::Absolute);
+        assert_eq!(choose(&mut modes, Mode::Velocity, true, SOON), Mode::Absolute);
         assert_eq!(refuse_twice(&mut modes, &STEP), Refusal::OfMode(Mode::Absolute));
-        assert_eq!(modes.choose(Mode::Velocity, true, SOON), Mode::Centre);
-        assert_eq!(modes.choose(Mode::Velocity, true, SOON + ModeSupport::TRY_AGAIN), Mode::Velocity);
+        assert_eq!(choose(&mut modes, Mode::Velocity, true, SOON), Mode::Centre);
+        assert_eq!(choose(&mut modes, Mode::Velocity, true, SOON + ModeSupport::TRY_AGAIN), Mode::Velocity);
         modes.forget_refusals();
-        assert_eq!(modes.choose(Mode::Velocity, true, SOON), Mode::Velocity);
+        assert_eq!(choose(&mut modes, Mode::Velocity, true, SOON), Mode::Velocity);
     }
 
     #[test]
@@ -245,7 +256,7 @@ mod tests {
         for command in [MOVE, STEP, PIXEL] {
             refuse_twice(&mut modes, &command);
         }
-        assert_eq!(modes.choose(Mode::Absolute, true, SOON), Mode::Absolute);
+        assert_eq!(choose(&mut modes, Mode::Absolute, true, SOON), Mode::Absolute);
         assert!(modes.lacks(Mode::Absolute, SOON));
         assert_eq!(refuse(&mut modes, &STEP), Refusal::OfMode(Mode::Absolute), "no doubt of that any more");
         assert_eq!(refuse(&mut modes, &Command::Stop), Refusal::Other);

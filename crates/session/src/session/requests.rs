@@ -4,9 +4,9 @@
 
 use std::time::Duration;
 
-use servo::{Actuation, Servo};
+use servo::Actuation;
 
-use super::{Session, StopConfirmation};
+use super::{Fact, Session, Steering, StopConfirmation};
 use crate::{Command, Next, Query, Request, SessionEvent};
 
 impl Session {
@@ -14,37 +14,33 @@ impl Session {
     /// them, and is moved all the worse for each answer that is waited for.
     const PATIENCE: u32 = 10;
 
-    /// What to send now, if anything, for the camera to do what the servo wants.
-    pub fn next_request(&mut self, servo: &mut Servo, now: Duration) -> Next {
-        if self.connection.halted() {
-            return Next::Wait(None);
-        }
+    /// Takes notice of what has come of the time that has passed.
+    pub fn catch_up(&mut self, now: Duration) {
         if let Some(owner) = self.arbitration.change(now) {
             self.events.push(owner.map_or(SessionEvent::Resumed, SessionEvent::TakenOver));
         }
         self.repeat_unseen_stop(now);
-        let actuation = servo.control(&self.actuator(servo, now), now);
+    }
+
+    /// What to send now, if anything, for the camera to do this.
+    pub fn next_request(&self, actuation: Actuation, steering: &Steering, now: Duration) -> Next {
+        if self.connection.halted() {
+            return Next::Wait(None);
+        }
         let (command, due) = self.command(actuation, self.settings.min_interval(), now);
-        let (query, query_due) = self.question(servo, now);
+        let (query, query_due) = self.question(steering.presets_due, now);
         let query_due = query_due.max(self.connection.retry_at());
-        let patience = self.patience(&query, servo, now);
-        let overdue = query_due.max(self.asked_at) + patience <= now;
+        let overdue = query_due.max(self.asked_at) + self.patience(&query) <= now;
         if due.is_some_and(|due| due <= now) && (command.is_stop() || !overdue) {
             return Next::Do(Request::Command(command));
         }
         if query_due <= now {
             return Next::Do(Request::Query(query));
         }
-        if cfg!(debug_assertions) {
-            self.check_invariants();
-            servo.check_invariants();
-        }
         let operator_until = self.arbitration.operator_until(now);
         let unseen_at = self.stop_confirmation.as_ref().and_then(StopConfirmation::unseen_at);
         let unseen_at = unseen_at.filter(|_| self.is_at_rest());
-        let reasons =
-            [due, Some(query_due), servo.stale_at(), operator_until, servo.undecided_until(now), unseen_at];
-        Next::Wait(reasons.into_iter().flatten().min())
+        Next::Wait([due, Some(query_due), operator_until, unseen_at].into_iter().flatten().min())
     }
 
     /// The words for that, and when to say them.
@@ -69,18 +65,18 @@ impl Session {
     }
 
     /// For how long moves come before a question.
-    fn patience(&self, query: &Query, servo: &Servo, now: Duration) -> Duration {
+    fn patience(&self, query: &Query) -> Duration {
         match query {
             // Our place in it is lost to who is late.
             Query::Queue(_) => Duration::ZERO,
-            _ => self.actuator(servo, now).interval * Self::PATIENCE,
+            _ => self.interval() * Self::PATIENCE,
         }
     }
 
     /// What to ask next, and when.
-    fn question(&self, servo: &mut Servo, now: Duration) -> (Query, Duration) {
+    fn question(&self, presets_due: Option<Duration>, now: Duration) -> (Query, Duration) {
         let poll = (Query::Position, self.next_poll);
-        let presets = servo.home().presets_due().map(|at| (Query::Presets, at));
+        let presets = presets_due.map(|at| (Query::Presets, at));
         // Of what is due the first; else what will be soonest.
         let questions = self.discovery.next().into_iter().chain(presets);
         let (query, at) = questions.chain([poll]).min_by_key(|(_, at)| (*at).max(now)).unwrap_or(poll);
@@ -95,16 +91,6 @@ impl Session {
         self.discovery.comes_first() && !self.connection.faulty()
     }
 
-    /// Whether there is something to do that a stop need not hurry for.
-    pub fn has_errand(&self, servo: &Servo, now: Duration) -> bool {
-        if self.arbitration.queue.is_deaf() {
-            // A stop would not be heard; the answer under way may make it so.
-            return true;
-        }
-        let homeward = || servo.is_homeward(&self.actuator(servo, now), now);
-        self.arbitration.owner(now).is_none() && (servo.has_target(now) || homeward())
-    }
-
     /// Something is being sent.
     pub fn sending(&mut self, request: &Request, now: Duration) {
         if let Request::Command(command) = request {
@@ -113,9 +99,10 @@ impl Session {
     }
 
     /// The answer is waited for no longer, as something else is more urgent: no fault of the camera's.
-    pub fn abandoned(&mut self, request: &Request, servo: &mut Servo, now: Duration) {
-        if let Request::Command(command) = request {
-            self.unanswered(command, servo, now);
+    pub fn abandoned(&mut self, request: &Request, now: Duration) -> Vec<Fact> {
+        match request {
+            Request::Command(command) => vec![self.unanswered(command, now)],
+            Request::Query(_) => Vec::new(),
         }
     }
 }

@@ -4,14 +4,13 @@
 
 use std::time::Duration;
 
-use servo::{Actuation, Mode, PanTilt, Position, Servo};
+use servo::{Mode, PanTilt, Position, Presets};
 
-use super::Session;
 use super::arbitration::Finding;
 use super::connection::Connection;
 use super::mode_support::Refusal;
-use super::operator::CommandedMotion;
 use super::scheduler::Scheduler;
+use super::{Fact, Session, Steering};
 use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent};
 
 impl Session {
@@ -28,14 +27,14 @@ impl Session {
     /// A camera that does not tell its position is asked again this much later.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
 
-    /// The camera answered what was sent then, or did not.
+    /// The camera answered what was sent then, or did not. Returns what that says of it, in order.
     pub fn on_response(
         &mut self,
         request: &Request,
         response: Result<Response, Error>,
-        servo: &mut Servo,
+        steering: &Steering,
         (sent, now): (Duration, Duration),
-    ) {
+    ) -> Vec<Fact> {
         if matches!(request, Request::Query(_)) {
             self.asked_at = now;
         }
@@ -43,66 +42,75 @@ impl Session {
             self.scheduler.answered(sent, now);
         }
         match (request, response) {
-            (Request::Command(command), Ok(_)) => self.command_accepted(command, servo, (sent, now)),
-            (Request::Command(command), Err(err)) => self.command_failed(command, &err, servo, now),
-            (Request::Query(query), Ok(response)) => self.told(*query, response, servo, (sent, now)),
-            (Request::Query(query), Err(err)) => self.not_told(*query, &err, servo, now),
-        }
-        if cfg!(debug_assertions) {
-            self.check_invariants();
-            servo.check_invariants();
+            (Request::Command(command), Ok(_)) => self.command_accepted(command, steering, (sent, now)),
+            (Request::Command(command), Err(err)) => self.command_failed(command, &err, steering, now),
+            (Request::Query(query), Ok(response)) => self.told(*query, response, steering, (sent, now)),
+            (Request::Query(query), Err(err)) => self.not_told(*query, &err, now),
         }
     }
 
-    fn command_failed(&mut self, command: &Command, err: &Error, servo: &mut Servo, now: Duration) {
+    fn command_failed(
+        &mut self,
+        command: &Command,
+        err: &Error,
+        steering: &Steering,
+        now: Duration,
+    ) -> Vec<Fact> {
+        let mut facts = Vec::new();
         if err.may_have_acted() {
-            self.unanswered(command, servo, now);
+            facts.push(self.unanswered(command, now));
         } else {
             self.scheduler.failed(command, false, now);
         }
-        if !matches!(err, Error::Camera(_)) || !self.is_understood(command, err, servo, now) {
+        let understood = matches!(err, Error::Camera(_))
+            && self.is_understood(command, err, steering.leads_home, &mut facts, now);
+        if !understood {
             self.failed(err, true, now);
         }
+        facts
     }
 
     /// Whether it is known why the camera refuses a command, so that it is no fault.
-    fn is_understood(&mut self, command: &Command, err: &Error, servo: &mut Servo, now: Duration) -> bool {
+    fn is_understood(
+        &mut self,
+        command: &Command,
+        err: &Error,
+        leads_home: bool,
+        facts: &mut Vec<Fact>,
+        now: Duration,
+    ) -> bool {
         let queue = &mut self.arbitration.queue;
         if queue.refused_command() || queue.refused(now) {
             return true;
         }
-        if matches!(command, Command::Velocity { .. }) && self.refused_freedom(command, servo) {
-            return true;
+        if let Command::Velocity { free, .. } = command {
+            // It may be refused only for being free of proportional speed: then it is sent again without. Where it is refused
+            // even so, it was not for that.
+            self.description.refuses_free_moves = *free;
+            facts.push(Fact::Capabilities(self.description.capabilities()));
+            if *free {
+                return true;
+            }
         }
-        if servo.leads_home(&command.actuation()) {
-            servo.home().settled();
+        if leads_home {
+            facts.push(Fact::HomeRefused);
             self.events.push(SessionEvent::HomeRefused(err.clone()));
             return true;
         }
-        self.refused_a_mode(command, err, servo, now)
-    }
-
-    /// Whether the refusal of a move may be only of its freedom from proportional speed: then it is sent again
-    /// without. Where it is refused even so, it was not for that.
-    fn refused_freedom(&mut self, command: &Command, servo: &mut Servo) -> bool {
-        let free = matches!(command, Command::Velocity { free: true, .. });
-        self.description.refuses_free_moves = free;
-        servo.told_capabilities(self.description.capabilities());
-        free
+        self.refused_a_mode(command, err, now)
     }
 
     /// Whether a refusal is, or may be, only of the words of a mode.
-    fn refused_a_mode(&mut self, command: &Command, err: &Error, servo: &Servo, now: Duration) -> bool {
+    fn refused_a_mode(&mut self, command: &Command, err: &Error, now: Duration) -> bool {
         match self.modes.refused(command, err, now) {
             Refusal::Other => false,
             Refusal::Doubtful => {
-                let tells_position = servo.camera().pan_tilt().is_some();
-                let witness = if tells_position { Query::Position } else { Query::Parameters };
+                let witness = if self.tells_position() { Query::Position } else { Query::Parameters };
                 self.discovery.ask_first(witness);
                 true
             }
             // There is none left to turn to: the wanted one is retried, with the pauses of a fault.
-            Refusal::OfMode(_) if self.modes.lacks(self.mode(servo, now), now) => false,
+            Refusal::OfMode(_) if self.modes.lacks(self.mode(now), now) => false,
             Refusal::OfMode(mode) => {
                 if mode == Mode::Velocity {
                     self.scheduler.stop_by(Command::Stop);
@@ -113,13 +121,18 @@ impl Session {
     }
 
     /// What the camera does from here on is unknown.
-    pub(super) fn unanswered(&mut self, command: &Command, servo: &mut Servo, now: Duration) {
+    pub(super) fn unanswered(&mut self, command: &Command, now: Duration) -> Fact {
         self.scheduler.failed(command, true, now);
         self.arbitration.excuse(now + Scheduler::DOUBT);
-        servo.unanswered(&command.actuation(), now);
+        Fact::Unanswered(command.actuation())
     }
 
-    fn command_accepted(&mut self, command: &Command, servo: &mut Servo, (sent, now): (Duration, Duration)) {
+    fn command_accepted(
+        &mut self,
+        command: &Command,
+        steering: &Steering,
+        (sent, now): (Duration, Duration),
+    ) -> Vec<Fact> {
         let was_moving = self.scheduler.may_move();
         self.scheduler.accepted(command, now);
         if let Some(confirmation) = &mut self.stop_confirmation {
@@ -128,45 +141,43 @@ impl Session {
         self.arbitration.commanded();
         self.arbitration.queue.obeyed();
         let actuation = command.actuation();
-        let homeward = servo.leads_home(&actuation);
-        servo.accepted(&actuation, sent, now);
         if actuation.is_point_to_point() {
             self.arbitration.excuse(now);
             self.next_poll = now + Self::POLL_UNDER_WAY;
         } else if command.is_stop() || !was_moving {
             self.next_poll = now + Self::POLL_MOVING;
         }
-        if !homeward && !command.is_stop() {
-            let mode = self.mode(servo, now);
+        if !steering.leads_home && !command.is_stop() {
+            let mode = self.mode(now);
             self.events.extend(self.modes.changed(mode).map(SessionEvent::Mode));
         }
         self.modes.accepted(command);
-        self.succeeded(true, servo);
+        self.succeeded(true, steering);
         match (was_moving, self.scheduler.may_move()) {
             (false, true) => self.events.push(SessionEvent::Moving),
             (true, false) => self.events.push(SessionEvent::Stopped),
             _ => {}
         }
+        vec![Fact::Accepted { actuation, sent }]
     }
 
     fn told(
         &mut self,
         query: Query,
         response: Response,
-        servo: &mut Servo,
+        steering: &Steering,
         (sent, now): (Duration, Duration),
-    ) {
+    ) -> Vec<Fact> {
+        let mut facts = Vec::new();
         match response {
-            Response::Position(position) => self.told_position(position, servo, (sent, now)),
+            Response::Position(position) => return self.told_position(position, steering, (sent, now)),
             Response::Limits(limits) => self.description.limits = limits,
             Response::Parameters(parameters) => {
                 self.description.parameters = parameters;
                 self.modes.told(&parameters);
                 self.arbitration.queue.told(parameters.control_queue);
             }
-            Response::Presets(presets) => {
-                self.events.extend(servo.home().told_presets(&presets).map(SessionEvent::NoSuchPreset));
-            }
+            Response::Presets(presets) => facts.push(Fact::Presets(presets)),
             Response::Place(place) => {
                 if let Query::Queue(request) = query {
                     self.arbitration.queue.answered(request, place, now);
@@ -177,67 +188,76 @@ impl Session {
             Response::Accepted => {}
         }
         if matches!(query, Query::Limits | Query::Parameters | Query::Attributes | Query::MoveSpeed) {
-            servo.told_capabilities(self.description.capabilities());
+            facts.push(Fact::Capabilities(self.description.capabilities()));
         }
-        self.succeeded(false, servo);
-        self.asked(query, servo, now);
+        self.succeeded(false, steering);
+        self.asked(query, now);
+        facts
     }
 
-    fn told_position(&mut self, position: Position, servo: &mut Servo, (sent, now): (Duration, Duration)) {
-        match position.pan_tilt() {
-            Some(place) => self.look_for_others((place, position.zoom_steps), servo, (sent, now)),
+    fn told_position(
+        &mut self,
+        position: Position,
+        steering: &Steering,
+        (sent, now): (Duration, Duration),
+    ) -> Vec<Fact> {
+        self.position = position;
+        let mut facts = match position.pan_tilt() {
+            Some(place) => self.look_for_others((place, position.zoom_steps), steering, (sent, now)),
             None => {
-                self.arbitration.undecided();
-                self.scheduler.settle(true);
+                self.undecided();
+                Vec::new()
             }
-        }
-        self.positioned(Some(position), servo, (sent + now) / 2, now);
+        };
+        facts.push(Fact::Position { position, at: (sent + now) / 2 });
+        facts
     }
 
-    fn not_told(&mut self, query: Query, err: &Error, servo: &mut Servo, now: Duration) {
+    /// Whose move the camera is in was to be told by a position that did not come.
+    fn undecided(&mut self) {
+        self.arbitration.undecided();
+        self.scheduler.settle(true);
+    }
+
+    fn not_told(&mut self, query: Query, err: &Error, now: Duration) -> Vec<Fact> {
         if query == Query::Position {
-            self.arbitration.undecided();
-            self.scheduler.settle(true);
+            self.undecided();
         }
         if let Some(refusal) = self.modes.failed().filter(|_| err.is_refusal() && !err.is_final()) {
-            self.asked(query, servo, now);
-            return self.failed(&refusal, true, now);
+            self.asked(query, now);
+            self.failed(&refusal, true, now);
+            return Vec::new();
         }
         if query != Query::Position {
             // Optional; a camera that is gone will be missed by the next position. One that lets anybody move it may
             // want a user for this.
             let anonymous = self.connection.connected() && matches!(err, Error::CredentialsMissing);
             if err.is_answer() || anonymous {
-                return self.will_not_tell(query, err, servo, now);
+                return self.will_not_tell(query, err, now);
             } else if !matches!(err, Error::Unreachable(_)) && !err.is_final() {
-                return self.may_tell_later(query, servo, now);
+                return self.may_tell_later(query, now);
             }
         } else if matches!(err, Error::NotPermitted { .. }) {
             self.next_poll = now + Connection::RARELY;
         } else if matches!(err, Error::Camera(_)) && self.arbitration.queue.refused(now) {
-            return;
+            return Vec::new();
         } else if self.will_not_tell_position(err) {
-            self.positioned(None, servo, now, now);
-            // One that told it before is well again soon.
-            if !servo.is_under_way() && servo.camera().pan_tilt().is_none() {
-                self.next_poll = now + Self::POLL_REFUSED;
-            }
-            return self.asked(query, servo, now);
+            return vec![Fact::NoPosition];
         }
         self.failed(err, false, now);
+        Vec::new()
     }
 
-    fn will_not_tell(&mut self, query: Query, err: &Error, servo: &mut Servo, now: Duration) {
+    fn will_not_tell(&mut self, query: Query, err: &Error, now: Duration) -> Vec<Fact> {
         let forbidden = matches!(err, Error::NotPermitted { .. } | Error::CredentialsMissing);
         match query {
             Query::Queue(_) if forbidden => self.arbitration.queue.forbidden(),
             Query::Queue(QueueRequest::Request) => self.arbitration.queue.turned_away(now),
             Query::Queue(_) => self.arbitration.queue.failed(now),
-            Query::Presets => {
-                self.events.extend(servo.home().no_presets().map(SessionEvent::NoSuchPreset));
-            }
-            _ => self.asked(query, servo, now),
+            Query::Presets => return vec![Fact::Presets(Presets::default())],
+            _ => self.asked(query, now),
         }
+        Vec::new()
     }
 
     /// Whether this is no fault: of a camera just met, which may answer the other questions, or of one that is well.
@@ -249,47 +269,35 @@ impl Session {
         }
     }
 
-    fn may_tell_later(&mut self, query: Query, servo: &mut Servo, now: Duration) {
+    fn may_tell_later(&mut self, query: Query, now: Duration) -> Vec<Fact> {
         // Whether the camera is there at all.
         self.next_poll = now;
         match query {
             Query::Queue(_) => self.arbitration.queue.failed(now),
-            Query::Presets => servo.home().ask_presets_at(now + Self::POLL_RESTING),
+            Query::Presets => return vec![Fact::PresetsNotBefore(now + Self::POLL_RESTING)],
             _ => {
                 if self.discovery.unanswered(query, !self.connection.faulty(), now) {
-                    self.discovered(servo, now);
+                    self.discovered(now);
                 }
             }
         }
+        Vec::new()
     }
 
     /// This need not be asked again.
-    fn asked(&mut self, query: Query, servo: &Servo, now: Duration) {
+    fn asked(&mut self, query: Query, now: Duration) {
         if self.discovery.done(query) {
-            self.discovered(servo, now);
+            self.discovered(now);
         }
     }
 
     /// After the last question it is known whom we met.
-    fn discovered(&mut self, servo: &Servo, now: Duration) {
+    fn discovered(&mut self, now: Duration) {
         let changed = self.discovery.changed(self.description.to_string());
         self.events.extend(changed.map(SessionEvent::Discovered));
-        self.judge_limits(servo);
         if !self.connection.connected() {
             // It told nothing: that is a fault after all.
             self.next_poll = now;
-        }
-    }
-
-    /// Whether the limits can be kept is known after the last question.
-    pub(super) fn judge_limits(&mut self, servo: &Servo) {
-        if self.discovery.next().is_some() {
-            return;
-        }
-        let unkept = servo.camera().pan_tilt().is_none() && servo.settings().limits.bound_turns();
-        let known = std::mem::replace(&mut self.limits_unkept, unkept);
-        if unkept && !known {
-            self.events.push(SessionEvent::LimitsUnkept);
         }
     }
 
@@ -297,21 +305,20 @@ impl Session {
     fn look_for_others(
         &mut self,
         place: (PanTilt, Option<f64>),
-        servo: &mut Servo,
+        steering: &Steering,
         (asked, now): (Duration, Duration),
-    ) {
-        if servo.is_under_way() {
+    ) -> Vec<Fact> {
+        let mut facts = Vec::new();
+        if steering.is_under_way {
             self.arbitration.excuse(now);
         }
         let give_way = self.settings.override_timeout;
-        // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
-        let commands = CommandedMotion { pan_tilt: &servo.camera().history, zoom: servo.zoom_commands() };
-        let finding = self.arbitration.positioned(place, (asked, now), commands, give_way);
+        let finding = self.arbitration.positioned(place, (asked, now), steering.commands, give_way);
         if self.scheduler.is_contested() {
             let is_ours = !self.arbitration.turns_otherwise();
             self.scheduler.settle(is_ours);
             if !is_ours {
-                servo.accepted(&Actuation::Rest, now, now);
+                facts.push(Fact::Superseded);
                 self.events.push(SessionEvent::Stopped);
             }
         }
@@ -324,35 +331,52 @@ impl Session {
                 self.events.push(SessionEvent::Orphan);
             }
             Finding::Operator => {
-                servo.home().strayed();
+                facts.push(Fact::Operator);
                 self.scheduler.contest();
             }
         }
+        facts
     }
 
-    /// The camera told its position as of a time, or does not tell.
-    fn positioned(&mut self, position: Option<Position>, servo: &mut Servo, at: Duration, now: Duration) {
-        // By the mode that the new position allows.
-        let actuator = self.actuator(servo, now);
-        if servo.told_position(position, at, &actuator, now) {
-            self.scheduler.arrived();
-            self.events.push(SessionEvent::Stopped);
+    /// A move to a position has ended by itself, as the last position shows or as time has passed.
+    pub fn arrived(&mut self) {
+        self.scheduler.arrived();
+        self.events.push(SessionEvent::Stopped);
+    }
+
+    /// What the last position says was taken notice of: goes on to the next question.
+    pub fn positioned(&mut self, steering: &Steering, now: Duration) {
+        self.poll_later(steering, now);
+        self.succeeded(false, steering);
+        self.asked(Query::Position, now);
+    }
+
+    /// The same, of a camera that does not tell it.
+    pub fn not_positioned(&mut self, steering: &Steering, now: Duration) {
+        self.poll_later(steering, now);
+        // One that told it before is well again soon.
+        if !steering.is_under_way && !self.tells_position() {
+            self.next_poll = now + Self::POLL_REFUSED;
         }
+        self.asked(Query::Position, now);
+    }
+
+    fn poll_later(&mut self, steering: &Steering, now: Duration) {
         self.next_poll = now
-            + match (servo.is_under_way(), self.scheduler.may_move()) {
+            + match (steering.is_under_way, self.scheduler.may_move()) {
                 (true, _) => Self::POLL_UNDER_WAY,
                 (false, true) if self.scheduler.is_contested() => Self::POLL_CONTESTED,
                 (false, _) if self.arbitration.asks() => Duration::ZERO,
-                (false, true) if servo.is_zooming(now) => Self::POLL_ZOOMING,
+                (false, true) if steering.is_zooming => Self::POLL_ZOOMING,
                 (false, true) => Self::POLL_MOVING,
-                (false, false) if self.is_wanted(servo, now) => Self::POLL_MOVING,
+                (false, false) if self.is_wanted(steering, now) => Self::POLL_MOVING,
                 (false, false) => Self::POLL_RESTING,
             };
     }
 
-    fn succeeded(&mut self, of_command: bool, servo: &Servo) {
+    fn succeeded(&mut self, of_command: bool, steering: &Steering) {
         self.modes.obeyed();
-        let idle = !servo.holds_target() && !self.scheduler.may_move();
+        let idle = !steering.holds_target && !self.scheduler.may_move();
         let was_faulty = self.connection.faulty();
         let Some(change) = self.connection.succeeded(of_command, idle) else { return };
         if was_faulty {
@@ -363,8 +387,8 @@ impl Session {
     }
 
     /// A camera that somebody may be about to move, or that may be, is asked more often.
-    fn is_wanted(&self, servo: &Servo, now: Duration) -> bool {
-        servo.holds_target() || self.arbitration.owner(now).is_some() || self.arbitration.looks(now)
+    fn is_wanted(&self, steering: &Steering, now: Duration) -> bool {
+        steering.holds_target || self.arbitration.owner(now).is_some() || self.arbitration.looks(now)
     }
 
     fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {

@@ -152,7 +152,7 @@ fn a_suspicion_that_no_answer_resolves_does_not_leave_the_camera_turning() {
         };
         rig.aside(ms(1500), positioned(odd_once));
         assert!(asked.get() > 1, "{failure}: it was suspicious");
-        let actuator = rig.control.session().actuator(rig.control.servo(), rig.now);
+        let actuator = rig.control.session().actuator(rig.now);
         assert_eq!(actuator.access, Access::Ours, "{failure}");
         // On the other side: it is steered there.
         for _ in 0..30 {

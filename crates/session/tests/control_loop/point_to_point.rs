@@ -56,16 +56,12 @@ fn limits_that_cannot_be_kept_are_told_once() {
             rig.now += ms(1000);
             rig.run_jobs(looking(pan));
         }
-        let told = rig
-            .reports()
-            .into_iter()
-            .filter(|report| *report == LoopEvent::Session(SessionEvent::LimitsUnkept))
-            .count();
+        let told = rig.reports().into_iter().filter(|report| *report == LoopEvent::LimitsUnkept).count();
         assert_eq!(told, times, "{pan:?}");
     }
     let mut rig = met(ServoSettings::default(), None);
     rig.control.configure(within(-30.0, 30.0));
-    assert!(rig.reports().contains(&LoopEvent::Session(SessionEvent::LimitsUnkept)), "set later");
+    assert!(rig.reports().contains(&LoopEvent::LimitsUnkept), "set later");
 }
 
 #[test]
