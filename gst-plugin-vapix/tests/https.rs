@@ -13,7 +13,7 @@ use std::time::Duration;
 use certificates::{certificate, server_config};
 use rustls::{ServerConnection, StreamOwned};
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
-use session::{Client as _, Command, Error, Request};
+use session::{Client as _, Command, Error, Request, Stop};
 use vapix::Client;
 
 /// Answers every request on a connection with the same bytes; the request lines and credentials go to `seen`.
@@ -73,7 +73,7 @@ fn try_client(location: &str, trust: Trust) -> Result<Client, Error> {
 
 fn halt(client: &mut Client) -> Result<(), Error> {
     let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build().unwrap();
-    runtime.block_on(client.exchange(&Request::Command(Command::Halt))).map(drop)
+    runtime.block_on(client.exchange(&Request::Command(Command::Stop(Stop::PanTilt)))).map(drop)
 }
 
 const ACCEPTED: &str = "HTTP/1.1 204 No Content\r\n\r\n";

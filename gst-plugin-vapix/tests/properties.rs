@@ -199,7 +199,7 @@ fn no_password_in_log_or_graph() {
     // The function stays: another thread may be in it, and GStreamer would free it all the same.
     gst::log::set_default_threshold(gst::DebugLevel::None);
     let log = log.lock().unwrap();
-    assert!(log.contains("move at speed steps"), "the log is of this element");
+    assert!(log.contains("% of full speed"), "the log is of this element");
     // "root:pass" in base64, as Basic sends it.
     assert!(!log.contains("cm9vdDpwYXNz") && !log.contains("geheimwort"));
     assert!(!graph.contains("geheimwort"));

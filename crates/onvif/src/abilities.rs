@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use servo::{HardLimits, Range, TableRow};
-use session::{Attributes, Command, Parameters};
+use servo::{HardLimits, Motion, Range, TableRow};
+use session::{Attributes, Parameters};
 
 use crate::soap::{Element, number};
 
@@ -11,8 +11,8 @@ use crate::soap::{Element, number};
 /// not turn far.
 const WANTED_TIMEOUT: Duration = Duration::from_secs(2);
 
-/// Steps of the zoom as the servo counts them.
-const ZOOM_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+/// The zoom's travel as the servo counts it, and as most cameras do.
+const TRAVEL: Range = Range { min: 0.0, max: 1.0 };
 
 /// What a PTZ configuration takes, as far as the camera tells. What it does not tell is tried.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -132,21 +132,24 @@ impl Abilities {
         (most > 0.0).then_some((most, space.uri.as_str()))
     }
 
-    /// The velocity of these speed steps. The camera's own is in proportion to the cube of the step: fine where it is slow.
-    pub fn velocity(&self, (pan, tilt): (i8, i8), zoom: Option<i8>) -> Velocity {
+    /// The velocity of these parts of the fastest. The camera's own is in proportion to the cube of the part: fine where it is slow.
+    pub fn velocity(&self, (pan, tilt): (f64, f64), zoom: Option<f64>) -> Velocity {
         let (most, space) = self.degrees_per_second().unzip();
         let most = most.unwrap_or(1.0);
         Velocity {
-            pan_tilt: Some((part(pan) * most, part(tilt) * most)),
+            pan_tilt: Some((pan.powi(3) * most, tilt.powi(3) * most)),
             space: space.map(ToOwned::to_owned),
-            zoom: zoom.map(|step| f64::from(step) / 100.0),
+            zoom,
         }
     }
 
-    /// What speed steps mean, where the camera takes velocities in degrees per second.
+    /// What parts of the fastest mean, where the camera takes velocities in degrees per second.
     pub fn attributes(&self) -> Option<Attributes> {
         let (most, _) = self.degrees_per_second()?;
-        let speeds = (1..=100).map(|step| TableRow { step: f64::from(step), value: part(step) * most });
+        let speeds = (1..=100).map(|hundredths| {
+            let part = f64::from(hundredths) / 100.0;
+            TableRow { setting: part, value: part.powi(3) * most }
+        });
         Some(Attributes { speeds: speeds.collect(), ..Attributes::default() })
     }
 
@@ -165,7 +168,7 @@ impl Abilities {
         HardLimits {
             pan_deg: degrees.map(|space| space.x),
             tilt_deg: degrees.and_then(|space| space.y),
-            zoom_steps: self.space(ZOOM_POSITION, |_| true).map(|_| ZOOM_STEPS),
+            zoom: self.space(ZOOM_POSITION, |_| true).map(|_| TRAVEL),
             field_angle_deg: None,
         }
     }
@@ -181,27 +184,20 @@ impl Abilities {
         Some((scaled(x, told.x, degrees.x), scaled(y, told.y?, degrees.y?)))
     }
 
-    /// Zoom steps of a place of the zoom.
-    pub fn zoom_steps(&self, x: f64) -> Option<f64> {
-        let range = self.space(ZOOM_POSITION, |_| true).map_or(Range { min: 0.0, max: 1.0 }, |space| space.x);
-        Some(ZOOM_STEPS.nearest(scaled(x, range, ZOOM_STEPS)))
+    /// The part of the zoom's travel that a place of it is.
+    pub fn travel(&self, x: f64) -> f64 {
+        let range = self.space(ZOOM_POSITION, |_| true).map_or(TRAVEL, |space| space.x);
+        TRAVEL.nearest(scaled(x, range, TRAVEL))
     }
 
     /// Where an absolute move goes to, and the name of the space; `None` where the camera does not take degrees.
-    pub fn place(&self, command: &Command) -> Option<(f64, f64, &str, Option<f64>)> {
-        let Command::Absolute { pan_deg, tilt_deg, zoom, .. } = *command else { return None };
+    pub fn place(&self, motion: &Motion) -> Option<(f64, f64, &str, Option<f64>)> {
+        let Motion::Absolute { pan_deg, tilt_deg, zoom, .. } = *motion else { return None };
         let space = self.space(PAN_TILT_POSITION, is_degrees)?;
-        let zoom = zoom.and_then(|step| {
-            let range = self.space(ZOOM_POSITION, |_| true)?.x;
-            Some(scaled(f64::from(step), ZOOM_STEPS, range))
-        });
+        let zoom =
+            zoom.and_then(|travel| Some(scaled(travel, TRAVEL, self.space(ZOOM_POSITION, |_| true)?.x)));
         Some((space.x.nearest(pan_deg), space.y?.nearest(tilt_deg), &space.uri, zoom))
     }
-}
-
-/// The part of full speed that a speed step is.
-fn part(step: i8) -> f64 {
-    (f64::from(step) / 100.0).powi(3)
 }
 
 /// A value in one range as it is in another.
@@ -252,8 +248,8 @@ mod tests {
     }
 
     #[test]
-    fn generic_velocities_are_the_cube_of_the_step() {
-        let velocity = abilities("", ("PT1S", "PT10S")).velocity((-100, 50), Some(-30));
+    fn generic_velocities_are_the_cube_of_the_part() {
+        let velocity = abilities("", ("PT1S", "PT10S")).velocity((-1.0, 0.5), Some(-0.3));
         assert_eq!(velocity, Velocity { pan_tilt: Some((-1.0, 0.125)), space: None, zoom: Some(-0.3) });
     }
 
@@ -262,7 +258,7 @@ mod tests {
         let offered = space(PAN_TILT_VELOCITY, "VelocityGenericSpace", (-1.0, 1.0), (-1.0, 1.0))
             + &space(PAN_TILT_VELOCITY, "VelocitySpaceDegrees", (-120.0, 120.0), (-80.0, 80.0));
         let abilities = abilities(&offered, ("PT1S", "PT10S"));
-        let velocity = abilities.velocity((100, -50), None);
+        let velocity = abilities.velocity((1.0, -0.5), None);
         assert_eq!(velocity.pan_tilt, Some((80.0, -10.0)));
         assert!(velocity.space.unwrap().ends_with("VelocitySpaceDegrees"));
         assert_eq!(abilities.attributes().unwrap().speeds[99].value, 80.0);
@@ -278,6 +274,6 @@ mod tests {
         assert_eq!(both.degrees((0.5, 0.0), None), Some((85.0, 35.0)));
         assert_eq!(both.degrees((30.0, 40.0), Some("x/SphericalPositionSpaceDegrees")), Some((30.0, 40.0)));
         assert_eq!(both.limits().pan_deg, Some(Range { min: -170.0, max: 170.0 }));
-        assert_eq!((both.zoom_steps(0.0), both.zoom_steps(2.0)), (Some(1.0), Some(9999.0)));
+        assert_eq!((both.travel(0.0), both.travel(2.0)), (0.0, 1.0));
     }
 }

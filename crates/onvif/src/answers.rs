@@ -94,12 +94,9 @@ pub fn parse_position(body: &Element, abilities: &Abilities) -> Option<Position>
         let degrees = abilities.degrees((place.0, place.1), place.2)?;
         (degrees.0.is_finite() && degrees.1.is_finite()).then_some(degrees)
     });
-    let zoom = told.child("Zoom").and_then(|zoom| abilities.zoom_steps(zoom.number("x")?));
-    let position = Position {
-        pan_deg: degrees.map(|(pan, _)| pan),
-        tilt_deg: degrees.map(|(_, tilt)| tilt),
-        zoom_steps: zoom,
-    };
+    let zoom = told.child("Zoom").and_then(|zoom| zoom.number("x")).map(|x| abilities.travel(x));
+    let position =
+        Position { pan_deg: degrees.map(|(pan, _)| pan), tilt_deg: degrees.map(|(_, tilt)| tilt), zoom };
     (position != Position::default()).then_some(position)
 }
 

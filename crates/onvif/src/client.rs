@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use servo::{Position, Presets};
+use servo::{Motion, Position, Presets};
 use session::http::{Credentials, HttpClient, Identity, Repeat, unexpected};
-use session::{Command, Error, Protocol, Query, Request, Response};
+use session::{Command, Error, Protocol, Query, Request, Response, Stop};
 use tokio::time::timeout;
 
 use crate::abilities::{Abilities, MoveTimeout, Velocity, parse_abilities};
@@ -307,12 +307,13 @@ impl Client {
     }
 
     async fn send(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {
-        if command.is_stop() {
-            return self.stop(command, abilities).await;
-        }
+        let motion = match command {
+            Command::Move { motion, .. } if !motion.is_still() => *motion,
+            _ => return self.stop(command, abilities).await,
+        };
         self.moves.moving();
-        match *command {
-            Command::Velocity { pan, tilt, zoom, .. } => {
+        match motion {
+            Motion::Velocity { pan, tilt, zoom } => {
                 let zoom = zoom.filter(|_| self.moves.zooms());
                 let moved = self.move_at(&abilities.velocity((pan, tilt), zoom), abilities).await;
                 if moves_zoom(command) && zoom.is_some() {
@@ -326,14 +327,14 @@ impl Client {
                 }
                 moved
             }
-            Command::Absolute { .. } => {
-                let Some((x, y, space, zoom)) = abilities.place(command) else {
+            Motion::Absolute { .. } => {
+                let Some((x, y, space, zoom)) = abilities.place(&motion) else {
                     return Err(Error::Camera("the camera takes no positions in degrees".to_owned()));
                 };
                 let message = messages::absolute_move(self.profile(), (x, y), Some(space), zoom);
                 self.call(Path::Ptz, &message).await.map(drop)
             }
-            Command::Preset { number } => {
+            Motion::Preset { number } => {
                 let index = usize::try_from(number).unwrap_or(usize::MAX).wrapping_sub(1);
                 let Some(token) = self.presets.get(index) else {
                     return Err(Error::Camera(format!("there is no preset {number}")));
@@ -341,8 +342,7 @@ impl Client {
                 let message = messages::goto_preset(self.profile(), token);
                 self.call(Path::Ptz, &message).await.map(drop)
             }
-            Command::Centre { .. } => Err(Error::Camera("ONVIF has no words for pixels".to_owned())),
-            Command::Halt | Command::Stop => Ok(()),
+            Motion::Centre { .. } => Err(Error::Camera("ONVIF has no words for pixels".to_owned())),
         }
     }
 
@@ -394,9 +394,8 @@ impl Client {
             StopWords::Stop => self.call(Path::Ptz, &messages::stop(self.profile())).await.map(drop),
             StopWords::Still => {
                 // A move to a position may have zoomed too.
-                let zoom = !matches!(command, Command::Halt | Command::Velocity { zoom: None, .. });
-                let zoom = (zoom && self.moves.zooms()).then_some(0);
-                self.move_at(&abilities.velocity((0, 0), zoom), abilities).await
+                let zoom = *command != Command::Stop(Stop::PanTilt) && self.moves.zooms();
+                self.move_at(&abilities.velocity((0.0, 0.0), zoom.then_some(0.0)), abilities).await
             }
         }
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use servo::Motion;
 use session::Command;
 
 /// By which words a camera is stopped.
@@ -90,7 +91,7 @@ impl Moves {
 
 /// Whether a command moves the zoom.
 pub fn moves_zoom(command: &Command) -> bool {
-    matches!(command, Command::Velocity { zoom: Some(zoom), .. } if *zoom != 0)
+    matches!(command, Command::Move { motion: Motion::Velocity { zoom: Some(zoom), .. }, .. } if *zoom != 0.0)
 }
 
 #[cfg(test)]

@@ -6,15 +6,19 @@
 use std::time::Duration;
 
 use onvif::Client;
+use servo::Motion;
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
 use session::watchdog::{Lease, Standing, StopOrder, Watchdog, WatchdogAddress};
-use session::{Client as _, Command, Error, Query, Request, Response};
+use session::{Client as _, Command, Error, Query, Request, Response, Stop};
 use virtual_camera::{Auth, OnvifSettings, Quirk, Settings, VirtualCamera};
 
 /// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);
 
-const RIGHT: Request = Request::Command(Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false });
+const RIGHT: Request = Request::Command(Command::Move {
+    motion: Motion::Velocity { pan: 0.4, tilt: 0.0, zoom: None },
+    free: false,
+});
 
 fn camera(quirks: &[Quirk]) -> VirtualCamera {
     let onvif = Some(OnvifSettings::with(quirks));
@@ -76,7 +80,7 @@ async fn presets_are_gone_to_by_their_numbers() {
         panic!()
     };
     let number = presets.number("Home").unwrap();
-    let go = Request::Command(Command::Preset { number });
+    let go = Request::Command(Command::Move { motion: Motion::Preset { number }, free: false });
     assert_eq!(client.exchange(&go).await, Ok(Response::Accepted));
     assert!(camera.commands().iter().any(|command| command.query.contains("GotoPreset")));
 }
@@ -88,7 +92,7 @@ async fn a_camera_whose_application_is_gone_is_stopped() {
     let mut client = client(&camera, "pass");
     let watchdog = Watchdog::new(WatchdogAddress::Program(env!("CARGO_BIN_EXE_onvif-watchdog").into()));
     let mut lease = Lease::new(watchdog.clone());
-    let order = StopOrder { identity: client.identity(), command: Command::Halt, in_doubt: false };
+    let order = StopOrder { identity: client.identity(), words: Stop::PanTilt, in_doubt: false };
     lease.hold(order);
     lease.settled().await;
     assert!(matches!(lease.standing(), Some(Standing::Held)), "{:?}", lease.standing());

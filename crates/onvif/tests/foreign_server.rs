@@ -10,8 +10,9 @@ use async_trait::async_trait;
 use onvif::{Client, Encoding};
 use onvif_server::generated::{DeviceInfo, PTZPreset, PTZStatusResult};
 use onvif_server::{DeviceService, MediaService, OnvifError, OnvifServer, PTZService};
+use servo::Motion;
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
-use session::{Client as _, Command, Error, Query, Request, Response};
+use session::{Client as _, Command, Error, Query, Request, Response, Stop};
 
 const PATIENCE: Duration = Duration::from_secs(60);
 
@@ -104,15 +105,19 @@ async fn it_logs_in_moves_stops_and_finds_streams_and_presets() {
     assert_eq!((found.port, found.target), (8554, format!("/{}", streams[0].profile)));
 
     // Half of full speed, of which a velocity is the cube; and the stop that ends it.
-    let right = Command::Velocity { pan: 50, tilt: -100, zoom: Some(20), free: false };
-    for command in [right, Command::REST] {
+    let right =
+        Command::Move { motion: Motion::Velocity { pan: 0.5, tilt: -1.0, zoom: Some(0.2) }, free: false };
+    for command in [right, Command::Stop(Stop::AllAxes)] {
         assert_eq!(client.exchange(&Request::Command(command)).await, Ok(Response::Accepted));
     }
     assert_eq!(camera.take(), ["move 0.125 -1 0.2", "stop true true"]);
 
     let presets = client.exchange(&Request::Query(Query::Presets)).await;
     let Ok(Response::Presets(presets)) = presets else { panic!("{presets:?}") };
-    let go = Command::Preset { number: presets.number("Door & gate").unwrap() };
+    let go = Command::Move {
+        motion: Motion::Preset { number: presets.number("Door & gate").unwrap() },
+        free: false,
+    };
     assert_eq!(client.exchange(&Request::Command(go)).await, Ok(Response::Accepted));
     assert_eq!(camera.take(), ["preset 7"]);
 }
@@ -122,7 +127,7 @@ async fn a_wrong_password_moves_nothing_and_is_not_tried_for_ever() {
     let camera = Camera::default();
     let address = served(camera.clone()).await;
     let mut client = client(&address, "wrong");
-    let rest = Request::Command(Command::REST);
+    let rest = Request::Command(Command::Stop(Stop::AllAxes));
     for _ in 0..2 {
         assert_eq!(client.exchange(&rest).await, Err(Error::BadCredentials { user: "admin".to_owned() }));
     }

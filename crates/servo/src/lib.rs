@@ -8,7 +8,8 @@
 //!                     │                                         │
 //!                     └──────── model (projection, speeds, delays, what was commanded) ────────┘
 //! ```
-//! Angles are degrees, positive to the right and up; times are [`Duration`](std::time::Duration)s since any fixed
+//! Angles are degrees, positive to the right and up; what a camera is told and tells of speed and zoom are parts of the whole
+//! (-1 to 1 of the fastest, 0 to 1 of the lens' travel), and what these mean in degrees a second and magnification the model knows; times are [`Duration`](std::time::Duration)s since any fixed
 //! moment, always given by the caller, so that tests turn the clock themselves. [`Servo`] is the whole of it.
 
 mod control;
@@ -17,7 +18,7 @@ mod model;
 mod servo;
 mod settings;
 
-pub use control::{Access, Actuation, ActuatorStatus, Home, Mode};
+pub use control::{Access, Actuation, ActuatorStatus, Home, Mode, Motion};
 pub use estimation::{AxisFinding, Estimates, Measurement, Mounting, Prediction, Visibility};
 pub use model::{
     CameraModel, Capabilities, CommandHistory, Delays, HardLimits, Lens, PanTilt, Position, Presets, Range,

@@ -7,7 +7,8 @@ use std::mem;
 use std::time::Duration;
 
 use crate::control::{
-    Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, PointToPoint, ZoomDrive,
+    Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, Motion, PointToPoint,
+    ZoomDrive,
 };
 use crate::estimation::{
     AxisEstimator, AxisFinding, Estimates, Measurement, Mounting, SelfCalibration, TargetEstimator,
@@ -191,7 +192,10 @@ impl Servo {
     /// What the camera is to do now.
     pub fn control(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
         let actuation = self.decide(actuator, now);
-        self.exchanged_actuation(actuation)
+        match actuation {
+            Actuation::Move(motion) => Actuation::Move(self.exchanged_motion(motion)),
+            other => other,
+        }
     }
 
     fn decide(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
@@ -304,7 +308,7 @@ impl Servo {
         self.zoom.is_moving(now)
     }
 
-    /// The speed steps that the zoom was told, as the pan of a history; `None`: it is anybody's to move.
+    /// The speeds that the zoom was told, as the pan of a history; `None`: it is anybody's to move.
     pub fn zoom_commands(&self) -> Option<&CommandHistory> {
         self.settings.target_height.map(|_| self.zoom.commands())
     }
@@ -344,7 +348,7 @@ impl Servo {
         let position = self.limits.position(&self.camera.history, delays.command, shown);
         let tilt_deg = position.map(|position| position.tilt).or(self.camera.position.tilt_deg);
         View {
-            horizontal_fov_deg: self.fov_deg(self.zoom.step_shown(measurement.taken_at, &delays)),
+            horizontal_fov_deg: self.fov_deg(self.zoom.travel_shown(measurement.taken_at, &delays)),
             aspect: measurement.aspect,
             tilt_deg: tilt_deg.unwrap_or(0.0),
         }
@@ -355,10 +359,10 @@ impl Servo {
         view.turns(part * view.horizontal_fov_deg, self.estimator.error())
     }
 
-    /// The field of view at a zoom step, or at the last told one.
-    fn fov_deg(&self, zoom_step: Option<f64>) -> f64 {
-        let assumed = match zoom_step {
-            Some(step) => self.lens().fov_deg(step),
+    /// The field of view at a part of the zoom's travel, or at the last told one.
+    fn fov_deg(&self, zoom: Option<f64>) -> f64 {
+        let assumed = match zoom {
+            Some(travel) => self.lens().fov_deg(travel),
             None => self.camera.fov_deg(self.settings.fov_deg),
         };
         magnified(assumed, 1.0 / self.calibration.field_factor())

@@ -29,7 +29,7 @@ pub struct ServoSettings {
     pub prediction: Prediction,
     /// The camera is stopped when the target was not seen for this long.
     pub stale_timeout: Duration,
-    /// Degrees per second the camera does at speed step 100.
+    /// Degrees per second of the camera's fastest.
     pub camera_speed_deg_s: f64,
     /// How its speed grows up to there.
     pub speed_curve: SpeedCurve,

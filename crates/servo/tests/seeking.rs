@@ -5,7 +5,7 @@
 use std::{collections::VecDeque, time::Duration};
 
 use ptztrack_contract::Vector;
-use servo::{Access, Actuation, ActuatorStatus, Measurement, Mode, Servo, ServoSettings};
+use servo::{Access, Actuation, ActuatorStatus, Measurement, Mode, Motion, Servo, ServoSettings, SpeedMap};
 
 const FOV_DEG: f64 = 55.0;
 const PICTURE_S: f64 = 0.04;
@@ -94,9 +94,10 @@ fn off(walker: Walker, factor: f64, background_seen: bool) -> f64 {
         }
         commanded = time;
         let actuation = servo.control(&actuator, at(time));
-        let pan_step = if let Actuation::Velocity { pan, .. } = actuation { pan } else { 0 };
-        servo.accepted(&Actuation::Velocity { pan: pan_step, tilt: 0, zoom: None }, at(time), at(time));
-        under_way.push_back((time + COMMAND_DELAY_S, factor * speeds.deg_s(pan_step)));
+        let pan = if let Actuation::Move(Motion::Velocity { pan, .. }) = actuation { pan } else { 0.0 };
+        let turn = Motion::Velocity { pan, tilt: 0.0, zoom: None };
+        servo.accepted(&Actuation::Move(turn), at(time), at(time));
+        under_way.push_back((time + COMMAND_DELAY_S, factor * speeds.deg_s(SpeedMap::level_of(pan))));
     }
     off
 }

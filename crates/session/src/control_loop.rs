@@ -7,7 +7,7 @@ use std::time::Duration;
 use servo::{Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo};
 
 use crate::session::{CommandedMotion, Fact, Session, Steering};
-use crate::{Command, Error, LoopSettings, Next, Protocol, Request, Response, SessionEvent};
+use crate::{Command, Error, LoopSettings, Next, Protocol, Request, Response, SessionEvent, Stop};
 
 /// A servo and the session it speaks by. Has no clock and sends nothing itself: both are the caller's.
 #[derive(Debug)]
@@ -249,7 +249,7 @@ impl ControlLoop {
     }
 
     /// What ends the last move.
-    pub fn stop(&self) -> Command {
+    pub fn stop(&self) -> Stop {
         self.session.stop()
     }
 
@@ -290,8 +290,8 @@ fn steering<'a>(servo: &'a Servo, answered: Option<&Request>, now: Duration) -> 
         is_under_way: servo.is_under_way(),
         is_zooming: servo.is_zooming(now),
         leads_home: answered.is_some_and(|request| match request {
-            Request::Command(command) => servo.leads_home(&command.actuation()),
-            Request::Query(_) => false,
+            Request::Command(Command::Move { motion, .. }) => servo.leads_home(motion),
+            Request::Command(Command::Stop(_)) | Request::Query(_) => false,
         }),
         presets_due: servo.presets_due(),
     }

@@ -19,7 +19,7 @@ pub enum Query {
     Limits,
     /// Its PTZ parameters.
     Parameters,
-    /// What its steps mean.
+    /// What its speeds and its zoom mean.
     Attributes,
     /// How fast its moves to a position are.
     MoveSpeed,
@@ -60,8 +60,8 @@ pub enum Response {
     Parameters(Parameters),
     /// To [`Query::Attributes`].
     Attributes(Attributes),
-    /// To [`Query::MoveSpeed`]: a speed step.
-    MoveSpeed(u8),
+    /// To [`Query::MoveSpeed`]: a part of the fastest.
+    MoveSpeed(f64),
     /// To [`Query::Presets`].
     Presets(Presets),
     /// To [`Query::Queue`]: where we stand; `None`: no more than yes.
@@ -85,12 +85,12 @@ pub struct Parameters {
     pub control_queue: Option<bool>,
 }
 
-/// What a camera's steps mean, as far as it tells.
+/// What a camera's speeds and zoom mean, as far as it tells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Attributes {
-    /// Degrees per second of speed steps, growing.
+    /// Degrees per second of parts of the fastest, growing.
     pub speeds: Vec<TableRow>,
-    /// Magnification of zoom steps, growing.
+    /// Magnification by the zoom's travel, growing.
     pub zooms: Vec<TableRow>,
     /// Magnification at the end of the optical zoom.
     pub max_optical_magnification: Option<f64>,

@@ -23,7 +23,7 @@ pub mod task;
 pub mod watchdog;
 
 pub use client::{Client, Protocol};
-pub use command::Command;
+pub use command::{Command, Stop};
 pub use control_loop::{ControlLoop, LoopEvent, Status};
 pub use error::Error;
 pub use exchange::{

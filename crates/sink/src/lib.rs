@@ -4,6 +4,7 @@
 //! messages. An element is a [`PtzSink`], of which [`ptz_sink!`] makes what GObject wants.
 
 mod events;
+mod home;
 mod measure;
 mod messages;
 mod picture;

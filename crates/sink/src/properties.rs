@@ -13,6 +13,7 @@ use ptztrack_contract::mistaken_unit;
 use session::http::{Authentication, Location, Secret};
 
 use crate::Particulars;
+use crate::home::{home_text, parse_home, travel, zoom_step};
 use crate::settings::{Settings, Steering};
 
 /// When a value that was set counts, and who must hear of it.
@@ -183,12 +184,12 @@ impl<'a> Table<'a> {
             t.number("pan-max", AsLimit, "The camera turns no farther right than this, in degrees (-180 and 180 together: no limit)", -180.0..=180.0, |s| &mut s.servo.limits.pan_deg.max),
             t.number("tilt-min", AsLimit, "The camera tilts no farther down than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.min),
             t.number("tilt-max", AsLimit, "The camera tilts no farther up than this, in degrees", -180.0..=180.0, |s| &mut s.servo.limits.tilt_deg.max),
-            t.zoom_steps("zoom-min", AsLimit, "`auto-zoom` zooms out no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.min),
-            t.zoom_steps("zoom-max", AsLimit, "`auto-zoom` zooms in no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom_steps.max),
+            t.zoom_steps("zoom-min", AsLimit, "`auto-zoom` zooms out no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom.min),
+            t.zoom_steps("zoom-max", AsLimit, "`auto-zoom` zooms in no farther than this, in steps of the optical zoom", |s| &mut s.servo.limits.zoom.max),
             special(
                 text("home", AtOnce, "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it connected), or the name of a preset (unset: it stays where the last target was)"),
-                |s| s.servo.home.as_ref().map(ToString::to_string).to_value(),
-                |s, value| { s.servo.home = string(value).filter(|text| !text.is_empty()).map(|text| text.parse()).transpose()?; Ok(()) },
+                |s| s.servo.home.as_ref().map(home_text).to_value(),
+                |s, value| { s.servo.home = string(value).filter(|text| !text.is_empty()).map(|text| parse_home(&text)).transpose()?; Ok(()) },
             ),
             t.duration("home-timeout", AtOnce, "The camera goes home when there has been no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
             t.switch("home-at-start", AtStart, "Go home on start-up too, without waiting for `home-timeout`", |s| &mut s.servo.home_at_start),
@@ -265,8 +266,15 @@ impl<'a> Table<'a> {
     fn zoom_steps(&self, name: &str, takes: Takes, blurb: &str, field: Field<f64>) -> Property {
         let builder = glib::ParamSpecUInt::builder(name).minimum(1).maximum(9999);
         // Within 1 to 9999, whole.
-        let spec = mutable(builder.default_value(self.default_of(field) as u32).blurb(blurb), takes).build();
-        converted((spec, takes), field, |steps| steps as u32, |steps: u32| Ok(f64::from(steps)))
+        let spec =
+            mutable(builder.default_value(zoom_step(self.default_of(field)) as u32).blurb(blurb), takes)
+                .build();
+        converted(
+            (spec, takes),
+            field,
+            |part| zoom_step(part) as u32,
+            |step: u32| Ok(travel(f64::from(step))),
+        )
     }
 
     fn switch(&self, name: &str, takes: Takes, blurb: &str, field: Field<bool>) -> Property {

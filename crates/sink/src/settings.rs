@@ -9,6 +9,8 @@ use servo::{Range, ServoSettings, SoftLimits};
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
 use session::{LoopSettings, SessionSettings};
 
+use crate::home::zoom_step;
+
 /// To what the camera is steered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Steering {
@@ -109,7 +111,7 @@ impl Settings {
         let refused = [
             uncross("pan", &mut limits.pan_deg, kept.pan_deg),
             uncross("tilt", &mut limits.tilt_deg, kept.tilt_deg),
-            uncross("zoom", &mut limits.zoom_steps, kept.zoom_steps),
+            uncross_zoom(&mut limits.zoom, kept.zoom),
         ];
         self.kept_limits = *limits;
         refused.into_iter().flatten().collect()
@@ -143,6 +145,14 @@ impl Settings {
         };
         Some(Credentials { user: user?, password: password.unwrap_or_else(|| Secret::new("")) })
     }
+}
+
+/// The same of parts of the zoom's travel, in steps.
+fn uncross_zoom(limits: &mut Range, kept: Range) -> Option<String> {
+    let steps = |travel: Range| Range { min: zoom_step(travel.min), max: zoom_step(travel.max) };
+    let refused = uncross("zoom", &mut steps(*limits), steps(kept))?;
+    *limits = kept;
+    Some(refused)
 }
 
 fn uncross(name: &str, limits: &mut Range, kept: Range) -> Option<String> {

@@ -8,6 +8,8 @@ use servo::{Estimates, Mode, is_endless};
 use session::Status;
 use session::task::Statistics;
 
+use crate::home::zoom_step;
+
 /// The property's value for the sink of this name; `None`: there is no camera task.
 pub fn stats(sink: &str, statistics: Option<&Statistics>) -> gst::Structure {
     match statistics {
@@ -43,13 +45,13 @@ fn structure(sink: &str, state: &str, statistics: &Statistics) -> gst::Structure
         .field_if_some("mode", status.mode.map(Mode::name))
         .field_if_some("pan", status.position.pan_deg)
         .field_if_some("tilt", status.position.tilt_deg)
-        .field_if_some("zoom", status.position.zoom_steps)
+        .field_if_some("zoom", status.position.zoom.map(zoom_step))
         .field_if_some("camera-pan-min", limits.pan_deg.map(|pan| pan.min))
         .field_if_some("camera-pan-max", limits.pan_deg.map(|pan| pan.max))
         .field_if_some("camera-tilt-min", limits.tilt_deg.map(|tilt| tilt.min))
         .field_if_some("camera-tilt-max", limits.tilt_deg.map(|tilt| tilt.max))
-        .field_if_some("camera-zoom-min", limits.zoom_steps.map(|zoom| zoom.min))
-        .field_if_some("camera-zoom-max", limits.zoom_steps.map(|zoom| zoom.max))
+        .field_if_some("camera-zoom-min", limits.zoom.map(|zoom| zoom_step(zoom.min)))
+        .field_if_some("camera-zoom-max", limits.zoom.map(|zoom| zoom_step(zoom.max)))
         .field_if_some("camera-endless-pan", limits.pan_deg.map(is_endless))
         .field_if_some("field-of-view", status.fov_deg)
         .field_if_some("latency", statistics.estimates.map(|estimates| nanoseconds(estimates.delays.sum())))

@@ -6,6 +6,7 @@ use servo::TableRow;
 use session::http::unexpected;
 use session::{Attributes, Error};
 
+use crate::steps::{part_of_fastest, travel};
 use crate::text::Fields;
 
 /// Reads the answer to `query=attributes`; firmware before 5.50 has none.
@@ -18,8 +19,8 @@ use crate::text::Fields;
 pub fn parse_attributes(body: &str) -> Result<Attributes, Error> {
     let fields = Fields::of(body);
     let attributes = Attributes {
-        speeds: fields.text("speeds").map(table).unwrap_or_default(),
-        zooms: fields.text("zooms").or(fields.text("zoom")).map(table).unwrap_or_default(),
+        speeds: table(fields.text("speeds"), part_of_fastest),
+        zooms: table(fields.text("zooms").or(fields.text("zoom")), travel),
         max_optical_magnification: fields
             .number("maxOpticalZoomMag")
             .filter(|magnification| *magnification >= 1.0),
@@ -27,15 +28,26 @@ pub fn parse_attributes(body: &str) -> Result<Attributes, Error> {
     if attributes == Attributes::default() { Err(unexpected(body)) } else { Ok(attributes) }
 }
 
-/// The rows that grow in both columns, without misprints (the documented example has one).
-fn table(text: &str) -> Vec<TableRow> {
-    let mut rows: Vec<TableRow> = text.split(',').filter_map(row).collect();
+/// The rows that grow in both columns, without misprints (the documented example has one), with the settings that their steps are.
+fn table(text: Option<&str>, setting: fn(f64) -> f64) -> Vec<TableRow> {
+    let rows = text.map(rows).unwrap_or_default();
+    rows.into_iter().map(|row| TableRow { setting: setting(row.step), value: row.value }).collect()
+}
+
+/// One row as it is told.
+struct Row {
+    step: f64,
+    value: f64,
+}
+
+fn rows(text: &str) -> Vec<Row> {
+    let mut rows: Vec<Row> = text.split(',').filter_map(row).collect();
     rows.sort_by(|a, b| a.step.total_cmp(&b.step));
-    let mut last: Option<TableRow> = None;
+    let mut last: Option<(f64, f64)> = None;
     rows.retain(|row| {
-        let grows = last.is_none_or(|last| row.step > last.step && row.value >= last.value);
+        let grows = last.is_none_or(|(step, value)| row.step > step && row.value >= value);
         if grows {
-            last = Some(*row);
+            last = Some((row.step, row.value));
         }
         grows
     });
@@ -53,7 +65,7 @@ const MISPRINT: f64 = 2.0;
 /// On paper with logarithmic axes such tables are a straight line, or bend one way where they begin at a floor, and the
 /// other where they end at a ceiling. A wrong row is a spike instead: the curve bends there and back, so at
 /// the rows on either side the other way.
-fn misprint(rows: &[TableRow]) -> Option<usize> {
+fn misprint(rows: &[Row]) -> Option<usize> {
     let bends: Vec<f64> = rows.windows(3).map(bend).collect();
     let spikes = bends.windows(3).enumerate().filter(|(_, around)| {
         around[1].abs() > MISPRINT.ln() && around[0] * around[1] < 0.0 && around[1] * around[2] < 0.0
@@ -64,7 +76,7 @@ fn misprint(rows: &[TableRow]) -> Option<usize> {
 
 /// By how much the middle of three rows is above the straight line through the others, on logarithmic axes; 0 where
 /// there is nothing to compare.
-fn bend(rows: &[TableRow]) -> f64 {
+fn bend(rows: &[Row]) -> f64 {
     let [low, row, high] = rows else { return 0.0 };
     if low.step <= 0.0 || low.value <= 0.0 {
         return 0.0;
@@ -74,12 +86,12 @@ fn bend(rows: &[TableRow]) -> f64 {
 }
 
 /// `value=1 | speed=0.05`
-fn row(text: &str) -> Option<TableRow> {
+fn row(text: &str) -> Option<Row> {
     let (step, meaning) = text.split_once('|')?;
     let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| *number >= 0.0);
     let step = number(step.trim().strip_prefix("value=")?)?;
     let value = number(meaning.split_once('=')?.1)?;
-    (step.is_finite() && value.is_finite()).then_some(TableRow { step, value })
+    (step.is_finite() && value.is_finite()).then_some(Row { step, value })
 }
 
 #[cfg(test)]
@@ -107,7 +119,8 @@ mod tests {
     #[test]
     fn the_documented_table_is_read() {
         let attributes = parse_attributes(DOCUMENTED).unwrap();
-        let speeds: Vec<(f64, f64)> = attributes.speeds.iter().map(|row| (row.step, row.value)).collect();
+        let speeds: Vec<(f64, f64)> =
+            attributes.speeds.iter().map(|row| ((row.setting * 100.0).round(), row.value)).collect();
         // Without 14, of which it says 2: as fast as 24, and five times what the others let expect.
         let expected =
             [(1.0, 0.05), (9.0, 0.16), (24.0, 2.1), (40.0, 9.0), (58.0, 28.0), (80.0, 74.0), (100.0, 150.0)];
@@ -120,7 +133,8 @@ mod tests {
     fn what_does_not_grow_or_is_no_number_is_left_out() {
         let body = "speeds=value=50 | speed=20,value=10 | speed=5,value=30 | speed=2,value=x | speed=1,\
                     value=20,value=60 | speed=NaN,value=100 | speed=40";
-        let steps: Vec<f64> = parse_attributes(body).unwrap().speeds.iter().map(|row| row.step).collect();
+        let steps: Vec<f64> =
+            parse_attributes(body).unwrap().speeds.iter().map(|row| (row.setting * 100.0).round()).collect();
         assert_eq!(steps, [10.0, 50.0, 100.0]);
         assert!(parse_attributes("Attributes for camera 1\r\n").is_err());
     }
@@ -135,8 +149,8 @@ mod tests {
         ) {
             if let Ok(attributes) = parse_attributes(&body) {
                 for table in [&attributes.speeds, &attributes.zooms] {
-                    prop_assert!(table.windows(2).all(|pair| pair[0].step < pair[1].step && pair[0].value <= pair[1].value));
-                    prop_assert!(table.iter().all(|row| row.step.is_finite() && row.value.is_finite()));
+                    prop_assert!(table.windows(2).all(|pair| pair[0].setting < pair[1].setting && pair[0].value <= pair[1].value));
+                    prop_assert!(table.iter().all(|row| row.setting.is_finite() && row.value.is_finite()));
                 }
             }
         }
@@ -151,7 +165,7 @@ mod tests {
             let rows: Vec<String> =
                 steps.iter().map(|step| format!("value={step} | speed={:.1e}", speed(*step))).collect();
             let read = parse_attributes(&format!("speeds={}\r\n", rows.join(","))).unwrap().speeds;
-            let read: Vec<u32> = read.iter().map(|row| row.step as u32).collect();
+            let read: Vec<u32> = read.iter().map(|row| (row.setting * 100.0).round() as u32).collect();
             prop_assert_eq!(read, steps.into_iter().collect::<Vec<_>>());
         }
 
@@ -166,7 +180,7 @@ mod tests {
                 .map(|row| format!("value={} | speed={}", 10 * (row + 1), if row == wrong { value } else { speed(row) }))
                 .collect();
             let read = parse_attributes(&format!("speeds={}\r\n", rows.join(","))).unwrap().speeds;
-            let read: Vec<usize> = read.iter().map(|row| row.step as usize / 10 - 1).collect();
+            let read: Vec<usize> = read.iter().map(|row| (row.setting * 10.0).round() as usize - 1).collect();
             prop_assert_eq!(read, (0..10).filter(|row| *row != wrong).collect::<Vec<_>>());
         }
     }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{HardLimits, Position, Presets};
+use servo::{HardLimits, Motion, Position, Presets};
 use session::http::{Credentials, HttpClient, Identity, Repeat, unexpected};
 use session::{
     Attributes, Command, Error, Parameters, Protocol, Query, QueuePlace, QueueRequest, Request, Response,
@@ -67,7 +67,7 @@ impl Client {
     async fn send(&mut self, command: &Command) -> Result<(), Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&{}", self.camera(), Words(command));
         // Of these the second would go on from where the first led.
-        let once = matches!(command, Command::Centre { .. });
+        let once = matches!(command, Command::Move { motion: Motion::Centre { .. }, .. });
         let answer = self.http.get(&target, if once { Repeat::Never } else { Repeat::WhereBroken }).await?;
         match answer.status {
             NO_CONTENT => Ok(()),
@@ -97,8 +97,8 @@ impl Client {
         parse_attributes(&self.query("attributes").await?)
     }
 
-    /// Asks for the speed step of moves to a position.
-    async fn move_speed(&mut self) -> Result<u8, Error> {
+    /// Asks how fast moves to a position are.
+    async fn move_speed(&mut self) -> Result<f64, Error> {
         parse_move_speed(&self.query("speed").await?)
     }
 

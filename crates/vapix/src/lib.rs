@@ -13,6 +13,7 @@ mod client;
 mod command;
 mod presets;
 mod queue;
+mod steps;
 mod text;
 
 pub use attributes::parse_attributes;

@@ -10,6 +10,8 @@ use servo::{HardLimits, Position, Range};
 use session::http::{excerpt, unexpected};
 use session::{Error, Parameters};
 
+use crate::steps::{part_of_fastest, travel};
+
 /// A longer line is not read: the longest real one, a table of speeds, has a few hundred characters.
 const MAX_LINE_BYTES: usize = 4096;
 
@@ -25,7 +27,7 @@ pub fn parse_position(body: &str) -> Result<Position, Error> {
     let position = Position {
         pan_deg: fields.number("pan"),
         tilt_deg: fields.number("tilt"),
-        zoom_steps: fields.number("zoom"),
+        zoom: fields.number("zoom").map(travel),
     };
     if position == Position::default() { Err(unexpected(body)) } else { Ok(position) }
 }
@@ -43,7 +45,9 @@ fn limits_of(fields: &Fields, prefix: &str) -> HardLimits {
     HardLimits {
         pan_deg: fields.range(prefix, "Pan"),
         tilt_deg: fields.range(prefix, "Tilt"),
-        zoom_steps: fields.range(prefix, "Zoom"),
+        zoom: fields
+            .range(prefix, "Zoom")
+            .map(|steps| Range { min: travel(steps.min), max: travel(steps.max) }),
         // Told in tenths of a degree: 44..516 of a camera whose lens sees 4.4 to 51.6 degrees.
         field_angle_deg: fields
             .range(prefix, "FieldAngle")
@@ -80,14 +84,14 @@ pub fn parse_parameters(body: &str, camera: &str) -> Result<Parameters, Error> {
     })
 }
 
-/// Reads the answer to `query=speed`: the step, 1 to 100, at which moves to a position are made.
+/// Reads the answer to `query=speed`, the step, 1 to 100, at which moves to a position are made, as a part of the fastest.
 ///
 /// # Errors
 /// [`Error::Unexpected`] where it tells no such step.
-pub fn parse_move_speed(body: &str) -> Result<u8, Error> {
+pub fn parse_move_speed(body: &str) -> Result<f64, Error> {
     let speed = Fields::of(body).number("speed").filter(|speed| (1.0..=100.0).contains(speed));
     // Truncated: "no assumption on rounding".
-    speed.map(|speed| speed as u8).ok_or_else(|| unexpected(body))
+    speed.map(|speed| part_of_fastest(speed.trunc())).ok_or_else(|| unexpected(body))
 }
 
 /// The text of an `Error:` answer, on one line; `None` where it is no error.
@@ -146,10 +150,10 @@ mod tests {
     fn positions_of_two_kinds_of_camera() {
         let first = "pan=51.2891\r\ntilt=46.1914\r\nzoom=1\r\niris=6427\r\nfocus=8265\r\nbrightness=4999\r\n\
                      autofocus=off\r\nautoiris=on\r\n";
-        let expected = Position { pan_deg: Some(51.2891), tilt_deg: Some(46.1914), zoom_steps: Some(1.0) };
+        let expected = Position { pan_deg: Some(51.2891), tilt_deg: Some(46.1914), zoom: Some(0.0) };
         assert_eq!(parse_position(first).unwrap(), expected);
         let second = "autofocus=on\ntilt=-45.03\npan=-0.01\n";
-        let expected = Position { pan_deg: Some(-0.01), tilt_deg: Some(-45.03), zoom_steps: None };
+        let expected = Position { pan_deg: Some(-0.01), tilt_deg: Some(-45.03), zoom: None };
         assert_eq!(parse_position(second).unwrap(), expected);
     }
 
@@ -206,7 +210,7 @@ mod tests {
 
     #[test]
     fn a_move_speed_is_a_step() {
-        assert_eq!(parse_move_speed("speed=100\r\n"), Ok(100));
+        assert_eq!(parse_move_speed("speed=100\r\n"), Ok(1.0));
         for body in ["", "speed=0", "speed=101", "speed=x", "speed=NaN", "mode=normal"] {
             assert!(parse_move_speed(body).is_err(), "{body}");
         }
@@ -216,7 +220,7 @@ mod tests {
     fn lines_and_lists_without_end_are_cut() {
         let body =
             format!("pan=1\ntilt={}\n{}zoom=5\n", "1".repeat(MAX_LINE_BYTES), "x=1\n".repeat(MAX_FIELDS));
-        let expected = Position { pan_deg: Some(1.0), tilt_deg: None, zoom_steps: None };
+        let expected = Position { pan_deg: Some(1.0), tilt_deg: None, zoom: None };
         assert_eq!(parse_position(&body).unwrap(), expected);
     }
 
@@ -245,7 +249,7 @@ mod tests {
         #[test]
         fn a_position_is_read_back(pan in -180.0..180.0f64, tilt in -90.0..90.0f64, zoom in 1.0..9999.0f64) {
             let body = format!("zoom={zoom}\r\n\r\ntilt = {tilt}\r\nnoise\r\npan={pan}");
-            let expected = Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: Some(zoom) };
+            let expected = Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom: Some(travel(zoom)) };
             prop_assert_eq!(parse_position(&body).unwrap(), expected);
         }
     }

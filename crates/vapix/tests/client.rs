@@ -8,12 +8,17 @@ use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use servo::Motion;
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
 use session::{Client as _, Command, Error, Request};
 use vapix::Client;
 
-const RIGHT: Command = Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false };
-const CENTRE: Command = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: None };
+const RIGHT: Command =
+    Command::Move { motion: Motion::Velocity { pan: 0.4, tilt: 0.0, zoom: None }, free: false };
+const CENTRE: Command = Command::Move {
+    motion: Motion::Centre { x: 1, y: 2, width: 640, height: 480, magnify: None },
+    free: false,
+};
 
 type Asked = Arc<Mutex<Vec<String>>>;
 
@@ -90,7 +95,10 @@ fn what_may_be_repeated_is_sent_again_where_the_connection_breaks() {
 /// It may have arrived, and would lead on from where it led.
 #[test]
 fn centring_is_never_sent_twice() {
-    let zoomed = Command::Centre { x: 1, y: 2, width: 640, height: 480, zoom_percent: Some(150) };
+    let zoomed = Command::Move {
+        motion: Motion::Centre { x: 1, y: 2, width: 640, height: 480, magnify: Some(1.5) },
+        free: false,
+    };
     for (command, words) in [(CENTRE, "center="), (zoomed, "areazoom=")] {
         let (mut client, asked) = camera(10, |number| number == 2);
         let answers = send(&mut client, &[RIGHT, command]);

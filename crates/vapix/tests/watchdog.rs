@@ -12,9 +12,10 @@ use std::process::{Command as Process, ExitStatus};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use servo::Motion;
 use session::http::{Authentication, ClientSettings, Credentials, Identity, Location, Secret, Trust};
 use session::watchdog::{Lease, Standing, StopOrder, Watchdog, WatchdogAddress};
-use session::{Client as _, Command, Request};
+use session::{Client as _, Command, Request, Stop};
 use vapix::Client;
 use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
@@ -24,7 +25,8 @@ const PATIENCE: Duration = Duration::from_secs(60);
 /// Between two looks.
 const MOMENT: Duration = Duration::from_millis(20);
 
-const RIGHT: Command = Command::Velocity { pan: 40, tilt: 0, zoom: None, free: false };
+const RIGHT: Command =
+    Command::Move { motion: Motion::Velocity { pan: 0.4, tilt: 0.0, zoom: None }, free: false };
 const PASSWORD: &str = "xyzzy-plugh-43";
 
 /// An application that moves a camera, with a watchdog of its own.
@@ -123,7 +125,7 @@ fn wait_until(what: &str, mut done: impl FnMut() -> bool) {
 }
 
 fn order(identity: Identity, in_doubt: bool) -> StopOrder {
-    StopOrder { identity, command: Command::Halt, in_doubt }
+    StopOrder { identity, words: Stop::PanTilt, in_doubt }
 }
 
 #[track_caller]

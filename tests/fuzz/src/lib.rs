@@ -40,14 +40,14 @@ pub fn challenge(bytes: &[u8]) -> bool {
 
 pub fn position(bytes: &[u8]) -> bool {
     let Ok(position) = parse_position(&text(bytes)) else { return false };
-    let told = [position.pan_deg, position.tilt_deg, position.zoom_steps];
+    let told = [position.pan_deg, position.tilt_deg, position.zoom];
     assert!(told.into_iter().flatten().all(f64::is_finite), "{position:?}");
     true
 }
 
 pub fn limits(bytes: &[u8]) -> bool {
     let Ok(limits) = parse_limits(&text(bytes)) else { return false };
-    let told = [limits.pan_deg, limits.tilt_deg, limits.zoom_steps, limits.field_angle_deg];
+    let told = [limits.pan_deg, limits.tilt_deg, limits.zoom, limits.field_angle_deg];
     assert!(told.into_iter().flatten().all(|range| range.min < range.max), "{limits:?}");
     true
 }
@@ -62,11 +62,11 @@ pub fn attributes(bytes: &[u8]) -> bool {
 }
 
 fn grow(a: &TableRow, b: &TableRow) -> bool {
-    a.step < b.step && a.value <= b.value
+    a.setting < b.setting && a.value <= b.value
 }
 
 pub fn move_speed(bytes: &[u8]) -> bool {
-    parse_move_speed(&text(bytes)).inspect(|speed| assert!((1..=100).contains(speed))).is_ok()
+    parse_move_speed(&text(bytes)).inspect(|speed| assert!(*speed > 0.0 && *speed <= 1.0)).is_ok()
 }
 
 pub fn parameters(bytes: &[u8]) -> bool {
@@ -99,7 +99,7 @@ pub fn onvif(bytes: &[u8]) -> bool {
     let abilities = parse_abilities(&body);
     let told = onvif::parse_position(&body, &abilities);
     let position = told.unwrap_or_default();
-    let places = [position.pan_deg, position.tilt_deg, position.zoom_steps];
+    let places = [position.pan_deg, position.tilt_deg, position.zoom];
     assert!(places.into_iter().flatten().all(f64::is_finite), "{position:?}");
     abilities != Abilities::default()
         || told.is_some()

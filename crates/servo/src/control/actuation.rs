@@ -32,14 +32,22 @@ pub enum Actuation {
     Rest,
     /// Whatever it does: a move to a position is under way.
     Continue,
+    /// This.
+    Move(Motion),
+}
+
+/// How the camera is to move. Speeds are parts of the camera's fastest, as no camera is believed how many degrees a second that
+/// is: how many each part is, is the model's to know ([`SpeedMap`](crate::SpeedMap)).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Motion {
     /// Turn at these speeds until told otherwise.
     Velocity {
-        /// Speed step, -100 (left) to 100 (right): percent of full speed.
-        pan: i8,
-        /// Speed step, -100 (down) to 100 (up).
-        tilt: i8,
-        /// Speed step of the zoom, -100 (out) to 100 (in); `None` leaves the zoom to others.
-        zoom: Option<i8>,
+        /// Part of the fastest, -1 (left) to 1 (right).
+        pan: f64,
+        /// Part of the fastest, -1 (down) to 1 (up).
+        tilt: f64,
+        /// Part of the zoom's fastest, -1 (out) to 1 (in); `None` leaves the zoom to others.
+        zoom: Option<f64>,
     },
     /// Look there.
     Absolute {
@@ -47,10 +55,10 @@ pub enum Actuation {
         pan_deg: f64,
         /// Degrees, -180 to 180.
         tilt_deg: f64,
-        /// Speed step, 1 to 100.
-        speed: u8,
-        /// Zoom step, 1 to 9999; `None` leaves it as it is.
-        zoom: Option<u16>,
+        /// Part of the fastest, beyond 0 to 1.
+        speed: f64,
+        /// Part of the optical zoom's travel, 0 (out) to 1 (in); `None` leaves it as it is.
+        zoom: Option<f64>,
     },
     /// Bring a pixel of the picture to its middle.
     Centre {
@@ -62,8 +70,8 @@ pub enum Actuation {
         width: u32,
         /// Height of the picture that the pixel is counted in.
         height: u32,
-        /// Magnify what is seen by so many per cent; `None` leaves the zoom as it is.
-        zoom_percent: Option<u32>,
+        /// Magnify what is seen by this factor; `None` leaves the zoom as it is.
+        magnify: Option<f64>,
     },
     /// Go to a position that is stored in the camera.
     Preset {
@@ -72,18 +80,32 @@ pub enum Actuation {
     },
 }
 
-impl Actuation {
-    /// Speed step of moves to a position, of a camera that does not tell its own.
-    pub const FULL_SPEED: u8 = 100;
+impl Motion {
+    /// Speed of moves to a position, of a camera that does not tell its own.
+    pub const FULL_SPEED: f64 = 1.0;
 
-    /// Whether the camera rests once it has done this.
-    pub fn is_rest(&self) -> bool {
-        matches!(self, Self::Rest | Self::Velocity { pan: 0, tilt: 0, zoom: None | Some(0) })
+    /// All axes at rest, where they move at a speed.
+    pub const STILL: Self = Self::Velocity { pan: 0.0, tilt: 0.0, zoom: Some(0.0) };
+
+    /// Whether this moves nothing.
+    pub fn is_still(&self) -> bool {
+        matches!(self, Self::Velocity { pan: 0.0, tilt: 0.0, zoom: None | Some(0.0) })
     }
 
     /// Whether this is a move from rest to rest.
     pub fn is_point_to_point(&self) -> bool {
-        matches!(self, Self::Absolute { .. } | Self::Centre { .. } | Self::Preset { .. })
+        !matches!(self, Self::Velocity { .. })
+    }
+}
+
+impl Actuation {
+    /// Whether the camera rests once it has done this.
+    pub fn is_rest(&self) -> bool {
+        match self {
+            Self::Rest => true,
+            Self::Continue => false,
+            Self::Move(motion) => motion.is_still(),
+        }
     }
 }
 

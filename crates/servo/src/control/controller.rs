@@ -29,8 +29,8 @@ pub struct Controller {
     tilt: Axis,
     /// Scales the gain of a loop that oscillates; what the target does by itself is followed all the same.
     pub oscillation: OscillationGuard,
-    /// The speed steps in force, for the quantiser's hysteresis.
-    pub speed_steps: (i8, i8),
+    /// The levels of the speed map in force, for the quantiser's hysteresis.
+    pub levels: (i8, i8),
 }
 
 impl Controller {
@@ -62,8 +62,8 @@ impl Controller {
     /// What holds at any time.
     pub fn check_invariants(&self) {
         self.oscillation.check_invariants();
-        let (pan, tilt) = self.speed_steps;
-        assert!(pan.unsigned_abs() <= 100 && tilt.unsigned_abs() <= 100, "speed steps {pan}, {tilt}");
+        let (pan, tilt) = self.levels;
+        assert!(pan.unsigned_abs() <= 100 && tilt.unsigned_abs() <= 100, "speed levels {pan}, {tilt}");
     }
 
     /// Both axes at rest.
@@ -71,10 +71,10 @@ impl Controller {
         (self.pan, self.tilt) = (Axis::default(), Axis::default());
     }
 
-    /// The speed steps for a rate.
-    pub fn quantise(&mut self, rate: PanTilt, map: &SpeedMap) -> (i8, i8) {
-        self.speed_steps = (map.step(rate.pan, self.speed_steps.0), map.step(rate.tilt, self.speed_steps.1));
-        self.speed_steps
+    /// The parts of the fastest for a rate.
+    pub fn quantise(&mut self, rate: PanTilt, map: &SpeedMap) -> (f64, f64) {
+        self.levels = (map.level(rate.pan, self.levels.0), map.level(rate.tilt, self.levels.1));
+        (SpeedMap::part(self.levels.0), SpeedMap::part(self.levels.1))
     }
 }
 

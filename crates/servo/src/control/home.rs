@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::fmt;
-use std::str::FromStr;
 use std::time::Duration;
 
-use super::Actuation;
+use super::Motion;
 use crate::model::{PanTilt, Position, Presets, SoftLimits};
 
 /// Where the camera waits for a target.
@@ -12,53 +10,10 @@ use crate::model::{PanTilt, Position, Presets, SoftLimits};
 pub enum Home {
     /// Where it looked when it was met.
     Start,
-    /// A direction, and a zoom step where one is given.
+    /// A direction, and a zoom where one is given.
     Position(Position),
     /// One of the camera's own presets.
     Preset(String),
-}
-
-impl FromStr for Home {
-    type Err = String;
-
-    /// Reads `start`, `pan,tilt` or `pan,tilt,zoom` in degrees and zoom steps, or the name of a preset.
-    fn from_str(text: &str) -> Result<Self, String> {
-        if text == "start" {
-            return Ok(Self::Start);
-        }
-        let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
-        match numbers.as_deref() {
-            // A preset may be called 7; a direction has two parts.
-            None | Some([_]) => Ok(Self::Preset(text.to_owned())),
-            Some([pan, tilt]) => Self::position(*pan, *tilt, None),
-            Some([pan, tilt, zoom]) => Self::position(*pan, *tilt, Some(*zoom)),
-            Some(_) => Err(format!("`{text}` has more parts than pan,tilt,zoom")),
-        }
-    }
-}
-
-impl fmt::Display for Home {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Start => f.write_str("start"),
-            Self::Position(position) => {
-                write!(f, "{},{}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))?;
-                position.zoom_steps.map_or(Ok(()), |zoom| write!(f, ",{zoom}"))
-            }
-            Self::Preset(name) => f.write_str(name),
-        }
-    }
-}
-
-impl Home {
-    fn position(pan: f64, tilt: f64, zoom: Option<f64>) -> Result<Self, String> {
-        let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
-        let zooms = zoom.is_none_or(|zoom| (1.0..=9999.0).contains(&zoom));
-        if !turns || !zooms {
-            return Err("pan and tilt must be from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
-        }
-        Ok(Self::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }))
-    }
 }
 
 /// Sends the camera home when nobody was seen for a while, once.
@@ -168,16 +123,16 @@ impl HomeReturn {
         self.preset.is_none().then(|| name.clone())
     }
 
-    /// The command to go home, at this speed step, if it is time for it.
-    pub fn due(&self, now: Duration, speed: u8) -> Option<Actuation> {
+    /// The move home, at this speed, if it is time for it.
+    pub fn due(&self, now: Duration, speed: f64) -> Option<Motion> {
         let wait = if self.at_start { Duration::ZERO } else { self.timeout };
         let alone = self.absence.is_some_and(|absence| absence.since + wait <= now && now <= absence.until);
-        if self.settled || !alone { None } else { self.actuation(speed) }
+        if self.settled || !alone { None } else { self.motion(speed) }
     }
 
-    /// Whether this command, of that speed step, leads home.
-    pub fn leads(&self, actuation: &Actuation, speed: u8) -> bool {
-        self.actuation(speed).as_ref() == Some(actuation)
+    /// Whether this move, at that speed, leads home.
+    pub fn leads(&self, motion: &Motion, speed: f64) -> bool {
+        self.motion(speed).as_ref() == Some(motion)
     }
 
     /// What holds at any time.
@@ -186,25 +141,18 @@ impl HomeReturn {
         assert!(self.preset.is_none() || matches!(self.home, Some(Home::Preset(_))), "a preset of no name");
     }
 
-    fn actuation(&self, speed: u8) -> Option<Actuation> {
+    fn motion(&self, speed: f64) -> Option<Motion> {
         match self.home.as_ref()? {
             Home::Start => self.start.and_then(|start| self.go_to(start, speed)),
             Home::Position(position) => self.go_to(*position, speed),
-            Home::Preset(_) => self.preset.map(|number| Actuation::Preset { number }),
+            Home::Preset(_) => self.preset.map(|number| Motion::Preset { number }),
         }
     }
 
-    fn go_to(&self, position: Position, speed: u8) -> Option<Actuation> {
+    fn go_to(&self, position: Position, speed: f64) -> Option<Motion> {
         let place = self.limits.nearest(PanTilt::new(position.pan_deg?, position.tilt_deg?));
-        Some(Actuation::Absolute {
-            pan_deg: place.pan,
-            tilt_deg: place.tilt,
-            speed,
-            // Within 1 to 9999.
-            zoom: position
-                .zoom_steps
-                .map(|zoom| self.limits.zoom_steps.nearest(zoom).clamp(1.0, 9999.0) as u16),
-        })
+        let zoom = position.zoom.map(|zoom| self.limits.zoom.nearest(zoom).clamp(0.0, 1.0));
+        Some(Motion::Absolute { pan_deg: place.pan, tilt_deg: place.tilt, speed, zoom })
     }
 }
 
@@ -212,25 +160,24 @@ impl HomeReturn {
 mod tests {
     use super::*;
     use crate::model::Range;
-    use proptest::prelude::*;
 
     fn s(s: u64) -> Duration {
         Duration::from_secs(s)
     }
 
     fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {
-        Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom_steps: zoom }
+        Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom }
     }
 
     fn going(home: Option<Home>, timeout: Duration, at_start: bool) -> HomeReturn {
         HomeReturn::new(home, timeout, at_start, SoftLimits::default())
     }
 
-    fn alone(home_return: &mut HomeReturn, from: u64, to: u64) -> Vec<(u64, Actuation)> {
+    fn alone(home_return: &mut HomeReturn, from: u64, to: u64) -> Vec<(u64, Motion)> {
         (from..to)
             .filter_map(|second| {
                 home_return.alone(s(second), s(second + 1));
-                let command = home_return.due(s(second), Actuation::FULL_SPEED)?;
+                let command = home_return.due(s(second), Motion::FULL_SPEED)?;
                 home_return.settled();
                 Some((second, command))
             })
@@ -238,27 +185,14 @@ mod tests {
     }
 
     #[test]
-    fn homes_are_read() {
-        assert_eq!("start".parse(), Ok(Home::Start));
-        assert_eq!("-12.5, 3".parse(), Ok(Home::Position(at(-12.5, 3.0, None))));
-        assert_eq!("10,-5,3868".parse(), Ok(Home::Position(at(10.0, -5.0, Some(3868.0)))));
-        for name in ["Gate", "7", "Gate, left", "north,south"] {
-            assert_eq!(name.parse(), Ok(Home::Preset(name.to_owned())), "{name}");
-        }
-        for wrong in ["200,0", "0,-190", "0,0,0", "0,0,20000", "NaN,1", "1,2,3,4"] {
-            assert!(wrong.parse::<Home>().is_err(), "{wrong}");
-        }
-    }
-
-    #[test]
     fn it_goes_home_once_when_nobody_was_seen_for_a_while() {
-        let home = Home::Position(at(5.0, 1.0, Some(20.0)));
+        let home = Home::Position(at(5.0, 1.0, Some(0.2)));
         let mut home_return = going(Some(home), s(10), false);
-        let there = Actuation::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 100, zoom: Some(20) };
+        let there = Motion::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 1.0, zoom: Some(0.2) };
         assert_eq!(alone(&mut home_return, 3, 60), [(13, there)]);
         home_return.not_alone();
         home_return.strayed();
-        assert_eq!(home_return.due(s(61), Actuation::FULL_SPEED), None);
+        assert_eq!(home_return.due(s(61), Motion::FULL_SPEED), None);
         assert_eq!(alone(&mut home_return, 70, 100), [(80, there)]);
         home_return.strayed();
         assert_eq!(alone(&mut home_return, 100, 110), [(100, there)], "somebody else took it away");
@@ -268,7 +202,7 @@ mod tests {
     fn without_pictures_nobody_knows_that_nobody_is_there() {
         let mut home_return = going(Some(Home::Position(at(5.0, 1.0, None))), s(10), false);
         home_return.alone(s(0), s(1));
-        assert_eq!(home_return.due(s(20), Actuation::FULL_SPEED), None);
+        assert_eq!(home_return.due(s(20), Motion::FULL_SPEED), None);
     }
 
     #[test]
@@ -283,12 +217,12 @@ mod tests {
     #[test]
     fn where_it_started_is_where_it_was_before_our_first_command() {
         let mut home_return = going(Some(Home::Start), s(10), true);
-        home_return.positioned(at(7.0, -2.0, Some(1.0)));
+        home_return.positioned(at(7.0, -2.0, Some(0.0)));
         assert_eq!(alone(&mut home_return, 0, 30), [], "it is there");
-        home_return.positioned(at(7.5, -2.0, Some(1.0)));
+        home_return.positioned(at(7.5, -2.0, Some(0.0)));
         home_return.strayed();
-        home_return.positioned(at(90.0, 0.0, Some(500.0)));
-        let start = Actuation::Absolute { pan_deg: 7.0, tilt_deg: -2.0, speed: 100, zoom: Some(1) };
+        home_return.positioned(at(90.0, 0.0, Some(0.05)));
+        let start = Motion::Absolute { pan_deg: 7.0, tilt_deg: -2.0, speed: 1.0, zoom: Some(0.0) };
         home_return.not_alone();
         assert_eq!(alone(&mut home_return, 40, 80), [(50, start)]);
     }
@@ -299,10 +233,10 @@ mod tests {
         let limits = SoftLimits {
             pan_deg: within(-30.0, 60.0),
             tilt_deg: within(-20.0, 5.0),
-            zoom_steps: within(100.0, 2000.0),
+            zoom: within(0.01, 0.2),
         };
-        let there = Actuation::Absolute { pan_deg: 60.0, tilt_deg: -20.0, speed: 100, zoom: Some(2000) };
-        let beyond = Home::Position(at(100.0, -60.0, Some(9999.0)));
+        let there = Motion::Absolute { pan_deg: 60.0, tilt_deg: -20.0, speed: 1.0, zoom: Some(0.2) };
+        let beyond = Home::Position(at(100.0, -60.0, Some(1.0)));
         let mut home_return = HomeReturn::new(Some(beyond.clone()), s(0), false, limits);
         assert_eq!(alone(&mut home_return, 3, 5), [(3, there)]);
         let mut home_return = going(Some(beyond.clone()), s(0), false);
@@ -320,7 +254,7 @@ mod tests {
             None
         );
         assert_eq!(home_return.presets_due(), None);
-        assert_eq!(alone(&mut home_return, 30, 60), [(30, Actuation::Preset { number: 4 })]);
+        assert_eq!(alone(&mut home_return, 30, 60), [(30, Motion::Preset { number: 4 })]);
     }
 
     #[test]
@@ -331,18 +265,5 @@ mod tests {
         assert_eq!(alone(&mut home_return, 0, 30), []);
         home_return.configure(Some(&Home::Position(at(0.0, 0.0, None))), s(10), SoftLimits::default());
         assert_eq!(alone(&mut home_return, 30, 60).len(), 1);
-    }
-
-    proptest! {
-        #[test]
-        fn a_home_is_read_back(pan in -180.0..180.0f64, tilt in -180.0..180.0f64, zoom in prop::option::of(1.0..9999.0f64)) {
-            let home = Home::Position(at(pan, tilt, zoom));
-            prop_assert_eq!(home.to_string().parse(), Ok(home));
-        }
-
-        #[test]
-        fn any_text_is_a_home_or_refused(text in ".{0,40}") {
-            let _ = text.parse::<Home>();
-        }
     }
 }

@@ -11,7 +11,7 @@ mod point_to_point;
 mod zoom;
 mod zoom_drive;
 
-pub use actuation::{Access, Actuation, ActuatorStatus, Mode};
+pub use actuation::{Access, Actuation, ActuatorStatus, Mode, Motion};
 pub use controller::{ControlLaw, Controller};
 pub use home::{Home, HomeReturn};
 pub use limits::LimitEnforcer;

@@ -34,8 +34,8 @@ impl PointToPoint {
     /// Positions this near to each other are the same.
     const SAME_DEG: f64 = 0.05;
 
-    /// Zoom steps this near to each other are the same.
-    const SAME_ZOOM: f64 = 10.0;
+    /// Parts of the zoom's travel this near to each other are the same.
+    const SAME_ZOOM: f64 = 0.001;
 
     /// As long as a step of some degrees takes until it is seen to be over.
     const USUAL: Duration = Duration::from_millis(600);
@@ -111,7 +111,7 @@ impl PointToPoint {
 
 fn same(before: &Position, now: &Position, tolerance_deg: f64) -> bool {
     let turned = before.pan_tilt().zip(now.pan_tilt()).map(|(before, now)| before.turn_to(now).largest());
-    let zoomed = before.zoom_steps.zip(now.zoom_steps).map(|(before, now)| (now - before).abs());
+    let zoomed = before.zoom.zip(now.zoom).map(|(before, now)| (now - before).abs());
     turned.is_some_and(|turned| turned < tolerance_deg)
         && zoomed.is_none_or(|zoomed| zoomed < PointToPoint::SAME_ZOOM)
 }
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     fn at(pan_deg: f64, zoom: f64) -> Option<Position> {
-        Some(Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom_steps: Some(zoom) })
+        Some(Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom: Some(zoom / 10_000.0) })
     }
 
     fn late(ms: u64) -> Delays {

@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use super::zoom::ZoomController;
 use crate::estimation::{Measurement, ZoomEstimator};
-use crate::model::{CommandHistory, Delays, Lens, Range};
+use crate::model::{CommandHistory, Delays, Lens, Range, SpeedMap};
 
-/// Turns the wish for a target of some height into zoom speeds and zoom steps of one lens.
+/// Turns the wish for a target of some height into zoom speeds and places of one lens.
 #[derive(Debug, Default)]
 pub struct ZoomDrive {
     controller: ZoomController,
@@ -18,15 +18,15 @@ pub struct ZoomDrive {
 pub struct ZoomGoal {
     /// The target's height as a part of the picture's.
     pub target_height: f64,
-    /// Zoom steps that are not left.
-    pub steps: Range,
+    /// The part of the zoom's travel that is not left.
+    pub travel: Range,
 }
 
 /// A zoom from rest to rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Jump {
-    /// Zoom step to go to.
-    pub step: u16,
+    /// Part of the zoom's travel to go to.
+    pub travel: f64,
     /// By what that magnifies.
     pub factor: f64,
     /// Whether it is worth a move of its own; else it goes along with one.
@@ -39,8 +39,8 @@ impl ZoomDrive {
 
     /// Takes a picture.
     pub fn see(&mut self, measurement: &Measurement, lens: &Lens, delays: &Delays) {
-        if let Some(step) = self.step_shown(measurement.taken_at, delays) {
-            self.controller.see(measurement, lens.magnification(step));
+        if let Some(travel) = self.travel_shown(measurement.taken_at, delays) {
+            self.controller.see(measurement, lens.magnification(travel));
         }
     }
 
@@ -55,19 +55,19 @@ impl ZoomDrive {
         self.track.commands().check_invariants();
     }
 
-    /// The camera told its zoom step, or does not tell.
-    pub fn told(&mut self, at: Duration, step: Option<f64>, delays: &Delays) {
-        if let Some(step) = step {
-            self.track.told(at, step, delays);
+    /// The camera told its zoom, or does not tell.
+    pub fn told(&mut self, at: Duration, travel: Option<f64>, delays: &Delays) {
+        if let Some(travel) = travel {
+            self.track.told(at, travel, delays);
         }
     }
 
-    /// From then on the zoom moves at a speed step.
-    pub fn commanded(&mut self, at: Duration, speed: i8) {
+    /// From then on the zoom moves at a part of its fastest.
+    pub fn commanded(&mut self, at: Duration, speed: f64) {
         self.track.commanded(at, speed);
     }
 
-    /// The speed steps it was told, as the pan of a history.
+    /// The speeds it was told, as the pan of a history.
     pub fn commands(&self) -> &CommandHistory {
         self.track.commands()
     }
@@ -82,12 +82,12 @@ impl ZoomDrive {
         self.track.moves(now)
     }
 
-    /// The zoom step that a picture shows.
-    pub fn step_shown(&self, taken_at: Duration, delays: &Delays) -> Option<f64> {
-        self.track.step(delays.sent_by(taken_at), delays)
+    /// The part of the zoom's travel that a picture shows.
+    pub fn travel_shown(&self, taken_at: Duration, delays: &Delays) -> Option<f64> {
+        self.track.travel(delays.sent_by(taken_at), delays)
     }
 
-    /// The zoom speed for a command sent now, -100 to 100; `None` where the camera does not tell its zoom.
+    /// The zoom speed for a command sent now, -1 to 1 in hundredths; `None` where the camera does not tell its zoom.
     pub fn speed(
         &mut self,
         goal: &ZoomGoal,
@@ -95,14 +95,14 @@ impl ZoomDrive {
         measurement: &Measurement,
         delays: &Delays,
         now: Duration,
-    ) -> Option<i8> {
-        let step = self.track.step(now, delays)?;
+    ) -> Option<f64> {
+        let travel = self.track.travel(now, delays)?;
         let lead = now.saturating_sub(measurement.taken_at) + delays.sum();
-        let rate = self.controller.rate(goal.target_height, lens.magnification(step), lead);
-        let there = lens.step_magnified(step, (rate * Self::AHEAD_S).exp())?;
-        let steps_s = (goal.steps.nearest(there) - step) / Self::AHEAD_S;
-        // Saturates.
-        Some((steps_s / self.track.full_step_s() * 100.0).round().clamp(-100.0, 100.0) as i8)
+        let rate = self.controller.rate(goal.target_height, lens.magnification(travel), lead);
+        let there = lens.travel_magnified(travel, (rate * Self::AHEAD_S).exp())?;
+        let per_s = (goal.travel.nearest(there) - travel) / Self::AHEAD_S;
+        let part = (per_s / self.track.fastest_per_s()).clamp(-1.0, 1.0);
+        Some(SpeedMap::part(SpeedMap::level_of(part)))
     }
 
     /// The zoom to do at once, for the height to be right `lead` after the last picture; `None`: it is well as it is.
@@ -114,13 +114,13 @@ impl ZoomDrive {
         now: Duration,
         lead: Duration,
     ) -> Option<Jump> {
-        let step = self.track.step(now, delays)?;
+        let travel = self.track.travel(now, delays)?;
         let (factor, pressing) =
-            self.controller.factor(goal.target_height, lens.magnification(step), lead)?;
-        let there = goal.steps.nearest(lens.step_magnified(step, factor)?).round();
-        let factor = lens.magnification(there) / lens.magnification(step);
+            self.controller.factor(goal.target_height, lens.magnification(travel), lead)?;
+        let there = goal.travel.nearest(lens.travel_magnified(travel, factor)?);
+        let factor = lens.magnification(there) / lens.magnification(travel);
         // Less than a hundredth is what rounding leaves at the lens' ends.
-        ((factor - 1.0).abs() > 0.01).then_some(Jump { step: there as u16, factor, pressing })
+        ((factor - 1.0).abs() > 0.01).then_some(Jump { travel: there, factor, pressing })
     }
 }
 
@@ -129,8 +129,8 @@ mod tests {
     use super::*;
     use ptztrack_contract::Rect;
 
-    const STEPS: Range = Range { min: 1.0, max: 9999.0 };
-    const GOAL: ZoomGoal = ZoomGoal { target_height: 0.4, steps: STEPS };
+    const TRAVEL: Range = Range { min: 0.0, max: 1.0 };
+    const GOAL: ZoomGoal = ZoomGoal { target_height: 0.4, travel: TRAVEL };
     const LATENCY: Duration = Duration::from_millis(200);
 
     fn delays() -> Delays {
@@ -138,13 +138,13 @@ mod tests {
     }
 
     fn lens() -> Lens {
-        Lens::linear(60.0, STEPS, 10.0)
+        Lens::linear(60.0, TRAVEL, 10.0)
     }
 
-    /// A drive that has seen a target of this height, at a zoom step.
-    fn drive(step: f64, height: f64) -> (ZoomDrive, Measurement, Duration) {
+    /// A drive that has seen a target of this height, at a part of the travel.
+    fn drive(travel: f64, height: f64) -> (ZoomDrive, Measurement, Duration) {
         let mut drive = ZoomDrive::default();
-        drive.told(Duration::from_millis(100), Some(step), &delays());
+        drive.told(Duration::from_millis(100), Some(travel), &delays());
         let bounds = Rect { x: 0.45, y: 0.5 - height / 2.0, width: 0.1, height };
         let mut seen = Measurement::at(0.5, 0.5, Duration::ZERO);
         for picture in 10..40 {
@@ -155,33 +155,33 @@ mod tests {
         (drive, seen, now)
     }
 
-    fn speed(goal: ZoomGoal, step: f64, height: f64) -> i8 {
-        let (mut drive, seen, now) = drive(step, height);
+    fn speed(goal: ZoomGoal, travel: f64, height: f64) -> f64 {
+        let (mut drive, seen, now) = drive(travel, height);
         drive.speed(&goal, &lens(), &seen, &delays(), now).unwrap()
     }
 
     #[test]
     fn it_zooms_in_on_a_small_target_and_out_of_a_tall_one() {
-        assert!(speed(GOAL, 1000.0, 0.2) > 0);
-        assert!(speed(GOAL, 1000.0, 0.8) < 0);
-        assert_eq!(speed(GOAL, 1000.0, 0.4), 0);
+        assert!(speed(GOAL, 0.1, 0.2) > 0.0);
+        assert!(speed(GOAL, 0.1, 0.8) < 0.0);
+        assert_eq!(speed(GOAL, 0.1, 0.4), 0.0);
     }
 
     #[test]
     fn it_ends_where_the_lens_or_the_limits_do() {
-        assert_eq!(speed(GOAL, 9999.0, 0.2), 0);
-        assert_eq!(speed(GOAL, 1.0, 0.8), 0);
-        let narrow = ZoomGoal { steps: Range { min: 500.0, max: 1000.0 }, ..GOAL };
-        assert_eq!((speed(narrow, 1000.0, 0.2), speed(narrow, 500.0, 0.8)), (0, 0));
-        assert!(speed(narrow, 3000.0, 0.4) < 0, "back into the limits");
+        assert_eq!(speed(GOAL, 1.0, 0.2), 0.0);
+        assert_eq!(speed(GOAL, 0.0, 0.8), 0.0);
+        let narrow = ZoomGoal { travel: Range { min: 0.05, max: 0.1 }, ..GOAL };
+        assert_eq!((speed(narrow, 0.1, 0.2), speed(narrow, 0.05, 0.8)), (0.0, 0.0));
+        assert!(speed(narrow, 0.3, 0.4) < 0.0, "back into the limits");
     }
 
     #[test]
     fn at_once_it_goes_where_the_height_is_right() {
+        let (drive_, _, now) = drive(0.0, 0.25);
+        let Jump { travel, factor, .. } = drive_.jump(&GOAL, &lens(), &delays(), now, LATENCY).unwrap();
+        assert!((factor - 1.6).abs() < 0.01 && (lens().magnification(travel) - 1.6).abs() < 0.01);
         let (drive_, _, now) = drive(1.0, 0.25);
-        let Jump { step, factor, .. } = drive_.jump(&GOAL, &lens(), &delays(), now, LATENCY).unwrap();
-        assert!((factor - 1.6).abs() < 0.01 && (lens().magnification(step.into()) - 1.6).abs() < 0.01);
-        let (drive_, _, now) = drive(9999.0, 0.25);
         assert_eq!(drive_.jump(&GOAL, &lens(), &delays(), now, LATENCY), None);
     }
 

@@ -43,7 +43,7 @@ pub struct Estimates {
     pub delays: Delays,
     /// Horizontal field of view in degrees.
     pub fov_deg: f64,
-    /// Degrees per second of the speed steps.
+    /// Degrees per second of the speeds that were told.
     pub map: SpeedMap,
 }
 
@@ -172,7 +172,7 @@ mod tests {
             let (mut history, mut map, mut now) = (CommandHistory::default(), assumed, Duration::ZERO);
             for (x, y, step, tells, wait) in pictures {
                 now += Duration::from_millis(if wait < 500 { 40 } else { wait });
-                history.push_steps(now, (step, -step), &map);
+                history.push_parts(now, (f64::from(step) / 100.0, f64::from(step) / -100.0), &map);
                 if tells {
                     calibration.positioned(now, PanTilt::new(x * 90.0, y * 90.0));
                 }

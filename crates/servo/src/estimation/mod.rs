@@ -8,7 +8,7 @@
 //! ```text
 //! rotation seen in the picture ─┬─ against positions told ── field of view   (how many degrees a picture is wide)
 //!                               ├─ against commands ──────── latency         (when they agree best)
-//!                               ├─ against speed steps ───── speed map       (degrees per second of a step)
+//!                               ├─ against speeds told ───── speed map       (degrees per second of a step)
 //!                               └─ against signs ─────────── axes            (which way each turns the picture)
 //! ```
 //! Each is learned by itself and bounded, and starts from what the camera told or the user set. Only a

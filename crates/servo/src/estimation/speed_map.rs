@@ -6,17 +6,17 @@ use std::time::Duration;
 use super::{ObservedRotation, RecursiveLeastSquares};
 use crate::model::{CommandHistory, Delays, PanTilt, SpeedMap};
 
-/// Learns how fast the speed steps really are, as a factor on the map that was assumed: on its bare curve, as the kink
-/// of a floor that another curve has not is no straight line between any two steps.
+/// Learns how fast the camera really is, as a factor on the map that was assumed: on its bare curve, as the kink
+/// of a floor that another curve has not is no straight line between any two levels.
 ///
 /// Found by [`RecursiveLeastSquares`] with forgetting on 12 regressors. Its logarithm is the sum of an offset (the camera is
-/// faster as a whole), a slope over the logarithm of the step (another exponent: a linear camera taken for a cubic one), a
+/// faster as a whole), a slope over the logarithm of the level (another exponent: a linear camera taken for a cubic one), a
 /// slope over the logarithm of the field of view (proportional speed that shrinks all speeds as the view narrows), and a
-/// small correction at each of a few steps, straight in between (any other curve).
+/// small correction at each of a few levels, straight in between (any other curve).
 ///
 /// Less does not suffice where field of view, latency and curve are wrong at once (test
 /// `everything_wrong_at_once_is_put_right_within_20_s`): with gain and exponent alone the target is lost, with a correction that
-/// only grows (increments from step to step, none below zero) a latency of 200 ms is taken for 709 ms, or for 309 ms with three
+/// only grows (increments from level to level, none below zero) a latency of 200 ms is taken for 709 ms, or for 309 ms with three
 /// increments instead of eight.
 #[derive(Debug)]
 pub(super) struct SpeedMapEstimator {
@@ -36,14 +36,14 @@ const FIRST_KNOT: usize = 3;
 const KNOTS: usize = 9;
 const FEATURES: usize = FIRST_KNOT + KNOTS;
 
-/// The step around which the slope turns: slow, as most of following is.
-const MIDDLE_STEP: f64 = 20.0;
+/// The level around which the slope turns: slow, as most of following is.
+const MIDDLE_LEVEL: f64 = 20.0;
 
 /// The field of view at which the slope over it does nothing, degrees.
 const MIDDLE_FOV_DEG: f64 = 55.0;
 
-/// No speed is taken to be further than this factor from the assumed one: enough for a camera whose steps are in
-/// proportion where those of the same greatest speed were to grow by the cube, from a floor on: at step 5, by 400.
+/// No speed is taken to be further than this factor from the assumed one: enough for a camera whose speeds are in
+/// proportion where those of the same greatest speed were to grow by the cube, from a floor on: at level 5, by 400.
 const LARGEST_FACTOR: f64 = 500.0;
 
 /// Part of the prior's variance that is forgotten in a second.
@@ -67,7 +67,7 @@ const ANOTHER_LATENCY: Duration = Duration::from_millis(50);
 /// ... is forgotten by this part of the prior's variance.
 const DOUBTED: f64 = 0.2;
 
-/// Standard deviations by which a step may be faster than it seems: a slower one than was assumed is believed in so late.
+/// Standard deviations by which a level may be faster than it seems: a slower one than was assumed is believed in so late.
 const CAUTION: f64 = 0.75;
 
 /// What the camera travels to and fro is counted over so long.
@@ -98,12 +98,12 @@ pub(super) struct Maps<'a> {
 #[derive(Clone, Copy)]
 struct Axis {
     rate: fn(PanTilt) -> f64,
-    step: fn((i8, i8)) -> i8,
+    level: fn((i8, i8)) -> i8,
 }
 
 impl Axis {
-    const PAN: Self = Self { rate: |rate| rate.pan, step: |steps| steps.0 };
-    const TILT: Self = Self { rate: |rate| rate.tilt, step: |steps| steps.1 };
+    const PAN: Self = Self { rate: |rate| rate.pan, level: |levels| levels.0 };
+    const TILT: Self = Self { rate: |rate| rate.tilt, level: |levels| levels.1 };
 }
 
 /// What a turn about one axis is to be compared with.
@@ -116,7 +116,7 @@ struct Seen<'a> {
     fov_deg: f64,
 }
 
-/// A way commanded, and the features of its steps, each by its part of the way.
+/// A way commanded, and the features of its levels, each by its part of the way.
 struct Way {
     degrees: f64,
     features: [f64; FEATURES],
@@ -127,7 +127,7 @@ impl SpeedMapEstimator {
     pub fn new(told: bool) -> Self {
         let mut deviations = [if told { 0.1 } else { 0.25 }; FEATURES];
         deviations[OFFSET] = if told { 0.1 } else { 1.5 };
-        // Linear for cubic is off by two: with less, that would be taken for an oddity at each step met so far.
+        // Linear for cubic is off by two: with less, that would be taken for an oddity at each level met so far.
         deviations[SLOPE] = if told { 0.1 } else { 2.0 };
         deviations[ZOOM] = if told { 0.1 } else { 0.5 };
         Self {
@@ -140,15 +140,15 @@ impl SpeedMapEstimator {
 
     /// The map with what was learned.
     pub fn correct(&self, assumed: &SpeedMap, fov_deg: f64) -> SpeedMap {
-        assumed.times(|step| {
-            let features = features(step, fov_deg);
+        assumed.times(|level| {
+            let features = features(level, fov_deg);
             let logarithm = self.regression.predict(&features);
-            // Slower only as far as that is sure: a step that was never tried may fling the camera round.
+            // Slower only as far as that is sure: a level that was never tried may fling the camera round.
             let cautious =
                 (logarithm + CAUTION * self.regression.deviation(&features)).min(0.0).max(logarithm);
-            // Of what is really assumed, which for slow steps may be more than the curve has. What is no number bounds
+            // Of what is really assumed, which for slow ones may be more than the curve has. What is no number bounds
             // nothing.
-            let raised = assumed.deg_s(step as i8) / assumed.bare_deg_s(step as u8);
+            let raised = assumed.deg_s(level) / assumed.bare_deg_s(level.unsigned_abs());
             cautious.min((raised * LARGEST_FACTOR).ln()).max(-LARGEST_FACTOR.ln()).exp()
         })
     }
@@ -211,7 +211,7 @@ impl SpeedMapEstimator {
                 self.learn(&features, (seen / commanded).ln(), variance);
             }
         } else if commanded > STRONG * noise {
-            // Far slower than it is taken for, or only late. How much slower is not told: nothing of this step
+            // Far slower than it is taken for, or only late. How much slower is not told: nothing of this level
             // in particular.
             features[FIRST_KNOT..].fill(0.0);
             self.learn(&features, (noise / commanded).ln(), STANDING_VARIANCE);
@@ -239,11 +239,12 @@ impl SpeedMapEstimator {
     /// The way commanded between two times, to and fro; `None` of none.
     fn way(&self, about: &Seen, from: Duration, to: Duration) -> Option<Way> {
         let mut way = Way { degrees: 0.0, features: [0.0; FEATURES] };
-        for (steps, seconds) in about.history.steps_between(from, to) {
-            let step = (about.axis.step)(steps).unsigned_abs();
-            let features = features(f64::from(step), about.fov_deg);
-            let degrees =
-                about.maps.assumed.bare_deg_s(step) * self.regression.predict(&features).exp() * seconds;
+        for (levels, seconds) in about.history.levels_between(from, to) {
+            let level = (about.axis.level)(levels);
+            let features = features(level, about.fov_deg);
+            let degrees = about.maps.assumed.bare_deg_s(level.unsigned_abs())
+                * self.regression.predict(&features).exp()
+                * seconds;
             way.degrees += degrees;
             for (sum, feature) in way.features.iter_mut().zip(features) {
                 *sum += degrees * feature;
@@ -270,13 +271,13 @@ fn extremes(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
 }
 
-fn features(step: f64, fov_deg: f64) -> [f64; FEATURES] {
-    let logarithm = step.max(1.0).ln();
+fn features(level: i8, fov_deg: f64) -> [f64; FEATURES] {
+    let logarithm = f64::from(level.unsigned_abs()).max(1.0).ln();
     let mut features = [0.0; FEATURES];
     features[OFFSET] = 1.0;
-    features[SLOPE] = logarithm - MIDDLE_STEP.ln();
+    features[SLOPE] = logarithm - MIDDLE_LEVEL.ln();
     features[ZOOM] = (fov_deg / MIDDLE_FOV_DEG).ln();
-    // Knots in equal ratios from step 1 to 100.
+    // Knots in equal ratios from level 1 to 100.
     let place = logarithm / 100f64.ln() * (KNOTS - 1) as f64;
     for (knot, feature) in features[FIRST_KNOT..].iter_mut().enumerate() {
         *feature = (1.0 - (place - knot as f64).abs()).max(0.0);

@@ -5,24 +5,27 @@ use super::{CommandHistory, HardLimits, Lens, PanTilt, Position, Range, SpeedMap
 /// Field of view of a camera that does not tell: a common dome's, zoomed out.
 const ASSUMED_FOV_DEG: f64 = 55.0;
 
-/// Steps of optical zoom; beyond them cameras magnify digitally.
-const OPTICAL_STEPS: Range = Range { min: 1.0, max: 9999.0 };
+/// The travel of the optical zoom; beyond it cameras magnify digitally.
+const OPTICAL: Range = Range { min: 0.0, max: 1.0 };
+
+/// A lens that travels less than that does not zoom.
+const SHORTEST_TRAVEL: f64 = 1e-4;
 
 /// What the camera told of itself; every part is optional.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Capabilities {
     /// How far it can look and zoom.
     pub limits: HardLimits,
-    /// Degrees per second of speed steps, growing.
+    /// Degrees per second of parts of the fastest, growing.
     pub speeds: Vec<TableRow>,
-    /// Magnification of zoom steps, growing.
+    /// Magnification by the zoom's travel, growing.
     pub zooms: Vec<TableRow>,
     /// Magnification at the end of the optical zoom.
     pub max_optical_magnification: Option<f64>,
     /// Fields of view per second that no speed exceeds, where speeds are proportional to the field of view.
     pub max_fields_s: Option<f64>,
-    /// The speed step of its moves to a position.
-    pub move_speed: Option<u8>,
+    /// The speed of its moves to a position, as a part of the fastest.
+    pub move_speed: Option<f64>,
 }
 
 /// The camera as it is known.
@@ -34,7 +37,7 @@ pub struct CameraModel {
     pub position: Position,
     /// What it was told.
     pub history: CommandHistory,
-    /// How fast its speed steps are, as it is known by now.
+    /// How fast it is, as it is known by now.
     pub speed_map: SpeedMap,
 }
 
@@ -44,7 +47,7 @@ impl CameraModel {
     /// The slowest heads that are simulated do 400; with 800 those that reach a rate at once are led past the target.
     const ACCELERATION_DEG_S2: f64 = 1000.0;
 
-    /// A camera that told nothing yet, and whose speed steps are taken to be those.
+    /// A camera that told nothing yet, and is taken to be that fast.
     pub fn new(speed_map: SpeedMap) -> Self {
         let (capabilities, position) = (Capabilities::default(), Position::default());
         let history = CommandHistory::accelerating(Self::ACCELERATION_DEG_S2);
@@ -60,7 +63,7 @@ impl CameraModel {
     /// it is set; else what the camera told, or what is common.
     pub fn fov_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
         let lens = self.capabilities.lens_or_fixed(wide_fov_deg);
-        lens.fov_deg(self.position.zoom_steps.unwrap_or(OPTICAL_STEPS.min))
+        lens.fov_deg(self.position.zoom.unwrap_or(OPTICAL.min))
     }
 }
 
@@ -74,10 +77,10 @@ impl Capabilities {
         }
         let most = angle.map(|angle| Lens::magnification_between(angle.max, angle.min));
         let most = self.max_optical_magnification.or(most)?;
-        let steps = self.limits.zoom_steps.unwrap_or(OPTICAL_STEPS);
-        // Beyond the optical steps it magnifies on, but by how much nobody says.
-        let max = steps.max.min(OPTICAL_STEPS.max).max(steps.min + 1.0);
-        Some(Lens::linear(wide_deg, Range { max, ..steps }, most))
+        let travel = self.limits.zoom.unwrap_or(OPTICAL);
+        // Beyond the optical zoom it magnifies on, but by how much nobody says.
+        let max = travel.max.min(OPTICAL.max).max(travel.min + SHORTEST_TRAVEL);
+        Some(Lens::linear(wide_deg, Range { max, ..travel }, most))
     }
 
     /// Its lens, with another field of view zoomed out where one is set; one that does not zoom where it did not tell.
@@ -91,7 +94,7 @@ impl Capabilities {
 
     /// Horizontal field of view in degrees, zoomed out.
     pub fn fov_zoomed_out_deg(&self, wide_fov_deg: Option<f64>) -> f64 {
-        self.lens_or_fixed(wide_fov_deg).fov_deg(OPTICAL_STEPS.min)
+        self.lens_or_fixed(wide_fov_deg).fov_deg(OPTICAL.min)
     }
 
     /// Whether it told its field of view.
@@ -125,7 +128,7 @@ mod tests {
             HardLimits { field_angle_deg: Some(Range { min: 3.2, max: 55.2 }), ..HardLimits::default() };
         let mut told = camera(Capabilities { limits, ..Capabilities::default() });
         assert!((told.fov_deg(None) - 55.2).abs() < 1e-9);
-        told.position.zoom_steps = Some(9999.0);
+        told.position.zoom = Some(1.0);
         assert!((told.fov_deg(None) - 3.2).abs() < 1e-9);
         // Set by hand: the widest, from which the lens narrows as it does.
         let magnification = Lens::magnification_between(40.0, told.fov_deg(Some(40.0)));
@@ -139,8 +142,8 @@ mod tests {
     #[test]
     fn a_told_magnification_outweighs_the_field_angles() {
         let mut told = Capabilities { max_optical_magnification: Some(10.0), ..Capabilities::default() };
-        assert!((told.lens().unwrap().magnification(9999.0) - 10.0).abs() < 1e-9);
-        told.zooms = vec![TableRow { step: 1.0, value: 1.0 }, TableRow { step: 9999.0, value: 3.0 }];
-        assert!((told.lens().unwrap().magnification(9999.0) - 3.0).abs() < 1e-9);
+        assert!((told.lens().unwrap().magnification(1.0) - 10.0).abs() < 1e-9);
+        told.zooms = vec![TableRow { setting: 0.0, value: 1.0 }, TableRow { setting: 1.0, value: 3.0 }];
+        assert!((told.lens().unwrap().magnification(1.0) - 3.0).abs() < 1e-9);
     }
 }

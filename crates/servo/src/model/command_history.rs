@@ -21,8 +21,8 @@ struct Entry {
     start: PanTilt,
     /// ... and what they are told.
     rate: PanTilt,
-    /// Where the rate comes from, and may be revised.
-    steps: Option<(i8, i8)>,
+    /// Levels of the speed map, from which the rate comes: it may be revised.
+    levels: Option<(i8, i8)>,
 }
 
 impl CommandHistory {
@@ -39,16 +39,17 @@ impl CommandHistory {
         self.add(at, rate, None);
     }
 
-    /// From `at` on the camera turns with these speed steps for pan and tilt.
-    pub fn push_steps(&mut self, at: Duration, steps: (i8, i8), map: &SpeedMap) {
-        self.add(at, rate_of(steps, map), Some(steps));
+    /// From `at` on the camera turns with these parts of its fastest, for pan and tilt.
+    pub fn push_parts(&mut self, at: Duration, (pan, tilt): (f64, f64), map: &SpeedMap) {
+        let levels = (SpeedMap::level_of(pan), SpeedMap::level_of(tilt));
+        self.add(at, rate_of(levels, map), Some(levels));
     }
 
-    /// Counts what was commanded in steps by another map.
+    /// Counts what was commanded in parts of the fastest by another map.
     pub fn revise(&mut self, map: &SpeedMap) {
         let mut before: Option<Entry> = None;
         for entry in &mut self.entries {
-            entry.rate = entry.steps.map_or(entry.rate, |steps| rate_of(steps, map));
+            entry.rate = entry.levels.map_or(entry.rate, |levels| rate_of(levels, map));
             if let Some(before) = before {
                 entry.start = before.reached(entry.since, self.acceleration_deg_s2);
             }
@@ -56,10 +57,10 @@ impl CommandHistory {
         }
     }
 
-    fn add(&mut self, at: Duration, rate: PanTilt, steps: Option<(i8, i8)>) {
+    fn add(&mut self, at: Duration, rate: PanTilt, levels: Option<(i8, i8)>) {
         let before = self.entries.back();
         let start = before.map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2));
-        self.entries.push_back(Entry { since: at, start, rate, steps });
+        self.entries.push_back(Entry { since: at, start, rate, levels });
         // The entry before the span is still in force at its beginning.
         while self.entries.get(1).is_some_and(|second| second.since + Self::SPAN < at) {
             self.entries.pop_front();
@@ -87,13 +88,13 @@ impl CommandHistory {
         iter::once(first).chain(self.entries.iter().filter(within).map(|entry| entry.rate))
     }
 
-    /// The speed steps in force between two times, last first, with how long each was, in seconds; what was
-    /// not commanded in steps is left out.
-    pub fn steps_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = ((i8, i8), f64)> {
+    /// The levels of the speed map in force between two times, last first, with how long each was, in seconds; what was
+    /// not commanded in parts of the fastest is left out.
+    pub fn levels_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = ((i8, i8), f64)> {
         let ends = iter::once(to).chain(self.entries.iter().rev().map(move |entry| entry.since.min(to)));
         self.entries.iter().rev().zip(ends).filter_map(move |(entry, end)| {
             let lasted = end.saturating_sub(entry.since.max(from)).as_secs_f64();
-            entry.steps.filter(|_| lasted > 0.0).map(|steps| (steps, lasted))
+            entry.levels.filter(|_| lasted > 0.0).map(|levels| (levels, lasted))
         })
     }
 
@@ -192,7 +193,7 @@ mod tests {
     #[test]
     fn motors_take_time_from_one_rate_to_the_next() {
         let mut history = CommandHistory::accelerating(100.0);
-        history.push_steps(ms(0), (20, 0), &SpeedMap::new(50.0, SpeedCurve::Linear));
+        history.push_parts(ms(0), (0.2, 0.0), &SpeedMap::new(50.0, SpeedCurve::Linear));
         history.push(ms(1000), PanTilt::new(-10.0, 0.0));
         let pan = |history: &CommandHistory, from, to| history.rotation(ms(from), ms(to)).pan;
         for (from, to, way) in [(0, 50, 0.125), (50, 100, 0.375), (100, 200, 1.0), (1000, 1200, 0.0)] {
@@ -209,9 +210,9 @@ mod tests {
     }
 
     #[test]
-    fn steps_are_counted_anew_by_another_map() {
+    fn parts_are_counted_anew_by_another_map() {
         let mut history = CommandHistory::default();
-        history.push_steps(ms(0), (10, -20), &SpeedMap::new(100.0, SpeedCurve::Linear));
+        history.push_parts(ms(0), (0.1, -0.2), &SpeedMap::new(100.0, SpeedCurve::Linear));
         history.push(ms(1000), PanTilt::new(3.0, 0.0));
         assert_eq!(history.rate_at(ms(5)), PanTilt::new(10.0, -20.0));
         history.revise(&SpeedMap::new(50.0, SpeedCurve::Linear));

@@ -97,12 +97,12 @@ impl View {
     }
 }
 
-/// A zoom lens: how much it magnifies at which zoom step.
+/// A zoom lens: how much it magnifies at which part of its travel.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Lens {
     /// Horizontal field of view zoomed out, degrees.
     wide_fov_deg: f64,
-    /// Zoom steps and magnification, growing; straight lines in between.
+    /// Parts of the travel and magnification, growing; straight lines in between.
     magnifications: Vec<TableRow>,
 }
 
@@ -112,15 +112,15 @@ impl Lens {
         Self { wide_fov_deg: fov_deg, magnifications: Vec::new() }
     }
 
-    /// A lens with a table of its magnification at zoom steps, rows growing in both.
+    /// A lens with a table of its magnification by its travel, rows growing in both.
     pub fn new(wide_fov_deg: f64, magnifications: Vec<TableRow>) -> Self {
         Self { wide_fov_deg, magnifications }
     }
 
-    /// Magnification grows linearly with the step (Axis' example: step 3868 is 2x, 7736 is 3x) up to `max`.
-    pub fn linear(wide_fov_deg: f64, steps: Range, max: f64) -> Self {
-        let row = |step, value| TableRow { step, value };
-        Self::new(wide_fov_deg, vec![row(steps.min, 1.0), row(steps.max, max)])
+    /// Magnification grows linearly with the travel, as in the one table that is documented, up to `max`.
+    pub fn linear(wide_fov_deg: f64, travel: Range, max: f64) -> Self {
+        let row = |setting, value| TableRow { setting, value };
+        Self::new(wide_fov_deg, vec![row(travel.min, 1.0), row(travel.max, max)])
     }
 
     /// How much narrower one field of view is than another, both in degrees, as a magnification.
@@ -133,25 +133,25 @@ impl Lens {
         Self { wide_fov_deg, ..self }
     }
 
-    /// Horizontal field of view in degrees at a zoom step.
-    pub fn fov_deg(&self, step: f64) -> f64 {
-        magnified(self.wide_fov_deg, self.magnification(step))
+    /// Horizontal field of view in degrees at a part of the travel.
+    pub fn fov_deg(&self, travel: f64) -> f64 {
+        magnified(self.wide_fov_deg, self.magnification(travel))
     }
 
-    /// Magnification at a zoom step.
-    pub fn magnification(&self, step: f64) -> f64 {
-        interpolate(&self.magnifications, step, |row| (row.step, row.value)).unwrap_or(1.0)
+    /// Magnification at a part of the travel.
+    pub fn magnification(&self, travel: f64) -> f64 {
+        interpolate(&self.magnifications, travel, |row| (row.setting, row.value)).unwrap_or(1.0)
     }
 
-    /// The zoom step that magnifies so much more than another; `None` where it does not zoom.
-    pub fn step_magnified(&self, step: f64, factor: f64) -> Option<f64> {
-        self.step(magnified(self.fov_deg(step), factor))
+    /// The part of the travel that magnifies so much more than another; `None` where it does not zoom.
+    pub fn travel_magnified(&self, travel: f64, factor: f64) -> Option<f64> {
+        self.travel(magnified(self.fov_deg(travel), factor))
     }
 
-    /// The zoom step with a horizontal field of view nearest to this, in degrees; `None` where it does not zoom.
-    pub fn step(&self, fov_deg: f64) -> Option<f64> {
+    /// The part of the travel with a horizontal field of view nearest to this, in degrees; `None` where it does not zoom.
+    pub fn travel(&self, fov_deg: f64) -> Option<f64> {
         let wanted = Self::magnification_between(self.wide_fov_deg, fov_deg);
-        interpolate(&self.magnifications, wanted, |row| (row.value, row.step))
+        interpolate(&self.magnifications, wanted, |row| (row.value, row.setting))
     }
 }
 
@@ -242,30 +242,30 @@ mod tests {
     }
 
     #[test]
-    fn magnification_is_linear_in_the_step() {
+    fn magnification_is_linear_in_the_travel() {
         let max = Lens::magnification_between(55.2, 3.2);
-        let lens = Lens::linear(55.2, Range { min: 1.0, max: 9999.0 }, max);
-        near(lens.fov_deg(1.0), 55.2, 1e-9);
-        near(lens.fov_deg(9999.0), 3.2, 1e-9);
-        near(lens.fov_deg(20_000.0), 3.2, 1e-9);
-        near(lens.magnification(5000.0), (1.0 + max) / 2.0, 1e-9);
-        near(lens.step(lens.fov_deg(1234.0)).unwrap(), 1234.0, 1e-6);
+        let lens = Lens::linear(55.2, Range { min: 0.0, max: 1.0 }, max);
+        near(lens.fov_deg(0.0), 55.2, 1e-9);
+        near(lens.fov_deg(1.0), 3.2, 1e-9);
+        near(lens.fov_deg(2.0), 3.2, 1e-9);
+        near(lens.magnification(0.5), (1.0 + max) / 2.0, 1e-9);
+        near(lens.travel(lens.fov_deg(0.1234)).unwrap(), 0.1234, 1e-9);
         near(
-            lens.magnification(lens.step_magnified(1000.0, 1.5).unwrap()),
-            1.5 * lens.magnification(1000.0),
+            lens.magnification(lens.travel_magnified(0.1, 1.5).unwrap()),
+            1.5 * lens.magnification(0.1),
             1e-9,
         );
-        assert_eq!((lens.step(90.0), lens.step(0.1)), (Some(1.0), Some(9999.0)));
+        assert_eq!((lens.travel(90.0), lens.travel(0.1)), (Some(0.0), Some(1.0)));
     }
 
     #[test]
     fn a_lens_has_its_own_table_or_none() {
-        let row = |step, value| TableRow { step, value };
-        let lens = Lens::new(60.0, vec![row(1.0, 1.0), row(5000.0, 2.0), row(9999.0, 12.0)]);
-        near(lens.magnification(5000.0), 2.0, 1e-9);
-        near(lens.magnification(7499.5), 7.0, 1e-9);
-        near(lens.clone().with_wide_fov(40.0).fov_deg(1.0), 40.0, 1e-9);
-        assert_eq!((Lens::fixed(50.0).fov_deg(777.0), Lens::fixed(50.0).step(20.0)), (50.0, None));
+        let row = |setting, value| TableRow { setting, value };
+        let lens = Lens::new(60.0, vec![row(0.0, 1.0), row(0.5, 2.0), row(1.0, 12.0)]);
+        near(lens.magnification(0.5), 2.0, 1e-9);
+        near(lens.magnification(0.75), 7.0, 1e-9);
+        near(lens.clone().with_wide_fov(40.0).fov_deg(0.0), 40.0, 1e-9);
+        assert_eq!((Lens::fixed(50.0).fov_deg(0.777), Lens::fixed(50.0).travel(20.0)), (50.0, None));
     }
 
     proptest! {

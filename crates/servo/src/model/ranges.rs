@@ -27,8 +27,8 @@ pub struct Position {
     pub pan_deg: Option<f64>,
     /// Degrees, positive up.
     pub tilt_deg: Option<f64>,
-    /// Zoom steps, 1 (wide) to 9999 (or 19999 with digital zoom).
-    pub zoom_steps: Option<f64>,
+    /// Part of the optical zoom's travel, 0 (wide) to 1; beyond it what cameras magnify digitally.
+    pub zoom: Option<f64>,
 }
 
 impl Position {
@@ -45,8 +45,8 @@ pub struct HardLimits {
     pub pan_deg: Option<Range>,
     /// Degrees.
     pub tilt_deg: Option<Range>,
-    /// Zoom steps.
-    pub zoom_steps: Option<Range>,
+    /// Parts of the optical zoom's travel.
+    pub zoom: Option<Range>,
     /// Horizontal field of view in degrees: smallest zoomed in, largest zoomed out.
     pub field_angle_deg: Option<Range>,
 }
@@ -57,7 +57,7 @@ impl HardLimits {
         Self {
             pan_deg: self.pan_deg.or(other.pan_deg),
             tilt_deg: self.tilt_deg.or(other.tilt_deg),
-            zoom_steps: self.zoom_steps.or(other.zoom_steps),
+            zoom: self.zoom.or(other.zoom),
             field_angle_deg: self.field_angle_deg.or(other.field_angle_deg),
         }
     }
@@ -70,8 +70,8 @@ pub struct SoftLimits {
     pub pan_deg: Range,
     /// Degrees above the horizon.
     pub tilt_deg: Range,
-    /// Zoom steps.
-    pub zoom_steps: Range,
+    /// Parts of the optical zoom's travel.
+    pub zoom: Range,
 }
 
 impl Default for SoftLimits {
@@ -79,7 +79,7 @@ impl Default for SoftLimits {
         Self {
             pan_deg: Range { min: -180.0, max: 180.0 },
             tilt_deg: Range { min: -180.0, max: 180.0 },
-            zoom_steps: Range { min: 1.0, max: 9999.0 },
+            zoom: Range { min: 0.0, max: 1.0 },
         }
     }
 }
@@ -121,11 +121,11 @@ impl Presets {
     }
 }
 
-/// One row of a table of the camera: what a step of it means.
+/// One row of a table of the camera: what a setting of it means.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableRow {
-    /// The step, as commands and positions have it.
-    pub step: f64,
+    /// The setting, as commands and positions have it: a part of the fastest, or of the zoom's travel.
+    pub setting: f64,
     /// What it means, in the table's unit.
     pub value: f64,
 }

@@ -5,42 +5,41 @@
 use std::mem;
 use std::time::Duration;
 
-use super::{Access, Actuation, ActuatorStatus, Capabilities, Servo};
+use super::{Access, Actuation, ActuatorStatus, Capabilities, Motion, Servo};
 use crate::model::{PanTilt, Position};
 
 impl Servo {
     /// The camera accepted what was sent then: that is when it can begin to act, however late the answer is.
     pub fn accepted(&mut self, actuation: &Actuation, sent: Duration, now: Duration) {
         match actuation {
-            Actuation::Velocity { pan, tilt, zoom } => {
-                let steps = self.axes.exchanged((*pan, *tilt));
-                self.camera.history.push_steps(sent, steps, &self.camera.speed_map);
+            Actuation::Move(Motion::Velocity { pan, tilt, zoom }) => {
+                let parts = self.axes.exchanged((*pan, *tilt));
+                self.camera.history.push_parts(sent, parts, &self.camera.speed_map);
                 if let Some(zoom) = zoom {
                     self.zoom.commanded(sent, *zoom);
                 }
             }
             _ => self.camera.history.push(sent, PanTilt::default()),
         }
-        if actuation.is_point_to_point() {
-            self.moves.begin(sent);
-        } else {
+        match actuation {
+            Actuation::Move(motion) if motion.is_point_to_point() => self.moves.begin(sent),
             // A move under way, from before the mode was changed, is over.
-            self.moves.rest(now);
+            _ => self.moves.rest(now),
         }
         if actuation.is_rest() {
-            self.controller.speed_steps = (0, 0);
+            self.controller.levels = (0, 0);
         }
-        if self.leads_home(actuation) {
-            self.home.settled();
-        } else if !actuation.is_rest() {
-            self.home.strayed();
+        match actuation {
+            Actuation::Move(motion) if self.leads_home(motion) => self.home.settled(),
+            _ if !actuation.is_rest() => self.home.strayed(),
+            _ => {}
         }
     }
 
     /// It may have acted on this, or may yet.
     pub fn unanswered(&mut self, actuation: &Actuation, now: Duration) {
-        if let Actuation::Velocity { zoom: Some(zoom), .. } = actuation
-            && *zoom != 0
+        if let Actuation::Move(Motion::Velocity { zoom: Some(zoom), .. }) = actuation
+            && *zoom != 0.0
         {
             self.zoom.commanded(now, *zoom);
         }
@@ -60,7 +59,7 @@ impl Servo {
         let delays = self.delays();
         let arrived = self.moves.position(position, now, &delays);
         if !self.moves.under_way() {
-            self.zoom.told(at, position.and_then(|position| position.zoom_steps), &delays);
+            self.zoom.told(at, position.and_then(|position| position.zoom), &delays);
         }
         // It came before this was known.
         if let Some(measurement) = self.target.as_ref().map(|target| target.measurement).filter(|_| arrived) {
@@ -75,7 +74,7 @@ impl Servo {
     fn take_position(&mut self, position: Position, at: Duration, actuator: &ActuatorStatus) {
         let before = mem::replace(&mut self.camera.position, position);
         self.home.positioned(position);
-        if position.zoom_steps != before.zoom_steps {
+        if position.zoom != before.zoom {
             self.calibration.zoomed();
         }
         let Some(place) = position.pan_tilt() else { return };

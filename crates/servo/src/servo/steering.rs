@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use ptztrack_contract::Point;
 
-use super::{Access, Actuation, ActuatorStatus, Servo};
+use super::{Access, Actuation, ActuatorStatus, Motion, Servo};
 use crate::control::{ControlLaw, Jump, Mode, ZoomGoal};
 use crate::estimation::Measurement;
 use crate::model::{PanTilt, Position, View, around_deg, narrower};
@@ -33,26 +33,24 @@ impl Servo {
         let wanted = if self.settings.learn_axes { self.axes.cautious(wanted, now) } else { wanted };
         let rate = self.limited(wanted, position, (delays.sum() + actuator.interval).as_secs_f64());
         let (pan, tilt) = self.controller.quantise(rate, &self.camera.speed_map);
-        let zoom = self.zoom_speed(measurement, now);
-        Some(Actuation::Velocity { pan, tilt, zoom })
-            .filter(|actuation| !actuation.is_rest())
-            .unwrap_or(Actuation::Rest)
+        let motion = Motion::Velocity { pan, tilt, zoom: self.zoom_speed(measurement, now) };
+        if motion.is_still() { Actuation::Rest } else { Actuation::Move(motion) }
     }
 
     /// What the zoom is to do; `None` leaves it alone.
-    fn zoom_speed(&mut self, measurement: &Measurement, now: Duration) -> Option<i8> {
+    fn zoom_speed(&mut self, measurement: &Measurement, now: Duration) -> Option<f64> {
         let delays = self.delays();
         let lens = self.camera.capabilities.lens();
         let wanted = self
             .zoom_goal()
             .zip(lens)
             .and_then(|(goal, lens)| self.zoom.speed(&goal, &lens, measurement, &delays, now));
-        wanted.or(self.zoom.is_moving(now).then_some(0))
+        wanted.or(self.zoom.is_moving(now).then_some(0.0))
     }
 
     fn zoom_goal(&self) -> Option<ZoomGoal> {
-        let steps = narrower(self.camera.capabilities.limits.zoom_steps, self.settings.limits.zoom_steps);
-        Some(ZoomGoal { target_height: self.settings.target_height?, steps })
+        let travel = narrower(self.camera.capabilities.limits.zoom, self.settings.limits.zoom);
+        Some(ZoomGoal { target_height: self.settings.target_height?, travel })
     }
 
     /// What of a motion from `position` the limits leave, if it goes on for so long.
@@ -70,15 +68,15 @@ impl Servo {
     }
 
     /// The same of what is to be done.
-    pub(super) fn exchanged_actuation(&self, actuation: Actuation) -> Actuation {
-        match actuation {
-            Actuation::Velocity { pan, tilt, zoom } => {
+    pub(super) fn exchanged_motion(&self, motion: Motion) -> Motion {
+        match motion {
+            Motion::Velocity { pan, tilt, zoom } => {
                 let (pan, tilt) = self.axes.exchanged((pan, tilt));
-                Actuation::Velocity { pan, tilt, zoom }
+                Motion::Velocity { pan, tilt, zoom }
             }
-            Actuation::Absolute { pan_deg, tilt_deg, speed, zoom } => {
+            Motion::Absolute { pan_deg, tilt_deg, speed, zoom } => {
                 let (pan_deg, tilt_deg) = self.axes.exchanged((pan_deg, tilt_deg));
-                Actuation::Absolute { pan_deg, tilt_deg, speed, zoom }
+                Motion::Absolute { pan_deg, tilt_deg, speed, zoom }
             }
             other => other,
         }
@@ -151,7 +149,7 @@ impl Servo {
                 centre(place, measurement.size, jump.map(|jump| jump.factor))
             }
             _ => position.map_or(Actuation::Continue, |position| {
-                absolute(position + turn, self.move_speed(), jump.map(|jump| jump.step))
+                absolute(position + turn, self.move_speed(), jump.map(|jump| jump.travel))
             }),
         }
     }
@@ -172,14 +170,14 @@ impl Servo {
         self.way_home(actuator, now).unwrap_or(Actuation::Rest)
     }
 
-    /// Whether this command takes the camera home.
-    pub fn leads_home(&self, actuation: &Actuation) -> bool {
-        self.home.leads(&self.exchanged_actuation(*actuation), self.move_speed())
+    /// Whether this takes the camera home.
+    pub fn leads_home(&self, motion: &Motion) -> bool {
+        self.home.leads(&self.exchanged_motion(*motion), self.move_speed())
     }
 
-    /// Speed step of moves to a position.
-    fn move_speed(&self) -> u8 {
-        self.camera.capabilities.move_speed.unwrap_or(Actuation::FULL_SPEED)
+    /// Speed of moves to a position.
+    fn move_speed(&self) -> f64 {
+        self.camera.capabilities.move_speed.unwrap_or(Motion::FULL_SPEED)
     }
 
     /// Whether the camera is on its way home, or is to go there.
@@ -191,7 +189,8 @@ impl Servo {
     /// move, and has to be ended first.
     fn way_home(&self, actuator: &ActuatorStatus, now: Duration) -> Option<Actuation> {
         let zooms = self.zoom.is_moving(now) || actuator.in_doubt;
-        self.home.due(now, self.move_speed()).filter(|_| actuator.access == Access::Ours && !zooms)
+        let due = self.home.due(now, self.move_speed()).map(Actuation::Move);
+        due.filter(|_| actuator.access == Access::Ours && !zooms)
     }
 }
 
@@ -202,21 +201,21 @@ fn centre(place: Point, (width, height): (u32, u32), magnify: Option<f64>) -> Ac
         // Saturates; inside the picture by the clamp.
         (place * f64::from(size)).round().clamp(0.0, last) as u32
     };
-    Actuation::Centre {
+    Actuation::Move(Motion::Centre {
         x: pixel(place.x, width),
         y: pixel(place.y, height),
         width,
         height,
-        zoom_percent: magnify.map(|factor| (factor * 100.0).round() as u32),
-    }
+        magnify,
+    })
 }
 
 /// The actuation to look there, the short way round.
-fn absolute(position: PanTilt, speed: u8, zoom: Option<u16>) -> Actuation {
-    Actuation::Absolute {
+fn absolute(position: PanTilt, speed: f64, zoom: Option<f64>) -> Actuation {
+    Actuation::Move(Motion::Absolute {
         pan_deg: around_deg(0.0, position.pan),
         tilt_deg: position.tilt.clamp(-180.0, 180.0),
         speed,
         zoom,
-    }
+    })
 }

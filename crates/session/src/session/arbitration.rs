@@ -24,7 +24,7 @@ pub struct Arbitration {
 #[derive(Debug)]
 struct Found {
     position: PanTilt,
-    zoom_steps: Option<f64>,
+    zoom: Option<f64>,
     at: Duration,
 }
 
@@ -54,8 +54,8 @@ impl Arbitration {
 
     /// More than the noise of a camera at rest, in so short a time.
     const DRIFT_DEG: f64 = 0.3;
-    /// The same for the zoom, of 9999.
-    const DRIFT_ZOOM_STEPS: f64 = 20.0;
+    /// The same for the zoom, in parts of its travel.
+    const DRIFT_ZOOM: f64 = 0.002;
 
     /// Of a camera just met, which may have a control queue or cannot.
     pub fn new(has_queue: bool) -> Self {
@@ -72,13 +72,13 @@ impl Arbitration {
     /// Judges where the camera looks. An operator found keeps it for `give_way`; zero: none is looked for.
     pub fn positioned(
         &mut self,
-        (position, zoom_steps): (PanTilt, Option<f64>),
+        (position, zoom): (PanTilt, Option<f64>),
         (asked, answered): (Duration, Duration),
         commands: CommandedMotion,
         give_way: Duration,
     ) -> Finding {
-        let verdict = self.watch.position((position, zoom_steps), (asked, answered), commands);
-        if self.is_orphan(position, zoom_steps, answered) {
+        let verdict = self.watch.position((position, zoom), (asked, answered), commands);
+        if self.is_orphan(position, zoom, answered) {
             return Finding::Orphan;
         }
         if verdict != Verdict::Foreign || give_way.is_zero() {
@@ -88,17 +88,17 @@ impl Arbitration {
         Finding::Operator
     }
 
-    fn is_orphan(&mut self, position: PanTilt, zoom_steps: Option<f64>, now: Duration) -> bool {
+    fn is_orphan(&mut self, position: PanTilt, zoom: Option<f64>, now: Duration) -> bool {
         if !self.met {
             self.met = true;
-            self.found = Some(Found { position, zoom_steps, at: now });
+            self.found = Some(Found { position, zoom, at: now });
             return false;
         }
         let Some(found) = self.found.as_ref().filter(|found| now <= found.at + Self::FIRST_LOOK) else {
             return false;
         };
-        let zoomed = found.zoom_steps.zip(zoom_steps).map_or(0.0, |(before, now)| (now - before).abs());
-        let zooms = zoomed > Self::DRIFT_ZOOM_STEPS;
+        let zoomed = found.zoom.zip(zoom).map_or(0.0, |(before, now)| (now - before).abs());
+        let zooms = zoomed > Self::DRIFT_ZOOM;
         let moves = found.position.turn_to(position).largest() > Self::DRIFT_DEG;
         if moves || zooms {
             self.found = None;
@@ -202,7 +202,7 @@ mod tests {
     }
 
     fn tell(arbitration: &mut Arbitration, pan: f64, at: Duration) -> Finding {
-        tell_place(arbitration, (PanTilt::new(pan, 0.0), Some(1.0)), at, GIVE_WAY)
+        tell_place(arbitration, (PanTilt::new(pan, 0.0), Some(0.0)), at, GIVE_WAY)
     }
 
     fn met() -> Arbitration {
@@ -249,7 +249,7 @@ mod tests {
         assert!(!arbitration.looks(s(3)));
         let mut arbitration = Arbitration::new(true);
         tell(&mut arbitration, 0.0, s(1));
-        let zoomed = (PanTilt::default(), Some(100.0));
+        let zoomed = (PanTilt::default(), Some(0.01));
         assert_eq!(tell_place(&mut arbitration, zoomed, s(2), GIVE_WAY), Finding::Orphan);
     }
 

@@ -16,7 +16,7 @@ pub struct Description {
     /// `query=attributes`.
     pub attributes: Attributes,
     /// `query=speed`.
-    pub move_speed: Option<u8>,
+    pub move_speed: Option<f64>,
     /// It refused a move that was to be free of proportional speed.
     pub refuses_free_moves: bool,
 }
@@ -67,7 +67,10 @@ impl fmt::Display for Description {
         };
         let endless = if limits.pan_deg.is_some_and(is_endless) { ", endless" } else { "" };
         write!(f, "pan {}{endless}; tilt {}; ", range(limits.pan_deg, "°"), range(limits.tilt_deg, "°"))?;
-        write!(f, "zoom {}; ", range(limits.zoom_steps, ""))?;
+        match self.capabilities().lens() {
+            Some(lens) => write!(f, "zoom to {:.1}x; ", lens.magnification(1.0))?,
+            None => f.write_str("zoom not told; ")?,
+        }
         write!(f, "field of view {}; ", range(limits.field_angle_deg, "°"))?;
         match SpeedMap::through(&self.attributes.speeds) {
             Some(map) => write!(f, "speeds to {:.0}°/s; ", map.deg_s(100))?,
@@ -97,13 +100,13 @@ mod tests {
         let limits = HardLimits {
             pan_deg: Some(Range { min: -180.0, max: 180.0 }),
             tilt_deg: Some(Range { min: -20.0, max: 90.0 }),
-            zoom_steps: Some(Range { min: 1.0, max: 9999.0 }),
+            zoom: Some(Range { min: 0.0, max: 1.0 }),
             field_angle_deg: Some(Range { min: 3.2, max: 55.2 }),
         };
         let parameters =
             Parameters { proportional_speed: Some(true), control_queue: Some(true), ..Parameters::default() };
         let camera = Description { limits, parameters, ..Description::default() };
-        let text = "pan -180 to 180°, endless; tilt -20 to 90°; zoom 1 to 9999; field of view 3.2 to 55.2°; \
+        let text = "pan -180 to 180°, endless; tilt -20 to 90°; zoom to 18.7x; field of view 3.2 to 55.2°; \
                     speeds not told; proportional to the field of view; a control queue";
         assert_eq!(camera.to_string(), text);
     }
@@ -115,7 +118,7 @@ mod tests {
         camera.parameters.proportional_speed = Some(true);
         camera.parameters.max_proportional_speed = Some(2.0);
         assert_eq!(camera.capabilities().max_fields_s, Some(2.0));
-        camera.attributes.speeds = vec![TableRow { step: 100.0, value: 150.0 }];
+        camera.attributes.speeds = vec![TableRow { setting: 1.0, value: 150.0 }];
         assert!(camera.wants_free_moves());
         assert_eq!(camera.capabilities().max_fields_s, None);
         camera.refuses_free_moves = true;

@@ -37,7 +37,7 @@ use scheduler::Scheduler;
 use servo::{Access, ActuatorStatus, Mode, Position};
 use stop_confirmation::{StopConfirmation, StopFinding};
 
-use crate::{Command, Protocol, SessionEvent, SessionSettings};
+use crate::{Protocol, SessionEvent, SessionSettings, Stop};
 
 /// A camera that did not answer a move is not expected to act on it later than this.
 pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
@@ -103,18 +103,18 @@ impl Session {
     }
 
     /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.
-    pub fn parting_stop(&self) -> Option<Command> {
+    pub fn parting_stop(&self) -> Option<Stop> {
         let is_heard = !self.connection.halted() && !self.arbitration.queue.is_deaf();
         (is_heard && !self.is_at_rest()).then_some(self.stop())
     }
 
     /// A predecessor left the camera in a move that this ends.
-    pub fn inherit(&mut self, stop: Command, now: Duration) {
+    pub fn inherit(&mut self, stop: Stop, now: Duration) {
         self.scheduler.inherited(stop, now);
     }
 
     /// What ends the last move.
-    pub fn stop(&self) -> Command {
+    pub fn stop(&self) -> Stop {
         self.scheduler.stop()
     }
 

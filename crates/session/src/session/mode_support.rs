@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use servo::Mode;
+use servo::{Mode, Motion};
 
-use crate::{Command, Error, Parameters};
+use crate::{Command, Error, Parameters, Stop};
 
 /// Which modes a camera supports: by what it tells of itself, and by what it refuses.
 #[derive(Debug)]
@@ -160,10 +160,14 @@ impl ModeSupport {
 /// The mode that a command belongs to.
 fn mode_of(command: &Command) -> Option<Mode> {
     match command {
-        Command::Velocity { .. } | Command::Halt => Some(Mode::Velocity),
-        Command::Absolute { .. } => Some(Mode::Absolute),
-        Command::Centre { .. } => Some(Mode::Centre),
-        Command::Preset { .. } | Command::Stop => None,
+        Command::Stop(Stop::PanTilt | Stop::AllAxes) => Some(Mode::Velocity),
+        Command::Stop(Stop::Position) => None,
+        Command::Move { motion, .. } => match motion {
+            Motion::Velocity { .. } => Some(Mode::Velocity),
+            Motion::Absolute { .. } => Some(Mode::Absolute),
+            Motion::Centre { .. } => Some(Mode::Centre),
+            Motion::Preset { .. } => None,
+        },
     }
 }
 
@@ -171,10 +175,14 @@ fn mode_of(command: &Command) -> Option<Mode> {
 mod tests {
     use super::*;
 
-    const MOVE: Command = Command::Velocity { pan: 1, tilt: 0, zoom: None, free: false };
-    const STEP: Command = Command::Absolute { pan_deg: 1.0, tilt_deg: 0.0, speed: 100, zoom: None };
-    const PIXEL: Command = Command::Centre { x: 1, y: 1, width: 640, height: 480, zoom_percent: None };
+    const MOVE: Command = moving(Motion::Velocity { pan: 0.01, tilt: 0.0, zoom: None });
+    const STEP: Command = moving(Motion::Absolute { pan_deg: 1.0, tilt_deg: 0.0, speed: 1.0, zoom: None });
+    const PIXEL: Command = moving(Motion::Centre { x: 1, y: 1, width: 640, height: 480, magnify: None });
     const SOON: Duration = Duration::from_secs(1);
+
+    const fn moving(motion: Motion) -> Command {
+        Command::Move { motion, free: false }
+    }
 
     fn refuse(modes: &mut ModeSupport, command: &Command) -> Refusal {
         refuse_at(modes, command, SOON)
@@ -259,6 +267,6 @@ mod tests {
         assert_eq!(choose(&mut modes, Mode::Absolute, true, SOON), Mode::Absolute);
         assert!(modes.lacks(Mode::Absolute, SOON));
         assert_eq!(refuse(&mut modes, &STEP), Refusal::OfMode(Mode::Absolute), "no doubt of that any more");
-        assert_eq!(refuse(&mut modes, &Command::Stop), Refusal::Other);
+        assert_eq!(refuse(&mut modes, &Command::Stop(Stop::Position)), Refusal::Other);
     }
 }

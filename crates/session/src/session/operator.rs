@@ -9,7 +9,7 @@ use servo::{CommandHistory, PanTilt};
 pub struct CommandedMotion<'a> {
     /// Rates of pan and tilt.
     pub pan_tilt: &'a CommandHistory,
-    /// Speed steps of the zoom, as the pan of a history; `None`: the zoom is anybody's.
+    /// Speeds of the zoom, as the pan of a history; `None`: the zoom is anybody's.
     pub zoom: Option<&'a CommandHistory>,
 }
 
@@ -35,7 +35,7 @@ pub struct OperatorDetector {
 #[derive(Debug, Clone, Copy)]
 struct Place {
     position: PanTilt,
-    zoom_steps: Option<f64>,
+    zoom: Option<f64>,
     asked: Duration,
 }
 
@@ -43,8 +43,8 @@ impl Place {
     /// This, but where the camera was before.
     fn seen_from(self, before: &Self) -> Self {
         // Where the zoom was is forgotten while it is anybody's.
-        let zoom_steps = self.zoom_steps.map(|now| before.zoom_steps.unwrap_or(now));
-        Self { position: before.position, zoom_steps, ..self }
+        let zoom = self.zoom.map(|now| before.zoom.unwrap_or(now));
+        Self { position: before.position, zoom, ..self }
     }
 }
 
@@ -63,8 +63,8 @@ impl OperatorDetector {
     /// Turns up to this come from noise, from whole degrees told, from an end that springs back.
     const TOLERANCE_DEG: f64 = 1.5;
 
-    /// So do zooms up to this, and from a lens that settles: 1 % of its travel.
-    const TOLERANCE_ZOOM_STEPS: f64 = 100.0;
+    /// So do zooms up to this part of the travel, and from a lens that settles.
+    const TOLERANCE_ZOOM: f64 = 0.01;
 
     /// A command acts no later than this, rest included, and positions are no older.
     const LATEST: Duration = Duration::from_secs(2);
@@ -81,12 +81,12 @@ impl OperatorDetector {
     /// Judges a position that was asked for and answered then.
     pub fn position(
         &mut self,
-        (position, zoom_steps): (PanTilt, Option<f64>),
+        (position, zoom): (PanTilt, Option<f64>),
         (asked, answered): (Duration, Duration),
         commands: CommandedMotion,
     ) -> Verdict {
-        let zoom_steps = commands.zoom.and(zoom_steps);
-        let place = Place { position, zoom_steps, asked };
+        let zoom = commands.zoom.and(zoom);
+        let place = Place { position, zoom, asked };
         let Some(before) = self.place else {
             self.place = Some(place);
             return Verdict::Ours;
@@ -181,9 +181,9 @@ fn explains_zoom(
     (since, answered): (Duration, Duration),
     commands: &CommandHistory,
 ) -> bool {
-    let zoomed = before.zoom_steps.zip(place.zoom_steps).map_or(0.0, |(from, to)| to - from);
+    let zoomed = before.zoom.zip(place.zoom).map_or(0.0, |(from, to)| to - from);
     let speeds = commands.rates_between(since, answered).map(|rate| rate.pan);
-    told(zoomed, OperatorDetector::TOLERANCE_ZOOM_STEPS, speeds)
+    told(zoomed, OperatorDetector::TOLERANCE_ZOOM, speeds)
 }
 
 /// Whether an axis was told to move that way at any time.
@@ -207,7 +207,7 @@ mod tests {
         watch: OperatorDetector,
         commands: CommandHistory,
         zooms: CommandHistory,
-        zoom_steps: f64,
+        zoom: f64,
         now: Duration,
     }
 
@@ -226,7 +226,7 @@ mod tests {
         fn tell_after(&mut self, wait: Duration, pan: f64, tilt: f64) -> Verdict {
             self.now += wait;
             let asked = self.now.saturating_sub(ms(100));
-            let place = (PanTilt::new(pan, tilt), Some(self.zoom_steps));
+            let place = (PanTilt::new(pan, tilt), Some(self.zoom));
             let commands = CommandedMotion { pan_tilt: &self.commands, zoom: Some(&self.zooms) };
             self.watch.position(place, (asked, self.now), commands)
         }
@@ -249,12 +249,12 @@ mod tests {
 
     #[test]
     fn a_hand_that_turns_slowly_is_noticed_too() {
-        for (pan, tilt, zoom) in [(0.4, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 30.0)] {
+        for (pan, tilt, zoom) in [(0.4, 0.0, 0.0), (0.0, -0.4, 0.0), (0.0, 0.0, 0.003)] {
             let mut rig = Rig::armed();
             let verdicts: Vec<Verdict> = (1..=5)
                 .map(|second| {
                     let turned = f64::from(second);
-                    rig.zoom_steps = zoom * turned;
+                    rig.zoom = zoom * turned;
                     rig.tell(pan * turned, tilt * turned)
                 })
                 .collect();
@@ -305,18 +305,18 @@ mod tests {
     #[test]
     fn a_zoom_that_was_not_told_is_somebodys_and_one_that_was_is_ours() {
         let mut rig = Rig::armed();
-        rig.zooms.push(rig.now, PanTilt::new(40.0, 0.0));
-        rig.zoom_steps = 900.0;
+        rig.zooms.push(rig.now, PanTilt::new(0.4, 0.0));
+        rig.zoom = 0.09;
         assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours);
-        rig.zoom_steps = 300.0;
+        rig.zoom = 0.03;
         assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious, "the other way");
         assert_eq!(rig.tell(0.0, 0.0), Verdict::Foreign);
         rig.zooms.push(rig.now, PanTilt::default());
         rig.now += ms(10_000);
         rig.tell(0.0, 0.0);
-        rig.zoom_steps = 390.0;
+        rig.zoom = 0.039;
         assert_eq!(rig.tell(0.0, 0.0), Verdict::Ours, "it settles");
-        rig.zoom_steps = 900.0;
+        rig.zoom = 0.09;
         assert_eq!(rig.tell(0.0, 0.0), Verdict::Suspicious);
     }
 
@@ -325,7 +325,7 @@ mod tests {
         let mut watch = OperatorDetector::default();
         let commands = CommandHistory::default();
         for second in 1..20 {
-            let place = (PanTilt::default(), Some(500.0 * second as f64));
+            let place = (PanTilt::default(), Some(0.05 * second as f64));
             let asked = ms(1000 * second);
             let commands = CommandedMotion { pan_tilt: &commands, zoom: None };
             assert_eq!(watch.position(place, (asked, asked), commands), Verdict::Ours);

@@ -51,13 +51,14 @@ impl Session {
         now: Duration,
     ) -> (Command, Option<Duration>) {
         let retry_at = self.connection.retry_at();
-        match Command::of(&actuation, self.description.wants_free_moves()) {
-            None if actuation == Actuation::Continue || self.arbitration.queue.is_deaf() => {
-                (self.stop(), None)
-            }
-            None => (self.stop(), self.scheduler.stop_due(now, interval, retry_at)),
-            Some(_) if self.is_discovering() => (self.stop(), None),
-            Some(command) => {
+        let stop = Command::Stop(self.stop());
+        match actuation {
+            Actuation::Continue => (stop, None),
+            Actuation::Rest if self.is_deaf() => (stop, None),
+            Actuation::Rest => (stop, self.scheduler.stop_due(now, interval, retry_at)),
+            Actuation::Move(_) if self.is_discovering() => (stop, None),
+            Actuation::Move(motion) => {
+                let command = Command::of(motion, self.description.wants_free_moves());
                 let not_before = retry_at.max(self.modes.not_before(&command));
                 (command, Some(self.scheduler.move_due(&command, interval, not_before)))
             }

@@ -4,14 +4,14 @@
 
 use std::time::Duration;
 
-use servo::{Mode, PanTilt, Position, Presets};
+use servo::{Actuation, Mode, Motion, PanTilt, Position, Presets};
 
 use super::arbitration::Finding;
 use super::connection::Connection;
 use super::mode_support::Refusal;
 use super::scheduler::Scheduler;
 use super::{Fact, Session, Steering};
-use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent};
+use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent, Stop};
 
 impl Session {
     /// A position is asked for this often while the zoom moves, by which the picture changes most, ...
@@ -83,7 +83,7 @@ impl Session {
         if queue.refused_command() || queue.refused(now) {
             return true;
         }
-        if let Command::Velocity { free, .. } = command {
+        if let Command::Move { motion: Motion::Velocity { .. }, free } = command {
             // It may be refused only for being free of proportional speed: then it is sent again without. Where it is refused
             // even so, it was not for that.
             self.description.refuses_free_moves = *free;
@@ -113,7 +113,7 @@ impl Session {
             Refusal::OfMode(_) if self.modes.lacks(self.mode(now), now) => false,
             Refusal::OfMode(mode) => {
                 if mode == Mode::Velocity {
-                    self.scheduler.stop_by(Command::Stop);
+                    self.scheduler.stop_by(Stop::Position);
                 }
                 true
             }
@@ -141,7 +141,7 @@ impl Session {
         self.arbitration.commanded();
         self.arbitration.queue.obeyed();
         let actuation = command.actuation();
-        if actuation.is_point_to_point() {
+        if matches!(actuation, Actuation::Move(motion) if motion.is_point_to_point()) {
             self.arbitration.excuse(now);
             self.next_poll = now + Self::POLL_UNDER_WAY;
         } else if command.is_stop() || !was_moving {
@@ -184,7 +184,7 @@ impl Session {
                 }
             }
             Response::Attributes(attributes) => self.description.attributes = attributes,
-            Response::MoveSpeed(step) => self.description.move_speed = Some(step),
+            Response::MoveSpeed(part) => self.description.move_speed = Some(part),
             Response::Accepted => {}
         }
         if matches!(query, Query::Limits | Query::Parameters | Query::Attributes | Query::MoveSpeed) {
@@ -203,7 +203,7 @@ impl Session {
     ) -> Vec<Fact> {
         self.position = position;
         let mut facts = match position.pan_tilt() {
-            Some(place) => self.look_for_others((place, position.zoom_steps), steering, (sent, now)),
+            Some(place) => self.look_for_others((place, position.zoom), steering, (sent, now)),
             None => {
                 self.undecided();
                 Vec::new()
@@ -327,7 +327,7 @@ impl Session {
             Finding::Orphan => {
                 // That its zoom was not seen to move is no proof that it does not.
                 let lacks_speed = self.modes.lacks(Mode::Velocity, now);
-                self.scheduler.found_moving(if lacks_speed { Command::Stop } else { Command::REST });
+                self.scheduler.found_moving(if lacks_speed { Stop::Position } else { Stop::AllAxes });
                 self.events.push(SessionEvent::Orphan);
             }
             Finding::Operator => {

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use crate::Command;
+use servo::{Actuation, Motion};
+
+use crate::{Command, Stop};
 
 /// When to say what to the camera: the newest only, not too often, nothing twice, stops first and
 /// until they are confirmed.
@@ -20,7 +22,7 @@ pub struct Scheduler {
     /// A move went unanswered, and maybe stops after it: the camera may still act on it until then, even after a stop.
     doubt_until: Option<Duration>,
     /// The words that end the last move, whatever the mode is by now.
-    stop: Command,
+    stop: Stop,
     /// How long the camera took to answer last.
     round_trip: Duration,
 }
@@ -39,7 +41,7 @@ impl Scheduler {
             stop_tried: false,
             contested: false,
             doubt_until: None,
-            stop: Command::Halt,
+            stop: Stop::PanTilt,
             round_trip: Duration::ZERO,
         }
     }
@@ -72,26 +74,24 @@ impl Scheduler {
     pub fn attempted(&mut self, command: &Command, now: Duration) {
         self.last_attempt = Some(now);
         self.stop_tried = command.is_stop();
-        match command {
-            _ if command.is_stop() => {}
-            Command::Velocity { zoom: Some(_), .. } => self.stop = Command::REST,
+        let Command::Move { motion, .. } = command else { return };
+        match motion {
+            _ if motion.is_still() => {}
+            Motion::Velocity { zoom: Some(_), .. } => self.stop = Stop::AllAxes,
             // A zoom goes on until it is told otherwise.
-            Command::Velocity { .. } if self.stop == Command::REST => {}
-            Command::Velocity { .. } => self.stop = Command::Halt,
-            Command::Absolute { .. } | Command::Centre { .. } | Command::Preset { .. } => {
-                self.stop = Command::Stop;
-            }
-            Command::Halt | Command::Stop => {}
+            Motion::Velocity { .. } if self.stop == Stop::AllAxes => {}
+            Motion::Velocity { .. } => self.stop = Stop::PanTilt,
+            _ => self.stop = Stop::Position,
         }
     }
 
     /// What ends the last move.
-    pub fn stop(&self) -> Command {
+    pub fn stop(&self) -> Stop {
         self.stop
     }
 
     /// The camera is to be stopped by these words.
-    pub fn stop_by(&mut self, stop: Command) {
+    pub fn stop_by(&mut self, stop: Stop) {
         self.stop = stop;
     }
 
@@ -112,9 +112,10 @@ impl Scheduler {
         if self.doubt_until.is_some_and(|until| until <= now) {
             self.doubt_until = None;
         }
-        let zoom_rests = matches!(command, Command::Velocity { zoom: Some(0), .. });
-        if zoom_rests && self.stop == Command::REST && !self.in_doubt() {
-            self.stop = Command::Halt;
+        let zoom_rests =
+            matches!(command.actuation(), Actuation::Move(Motion::Velocity { zoom: Some(0.0), .. }));
+        if zoom_rests && self.stop == Stop::AllAxes && !self.in_doubt() {
+            self.stop = Stop::PanTilt;
         }
     }
 
@@ -141,7 +142,7 @@ impl Scheduler {
     /// is; but a zoom of ours goes on whatever pan and tilt do, and what looks like somebody else may be a move of ours that
     /// went unanswered.
     pub fn contest(&mut self) {
-        self.contested = self.may_move && self.stop != Command::REST && !self.in_doubt();
+        self.contested = self.may_move && self.stop != Stop::AllAxes && !self.in_doubt();
     }
 
     /// Whether that is being found out.
@@ -158,21 +159,20 @@ impl Scheduler {
     }
 
     /// It moves at the word of somebody who is not there any more.
-    pub fn found_moving(&mut self, stop: Command) {
+    pub fn found_moving(&mut self, stop: Stop) {
         self.stop = stop;
         self.may_move = true;
         self.stop_tried = false;
     }
 
     /// The same, and not all that he said may have been acted on yet.
-    pub fn inherited(&mut self, stop: Command, now: Duration) {
+    pub fn inherited(&mut self, stop: Stop, now: Duration) {
         self.found_moving(stop);
         self.doubt_until = Some(now + Self::DOUBT);
     }
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        assert!(self.stop.is_stop(), "{} ends no move", self.stop);
         let moves = self.accepted.is_some_and(|(command, _)| !command.is_stop());
         assert!(self.may_move || !moves, "an accepted move is taken for rest: {self:?}");
     }
@@ -193,8 +193,13 @@ mod tests {
     use super::*;
 
     const INTERVAL: Duration = Duration::from_millis(100);
-    const RIGHT: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false };
-    const LEFT: Command = Command::Velocity { pan: -10, tilt: 0, zoom: None, free: false };
+    const RIGHT: Command = turning(0.1, None);
+    const LEFT: Command = turning(-0.1, None);
+    const HALT: Command = Command::Stop(Stop::PanTilt);
+
+    const fn turning(pan: f64, zoom: Option<f64>) -> Command {
+        Command::Move { motion: Motion::Velocity { pan, tilt: 0.0, zoom }, free: false }
+    }
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
@@ -230,10 +235,10 @@ mod tests {
     fn a_stop_is_repeated_until_the_camera_says_yes() {
         let mut scheduler = Scheduler::new(Duration::from_secs(2));
         accept(&mut scheduler, RIGHT, ms(0));
-        scheduler.attempted(&Command::Halt, ms(500));
-        scheduler.failed(&Command::Halt, true, ms(600));
+        scheduler.attempted(&HALT, ms(500));
+        scheduler.failed(&HALT, true, ms(600));
         assert_eq!(scheduler.stop_due(ms(600), INTERVAL, ms(725)), Some(ms(725)));
-        accept(&mut scheduler, Command::Halt, ms(725));
+        accept(&mut scheduler, HALT, ms(725));
         assert_eq!(scheduler.stop_due(ms(800), INTERVAL, ms(0)), None);
         assert!(!scheduler.may_move());
     }
@@ -258,7 +263,7 @@ mod tests {
             assert_eq!(scheduler.may_move(), is_ours);
         }
         let mut scheduler = Scheduler::new(Duration::from_secs(2));
-        accept(&mut scheduler, Command::Velocity { pan: 1, tilt: 0, zoom: Some(9), free: false }, ms(0));
+        accept(&mut scheduler, turning(0.01, Some(0.09)), ms(0));
         scheduler.contest();
         assert!(!scheduler.is_contested(), "a zoom is ended in any case");
         let mut scheduler = Scheduler::new(Duration::from_secs(2));
@@ -274,9 +279,9 @@ mod tests {
         let mut scheduler = Scheduler::new(Duration::from_secs(2));
         scheduler.attempted(&RIGHT, ms(0));
         scheduler.failed(&RIGHT, true, ms(2000));
-        accept(&mut scheduler, Command::Halt, ms(2100));
+        accept(&mut scheduler, HALT, ms(2100));
         assert_eq!(scheduler.stop_due(ms(2100), INTERVAL, ms(0)), Some(ms(8000)));
-        accept(&mut scheduler, Command::Halt, ms(8000));
+        accept(&mut scheduler, HALT, ms(8000));
         assert_eq!(scheduler.stop_due(ms(8000), INTERVAL, ms(0)), None);
     }
 
@@ -286,13 +291,13 @@ mod tests {
         scheduler.attempted(&RIGHT, ms(0));
         scheduler.failed(&RIGHT, true, ms(2000));
         for second in (4..56).step_by(2) {
-            scheduler.attempted(&Command::Halt, ms(1000 * second));
-            scheduler.failed(&Command::Halt, true, ms(1000 * second + 2000));
+            scheduler.attempted(&HALT, ms(1000 * second));
+            scheduler.failed(&HALT, true, ms(1000 * second + 2000));
         }
-        accept(&mut scheduler, Command::Halt, ms(57_000));
+        accept(&mut scheduler, HALT, ms(57_000));
         assert!(scheduler.in_doubt(), "the old move may come after the stop");
         assert_eq!(scheduler.stop_due(ms(57_000), INTERVAL, ms(0)), Some(ms(62_000)));
-        accept(&mut scheduler, Command::Halt, ms(62_000));
+        accept(&mut scheduler, HALT, ms(62_000));
         assert!(!scheduler.in_doubt() && scheduler.stop_due(ms(62_000), INTERVAL, ms(0)).is_none());
     }
 }

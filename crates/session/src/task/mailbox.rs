@@ -15,7 +15,7 @@ use servo::Measurement;
 
 use super::Clock;
 use crate::http::Credentials;
-use crate::{Command, LoopSettings};
+use crate::{LoopSettings, Stop};
 
 /// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
 #[derive(Debug, Default)]
@@ -23,7 +23,7 @@ pub struct Mail {
     pub credentials: Option<Option<Credentials>>,
     pub settings: Option<LoopSettings>,
     /// What ends the move in which a predecessor left the camera.
-    pub orphan: Option<Command>,
+    pub orphan: Option<Stop>,
     /// Forget the target and stop; before `measurement`.
     pub rest: bool,
     pub measurement: Option<Measurement>,
@@ -130,7 +130,7 @@ impl Mailbox {
     }
 
     /// A predecessor left the camera in a move that this ends.
-    pub fn inherit(&self, stop: Command) {
+    pub fn inherit(&self, stop: Stop) {
         self.mail().orphan = Some(stop);
         self.arrived.notify_one();
     }

@@ -29,7 +29,7 @@ use self::state::TaskState;
 
 use crate::http::{ClientSettings, Credentials, Location};
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
-use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
+use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status, Stop};
 use ptztrack_contract::lock::lock;
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
@@ -207,7 +207,7 @@ impl Predecessor {
         self.unconfirmed_stop().is_none() && self.mailbox.strong_count() == 0
     }
 
-    fn unconfirmed_stop(&self) -> Option<Command> {
+    fn unconfirmed_stop(&self) -> Option<Stop> {
         let statistics = lock(&self.statistics);
         statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
     }
@@ -219,7 +219,7 @@ impl Predecessor {
             let mut statistics = lock(&self.statistics);
             // For whoever comes next, until it is known better.
             statistics.status.moving = true;
-            statistics.stop.unwrap_or(Command::Stop)
+            Command::Stop(statistics.stop.unwrap_or(Stop::Position))
         };
         let tries = async {
             while !mailbox.take().quit {
@@ -324,8 +324,8 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             if !state.is_ours_to_stop() {
                 dead_man.release();
             } else if dead_man.is_outdated(in_doubt) {
-                let (identity, command) = (client.identity(), state.control.stop());
-                dead_man.hold(StopOrder { identity, command, in_doubt });
+                let (identity, words) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, words, in_doubt });
             }
         }
         state.keep_dead_man(dead_man);
@@ -336,8 +336,8 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         let Self { client, dead_man, state, move_waits, .. } = self;
         if is_move(request) && state.control.session().is_at_rest() {
             if dead_man.is_outdated(true) {
-                let (identity, command) = (client.identity(), state.control.stop());
-                dead_man.hold(StopOrder { identity, command, in_doubt: true });
+                let (identity, words) = (client.identity(), state.control.stop());
+                dead_man.hold(StopOrder { identity, words, in_doubt: true });
             }
             state.keep_dead_man(dead_man);
             *move_waits = dead_man.is_awaited();
@@ -349,7 +349,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
     /// may it answer.
     async fn change_credentials(&mut self) {
         if let Some(stop) = self.state.control.session().parting_stop() {
-            self.perform(Request::Command(stop)).await;
+            self.perform(Request::Command(Command::Stop(stop))).await;
             // A password often follows on the user's heels.
             self.state.take_mail();
         }
@@ -386,7 +386,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         let stop = state.control.stop();
         lock(&state.statistics).stop = Some(stop);
         if is_move(&request) {
-            dead_man.hold(StopOrder { identity: client.identity(), command: stop, in_doubt: true });
+            dead_man.hold(StopOrder { identity: client.identity(), words: stop, in_doubt: true });
             state.keep_dead_man(dead_man);
         }
         let mut exchange = pin!(client.exchange(&request));
@@ -423,7 +423,7 @@ mod tests {
     fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
         let camera = (Location::parse("http://192.168.0.90").unwrap().0, String::new());
         for may_yet_move in [true, false] {
-            let stop = Some(Command::Halt);
+            let stop = Some(Stop::PanTilt);
             let statistics = Arc::new(Mutex::new(Statistics { stop, may_yet_move, ..Statistics::default() }));
             let predecessor = Predecessor { camera: camera.clone(), mailbox: Weak::new(), statistics };
             assert_eq!(predecessor.unconfirmed_stop().is_some(), may_yet_move);

@@ -240,12 +240,16 @@ impl<O: Fn(Event)> TaskState<O> {
 mod tests {
     use super::*;
     use crate::task::{Clock, FINISH_BUDGET};
-    use crate::{Command, LoopSettings, Next, Protocol, Query, SessionSettings};
+    use crate::{Command, LoopSettings, Next, Protocol, Query, SessionSettings, Stop};
     use proptest::prelude::*;
-    use servo::{Measurement, Position, ServoSettings, Visibility};
+    use servo::{Measurement, Motion, Position, ServoSettings, Visibility};
     use std::sync::mpsc::{Receiver, TryRecvError};
 
-    const MOVE: Request = Request::Command(Command::Velocity { pan: 9, tilt: 0, zoom: None, free: false });
+    const MOVE: Request = Request::Command(Command::Move {
+        motion: Motion::Velocity { pan: 0.09, tilt: 0.0, zoom: None },
+        free: false,
+    });
+    const HALT: Command = Command::Stop(Stop::PanTilt);
 
     fn ms(ms: u64) -> Duration {
         Duration::from_millis(ms)
@@ -312,7 +316,7 @@ mod tests {
             self.see(Visibility::Seen);
             self.serve_at(ms(1000), |_| timeout());
             let rest = self.mailbox.finish(FINISH_BUDGET);
-            assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [Command::Halt]);
+            assert_eq!(self.serve_at(ms(2000), |_| Ok(Response::Accepted)), [HALT]);
             assert!(self.control.session().is_at_rest());
             rest
         }
@@ -330,7 +334,7 @@ mod tests {
         assert!(!state.is_over() && lock(&state.statistics).may_yet_move);
         assert_eq!(state.serve_at(ms(5000), |_| Ok(Response::Accepted)), []);
         assert!(!state.is_over());
-        assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [Command::Halt]);
+        assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [HALT]);
         assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
         assert!(!gave_up(&told));
     }
@@ -366,7 +370,7 @@ mod tests {
                     3 => waiting.push(state.mailbox.rest()),
                     4 => state.mailbox.accept_measurements(false),
                     5 => state.mailbox.accept_measurements(true),
-                    6 => state.mailbox.inherit(Command::Stop),
+                    6 => state.mailbox.inherit(Stop::Position),
                     7 => state.mailbox.configure(LoopSettings { session: SessionSettings { max_rate_hz: 5.0, ..SessionSettings::default() }, ..LoopSettings::default() }),
                     8 => state.mailbox.set_credentials(None),
                     _ => waiting.push(state.mailbox.finish(FINISH_BUDGET)),
@@ -401,6 +405,6 @@ mod tests {
         assert_eq!(state.give_up_at(&MOVE, at, ms(1400)), at);
         state.see(Visibility::Seen);
         assert_eq!(state.give_up_at(&MOVE, at, ms(1450)), None);
-        assert_eq!(state.give_up_at(&Request::Command(Command::Halt), None, ms(1450)), None);
+        assert_eq!(state.give_up_at(&Request::Command(HALT), None, ms(1450)), None);
     }
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use servo::Estimates;
 
 use super::DeadManState;
-use crate::{Command, Status};
+use crate::{Status, Stop};
 
 /// What was exchanged with the camera, and what it is known to do.
 #[derive(Debug, Clone, Default)]
@@ -15,7 +15,7 @@ pub struct Statistics {
     /// What the camera is taken for by now.
     pub estimates: Option<Estimates>,
     /// What ends the last move.
-    pub stop: Option<Command>,
+    pub stop: Option<Stop>,
     /// The camera does not rest for good: it moves, or something unanswered may set it going.
     pub may_yet_move: bool,
     /// Commands that the camera accepted.

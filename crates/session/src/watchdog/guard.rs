@@ -9,7 +9,7 @@ use super::camera_lock::CameraLock;
 use super::protocol::StopOrder;
 use super::{Armed, LAST_TRIES};
 use crate::session::DOUBT;
-use crate::{Client, Command, Request};
+use crate::{Client, Command, Request, Stop};
 
 /// From one try to stop a camera to the next.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -110,10 +110,10 @@ async fn stop<C: Client>(order: &StopOrder) {
             }
         };
         let begin = Instant::now();
-        until_accepted(&mut client, &order.command).await?;
+        until_accepted(&mut client, order.words).await?;
         if order.in_doubt {
             sleep_until(begin + DOUBT).await;
-            until_accepted(&mut client, &order.command).await?;
+            until_accepted(&mut client, order.words).await?;
         }
         Some(())
     };
@@ -122,9 +122,9 @@ async fn stop<C: Client>(order: &StopOrder) {
 }
 
 /// `None`: the camera refuses user or password, and asking again could lock the account.
-async fn until_accepted(client: &mut impl Client, stop: &Command) -> Option<()> {
+async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
     loop {
-        match client.exchange(&Request::Command(*stop)).await {
+        match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
             Err(err) if err.is_final() => return None,
             Err(_) => sleep(PAUSE).await,

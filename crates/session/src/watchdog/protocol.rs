@@ -5,7 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::Command;
+use crate::Stop;
 use crate::http::Identity;
 
 /// One line.
@@ -48,7 +48,7 @@ pub struct StopOrder {
     /// By whom the camera is to think that it is stopped.
     pub identity: Identity,
     /// The words that end its move.
-    pub command: Command,
+    pub words: Stop,
     /// A move is under way that the camera has not answered: it may act on it after a stop.
     pub in_doubt: bool,
 }
@@ -112,7 +112,7 @@ mod tests {
             trust: Trust::Anyone,
         };
         let identity = settings.into();
-        let stop = StopOrder { identity, command: Command::REST, in_doubt: true };
+        let stop = StopOrder { identity, words: Stop::AllAxes, in_doubt: true };
         let message = Message::Hold { lease: 7, stop: Box::new(stop) };
         let line = message.to_line().unwrap();
         assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);

@@ -67,7 +67,7 @@ pub async fn serve<C: Client>(application: UnixStream, armed: &'static Armed) {
             _ => break,
         }
         let (lease, held) = match Message::of_line(&line) {
-            Ok(Message::Hold { lease, stop }) if stop.command.is_stop() => {
+            Ok(Message::Hold { lease, stop }) => {
                 (lease, Some(Held { stop: *stop, until: Instant::now() + LEASE }))
             }
             Ok(Message::Release { lease }) => (lease, None),

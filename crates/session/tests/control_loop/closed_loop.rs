@@ -12,7 +12,7 @@ use ptztrack_contract::{Point, Rect, Vector};
 use servo::{
     Estimates, HardLimits, Measurement, PanTilt, Position, Range, ServoSettings, View, Visibility, around_deg,
 };
-use session::{Command, Error};
+use session::{Command, Error, Stop};
 use session::{Next, Query, Request, Response};
 use virtual_camera::{Head, Kinematics, Motion, Optics, Pose, ProportionalSpeed, ZOOM_RANGE};
 
@@ -303,12 +303,12 @@ impl Simulation {
             Request::Query(Query::Position) if self.setup.tells_position => Response::Position(Position {
                 pan_deg: Some(around_deg(0.0, self.pose().pan)),
                 tilt_deg: Some(self.pose().tilt),
-                zoom_steps: Some(self.head.now().pose.zoom_step.round()),
+                zoom: Some(travel(self.head.now().pose.zoom_step.round())),
             }),
             Request::Query(Query::Limits) => Response::Limits(HardLimits {
                 pan_deg: Some(range(self.setup.pan_limits_deg())),
                 tilt_deg: Some(range(TILT_LIMITS_DEG)),
-                zoom_steps: Some(range(ZOOM_RANGE)),
+                zoom: Some(Range { min: travel(ZOOM_RANGE.0), max: travel(ZOOM_RANGE.1) }),
                 field_angle_deg: Some(range((OPTICS.fov_deg(ZOOM_RANGE.1), WIDE_FOV_DEG))),
             }),
             Request::Query(_) => return Err(Error::Camera("none".to_owned())),
@@ -327,33 +327,43 @@ fn range((min, max): (f64, f64)) -> Range {
     Range { min, max }
 }
 
-/// What the head is to do.
+/// The part of the zoom's travel that a step of the head's is.
+fn travel(step: f64) -> f64 {
+    (step - 1.0) / 9998.0
+}
+
+/// What the head is to do, which counts in steps.
 fn motions(command: &Command) -> Vec<Motion> {
-    match *command {
-        Command::Velocity { pan, tilt, zoom, .. } => {
-            let turn = Motion::PanTilt { pan: f64::from(pan), tilt: f64::from(tilt) };
-            iter::once(turn).chain(zoom.map(|zoom| Motion::Zoom(f64::from(zoom)))).collect()
+    let motion = match command {
+        Command::Move { motion, .. } => motion,
+        Command::Stop(Stop::AllAxes) => &servo::Motion::STILL,
+        Command::Stop(_) => return vec![Motion::Stop],
+    };
+    let step = |part: f64| (part * 100.0).round();
+    match *motion {
+        servo::Motion::Velocity { pan, tilt, zoom } => {
+            let turn = Motion::PanTilt { pan: step(pan), tilt: step(tilt) };
+            iter::once(turn).chain(zoom.map(|zoom| Motion::Zoom(step(zoom)))).collect()
         }
-        Command::Absolute { pan_deg, tilt_deg, speed, zoom } => vec![
-            Motion::Speed(f64::from(speed)),
+        servo::Motion::Absolute { pan_deg, tilt_deg, speed, zoom } => vec![
+            Motion::Speed(step(speed)),
             Motion::Absolute {
                 pan_deg: Some(pan_deg),
                 tilt_deg: Some(tilt_deg),
-                zoom_step: zoom.map(f64::from),
+                zoom_step: zoom.map(|travel| (1.0 + travel * 9998.0).round()),
             },
         ],
-        Command::Centre { x, y, width, height, zoom_percent } => {
+        servo::Motion::Centre { x, y, width, height, magnify } => {
             let (width, height) = (f64::from(width), f64::from(height));
             vec![Motion::Centre {
                 x: f64::from(x) / width - 0.5,
                 y: (f64::from(y) - height / 2.0) / width,
-                magnify: f64::from(zoom_percent.unwrap_or(100)) / 100.0,
+                magnify: (magnify.unwrap_or(1.0) * 100.0).round() / 100.0,
             }]
         }
-        Command::Preset { .. } => {
+        servo::Motion::Preset { .. } => {
             vec![Motion::Absolute { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom_step: None }]
         }
-        Command::Halt | Command::Stop => vec![Motion::Stop],
     }
 }
 

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use servo::{HardLimits, Home, Measurement, Position, Presets, Range, ServoSettings, Visibility};
+use servo::{HardLimits, Home, Measurement, Motion, Position, Presets, Range, ServoSettings, Visibility};
 use session::session::ConnectionChange;
 use session::{Command, Error, Parameters, QueueRequest};
 use session::{Next, Query, Request, Response, SessionEvent};
@@ -32,7 +32,7 @@ fn told(request: &Request) -> Result<Response, Error> {
     Ok(match request {
         Request::Command(_) => Response::Accepted,
         Request::Query(Query::Position) => {
-            Response::Position(Position { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom_steps: Some(1.0) })
+            Response::Position(Position { pan_deg: Some(0.0), tilt_deg: Some(0.0), zoom: Some(0.0) })
         }
         Request::Query(Query::Limits) => Response::Limits(HardLimits {
             pan_deg: Some(Range { min: -170.0, max: 170.0 }),
@@ -41,7 +41,7 @@ fn told(request: &Request) -> Result<Response, Error> {
         Request::Query(Query::Parameters) => {
             Response::Parameters(Parameters { proportional_speed: Some(false), ..Parameters::default() })
         }
-        Request::Query(Query::MoveSpeed) => Response::MoveSpeed(40),
+        Request::Query(Query::MoveSpeed) => Response::MoveSpeed(0.4),
         Request::Query(Query::Presets) => Response::Presets(Presets(vec![(4, "Gate".to_owned())])),
         Request::Query(_) => return Err(refused()),
     })
@@ -296,21 +296,25 @@ fn who_never_lets_up_does_not_keep_a_slow_camera_from_being_asked() {
 
 #[test]
 fn a_camera_that_is_busy_goes_home_later() {
-    let home = Home::Position(Position { pan_deg: Some(30.0), tilt_deg: Some(0.0), zoom_steps: None });
+    let home = Home::Position(Position { pan_deg: Some(30.0), tilt_deg: Some(0.0), zoom: None });
     for err in [starting(), timeout()] {
         let settings =
             ServoSettings { home: Some(home.clone()), home_timeout: ms(500), ..ServoSettings::default() };
         let mut meeting = Meeting::new(settings);
         let mut failures = 2;
         meeting.run((20, ms(0)), nobody, |request| match request {
-            Request::Command(Command::Absolute { speed, .. }) if failures > 0 => {
-                assert_eq!(*speed, 40, "as it told");
+            Request::Command(Command::Move { motion: Motion::Absolute { speed, .. }, .. })
+                if failures > 0 =>
+            {
+                assert_eq!(*speed, 0.4, "as it told");
                 failures -= 1;
                 Err(err.clone())
             }
             _ => told(request),
         });
-        let went = |request: &&Request| matches!(request, Request::Command(Command::Absolute { .. }));
+        let went = |request: &&Request| {
+            matches!(request, Request::Command(Command::Move { motion: Motion::Absolute { .. }, .. }))
+        };
         assert_eq!(meeting.requests.iter().filter(went).count(), 3, "{err}");
         assert!(
             !meeting
@@ -339,7 +343,13 @@ fn presets_that_are_not_told_yet_are_asked_for_later() {
             }
             told(request)
         });
-        assert!(meeting.requests.contains(&Request::Command(Command::Preset { number: 4 })), "{err}");
+        assert!(
+            meeting.requests.contains(&Request::Command(Command::Move {
+                motion: Motion::Preset { number: 4 },
+                free: false
+            })),
+            "{err}"
+        );
         assert_eq!(meeting.asked(Query::Presets), 5, "{err}");
         assert!(!meeting.reports.iter().any(|report| matches!(report, LoopEvent::NoSuchPreset(_))), "{err}");
     }

@@ -6,8 +6,8 @@ use std::ops::Range;
 use std::time::Duration;
 
 use super::closed_loop::{Run, Setup, WIDE_FOV_DEG};
+use super::pan_level;
 use servo::{PanTilt, SpeedCurve};
-use session::Command;
 use virtual_camera::{Kinematics, Limits, SpeedMap};
 
 type Walk = fn(f64) -> (PanTilt, f64);
@@ -60,9 +60,7 @@ fn setup(delay_ms: u64, run: u64, lie: impl Fn(&mut Setup)) -> Setup {
 fn used_steps(run: &Run) -> impl Iterator<Item = i8> {
     let mut seconds = [0.0; 101];
     for pair in run.commands.windows(2).filter(|pair| pair[0].0 > 8.0) {
-        if let Command::Velocity { pan, .. } = pair[0].1 {
-            seconds[usize::from(pan.unsigned_abs())] += pair[1].0 - pair[0].0;
-        }
+        seconds[usize::from(pan_level(&pair[0].1).unsigned_abs())] += pair[1].0 - pair[0].0;
     }
     (1..=100).filter(move |step| seconds[*step as usize] > 1.0)
 }

@@ -18,12 +18,26 @@ use std::mem;
 use std::time::Duration;
 
 use proptest::prelude::*;
-use servo::{HardLimits, Measurement, Mode, Position, Range, ServoSettings, TableRow, Visibility};
+use servo::{
+    HardLimits, Measurement, Mode, Motion, Position, Range, ServoSettings, SpeedMap, TableRow, Visibility,
+};
 use session::session::{ConnectionChange, ControlOwner};
 use session::{
     Attributes, Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Query, Request, Response,
-    SessionEvent, SessionSettings,
+    SessionEvent, SessionSettings, Stop,
 };
+
+const HALT: Command = Command::Stop(Stop::PanTilt);
+const REST: Command = Command::Stop(Stop::AllAxes);
+const STOP: Command = Command::Stop(Stop::Position);
+
+/// At which level of the speed map it pans.
+fn pan_level(command: &Command) -> i8 {
+    match command {
+        Command::Move { motion: Motion::Velocity { pan, .. }, .. } => SpeedMap::level_of(*pan),
+        _ => 0,
+    }
+}
 
 /// A loop that speaks VAPIX.
 fn control_loop(settings: impl Into<LoopSettings>) -> ControlLoop {
@@ -70,7 +84,7 @@ impl Rig {
                 Request::Query(Query::Position) => Ok(Response::Position(Position {
                     pan_deg: Some(0.0),
                     tilt_deg: Some(0.0),
-                    zoom_steps: Some(1.0),
+                    zoom: Some(0.0),
                 })),
                 Request::Query(Query::Limits) => Ok(Response::Limits(HardLimits {
                     pan_deg: Some(Range { min: -170.0, max: 170.0 }),
@@ -126,8 +140,8 @@ fn the_camera_turns_towards_the_target() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.see(0.9, 0.2);
     match rig.after(ms(0))[..] {
-        [Command::Velocity { pan, tilt, zoom: None, free: false }] => {
-            assert!(pan > 0 && tilt > 0, "{pan}, {tilt}")
+        [Command::Move { motion: Motion::Velocity { pan, tilt, zoom: None }, free: false }] => {
+            assert!(pan > 0.0 && tilt > 0.0, "{pan}, {tilt}")
         }
         ref other => panic!("{other:?}"),
     }
@@ -142,7 +156,7 @@ fn a_lost_target_stops_it_at_once() {
     rig.after(ms(0));
     rig.control
         .measure(Measurement { visibility: Visibility::Gone, ..Measurement::at(0.9, 0.5, rig.now) }, rig.now);
-    assert_eq!(rig.after(ms(1)), [Command::Halt]);
+    assert_eq!(rig.after(ms(1)), [HALT]);
     assert_eq!(
         rig.reports(),
         [LoopEvent::Session(SessionEvent::Moving), LoopEvent::Session(SessionEvent::Stopped)]
@@ -161,7 +175,7 @@ fn a_stale_target_stops_it() {
         other => panic!("{other:?}"),
     };
     assert!(wake <= rig.now + ServoSettings::default().stale_timeout);
-    assert_eq!(rig.after(ms(1000)), [Command::Halt]);
+    assert_eq!(rig.after(ms(1000)), [HALT]);
 }
 
 #[test]
@@ -177,7 +191,7 @@ fn a_predicted_target_is_followed_no_longer_than_a_stale_one() {
         );
         commands.extend(rig.after(ms(100)));
     }
-    assert_eq!(commands.last(), Some(&Command::Halt));
+    assert_eq!(commands.last(), Some(&HALT));
     assert!(commands.len() > 1, "it was followed for a while: {commands:?}");
 }
 
@@ -201,7 +215,10 @@ fn at_its_limit_the_camera_is_stopped_in_that_axis_and_it_is_said_once() {
         rig.see(0.9, 0.1);
         for command in rig.after(ms(100)) {
             assert!(
-                matches!(command, Command::Velocity { pan: 0, tilt: 1.., zoom: None, .. }),
+                matches!(
+                    command,
+                    Command::Move { motion: Motion::Velocity { pan: 0.0, tilt: 0.01.., zoom: None }, .. }
+                ),
                 "{command:?}"
             );
         }
@@ -226,7 +243,7 @@ fn a_failed_stop_is_repeated() {
             Err(Error::Timeout(ms(1)))
         });
     }
-    assert_eq!(mem::take(&mut rig.sent), [Command::Halt; 4]);
+    assert_eq!(mem::take(&mut rig.sent), [HALT; 4]);
     assert!(rig.control.session().is_at_rest());
     let disconnected = rig
         .reports()
@@ -241,11 +258,11 @@ fn a_failed_stop_is_repeated() {
 #[test]
 fn what_a_predecessor_left_is_stopped_twice() {
     let mut rig = Rig::new(ServoSettings::default());
-    rig.control.session_mut().inherit(Command::REST, rig.now);
-    assert_eq!(rig.after(ms(0)), [Command::REST]);
+    rig.control.session_mut().inherit(Stop::AllAxes, rig.now);
+    assert_eq!(rig.after(ms(0)), [REST]);
     assert!(rig.control.session().is_at_rest() && !rig.control.session().stays_at_rest());
     assert_eq!(rig.after(ms(5000)), []);
-    assert_eq!(rig.after(ms(1000)), [Command::REST], "he may have said something that acts late");
+    assert_eq!(rig.after(ms(1000)), [REST], "he may have said something that acts late");
     assert!(rig.control.session().stays_at_rest());
     assert_eq!(rig.after(ms(60_000)), []);
 }
@@ -256,7 +273,7 @@ fn a_camera_that_hears_is_stopped_before_we_are_somebody_else() {
     assert_eq!(rig.control.session().parting_stop(), None);
     rig.see(0.9, 0.5);
     rig.after(ms(0));
-    assert_eq!(rig.control.session().parting_stop(), Some(Command::Halt));
+    assert_eq!(rig.control.session().parting_stop(), Some(Stop::PanTilt));
     rig.see(0.1, 0.5);
     rig.now += ms(200);
     rig.run(|_| Err(Error::BadCredentials { user: "root".to_owned() }));
@@ -269,7 +286,9 @@ fn what_was_learned_outlives_the_same_answers_and_no_others() {
     let limits =
         |wide| HardLimits { field_angle_deg: Some(Range { min: 3.2, max: wide }), ..HardLimits::default() };
     let attributes = |fastest| Attributes {
-        speeds: [(1.0, 0.05), (100.0, fastest)].map(|(step, value)| TableRow { step, value }).to_vec(),
+        speeds: [(1.0, 0.05), (100.0, fastest)]
+            .map(|(step, value)| TableRow { setting: step / 100.0, value })
+            .to_vec(),
         ..Attributes::default()
     };
     let tell = |rig: &mut Rig, query, answer| {
@@ -280,7 +299,7 @@ fn what_was_learned_outlives_the_same_answers_and_no_others() {
     tell(&mut rig, Query::Attributes, Response::Attributes(attributes(150.0)));
     for step in 0..100 {
         let pan_deg = Some(0.1 * f64::from(step));
-        let position = Position { pan_deg, tilt_deg: Some(0.0), zoom_steps: Some(1.0) };
+        let position = Position { pan_deg, tilt_deg: Some(0.0), zoom: Some(0.0) };
         tell(&mut rig, Query::Position, Response::Position(position));
         let ego_velocity = Some(ptztrack_contract::Vector { x: -0.02, y: 0.0 });
         rig.control.measure(Measurement { ego_velocity, ..Measurement::at(0.9, 0.5, rig.now) }, rig.now);
@@ -328,7 +347,7 @@ fn what_the_user_may_not_ask_is_not_asked_again_and_the_rest_is_done() {
         control.measure(Measurement::at(0.9, 0.5, ms(1000)), ms(1000));
         assert!(matches!(
             control.next_request(ms(1000)),
-            Next::Do(Request::Command(Command::Velocity { .. }))
+            Next::Do(Request::Command(Command::Move { motion: Motion::Velocity { .. }, .. }))
         ));
     }
 }
@@ -356,7 +375,7 @@ fn absolute_mode_steps_from_rest_to_rest() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
     rig.see(1.0, 0.5);
     match rig.after(ms(0))[..] {
-        [Command::Absolute { pan_deg, tilt_deg, speed: 100, zoom: None }] => {
+        [Command::Move { motion: Motion::Absolute { pan_deg, tilt_deg, speed: 1.0, zoom: None }, .. }] => {
             assert!((pan_deg - 30.0).abs() < 1e-6 && tilt_deg.abs() < 1e-6, "{pan_deg}, {tilt_deg}");
         }
         ref other => panic!("{other:?}"),
@@ -380,10 +399,13 @@ fn absolute_mode_steps_from_rest_to_rest() {
 fn centre_mode_names_the_pixel_and_stops_with_move_stop() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, ..ServoSettings::default() });
     rig.see(0.75, 0.25);
-    let expected = Command::Centre { x: 480, y: 120, width: 640, height: 480, zoom_percent: None };
+    let expected = Command::Move {
+        motion: Motion::Centre { x: 480, y: 120, width: 640, height: 480, magnify: None },
+        free: false,
+    };
     assert_eq!(rig.after(ms(0)), [expected]);
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::Stop]);
+    assert_eq!(rig.after(ms(10)), [STOP]);
 }
 
 #[test]
@@ -395,7 +417,7 @@ fn a_move_by_speed_is_stopped_when_the_mode_becomes_one_of_steps() {
         rig.control.configure(ServoSettings { mode, ..ServoSettings::default() });
         // In the middle: no step is due that would end the move.
         rig.see(0.5, 0.5);
-        assert_eq!(rig.after(ms(100)), [Command::Halt], "{mode:?}");
+        assert_eq!(rig.after(ms(100)), [HALT], "{mode:?}");
         assert!(rig.control.session().is_at_rest());
     }
 }
@@ -415,7 +437,7 @@ fn a_step_under_way_is_forgotten_when_the_mode_becomes_speed() {
         "a position that stays the same is no arrival of a move by speed"
     );
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::Halt]);
+    assert_eq!(rig.after(ms(10)), [HALT]);
 }
 
 #[test]
@@ -425,7 +447,7 @@ fn a_step_is_ended_by_the_words_for_steps_whatever_the_mode_is_by_then() {
     rig.after(ms(0));
     rig.control.configure(ServoSettings::default());
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::Stop]);
+    assert_eq!(rig.after(ms(10)), [STOP]);
 }
 
 #[test]
@@ -441,13 +463,16 @@ fn a_target_goes_stale_while_an_answer_is_waited_for() {
 #[test]
 fn what_was_abandoned_for_a_stop_is_no_fault_but_may_have_acted() {
     let mut rig = Rig::new(ServoSettings::default());
-    let request = Request::Command(Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false });
+    let request = Request::Command(Command::Move {
+        motion: Motion::Velocity { pan: 0.1, tilt: 0.0, zoom: None },
+        free: false,
+    });
     rig.control.sending(&request, rig.now);
     rig.control.abandoned(&request, rig.now);
     rig.control.abandoned(&Request::Query(Query::Position), rig.now);
     assert!(!rig.control.session().is_at_rest());
     assert_eq!(rig.reports(), []);
-    assert_eq!(rig.after(ms(1)), [Command::Halt]);
+    assert_eq!(rig.after(ms(1)), [HALT]);
     assert!(rig.control.session().is_at_rest());
 }
 
@@ -475,7 +500,7 @@ fn walk(settings: ServoSettings, target_deg_s: f64, delay_frames: usize) -> Vec<
         };
         rig.control.measure(seen, rig.now);
         for sent in rig.after(ms(0)) {
-            command = if let Command::Velocity { pan, .. } = sent { pan } else { 0 };
+            command = pan_level(&sent);
         }
         rig.now += FRAME;
     }

@@ -68,7 +68,7 @@ fn a_stop_that_is_refused_out_of_turn_is_tried_at_each_answer_and_says_nothing_o
     rig.aside(ms(6000), queued(Some(2), false));
     assert!(!rig.control.session().is_at_rest());
     rig.control.release();
-    assert_eq!(rig.aside(ms(20_000), queued(Some(2), false)), [Command::Halt; 4]);
+    assert_eq!(rig.aside(ms(20_000), queued(Some(2), false)), [HALT; 4]);
     let reports = rig.reports();
     let taken = |report: &LoopEvent| matches!(report, LoopEvent::Session(SessionEvent::TakenOver(_)));
     assert!(reports.iter().all(taken), "{reports:?}");
@@ -81,7 +81,7 @@ fn a_stop_that_is_refused_out_of_turn_is_tried_at_each_answer_and_says_nothing_o
     rig.now += ms(6000);
     rig.run_jobs(queued(Some(1), false));
     assert!(rig.control.session().is_at_rest() && !rig.control.session().is_queued());
-    assert_eq!(rig.sent.last(), Some(&Command::Halt));
+    assert_eq!(rig.sent.last(), Some(&HALT));
 }
 
 #[test]
@@ -125,7 +125,7 @@ fn the_place_is_kept_for_the_second_stop_of_an_unanswered_move() {
 }
 
 fn at(pan_deg: f64) -> Said {
-    let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom_steps: Some(1.0) };
+    let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom: Some(0.0) };
     Some(Ok(Response::Position(position)))
 }
 
@@ -160,7 +160,13 @@ fn a_suspicion_that_no_answer_resolves_does_not_leave_the_camera_turning() {
             rig.see(0.1, 0.5);
             rig.run_jobs(positioned(|| Some(Err(failure.clone()))));
         }
-        assert!(matches!(rig.sent.last(), Some(Command::Velocity { pan: ..0, .. })), "{failure}");
+        assert!(
+            matches!(
+                rig.sent.last(),
+                Some(Command::Move { motion: Motion::Velocity { pan: ..0.0, .. }, .. })
+            ),
+            "{failure}"
+        );
     }
 }
 

@@ -9,7 +9,7 @@ use servo::{Home, Mounting, SoftLimits};
 fn looking(pan_deg: Option<f64>) -> impl Fn(&Request) -> Option<Result<Response, Error>> {
     move |request| {
         let position =
-            pan_deg.map(|pan| Position { pan_deg: Some(pan), tilt_deg: Some(0.0), zoom_steps: Some(1.0) });
+            pan_deg.map(|pan| Position { pan_deg: Some(pan), tilt_deg: Some(0.0), zoom: Some(0.0) });
         let answer = position.map(Response::Position).ok_or_else(|| Error::Camera("not now".to_owned()));
         (*request == Request::Query(Query::Position)).then_some(answer)
     }
@@ -66,21 +66,27 @@ fn limits_that_cannot_be_kept_are_told_once() {
 
 #[test]
 fn a_zoom_is_ended_before_the_camera_goes_home() {
-    let there = Position { pan_deg: Some(9.0), tilt_deg: Some(0.0), zoom_steps: None };
+    let there = Position { pan_deg: Some(9.0), tilt_deg: Some(0.0), zoom: None };
     let settings = ServoSettings {
         home: Some(Home::Position(there)),
         home_timeout: Duration::ZERO,
         ..ServoSettings::default()
     };
     let mut rig = Rig::new(settings);
-    let zoom = Request::Command(Command::Velocity { pan: 0, tilt: 0, zoom: Some(20), free: false });
+    let zoom = Request::Command(Command::Move {
+        motion: Motion::Velocity { pan: 0.0, tilt: 0.0, zoom: Some(0.2) },
+        free: false,
+    });
     rig.control.sending(&zoom, rig.now);
     rig.control.on_response(&zoom, Ok(Response::Accepted), rig.now, rig.now);
     rig.control
         .measure(Measurement { visibility: Visibility::Gone, ..Measurement::at(0.5, 0.5, rig.now) }, rig.now);
     let mut sent = rig.after(ms(100));
     sent.extend(rig.after(ms(100)));
-    assert!(matches!(sent[..], [Command::REST, Command::Absolute { pan_deg: 9.0, .. }]), "{sent:?}");
+    assert!(
+        matches!(sent[..], [REST, Command::Move { motion: Motion::Absolute { pan_deg: 9.0, .. }, .. }]),
+        "{sent:?}"
+    );
 }
 
 /// The camera counts in its own picture, which is the one that arrives: an axis that is inverted within it inverts that too.
@@ -91,7 +97,10 @@ fn whichever_axis_is_inverted_the_camera_centres_the_place_that_is_seen() {
         let mut rig = Rig::new(ServoSettings { mode: Mode::Centre, mounting, ..ServoSettings::default() });
         rig.see(0.9, 0.2);
         let sent = rig.after(ms(0));
-        let [Command::Centre { x, y, width: 640, height: 480, .. }] = sent[..] else { panic!("{sent:?}") };
+        let [Command::Move { motion: Motion::Centre { x, y, width: 640, height: 480, .. }, .. }] = sent[..]
+        else {
+            panic!("{sent:?}")
+        };
         assert!(x.abs_diff(576) <= 1 && y.abs_diff(96) <= 1, "{mounting:?}: {x}, {y}");
     }
 }

@@ -4,8 +4,10 @@
 
 use super::*;
 
-const ZOOM: Command = Command::Velocity { pan: 0, tilt: 0, zoom: Some(20), free: false };
-const TURN: Command = Command::Velocity { pan: 10, tilt: 0, zoom: None, free: false };
+const ZOOM: Command =
+    Command::Move { motion: Motion::Velocity { pan: 0.0, tilt: 0.0, zoom: Some(0.2) }, free: false };
+const TURN: Command =
+    Command::Move { motion: Motion::Velocity { pan: 0.1, tilt: 0.0, zoom: None }, free: false };
 
 fn accept(rig: &mut Rig, command: Command) {
     let request = Request::Command(command);
@@ -19,14 +21,17 @@ fn a_zoom_is_ended_even_where_the_last_move_was_only_a_turn() {
     accept(&mut rig, ZOOM);
     accept(&mut rig, TURN);
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::REST]);
+    assert_eq!(rig.after(ms(10)), [REST]);
     accept(&mut rig, TURN);
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::Halt], "it rests since");
+    assert_eq!(rig.after(ms(10)), [HALT], "it rests since");
     accept(&mut rig, ZOOM);
-    accept(&mut rig, Command::Velocity { pan: 10, tilt: 0, zoom: Some(0), free: false });
+    accept(
+        &mut rig,
+        Command::Move { motion: Motion::Velocity { pan: 0.1, tilt: 0.0, zoom: Some(0.0) }, free: false },
+    );
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::Halt]);
+    assert_eq!(rig.after(ms(10)), [HALT]);
 }
 
 #[test]
@@ -40,7 +45,7 @@ fn a_zoom_that_went_unanswered_may_be_under_way() {
     accept(&mut rig, TURN);
     assert!(rig.control.servo().is_zooming(rig.now), "a turn leaves it alone");
     rig.control.release();
-    assert_eq!(rig.after(ms(10)), [Command::REST]);
+    assert_eq!(rig.after(ms(10)), [REST]);
     assert!(!rig.control.servo().is_zooming(rig.now));
 }
 
@@ -50,12 +55,11 @@ fn a_camera_found_turning_is_told_to_end_its_zoom_too() {
     for turn in 0..10 {
         rig.now += ms(500);
         rig.run_jobs(|request| {
-            let position =
-                Position { pan_deg: Some(turn.into()), tilt_deg: Some(0.0), zoom_steps: Some(1.0) };
+            let position = Position { pan_deg: Some(turn.into()), tilt_deg: Some(0.0), zoom: Some(0.0) };
             (*request == Request::Query(Query::Position)).then_some(Ok(Response::Position(position)))
         });
     }
-    assert_eq!(rig.sent, [Command::REST]);
+    assert_eq!(rig.sent, [REST]);
 }
 
 /// How often a swing is reported of targets that go to and fro; each is another after so many half waves.

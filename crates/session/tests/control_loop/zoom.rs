@@ -5,7 +5,8 @@
 use std::time::Duration;
 
 use super::closed_loop::{Run, Setup};
-use servo::{Mode, PanTilt, Range, Visibility};
+use super::{HALT, STOP};
+use servo::{Mode, Motion, PanTilt, Range, Visibility};
 use session::Command;
 
 const MODES: [Mode; 3] = [Mode::Velocity, Mode::Absolute, Mode::Centre];
@@ -124,9 +125,9 @@ fn without_auto_zoom_nothing_zooms() {
     let zooms = |command: &Command| {
         matches!(
             command,
-            Command::Velocity { zoom: Some(_), .. }
-                | Command::Absolute { zoom: Some(_), .. }
-                | Command::Centre { zoom_percent: Some(_), .. }
+            Command::Move { motion: Motion::Velocity { zoom: Some(_), .. }, .. }
+                | Command::Move { motion: Motion::Absolute { zoom: Some(_), .. }, .. }
+                | Command::Move { motion: Motion::Centre { magnify: Some(_), .. }, .. }
         )
     };
     assert!(run.commands.len() > 5 && !run.commands.iter().any(|(_, command)| zooms(command)));
@@ -138,7 +139,7 @@ fn soft_limits_are_not_left() {
         let mut setup = zooming(300, 1.0);
         setup.settings.mode = mode;
         setup.settings.limits.pan_deg = Range { min: -5.0, max: 20.0 };
-        setup.settings.limits.zoom_steps = Range { min: 1.0, max: 1000.0 };
+        setup.settings.limits.zoom = Range { min: 0.0, max: 0.1 };
         let run = setup.run(20.0, |time| (PanTilt::new(6.0 * time, 0.0), 2.0));
         let farthest = run.frames.iter().map(|frame| frame.pose.pan).fold(0.0, f64::max);
         // A degree for what the head does after it was told to stop.
@@ -170,9 +171,15 @@ type Refuses = fn(&Command) -> bool;
 #[test]
 fn each_mode_does_with_its_own_commands() {
     let cases: [(Mode, Refuses); 3] = [
-        (Mode::Velocity, |command| !matches!(command, Command::Velocity { .. } | Command::Halt)),
-        (Mode::Absolute, |command| !matches!(command, Command::Absolute { .. } | Command::Stop)),
-        (Mode::Centre, |command| !matches!(command, Command::Centre { .. } | Command::Stop)),
+        (Mode::Velocity, |command| {
+            !matches!(*command, Command::Move { motion: Motion::Velocity { .. }, .. } | HALT)
+        }),
+        (Mode::Absolute, |command| {
+            !matches!(*command, Command::Move { motion: Motion::Absolute { .. }, .. } | STOP)
+        }),
+        (Mode::Centre, |command| {
+            !matches!(*command, Command::Move { motion: Motion::Centre { .. }, .. } | STOP)
+        }),
     ];
     for (mode, refuses) in cases {
         let mut setup = Setup { refuses, jitter: 0.003, ..Setup::new(200, 1.0) };

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! `home` and the zoom as properties and statistics have them.
+
+use servo::{Home, Position};
+
+/// The zoom's last step, zoomed in, as users have it; the first is 1.
+const LAST_STEP: f64 = 9999.0;
+
+/// The part of the zoom's travel that a step is, 1 to 9999.
+pub fn travel(step: f64) -> f64 {
+    (step - 1.0) / (LAST_STEP - 1.0)
+}
+
+/// The step that a part of the zoom's travel is, to a ten thousandth.
+pub fn zoom_step(travel: f64) -> f64 {
+    ((1.0 + travel * (LAST_STEP - 1.0)) * 1e4).round() / 1e4
+}
+
+/// Reads `start`, `pan,tilt` or `pan,tilt,zoom` in degrees and zoom steps, or the name of a preset.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn parse_home(text: &str) -> Result<Home, String> {
+    if text == "start" {
+        return Ok(Home::Start);
+    }
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    match numbers.as_deref() {
+        // A preset may be called 7; a direction has two parts.
+        None | Some([_]) => Ok(Home::Preset(text.to_owned())),
+        Some([pan, tilt]) => position(*pan, *tilt, None),
+        Some([pan, tilt, zoom]) => position(*pan, *tilt, Some(*zoom)),
+        Some(_) => Err(format!("`{text}` has more parts than pan,tilt,zoom")),
+    }
+}
+
+fn position(pan: f64, tilt: f64, step: Option<f64>) -> Result<Home, String> {
+    let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
+    let zooms = step.is_none_or(|step| (1.0..=LAST_STEP).contains(&step));
+    if !turns || !zooms {
+        return Err("pan and tilt must be from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
+    }
+    Ok(Home::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom: step.map(travel) }))
+}
+
+/// What [`parse_home`] reads.
+pub fn home_text(home: &Home) -> String {
+    match home {
+        Home::Start => "start".to_owned(),
+        Home::Position(position) => {
+            let zoom = position.zoom.map_or_else(String::new, |travel| format!(",{}", zoom_step(travel)));
+            format!("{},{}{zoom}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))
+        }
+        Home::Preset(name) => name.clone(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {
+        Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom }
+    }
+
+    #[test]
+    fn homes_are_read() {
+        assert_eq!(parse_home("start"), Ok(Home::Start));
+        assert_eq!(parse_home("-12.5, 3"), Ok(Home::Position(at(-12.5, 3.0, None))));
+        assert_eq!(parse_home("10,-5,9999"), Ok(Home::Position(at(10.0, -5.0, Some(1.0)))));
+        for name in ["Gate", "7", "Gate, left", "north,south"] {
+            assert_eq!(parse_home(name), Ok(Home::Preset(name.to_owned())), "{name}");
+        }
+        for wrong in ["200,0", "0,-190", "0,0,0", "0,0,20000", "NaN,1", "1,2,3,4"] {
+            assert!(parse_home(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn a_home_is_told_as_it_was_set(pan in -180.0..180.0f64, tilt in -180.0..180.0f64, zoom in prop::option::of(1u32..=9999)) {
+            let text = format!("{pan},{tilt}") + &zoom.map_or_else(String::new, |step| format!(",{step}"));
+            prop_assert_eq!(home_text(&parse_home(&text).unwrap()), text);
+        }
+
+        #[test]
+        fn any_text_is_a_home_or_refused(text in ".{0,40}") {
+            let _ = parse_home(&text);
+        }
+    }
+}
