@@ -16,6 +16,8 @@ use crate::metrics::mean;
 
 /// As often as this, at most, any of a comparison's verdicts is wrong.
 const LEVEL: f64 = 0.05;
+/// What all scenes together are called, where there are several strata: a small difference that is everywhere shows in them.
+const ALL: &str = "all strata";
 
 /// An endpoint as it is shown.
 struct Endpoint {
@@ -63,12 +65,14 @@ pub struct Compared {
     pairs: Vec<(Figures, Figures)>,
     /// Of each endpoint, corrected for all endpoints and strata.
     probabilities: [f64; ENDPOINTS],
+    /// Its share of the level.
+    weight: f64,
 }
 
 /// All strata of a comparison.
 #[derive(Debug, Clone)]
 pub struct Comparison {
-    /// In the order of their names.
+    /// In the order of their names, all of them together first.
     pub strata: Vec<Compared>,
 }
 
@@ -89,18 +93,24 @@ impl Comparison {
     /// Of the scenes that both have.
     pub fn of(before: &BTreeMap<Key, Figures>, after: &BTreeMap<Key, Figures>) -> Self {
         let mut strata = BTreeMap::<(String, String), Vec<(Figures, Figures)>>::new();
+        let stratum: BTreeSet<&String> = before.keys().map(|(_, stratum, ..)| stratum).collect();
         for (key, before) in before {
             let Some(after) = after.get(key) else { continue };
-            strata.entry((key.0.clone(), key.1.clone())).or_default().push((*before, *after));
+            let together = (stratum.len() > 1).then_some(ALL);
+            for name in [key.1.as_str()].into_iter().chain(together) {
+                strata.entry((key.0.clone(), name.to_owned())).or_default().push((*before, *after));
+            }
         }
         let found: Vec<_> = strata.values().map(|pairs| sign_flip(&differences(pairs))).collect();
-        let least: Vec<f64> = found.iter().map(|all| all.iter().copied().fold(1.0, f64::min)).collect();
-        let corrected = holm(&least);
+        let weights = weights(strata.keys().map(|(_, name)| name == ALL).collect());
+        let least: Vec<_> = found.iter().map(|all| all.iter().copied().fold(1.0, f64::min)).collect();
+        let corrected = holm(&least.iter().copied().zip(weights.iter().copied()).collect::<Vec<_>>());
         let strata = strata.into_iter().enumerate().map(|(index, (name, pairs))| {
-            // What Holm's correction does to the least of a stratum's probabilities it does to all of them.
+            // What the correction does to the least of a stratum's probabilities it does to all of them.
             let factor = if least[index] > 0.0 { corrected[index] / least[index] } else { 1.0 };
             let probabilities = found[index].map(|probability| (probability * factor).min(1.0));
-            Compared { verdict: verdict(&pairs, &probabilities), name, pairs, probabilities }
+            let (verdict, weight) = (verdict(&pairs, &probabilities), weights[index]);
+            Compared { verdict, name, pairs, probabilities, weight }
         });
         Self { strata: strata.collect() }
     }
@@ -119,6 +129,18 @@ impl Comparison {
             (false, false) => "Not told apart in any stratum.",
         }
     }
+}
+
+/// Shares of the level: half of it is for all strata together, the rest for each alike.
+fn weights(together: Vec<bool>) -> Vec<f64> {
+    let all = together.iter().filter(|one| **one).count();
+    let each = together.len() - all;
+    let weight = |one: &bool| match (one, all) {
+        (true, _) => 0.5 / all as f64,
+        (false, 0) => 1.0 / each as f64,
+        (false, _) => 0.5 / each as f64,
+    };
+    together.iter().map(weight).collect()
 }
 
 fn differences(pairs: &[(Figures, Figures)]) -> Vec<[Option<f64>; ENDPOINTS]> {
@@ -154,7 +176,7 @@ impl fmt::Display for Comparison {
         writeln!(f, "| stratum | scenes | second to first | {} | scenes with a loss |", names.join(" | "))?;
         writeln!(f, "|---|---:|---|{}---|", "---|".repeat(ENDPOINTS))?;
         for one in &self.strata {
-            let cells: Vec<_> = (0..ENDPOINTS).map(|index| one.cell(index, self.strata.len())).collect();
+            let cells: Vec<_> = (0..ENDPOINTS).map(|index| one.cell(index)).collect();
             let (suite, stratum) = &one.name;
             writeln!(
                 f,
@@ -175,14 +197,14 @@ impl fmt::Display for Comparison {
 }
 
 impl Compared {
-    fn cell(&self, index: usize, strata: usize) -> String {
+    fn cell(&self, index: usize) -> String {
         let of = |which: fn(&(Figures, Figures)) -> Figures| {
             mean(&self.pairs.iter().filter_map(|pair| which(pair).endpoints[index]).collect::<Vec<_>>())
         };
         let Some((before, after)) = of(|pair| pair.0).zip(of(|pair| pair.1)) else { return "—".into() };
         let decimals = ENDPOINT[index].decimals;
         // The first of Holm's steps, which all have to pass if only one is to be told.
-        let alpha = LEVEL / (strata * ENDPOINTS) as f64;
+        let alpha = LEVEL * self.weight / ENDPOINTS as f64;
         let seen = match detectable(&column(&self.pairs, index), alpha) {
             Some(Detectable::Difference(least)) => format!(", ≥ {least:.decimals$}"),
             Some(Detectable::Scenes(scenes)) => format!(", ≥ {scenes} scenes"),

@@ -58,12 +58,21 @@ fn many_endpoints_are_paid_for_only_as_far_as_they_differ() {
 #[test]
 fn holm_corrects_as_in_his_example() {
     // By hand: 4 × 0.005, 3 × 0.01, then 2 × 0.03 and 0.04, which may not be less than what came before.
-    let corrected = holm(&[0.01, 0.04, 0.03, 0.005]);
+    let corrected = holm(&[0.01, 0.04, 0.03, 0.005].map(|one| (one, 1.0)));
     for (found, expected) in corrected.into_iter().zip([0.03, 0.06, 0.06, 0.02]) {
         near(found, expected, 1e-12);
     }
-    assert_eq!(holm(&[0.9, 0.8]), [1.0, 1.0]);
+    assert_eq!(holm(&[(0.9, 1.0), (0.8, 1.0)]), [1.0, 1.0]);
     assert!(holm(&[]).is_empty());
+}
+
+#[test]
+fn what_weighs_more_is_corrected_less() {
+    // 0.02 of a half is as much as 0.01 of a quarter: 0.04, then 0.02 × 0.75 / 0.5, and what is left alone.
+    let corrected = holm(&[(0.02, 0.5), (0.008, 0.25), (0.5, 0.25)]);
+    for (found, expected) in corrected.into_iter().zip([0.032, 0.032, 0.5]) {
+        near(found, expected, 1e-12);
+    }
 }
 
 #[test]
@@ -110,15 +119,28 @@ fn what_is_worse_in_one_stratum_is_told_there_alone() {
     let after = figures(|stratum, seed| 80.0 + noise(seed + 3) - if stratum == "hidden" { 9.0 } else { 0.0 });
     let comparison = Comparison::of(&before, &after);
     let verdicts: Vec<_> = comparison.strata.iter().map(|one| (one.name.1.as_str(), one.verdict)).collect();
-    assert_eq!(verdicts, [("alone", Verdict::NotToldApart), ("hidden", Verdict::Worse)]);
+    assert_eq!(
+        verdicts,
+        [("all strata", Verdict::Worse), ("alone", Verdict::NotToldApart), ("hidden", Verdict::Worse)]
+    );
     let text = comparison.to_string();
     assert!(
         text.contains("Worse: at least one stratum is.") && text.contains("0 (0–12 %) → 0 (0–12 %)"),
         "{text}"
     );
     let back = Comparison::of(&after, &before);
-    assert_eq!(back.strata[1].verdict, Verdict::Better);
+    assert_eq!(back.strata[2].verdict, Verdict::Better);
     assert!(back.to_string().contains("Better: at least one stratum is, and none is worse."));
+}
+
+#[test]
+fn what_is_a_little_worse_everywhere_is_told_of_all_strata_together() {
+    // In two scenes of three.
+    let worse = |seed: u64| if seed.is_multiple_of(3) { -0.5 } else { 0.5 };
+    let (before, after) = (figures(|_, seed| seed as f64), figures(|_, seed| seed as f64 - worse(seed)));
+    let comparison = Comparison::of(&before, &after);
+    let verdicts: Vec<_> = comparison.strata.iter().map(|one| one.verdict).collect();
+    assert_eq!(verdicts, [Verdict::Worse, Verdict::NotToldApart, Verdict::NotToldApart], "{comparison}");
 }
 
 #[test]
@@ -172,7 +194,7 @@ proptest! {
 
     #[test]
     fn corrected_probabilities_are_in_the_order_of_what_they_were(values in prop::collection::vec(0.0f64..1.0, 1..12)) {
-        let corrected = holm(&values);
+        let corrected = holm(&values.iter().map(|one| (*one, 1.0)).collect::<Vec<_>>());
         for (one, other) in (0..values.len()).flat_map(|one| (0..values.len()).map(move |other| (one, other))) {
             prop_assert!(corrected[one] >= values[one]);
             prop_assert!(values[one] > values[other] || corrected[one] <= corrected[other]);
