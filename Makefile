@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-all evaluate-everybody soak deny fuzz prove install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
+.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-everybody soak deny fuzz prove install deb test-packages test-container test-fleet packages-bench packages-build packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -119,12 +119,6 @@ evaluate: packages-evaluate
 	$(CARGO) build --release --package evaluation
 	target/release/evaluate $(or $(ARGS),$(SPOT_CHECK))
 	$(if $(PHOTOS),target/release/evaluate --photos "$(PHOTOS)" --out target/evaluation/photos $(PHOTO_ARGS))
-
-## evaluate-all: the same with every tracker and ten seeds, hours of it; broken off, it goes on where it was
-##       (leaves summary.md for the README and tables.md for docs/evaluation.md in target/evaluation/all)
-evaluate-all: packages-evaluate
-	$(CARGO) build --release --package evaluation
-	target/release/evaluate --matrix --out target/evaluation/all $(ARGS)
 
 ## evaluate-everybody: score who is who among all who are in view (HOTA, IDF1, MOTA): ours beside SORT, ByteTrack, OC-SORT and BoT-SORT
 ##       over the same regions, in open-loop scenes with two people and more, or in RECORDING=file with TRUTH=file (MOTChallenge); leaves

@@ -31,7 +31,7 @@ pub struct Args {
     /// Width and height of the pictures; a recording as it is has its own
     #[arg(long, value_name = "WxH", default_value = "640x480", value_parser = size, conflicts_with = "still_recording")]
     pub size: (u32, u32),
-    /// Numbers of worlds, `1` or `1-3`; 1 is the reference, 1 to 5 are for tuning, 6 to 10 are not
+    /// Numbers of worlds, `1` or `1-3`; 1 is the reference
     #[arg(long, value_name = "N[,N-M]", value_delimiter = ',', default_value = "1")]
     pub seed: Vec<Seeds>,
     /// From light on the sensor to the picture at the tracker, in milliseconds
@@ -44,10 +44,6 @@ pub struct Args {
     /// in recordings, unless said otherwise
     #[arg(long)]
     pub first_box: Option<FirstBox>,
-    /// Run everything that the published tables are made from, hours of it: ours and `thesis` on seeds 1 to 10, all others on 1
-    /// and 6. What is kept is not run again, so it may be broken off and called again
-    #[arg(long, conflicts_with_all = ["test", "tracker", "seed", "first_box", "footage", "still_recording", "real_time"])]
-    pub matrix: bool,
     /// Run everything anew, whatever results are kept
     #[arg(long)]
     pub fresh: bool,
@@ -56,11 +52,11 @@ pub struct Args {
     pub results: PathBuf,
     /// Instead of running anything, say of each stratum whether the second of two reports is better, worse or not told apart from
     /// the first: two folders once given as --out with --open-loop or --closed-loop
-    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["matrix", "test", "gallery", "footage", "still_recording"])]
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["test", "gallery", "footage", "still_recording"])]
     pub compare: Vec<PathBuf>,
     /// Instead of running anything, say how often a report of --replicates 2 or more is told apart from itself, its recordings dealt out
     /// at random
-    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["compare", "matrix", "test", "gallery", "footage", "still_recording"])]
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["compare", "test", "gallery", "footage", "still_recording"])]
     pub calibrate: Option<PathBuf>,
     /// Write a video of each run into films/ as well, with everything drawn in: the truth in white
     #[arg(long)]
@@ -89,10 +85,10 @@ pub struct Args {
     pub person: Whom,
     /// Instead of the tests, twelve ways through each photograph of a folder: panoramas in panoramas/, in walker/ somebody cut out
     /// of film
-    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording", "matrix"])]
+    #[arg(long, value_name = "FOLDER", group = "photographs", conflicts_with_all = ["recording"])]
     pub photos: Option<PathBuf>,
     /// Instead of the tests, twelve ways through this equirectangular panorama
-    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording", "matrix"])]
+    #[arg(long, value_name = "FILE", group = "photographs", requires = "walker", conflicts_with_all = ["recording"])]
     pub photo: Option<PathBuf>,
     /// Folder of somebody cut out of film: walker.csv, and the pictures that it lists
     #[arg(long, value_name = "FOLDER", requires = "photo")]
@@ -198,9 +194,7 @@ impl Args {
 
     /// The trackers asked for, in the order of the tables, and what is to be said of those that are left out.
     pub fn trackers(&self) -> (Vec<TrackerName>, Vec<String>) {
-        let asked = |name: &TrackerName| {
-            self.matrix || self.tracker.iter().any(|Trackers(names)| names.contains(name))
-        };
+        let asked = |name: &TrackerName| self.tracker.iter().any(|Trackers(names)| names.contains(name));
         let (mut there, mut left_out) = (Vec::new(), Vec::new());
         for name in TrackerName::ALL.iter().copied().filter(asked) {
             match missing(name) {
@@ -294,34 +288,11 @@ impl Args {
         rooms.map(|scene| (scene, seed)).collect()
     }
 
-    /// What the published tables are made from.
-    fn matrix(&self, trackers: &[TrackerName]) -> Vec<Experiment> {
-        let mut experiments = Vec::new();
-        let runs = |name: TrackerName, seed: u64, first_box: FirstBox| {
-            let with = move |(scene, seed)| Experiment { first_box, ..self.experiment(scene, name, seed) };
-            self.rooms(seed).into_iter().map(with).collect::<Vec<_>>()
-        };
-        for &name in trackers {
-            let detects = name.detects();
-            for seed in if detects { (1..=10).collect() } else { vec![1, 6] } {
-                experiments.extend(runs(name, seed, FirstBox::Detected));
-            }
-        }
-        // Beside it, with the first box given to those that need none.
-        for &name in trackers.iter().filter(|name| name.detects()) {
-            experiments.extend([1, 6].into_iter().flat_map(|seed| runs(name, seed, FirstBox::Given)));
-        }
-        experiments
-    }
-
     /// Everything asked for, tracker after tracker.
     ///
     /// # Errors
     /// Where a recording or its ground truth cannot be used.
     pub fn experiments(&self, trackers: &[TrackerName]) -> Result<Vec<Experiment>, SceneError> {
-        if self.matrix {
-            return Ok(self.matrix(trackers));
-        }
         let scenes = self.scenes()?;
         let mut experiments = Vec::new();
         for tracker in trackers {
@@ -362,19 +333,6 @@ mod tests {
     }
 
     #[test]
-    fn the_matrix_has_all_of_ours_and_two_seeds_of_the_others() {
-        let experiments = parse("--matrix").unwrap().matrix(TrackerName::ALL);
-        let count = |name, first_box| {
-            experiments.iter().filter(|one| one.tracker == name && one.first_box == first_box).count()
-        };
-        assert_eq!(count(TrackerName::Ptztrack, FirstBox::Detected), 720);
-        assert_eq!(count(TrackerName::Thesis, FirstBox::Given), 144);
-        assert_eq!(count(TrackerName::Csrt, FirstBox::Detected), 144);
-        assert_eq!(count(TrackerName::Csrt, FirstBox::Given), 0, "it is given the box anyway");
-        assert_eq!(experiments.len(), 720 * 2 + 144 * 2 + 144 * 11);
-    }
-
-    #[test]
     fn all_means_all_that_are_there() {
         crate::init().unwrap();
         let (there, left_out) = parse("--tracker all").unwrap().trackers();
@@ -403,7 +361,6 @@ mod tests {
             ("--first-box drawn", "detected, given"),
             ("--seed 3-1", "whole numbers"),
             ("--compare a", "2 values"),
-            ("--matrix --seed 2", "cannot be used with"),
             ("--footage x.avi", "--truth"),
             ("--truth x.csv", "--footage"),
             ("--person 3", "--still-recording"),

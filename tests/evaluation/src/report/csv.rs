@@ -4,11 +4,10 @@
 
 use super::{
     column,
-    judged::{Judged, Section, Setup},
-    tables::{PRINTED, conditions, in_condition, printed_in},
+    judged::{Judged, Setup},
 };
 use crate::{
-    metrics::{Metrics, d_gc, d_gp, is_true_positive},
+    metrics::{d_gc, d_gp, is_true_positive},
     record::{FrameRecord, GroundTruth, Provenance},
 };
 
@@ -71,45 +70,6 @@ pub fn losses(judged: &[Judged]) -> String {
 /// Whether a text is what [`results`] once wrote.
 pub fn is_results(text: &str) -> bool {
     text.starts_with(&RUN.join(","))
-}
-
-/// One line a tracker and condition, and the thesis' own means of the same tests.
-pub fn by_condition(sections: &[Section]) -> String {
-    let figures = column::OF_TESTS.iter().map(|column| column.key.to_owned());
-    let intervals = column::WITH_INTERVAL
-        .iter()
-        .flat_map(|column| ["low", "high"].map(|end| format!("{}_{end}", column.key)));
-    let first = ["tracker", "condition", "runs", "worlds"].into_iter().chain(SETUP).map(str::to_owned);
-    let mut csv = line(first.chain(figures).chain(intervals));
-    for section in sections {
-        let printed = section.printed();
-        for condition in conditions(section) {
-            let ours = section.trackers().map(|tracker| {
-                (tracker.to_string(), in_condition(section, tracker, condition).collect::<Vec<_>>())
-            });
-            let begin = |name: String, count: usize| {
-                let worlds = section.setup.worlds.name().to_owned();
-                let mut cells = vec![name, condition.name.to_owned(), count.to_string(), worlds];
-                cells.extend(setup(&section.setup));
-                cells
-            };
-            for (name, runs) in ours {
-                let mut cells = begin(name, runs.len());
-                cells.extend(means(&runs.iter().map(|one| &one.metrics).collect::<Vec<_>>()));
-                cells.extend(column::WITH_INTERVAL.iter().flat_map(|column| {
-                    let interval = column.interval(runs.iter().copied());
-                    [number(interval.map(|i| i.low)), number(interval.map(|i| i.high))]
-                }));
-                csv += &line(cells);
-            }
-            let theirs: Vec<_> = printed_in(&printed, condition).collect();
-            let mut cells = begin(PRINTED.to_owned(), theirs.len());
-            cells.extend(means(&theirs));
-            cells.extend(column::WITH_INTERVAL.iter().flat_map(|_| [String::new(), String::new()]));
-            csv += &line(cells);
-        }
-    }
-    csv
 }
 
 /// One line a picture of one run.
@@ -190,10 +150,6 @@ fn setup(setup: &Setup) -> [String; 7] {
         command.to_string(),
         setup.real_time.to_string(),
     ]
-}
-
-fn means(runs: &[&Metrics]) -> impl Iterator<Item = String> {
-    column::OF_TESTS.iter().map(|column| number(column.mean(runs.iter().copied())))
 }
 
 /// Of fixed digits; nothing where there is none.

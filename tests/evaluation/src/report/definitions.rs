@@ -70,10 +70,7 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
         "95 %, by the bootstrap: 2000 draws of groups with replacement. A group is all runs of the same seed and path, as \
          they are not independent of each other.",
     ),
-    (
-        "Seeds",
-        "Each is another room, another person and other ways. 1 to 5 may be tuned on, 6 to 10 are not, and are printed apart.",
-    ),
+    ("Seeds", "Each is another room, another person and other ways."),
     ("Acquired after", "From the first box to the first true positive."),
     (
         "Identity kept",

@@ -13,36 +13,6 @@ use crate::{
     record::{Codec, Delays, FirstBox, Run, Suite, TestId, TrackerName},
 };
 
-/// Which worlds: those that anybody may tune on are told apart from those that nobody does.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Worlds {
-    /// Seeds 1 to 5.
-    Tuning,
-    /// Seeds 6 to 10.
-    HeldOut,
-    /// Any other.
-    Other,
-}
-
-impl Worlds {
-    fn of(seed: u64) -> Self {
-        match seed {
-            1..=5 => Self::Tuning,
-            6..=10 => Self::HeldOut,
-            _ => Self::Other,
-        }
-    }
-
-    /// In words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Tuning => "seeds 1 to 5 (for tuning)",
-            Self::HeldOut => "seeds 6 to 10 (never tuned on)",
-            Self::Other => "other seeds",
-        }
-    }
-}
-
 /// What makes runs comparable.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Setup {
@@ -50,8 +20,6 @@ pub struct Setup {
     pub suite: Suite,
     /// Who draws the first box.
     pub first_box: FirstBox,
-    /// Which worlds.
-    pub worlds: Worlds,
     /// What the pictures go through.
     pub codec: Codec,
     /// Width and height in pixels.
@@ -64,9 +32,8 @@ pub struct Setup {
 
 impl Setup {
     fn of(run: &Run) -> Self {
-        let Run { suite, seed, codec, size, first_box, delays, .. } = *run;
-        let (worlds, real_time) = (Worlds::of(seed), run.dropped.is_some());
-        Self { suite, first_box, worlds, codec, size, delays, real_time }
+        let Run { suite, codec, size, first_box, delays, .. } = *run;
+        Self { suite, first_box, codec, size, delays, real_time: run.dropped.is_some() }
     }
 
     /// Name of a folder for runs of that seed.
@@ -86,8 +53,7 @@ impl fmt::Display for Setup {
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         write!(
             f,
-            "{suite}, {}, first box {first_box}, {codec}, {width}x{height}, delays: video {video} ms, command {command} ms{}",
-            self.worlds.name(),
+            "{suite}, first box {first_box}, {codec}, {width}x{height}, delays: video {video} ms, command {command} ms{}",
             if self.real_time { ", in real time" } else { "" }
         )
     }
@@ -192,7 +158,7 @@ impl<'a> Section<'a> {
         first.iter().filter(|shown| others.iter().all(|other| other.contains(*shown))).copied().collect()
     }
 
-    /// The runs of what was shown, in the first of the worlds.
+    /// The runs of what was shown, of the first seed.
     pub fn showing(&self, title: &str) -> impl Iterator<Item = &'a Judged<'a>> + use<'a, '_> {
         let title = title.to_owned();
         let first = self.runs.iter().filter(|one| one.run.title == title).map(|one| one.run.seed).min();

@@ -5,11 +5,9 @@
 //! | file | what is in it |
 //! |---|---|
 //! | `results.csv` | one line a run |
-//! | `conditions.csv` | means a tracker and condition, the thesis' beside them |
 //! | `frames/…/….csv` | one line a picture of a run |
 //! | `losses.csv` | one line a loss, with its cause |
 //! | `summary.md` | the worst conditions, trackers × figures, causes of losses: for a screen, and for the README |
-//! | `tables.md` | trackers × figures, trackers × conditions |
 //! | `tests.md` | every test of every tracker beside the thesis' figures |
 //! | `plots/….png` | d_gc and d_gp over time |
 //! | `index.html` | all of it in one file |
@@ -106,7 +104,6 @@ pub fn write(runs: &[Run], left_out: &[String], out: &Path) -> Result<Report, Re
     let content = Content::of(&judged, left_out);
     clear(out)?;
     save(&out.join(RESULTS), csv::results(&judged))?;
-    save(&out.join("conditions.csv"), csv::by_condition(&content.sections))?;
     save(&out.join("losses.csv"), csv::losses(&judged))?;
     for one in &judged {
         save(&out.join(format!("frames/{}.csv", place(one.run))), csv::frames(&one.run.frames))?;
@@ -118,7 +115,6 @@ pub fn write(runs: &[Run], left_out: &[String], out: &Path) -> Result<Report, Re
     notes.extend(content.draw(&plots));
     let summary = content.summary();
     save(&out.join("summary.md"), with_notes(&summary, &notes))?;
-    save(&out.join("tables.md"), content.tables())?;
     save(&out.join("tests.md"), content.test_by_test())?;
     save(&out.join("index.html"), page::html(&content, &plots))?;
     Ok(Report { summary, notes })
@@ -201,7 +197,7 @@ impl<'a> Content<'a> {
             let recordings = Some(tables::recordings(section)).filter(|table| !table.rows.is_empty());
             let overview = tables::overview(section);
             let causes = tables::causes(section);
-            let tables = [Some(overview), tables::all_worlds(section), Some(causes), recordings];
+            let tables = [Some(overview), Some(causes), recordings];
             let worst = tables::worst(section).map(|worst| worst + "\n").unwrap_or_default();
             worst + &joined(tables.into_iter().flatten())
         };
@@ -209,25 +205,6 @@ impl<'a> Content<'a> {
         let note = self.sections.iter().any(|section| !section.printed().is_empty());
         let note = if note { format!("\n{}\n", thesis::NOTE) } else { String::new() };
         sections.join("\n") + &note
-    }
-
-    /// Everything by condition.
-    fn tables(&self) -> String {
-        let figures = [
-            column::P,
-            column::P_PREDICTED,
-            column::DP,
-            column::TF,
-            column::SUCCESS,
-            column::MEAN_DGC,
-            column::MEAN_DGP,
-            column::LOSSES,
-        ];
-        let sections = self.sections.iter().filter(|section| !section.printed().is_empty());
-        let tables = sections.flat_map(|section| {
-            figures.iter().map(|column| tables::by_condition(section, column)).collect::<Vec<_>>()
-        });
-        format!("{}\n{}", self.summary(), joined(tables))
     }
 
     fn test_by_test(&self) -> String {

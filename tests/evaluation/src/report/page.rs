@@ -45,7 +45,6 @@ fn section(section: &Section, content: &Content, plots: &Path) -> String {
     if !section.printed().is_empty() {
         html += "<p>P and DP: more is better; TF, d_gc, d_gp: less is better. See <a href=\"#counted\">what is counted</a>.</p>\n";
         html += &tables::overview(section).html();
-        html += &tables::all_worlds(section).map(|table| table.html()).unwrap_or_default();
         html += &format!("<p>{}</p>\n", escape(thesis::NOTE));
         html += &BY_CONDITION.map(|column| tables::by_condition(section, &column).html()).concat();
     }

@@ -47,20 +47,6 @@ pub fn overview(section: &Section) -> Table {
     }
 }
 
-/// Trackers × figures, over all runs of those that were run on more than was shown to every tracker.
-pub fn all_worlds(section: &Section) -> Option<Table> {
-    let shared = section.shared().len();
-    let more = section.trackers().filter(|name| section.whole(*name).count() > shared);
-    let line =
-        |name: TrackerName| figures(section, name.to_string(), &section.whole(name).collect::<Vec<_>>());
-    let rows: Vec<_> = more.map(line).collect();
-    (!rows.is_empty()).then(|| Table {
-        caption: format!("Those that were run on all seeds ({})", section.setup),
-        headings: summary_headings(section),
-        rows,
-    })
-}
-
 fn summary_columns(section: &Section) -> impl Iterator<Item = &'static Column> + use<> {
     let dropped = section.setup.real_time.then_some(&column::DROPPED);
     column::OF_SUMMARY.iter().chain(dropped)

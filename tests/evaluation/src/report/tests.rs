@@ -146,12 +146,10 @@ fn the_thesis_stands_beside_the_tests_that_were_run() {
     let folder = Folder::new("thesis");
     write(&runs(), &[], &folder.0).unwrap();
     assert!(folder.read("tests.md").contains("87.5 (92.8)"), "{}", folder.read("tests.md"));
-    let conditions = folder.read("conditions.csv");
     // Tests 1 and 40 are unoccluded: (92.81 + 80.66) / 2.
-    let printed =
-        conditions.lines().find(|line| line.starts_with("\"thesis, as printed\",occlusion=none,2,"));
-    assert!(printed.unwrap().contains(",86.735000,"), "{conditions}");
-    assert!(!conditions.contains("occlusion=full"), "none was run");
+    let page = folder.read("index.html");
+    assert!(page.contains("<td>86.7</td>"), "{page}");
+    assert!(!page.contains("<th>full occlusion</th>"), "none was run");
 }
 
 #[test]
@@ -197,7 +195,7 @@ fn same_runs_give_same_bytes_in_any_order() {
     runs.reverse();
     write(&runs, &[], &other.0).unwrap();
     assert!(one.all() == other.all());
-    assert!(one.all().len() >= 11);
+    assert!(one.all().len() >= 9);
 }
 
 #[test]
@@ -207,9 +205,6 @@ fn a_run_that_failed_keeps_its_line_and_is_in_no_mean() {
     let broken = Run { frames: (0..40).map(|index| frame(index, index < 5)).collect(), ..broken };
     write(&[run(1, TrackerName::Ptztrack), broken], &[], &folder.0).unwrap();
     assert!(folder.read("results.csv").lines().nth(2).unwrap().ends_with(",broke off"));
-    let conditions = folder.read("conditions.csv");
-    let all = conditions.lines().find(|line| line.starts_with("ptztrack,all,1,")).unwrap();
-    assert!(all.contains(",87.500000,100.000000,"), "test 1 alone: {all}");
     let summary = folder.read("summary.md");
     assert!(summary.contains("| ptztrack           |    1 | 87.5 |"), "{summary}");
     assert!(summary.contains("\n- test 40, ptztrack failed: broke off\n"), "{summary}");
@@ -276,22 +271,15 @@ fn what_was_run_with_another_servo_or_laboratory_is_refused() {
 }
 
 #[test]
-fn seeds_that_nobody_tunes_on_stand_apart_and_rows_are_over_the_same_runs() {
-    let folder = Folder::new("worlds");
+fn rows_are_over_the_same_runs() {
+    let folder = Folder::new("shared");
     let seeded = |seed, tracker| Run { seed, ..run(1, tracker) };
-    let runs = [
-        seeded(1, TrackerName::Ptztrack),
-        seeded(2, TrackerName::Ptztrack),
-        seeded(1, TrackerName::Still),
-        seeded(6, TrackerName::Ptztrack),
-    ];
+    let runs =
+        [seeded(1, TrackerName::Ptztrack), seeded(2, TrackerName::Ptztrack), seeded(1, TrackerName::Still)];
     let summary = write(&runs, &[], &folder.0).unwrap().summary;
-    let means: Vec<_> = summary.lines().filter(|line| line.starts_with("Means over")).collect();
     assert!(
-        means.len() == 2 && means[0].contains("1 runs of each tracker") && means[0].contains("seed 1 "),
-        "{means:?}"
+        summary.contains("Means over 1 runs of each tracker") && summary.contains("seed 1 "),
+        "{summary}"
     );
-    assert!(means[1].contains("never tuned on"), "{means:?}");
-    let all = summary.split("Those that were run on all seeds").nth(1).unwrap();
-    assert!(all.lines().nth(4).unwrap().starts_with("| ptztrack |    2 |"), "{all}");
+    assert!(summary.contains("| ptztrack           |    1 |"), "{summary}");
 }

@@ -42,9 +42,7 @@ pub struct Conditions {
 
 /// A kind of test over which figures are averaged.
 pub struct Condition {
-    /// For machines.
-    pub name: &'static str,
-    /// For people.
+    /// What it is called.
     pub heading: &'static str,
     /// Whether a test is one of them.
     pub includes: fn(&Conditions) -> bool,
@@ -52,27 +50,19 @@ pub struct Condition {
 
 /// The kinds of test that the tables have a column for.
 pub const CONDITIONS: &[Condition] = &[
-    Condition { name: "all", heading: "all", includes: |_| true },
-    Condition { name: "lighting=optimal", heading: "optimal light", includes: |c| c.lighting == "optimal" },
-    Condition { name: "lighting=dim", heading: "dim light", includes: |c| c.lighting == "dim" },
-    Condition { name: "occlusion=none", heading: "no occlusion", includes: |c| c.occlusion == "none" },
-    Condition {
-        name: "occlusion=partial",
-        heading: "partial occlusion",
-        includes: |c| c.occlusion == "partial",
-    },
-    Condition { name: "occlusion=full", heading: "full occlusion", includes: |c| c.occlusion == "full" },
-    Condition { name: "speed=fixed", heading: "fixed speed", includes: |c| c.speed == "fixed" },
-    Condition { name: "speed=variable", heading: "variable speed", includes: |c| c.speed == "variable" },
-    Condition { name: "direction=fixed", heading: "fixed direction", includes: |c| c.direction == "fixed" },
-    Condition {
-        name: "direction=variable",
-        heading: "variable direction",
-        includes: |c| c.direction == "variable",
-    },
-    Condition { name: "subject=a", heading: "subject A", includes: |c| c.subject == "a" },
-    Condition { name: "subject=b", heading: "subject B", includes: |c| c.subject == "b" },
-    Condition { name: "subject=c", heading: "subject C", includes: |c| c.subject == "c" },
+    Condition { heading: "all", includes: |_| true },
+    Condition { heading: "optimal light", includes: |c| c.lighting == "optimal" },
+    Condition { heading: "dim light", includes: |c| c.lighting == "dim" },
+    Condition { heading: "no occlusion", includes: |c| c.occlusion == "none" },
+    Condition { heading: "partial occlusion", includes: |c| c.occlusion == "partial" },
+    Condition { heading: "full occlusion", includes: |c| c.occlusion == "full" },
+    Condition { heading: "fixed speed", includes: |c| c.speed == "fixed" },
+    Condition { heading: "variable speed", includes: |c| c.speed == "variable" },
+    Condition { heading: "fixed direction", includes: |c| c.direction == "fixed" },
+    Condition { heading: "variable direction", includes: |c| c.direction == "variable" },
+    Condition { heading: "subject A", includes: |c| c.subject == "a" },
+    Condition { heading: "subject B", includes: |c| c.subject == "b" },
+    Condition { heading: "subject C", includes: |c| c.subject == "c" },
 ];
 
 /// All rows, in order of their numbers.

@@ -106,7 +106,8 @@ pub(super) fn turning(draft: &mut Draft, chance: &mut Seeded) {
 pub(super) fn faint(draft: &mut Draft, chance: &mut Seeded) {
     draft.room.occlusion = Occlusion::None;
     draft.room.lighting = Lighting::Dim;
-    draft.room.faint = Some(chance.range(3.0, 5.0));
+    // From what nobody finds to what everybody does: a tracker is known by where it begins to.
+    draft.room.faint = Some(chance.range(3.0, 12.0));
 }
 
 pub(super) fn reaching(draft: &mut Draft, chance: &mut Seeded) {
