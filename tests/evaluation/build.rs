@@ -30,7 +30,16 @@ fn main() -> io::Result<()> {
         ("TRACKER_SOURCES", vec!["crates/contract/src", "gst-plugin-ptztrack/src"]),
         (
             "SERVO_SOURCES",
-            vec!["crates/contract/src", "crates/servo/src", "crates/vapix/src", "gst-plugin-vapix/src"],
+            vec![
+                "crates/contract/src",
+                "crates/servo/src",
+                "crates/session/src",
+                "crates/sink/src",
+                "crates/vapix/src",
+                "crates/onvif/src",
+                "gst-plugin-vapix/src",
+                "gst-plugin-onvif/src",
+            ],
         ),
         (
             "GENERATOR_SOURCES",

@@ -7,7 +7,7 @@ use std::{collections::BTreeSet, ops::RangeInclusive, path::PathBuf, str::FromSt
 use clap::Parser;
 
 use crate::{
-    experiment::{Experiment, Scene},
+    experiment::{Experiment, Protocol, Scene},
     footage::{SceneError, Whom},
     record::{Codec, Delays, FirstBox, TestId, TrackerName},
     strata::options::StrataArgs,
@@ -25,6 +25,9 @@ pub struct Args {
     /// Trackers by name, or `all`
     #[arg(long, value_name = "NAME", value_delimiter = ',', default_value = "ptztrack")]
     pub tracker: Vec<Trackers>,
+    /// By what the camera is moved, where it is
+    #[arg(long, default_value = "vapix")]
+    pub protocol: Protocol,
     /// What the pictures go through: mjpeg, mpeg4 or raw; a recording as it is only ever is raw
     #[arg(long, default_value = "mjpeg")]
     pub codec: Codec,
@@ -235,6 +238,7 @@ impl Args {
             command: Duration::from_millis(self.command_delay),
         };
         Experiment {
+            protocol: self.protocol,
             codec: self.codec,
             size: self.size,
             delays,

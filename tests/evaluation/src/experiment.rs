@@ -4,7 +4,10 @@
 
 use std::{path::PathBuf, time::Duration};
 
-use virtual_camera::{Auth, Clock, GroundTruth, RoomSettings, Settings, Sighting, VirtualCamera, World};
+use virtual_camera::{
+    Auth, Clock, GroundTruth, OnvifSettings, ProportionalSpeed, RoomSettings, Settings, Sighting, SpeedMap,
+    VirtualCamera, World,
+};
 
 use crate::{
     open_loop::Stage,
@@ -38,6 +41,29 @@ impl Place {
         Self::Camera(Box::new(Settings { world, ..Settings::default() }))
     }
 }
+
+/// By what the camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Protocol {
+    /// Axis', by `vapixptzsink`.
+    #[default]
+    Vapix,
+    /// That of any make, by `onvifptzsink`: a camera that tells nothing of its speeds.
+    Onvif,
+}
+
+impl Protocol {
+    /// The element that speaks it.
+    pub(crate) fn sink(self) -> &'static str {
+        match self {
+            Self::Vapix => "vapixptzsink",
+            Self::Onvif => "onvifptzsink",
+        }
+    }
+}
+
+/// Degrees a second of a camera that is moved by ONVIF, as the brisker of them do.
+const ONVIF_SPEED_DEG_S: f64 = 120.0;
 
 /// Who is to be followed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -108,6 +134,8 @@ pub struct Experiment {
     pub scene: Scene,
     /// What follows.
     pub tracker: TrackerName,
+    /// By what the camera is moved.
+    pub protocol: Protocol,
     /// What the pictures go through.
     pub codec: Codec,
     /// Width and height of the pictures.
@@ -142,6 +170,7 @@ impl Experiment {
         Self {
             scene,
             tracker,
+            protocol: Protocol::Vapix,
             codec: Codec::Mjpeg,
             size: (640, 480),
             seed,
@@ -169,6 +198,12 @@ impl Experiment {
         settings.video.delay = self.delays.video;
         settings.video.size = Some(self.size);
         settings.kinematics.command_delay = self.delays.command;
+        if self.protocol == Protocol::Onvif {
+            settings.onvif = Some(OnvifSettings::default());
+            settings.kinematics.speed_map = SpeedMap::Linear { max_deg_s: ONVIF_SPEED_DEG_S };
+            settings.kinematics.proportional_speed =
+                ProportionalSpeed { enabled: false, ..settings.kinematics.proportional_speed };
+        }
         VirtualCamera::start(settings)
     }
 

@@ -40,7 +40,7 @@ mod trackers;
 pub mod verdict;
 
 pub use batch::run_all;
-pub use experiment::{Experiment, Place, Scene, Target};
+pub use experiment::{Experiment, Place, Protocol, Scene, Target};
 pub use footage::{SceneError, Whom};
 pub use lockstep::run;
 pub use people::TruthError;
@@ -62,8 +62,11 @@ pub fn init() -> Result<(), glib::Error> {
         opencv::core::set_num_threads(1)
             .and_then(|()| opencv::core::set_use_optimized(false))
             .map_err(|error| glib::Error::new(gst::LibraryError::Init, &error.message))?;
-        let register =
-            || gstptztrack::plugin_register_static().and_then(|()| gstvapix::plugin_register_static());
+        let register = || {
+            gstptztrack::plugin_register_static()?;
+            gstvapix::plugin_register_static()?;
+            gstonvifptz::plugin_register_static()
+        };
         register().map_err(|error| glib::Error::new(gst::CoreError::Failed, &error.message))
     });
     ready.clone()

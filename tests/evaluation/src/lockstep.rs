@@ -109,7 +109,7 @@ impl<'a> Stage<'a> {
         let tracker = Tracker::new(experiment.tracker, experiment.first_box, experiment.size);
         let info = info(experiment.size, camera.frame_period())?;
         let servo = format!("lockstep=true timeout=60000000000 {}", experiment.servo);
-        let sink = film::beside(&tracker.sink(&camera.url(), &servo), film);
+        let sink = film::beside(&tracker.sink(experiment.protocol, &camera.url(), &servo), film);
         let (codec, elements) = (experiment.codec.description(), experiment.elements(&tracker));
         let description = format!("appsrc name={SOURCE} ! {codec} ! {elements} ! {sink}");
         let pipeline = Pipeline::new(&description, &info)?;

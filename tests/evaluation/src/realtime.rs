@@ -234,7 +234,8 @@ fn description(watch: &Watch) -> String {
             camera.url()
         ),
     };
-    let (tracker, sink) = (watch.tracker.description(), watch.tracker.sink(&camera.url(), ""));
+    let (tracker, sink) =
+        (watch.tracker.description(), watch.tracker.sink(watch.experiment.protocol, &camera.url(), ""));
     format!(
         "{stream} ! queue name={QUEUE} leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0 ! {tracker} ! {sink}"
     )

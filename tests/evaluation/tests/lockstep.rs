@@ -6,7 +6,7 @@
 use std::time::Duration;
 
 use evaluation::{
-    Experiment, Place, Scene, Target,
+    Experiment, Place, Protocol, Scene, Target,
     metrics::Metrics,
     record::{Codec, FirstBox, Run, Suite, TargetState, TrackerName},
 };
@@ -71,6 +71,15 @@ fn who_knows_the_truth_is_always_right_and_keeps_the_person_in_view() {
     assert_eq!(metrics.precision, Some(1.0));
     assert_eq!(metrics.detection_precision, Some(1.0));
     assert_eq!(metrics.track_fragmentation, Some(0.0));
+    let last = run.frames.last().unwrap();
+    assert!(last.pan_deg > 20.0, "the camera looks {} degrees right", last.pan_deg);
+}
+
+/// Of a camera that tells nothing of its speeds, and whose axes have to be found out, by how the background moves.
+#[test]
+fn by_onvif_the_person_is_kept_in_view_too() {
+    let run = run(&Experiment { protocol: Protocol::Onvif, ..experiment(TrackerName::OracleEgo) });
+    assert_eq!(Metrics::of(&run).track_fragmentation, Some(0.0));
     let last = run.frames.last().unwrap();
     assert!(last.pan_deg > 20.0, "the camera looks {} degrees right", last.pan_deg);
 }

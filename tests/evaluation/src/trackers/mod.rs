@@ -13,6 +13,7 @@ use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 use virtual_camera::{Matrix, VirtualCamera};
 
 use crate::{
+    experiment::Protocol,
     pipeline::{PipelineError, SINK, lock},
     record::{Bounds, FirstBox, GroundTruth, TrackerName},
 };
@@ -131,18 +132,15 @@ impl Tracker {
 
     /// The element that moves the camera at `location`, with `settings` that are the same for all; one that moves nothing
     /// where the tracker is not to, or commands it by [`Self::steer`].
-    pub fn sink(&self, location: &str, settings: &str) -> String {
+    pub fn sink(&self, protocol: Protocol, location: &str, settings: &str) -> String {
+        let sink = format!("{} name={SINK} location={location} {settings}", protocol.sink());
         match self.name {
             name if name == TrackerName::Still || self.follower.is_some() => {
                 format!("fakesink name={SINK} sync=false async=false")
             }
             // The thesis knows its camera from the start.
-            TrackerName::Thesis => {
-                format!(
-                    "vapixptzsink name={SINK} location={location} {settings} prediction=average learn=false"
-                )
-            }
-            _ => format!("vapixptzsink name={SINK} location={location} {settings}"),
+            TrackerName::Thesis => format!("{sink} prediction=average learn=false"),
+            _ => sink,
         }
     }
 
