@@ -9,14 +9,16 @@
 //!                     └──────── model (projection, speeds, delays, what was commanded) ────────┘
 //! ```
 //! Angles are degrees, positive to the right and up; what a camera is told and tells of speed and zoom are parts of the whole
-//! (-1 to 1 of the fastest, 0 to 1 of the lens' travel), and what these mean in degrees a second and magnification the model knows; times are [`Duration`](std::time::Duration)s since any fixed
-//! moment, always given by the caller, so that tests turn the clock themselves. [`Servo`] is the whole of it.
+//! (-1 to 1 of the fastest, 0 to 1 of the lens' travel), and what these mean in degrees a second and magnification the model
+//! knows. A [`Time`] is a moment, always given by the caller, so that tests turn the clock themselves; a
+//! [`Duration`](std::time::Duration) lasts. [`Servo`] is the whole of it.
 
 mod control;
 mod estimation;
 mod model;
 mod servo;
 mod settings;
+mod time;
 
 pub use control::{Access, Actuation, ActuatorStatus, Home, Mode, Motion};
 pub use estimation::{AxisFinding, Estimates, Measurement, Mounting, Prediction, Visibility};
@@ -26,3 +28,4 @@ pub use model::{
 };
 pub use servo::Servo;
 pub use settings::ServoSettings;
+pub use time::Time;

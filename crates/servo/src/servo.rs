@@ -6,6 +6,7 @@ mod steering;
 use std::mem;
 use std::time::Duration;
 
+use crate::Time;
 use crate::control::{
     Access, Actuation, ActuatorStatus, Controller, HomeReturn, LimitEnforcer, Mode, Motion, PointToPoint,
     ZoomDrive,
@@ -44,11 +45,11 @@ const LONGEST_DELAY: Duration = Duration::from_millis(1600);
 #[derive(Debug)]
 struct Target {
     measurement: Measurement,
-    last_seen: Duration,
+    last_seen: Time,
     /// Whether the camera was steered by this measurement.
     considered: bool,
     /// Since when it is not known whether the camera is ours to follow it.
-    undecided_since: Option<Duration>,
+    undecided_since: Option<Time>,
 }
 
 impl Servo {
@@ -103,12 +104,7 @@ impl Servo {
 
     /// Takes the newest picture of the target. Returns what part of the gain is left where this shows that the loop
     /// oscillates.
-    pub fn measure(
-        &mut self,
-        measurement: Measurement,
-        actuator: &ActuatorStatus,
-        now: Duration,
-    ) -> Option<f64> {
+    pub fn measure(&mut self, measurement: Measurement, actuator: &ActuatorStatus, now: Time) -> Option<f64> {
         let measurement = self.mounting().along_axes(measurement);
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => measurement.taken_at.min(now),
@@ -146,7 +142,7 @@ impl Servo {
 
     /// Learns of the camera what the picture shows, if nothing else moves it. Returns whether an axis is now taken to turn
     /// the picture otherwise.
-    fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Duration) -> bool {
+    fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Time) -> bool {
         let zooms = self.zoom.moves(measurement.taken_at, &self.calibration.delays(), now);
         if !self.settings.learn || actuator.access != Access::Ours || zooms {
             return false;
@@ -190,7 +186,7 @@ impl Servo {
     }
 
     /// What the camera is to do now.
-    pub fn control(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+    pub fn control(&mut self, actuator: &ActuatorStatus, now: Time) -> Actuation {
         let actuation = self.decide(actuator, now);
         match actuation {
             Actuation::Move(motion) => Actuation::Move(self.exchanged_motion(motion)),
@@ -198,7 +194,7 @@ impl Servo {
         }
     }
 
-    fn decide(&mut self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+    fn decide(&mut self, actuator: &ActuatorStatus, now: Time) -> Actuation {
         if actuator.access == Access::Others {
             // What moves it is theirs; what we last said must not outlive our hold on it.
             return Actuation::Rest;
@@ -235,7 +231,7 @@ impl Servo {
     }
 
     /// Whether there is a target that was seen lately.
-    pub fn has_target(&self, now: Duration) -> bool {
+    pub fn has_target(&self, now: Time) -> bool {
         self.stale_at().is_some_and(|at| now < at)
     }
 
@@ -250,12 +246,12 @@ impl Servo {
     }
 
     /// When the target will not have been seen for too long, where there is one.
-    pub fn stale_at(&self) -> Option<Duration> {
+    pub fn stale_at(&self) -> Option<Time> {
         self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout)
     }
 
     /// Until when the camera goes on as it was last told, while it is found out whether it is ours.
-    pub fn undecided_until(&self, now: Duration) -> Option<Duration> {
+    pub fn undecided_until(&self, now: Time) -> Option<Time> {
         // As long as it goes on without a picture of the target, by default.
         const LONGEST: Duration = Duration::from_secs(1);
         let since = self.target.as_ref()?.undecided_since?;
@@ -294,7 +290,7 @@ impl Servo {
     }
 
     /// When the camera is to be asked for its presets, where it is.
-    pub fn presets_due(&self) -> Option<Duration> {
+    pub fn presets_due(&self) -> Option<Time> {
         self.home.presets_due()
     }
 
@@ -304,7 +300,7 @@ impl Servo {
     }
 
     /// Whether the zoom was last told to move.
-    pub fn is_zooming(&self, now: Duration) -> bool {
+    pub fn is_zooming(&self, now: Time) -> bool {
         self.zoom.is_moving(now)
     }
 

@@ -5,7 +5,9 @@
 use std::{collections::VecDeque, time::Duration};
 
 use ptztrack_contract::Vector;
-use servo::{Access, Actuation, ActuatorStatus, Measurement, Mode, Motion, Servo, ServoSettings, SpeedMap};
+use servo::{
+    Access, Actuation, ActuatorStatus, Measurement, Mode, Motion, Servo, ServoSettings, SpeedMap, Time,
+};
 
 const FOV_DEG: f64 = 55.0;
 const PICTURE_S: f64 = 0.04;
@@ -39,8 +41,8 @@ fn angle_deg(column: f64) -> f64 {
     ((column - 0.5) * 2.0 * (FOV_DEG / 2.0).to_radians().tan()).atan().to_degrees()
 }
 
-fn at(seconds: f64) -> Duration {
-    Duration::from_secs_f64(seconds)
+fn at(seconds: f64) -> Time {
+    Duration::from_secs_f64(seconds).into()
 }
 
 /// Degrees off the middle times seconds; the camera's speeds are `factor` times those that are assumed.
@@ -53,7 +55,7 @@ fn off(walker: Walker, factor: f64, background_seen: bool) -> f64 {
         mode: Mode::Velocity,
         may_move: true,
         in_doubt: false,
-        interval: at(COMMAND_S),
+        interval: Duration::from_secs_f64(COMMAND_S),
     };
     let (mut pan, mut rate, mut told, mut under_way) = (0.0, 0.0f64, 0.0f64, VecDeque::new());
     let (mut pictures, mut shown, mut exposures) = (VecDeque::new(), None::<(f64, f64)>, 0);

@@ -2,9 +2,9 @@
 
 //! The whole loop but the network: measurement, estimation, control, session.
 
-use std::time::Duration;
-
-use servo::{Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo};
+use servo::{
+    Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, Time,
+};
 
 use crate::session::{CommandedMotion, Fact, Session, Steering};
 use crate::{Command, Error, LoopSettings, Next, Protocol, Request, Response, SessionEvent, Stop};
@@ -85,7 +85,7 @@ impl ControlLoop {
     }
 
     /// Takes the newest picture of the target.
-    pub fn measure(&mut self, measurement: Measurement, now: Duration) {
+    pub fn measure(&mut self, measurement: Measurement, now: Time) {
         let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y));
         self.session.see_background(shown, measurement.taken_at, now);
         let actuator = self.session.actuator(now);
@@ -105,7 +105,7 @@ impl ControlLoop {
     }
 
     /// What to send now, if anything.
-    pub fn next_request(&mut self, now: Duration) -> Next {
+    pub fn next_request(&mut self, now: Time) -> Next {
         if self.session.halted() {
             return Next::Wait(None);
         }
@@ -131,7 +131,7 @@ impl ControlLoop {
     }
 
     /// Something is being sent.
-    pub fn sending(&mut self, request: &Request, now: Duration) {
+    pub fn sending(&mut self, request: &Request, now: Time) {
         self.session.sending(request, now);
     }
 
@@ -140,8 +140,8 @@ impl ControlLoop {
         &mut self,
         request: &Request,
         response: Result<Response, Error>,
-        sent: Duration,
-        now: Duration,
+        sent: Time,
+        now: Time,
     ) {
         let response = match response {
             Ok(Response::Position(position)) => Ok(Response::Position(self.servo.along_picture(position))),
@@ -156,14 +156,14 @@ impl ControlLoop {
     }
 
     /// The answer is waited for no longer.
-    pub fn abandoned(&mut self, request: &Request, now: Duration) {
+    pub fn abandoned(&mut self, request: &Request, now: Time) {
         for fact in self.session.abandoned(request, now) {
             self.take(fact, now);
         }
     }
 
     /// Has the servo take notice.
-    fn take(&mut self, fact: Fact, now: Duration) {
+    fn take(&mut self, fact: Fact, now: Time) {
         match fact {
             Fact::Accepted { actuation, sent } => self.servo.accepted(&actuation, sent, now),
             Fact::Unanswered(actuation) => self.servo.unanswered(&actuation, now),
@@ -187,7 +187,7 @@ impl ControlLoop {
         }
     }
 
-    fn take_position(&mut self, position: Option<Position>, at: Duration, now: Duration) {
+    fn take_position(&mut self, position: Option<Position>, at: Time, now: Time) {
         let actuator = self.session.actuator(now);
         if self.servo.told_position(position, at, &actuator, now) {
             self.session.arrived();
@@ -215,7 +215,7 @@ impl ControlLoop {
     }
 
     /// Whether there is something to do that a stop need not hurry for.
-    pub fn has_errand(&self, now: Duration) -> bool {
+    pub fn has_errand(&self, now: Time) -> bool {
         if self.session.is_deaf() {
             return true;
         }
@@ -224,7 +224,7 @@ impl ControlLoop {
     }
 
     /// When the target will not have been seen for too long, where there is one.
-    pub fn stale_at(&self) -> Option<Duration> {
+    pub fn stale_at(&self) -> Option<Time> {
         self.servo.stale_at()
     }
 
@@ -265,7 +265,7 @@ impl ControlLoop {
     }
 
     /// The camera as it is known.
-    pub fn status(&self, now: Duration) -> Status {
+    pub fn status(&self, now: Time) -> Status {
         let (servo, session) = (&self.servo, &self.session);
         let camera = servo.camera();
         Status {
@@ -282,7 +282,7 @@ impl ControlLoop {
 }
 
 /// How the camera is being steered, as it answers this.
-fn steering<'a>(servo: &'a Servo, answered: Option<&Request>, now: Duration) -> Steering<'a> {
+fn steering<'a>(servo: &'a Servo, answered: Option<&Request>, now: Time) -> Steering<'a> {
     Steering {
         // Who does not zoom cannot be contradicted: an operator may, and is followed for all the same.
         commands: CommandedMotion { pan_tilt: &servo.camera().history, zoom: servo.zoom_commands() },

@@ -5,7 +5,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use servo::{HardLimits, Mode, Position, Presets, TableRow};
+use servo::{HardLimits, Mode, Position, Presets, TableRow, Time};
 
 use crate::session::{ConnectionChange, ControlOwner};
 use crate::{Command, Error};
@@ -122,7 +122,7 @@ pub enum Next {
     /// This.
     Do(Request),
     /// Nothing before this time, or before something new is seen.
-    Wait(Option<Duration>),
+    Wait(Option<Time>),
 }
 
 /// Something that happened.

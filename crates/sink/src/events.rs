@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use ptztrack_contract::CameraEvent;
 
-use servo::{Mounting, View};
+use servo::{Mounting, Time, View};
 
 use session::Status;
 
@@ -14,7 +14,7 @@ use session::Status;
 #[derive(Debug, Default)]
 pub struct PendingStatus {
     next: Option<Status>,
-    last: Option<(Status, Duration)>,
+    last: Option<(Status, Time)>,
 }
 
 impl PendingStatus {
@@ -27,10 +27,10 @@ impl PendingStatus {
     }
 
     /// What was told last is to be told again, where it is time to.
-    pub fn repeat(&mut self, now: Duration) {
+    pub fn repeat(&mut self, now: Time) {
         if let (None, Some((status, told))) = (self.next, self.last)
             && status.moving
-            && now.saturating_sub(told) >= Self::REPEAT
+            && now - told >= Self::REPEAT
         {
             self.next = Some(status);
         }
@@ -42,7 +42,7 @@ impl PendingStatus {
     }
 
     /// What is to be told now.
-    pub fn take(&mut self, now: Duration) -> Option<Status> {
+    pub fn take(&mut self, now: Time) -> Option<Status> {
         let status = self.next.take()?;
         self.last = Some((status, now));
         Some(status)
@@ -77,7 +77,7 @@ mod tests {
             let mut pending = PendingStatus::default();
             pending.changed(Status { moving, ..Status::default() });
             let told = (0..40).filter(|tick| {
-                let now = Duration::from_millis(100 * tick);
+                let now = Time::from_millis(100 * tick);
                 pending.repeat(now);
                 pending.take(now).is_some()
             });

@@ -63,7 +63,7 @@ pub trait Measuring: PtzSink {
                 ego_velocity: target.ego_velocity,
                 size: picture.size,
                 aspect: picture.aspect,
-                taken_at: mailbox.now().saturating_sub(age),
+                taken_at: mailbox.now() - age,
             });
         });
     }

@@ -317,8 +317,8 @@ pub trait Plumbing: PtzSink {
     }
 
     /// The camera task's.
-    fn time(&self) -> Duration {
-        lock(&self.core().task).as_ref().map_or(Duration::ZERO, |task| task.mailbox().now())
+    fn time(&self) -> servo::Time {
+        lock(&self.core().task).as_ref().map_or(servo::Time::ZERO, |task| task.mailbox().now())
     }
 
     /// Tells upstream what the camera does, if that has changed. Whoever comes while somebody else does leaves it to him,

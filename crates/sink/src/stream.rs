@@ -5,6 +5,8 @@
 use std::mem;
 use std::time::Duration;
 
+use servo::Time;
+
 use crate::picture::Picture;
 
 /// What is kept of the stream from buffer to buffer.
@@ -39,7 +41,7 @@ enum MetaWait {
     #[default]
     NoBuffer,
     /// The first buffer came then.
-    Since(Duration),
+    Since(Time),
     Over,
 }
 
@@ -62,7 +64,7 @@ impl Stream {
     }
 
     /// A buffer came, with a target meta or without. Returns whether none has had one for long.
-    pub fn lacks_meta(&mut self, has_meta: bool, now: Duration) -> bool {
+    pub fn lacks_meta(&mut self, has_meta: bool, now: Time) -> bool {
         self.meta_wait = match mem::take(&mut self.meta_wait) {
             _ if has_meta => MetaWait::Over,
             MetaWait::NoBuffer => MetaWait::Since(now),
@@ -79,7 +81,7 @@ pub struct PictureAge {
     /// The least that a picture's timestamp was behind the clock so far, in nanoseconds.
     least: i64,
     /// By how much the last one was, and when it came; `None` before the first.
-    last: Option<(i64, Duration)>,
+    last: Option<(i64, Time)>,
 }
 
 impl PictureAge {
@@ -89,11 +91,11 @@ impl PictureAge {
 
     /// How old the picture is that was captured at one running time and arrives at another, both in nanoseconds, and at a
     /// time of a clock that nobody sets.
-    pub fn of(&mut self, captured: i64, now: i64, arrived: Duration) -> Duration {
+    pub fn of(&mut self, captured: i64, now: i64, arrived: Time) -> Duration {
         let behind = now.saturating_sub(captured);
         self.least = match self.last {
             Some((last, at)) => {
-                let elapsed = arrived.saturating_sub(at).as_nanos() as i64;
+                let elapsed = (arrived - at).as_nanos() as i64;
                 // Nothing grows older by more than the time that has passed: the rest is a clock that was set.
                 let set = behind.saturating_sub(last).saturating_sub(elapsed).max(0);
                 // Saturates.
@@ -115,7 +117,7 @@ mod tests {
     /// In milliseconds; the clock that nobody sets is the first of them.
     fn age(pictures: &mut PictureAge, [arrived, now, captured]: [i64; 3]) -> i64 {
         const MS: i64 = 1_000_000;
-        let arrived = Duration::from_millis(arrived as u64);
+        let arrived = Time::from_millis(arrived as u64);
         pictures.of(captured * MS, now * MS, arrived).as_millis() as i64
     }
 
@@ -168,7 +170,7 @@ mod tests {
 
     #[test]
     fn meta_is_missed_once_a_second_has_passed_without_any() {
-        let ms = Duration::from_millis;
+        let ms = Time::from_millis;
         let mut stream = Stream::default();
         assert!(![1000, 1500, 1999].map(|at| stream.lacks_meta(false, ms(at))).contains(&true));
         assert!(stream.lacks_meta(false, ms(2000)));
@@ -181,7 +183,7 @@ mod tests {
         fn any_timestamps_give_an_age(pictures in prop::collection::vec(any::<(i64, i64, u32)>(), 1..20)) {
             let mut age = PictureAge::default();
             for (captured, now, arrived) in pictures {
-                age.of(captured, now, Duration::from_millis(arrived.into()));
+                age.of(captured, now, Time::from_millis(arrived.into()));
             }
         }
     }

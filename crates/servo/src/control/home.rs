@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::Motion;
+use crate::Time;
 use crate::model::{PanTilt, Position, Presets, SoftLimits};
 
 /// Where the camera waits for a target.
@@ -31,7 +32,7 @@ pub struct HomeReturn {
     /// The number of the preset.
     preset: Option<u32>,
     /// When to ask for it.
-    presets_at: Duration,
+    presets_at: Time,
     /// It is there, or on its way, or cannot get there.
     settled: bool,
 }
@@ -40,9 +41,9 @@ pub struct HomeReturn {
 #[derive(Debug, Clone, Copy)]
 struct Absence {
     /// When that was first seen.
-    since: Duration,
+    since: Time,
     /// When the next picture is due: without pictures it is not known that nobody is there.
-    until: Duration,
+    until: Time,
 }
 
 impl HomeReturn {
@@ -56,14 +57,14 @@ impl HomeReturn {
     pub fn configure(&mut self, home: Option<&Home>, timeout: Duration, limits: SoftLimits) {
         (self.timeout, self.limits) = (timeout, limits);
         if home != self.home.as_ref() {
-            let presets_at = Duration::ZERO;
+            let presets_at = Time::ZERO;
             let home = home.cloned();
             *self = Self { home, preset: None, presets_at, settled: false, at_start: false, ..*self };
         }
     }
 
     /// A picture came without a target; the next is awaited until `next`.
-    pub fn alone(&mut self, now: Duration, next: Duration) {
+    pub fn alone(&mut self, now: Time, next: Time) {
         self.absence =
             Some(Absence { since: self.absence.map_or(now, |absence| absence.since), until: next });
     }
@@ -105,13 +106,13 @@ impl HomeReturn {
     }
 
     /// When the camera is to be asked for its presets, where it is.
-    pub fn presets_due(&self) -> Option<Duration> {
+    pub fn presets_due(&self) -> Option<Time> {
         let wanted = self.preset.is_none() && !self.settled && matches!(self.home, Some(Home::Preset(_)));
         wanted.then_some(self.presets_at)
     }
 
     /// They went unanswered: not before then again.
-    pub fn ask_presets_at(&mut self, at: Duration) {
+    pub fn ask_presets_at(&mut self, at: Time) {
         self.presets_at = at;
     }
 
@@ -124,7 +125,7 @@ impl HomeReturn {
     }
 
     /// The move home, at this speed, if it is time for it.
-    pub fn due(&self, now: Duration, speed: f64) -> Option<Motion> {
+    pub fn due(&self, now: Time, speed: f64) -> Option<Motion> {
         let wait = if self.at_start { Duration::ZERO } else { self.timeout };
         let alone = self.absence.is_some_and(|absence| absence.since + wait <= now && now <= absence.until);
         if self.settled || !alone { None } else { self.motion(speed) }
@@ -161,8 +162,8 @@ mod tests {
     use super::*;
     use crate::model::Range;
 
-    fn s(s: u64) -> Duration {
-        Duration::from_secs(s)
+    fn s<T: From<Duration>>(s: u64) -> T {
+        Duration::from_secs(s).into()
     }
 
     fn at(pan: f64, tilt: f64, zoom: Option<f64>) -> Position {

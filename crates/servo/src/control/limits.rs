@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::Time;
 use crate::model::{
     CommandHistory, HardLimits, PanTilt, Range, SoftLimits, around_deg, is_endless, narrower,
 };
@@ -10,7 +11,7 @@ use crate::model::{
 #[derive(Debug, Default)]
 pub struct LimitEnforcer {
     at_limit: bool,
-    told: Option<(Duration, PanTilt)>,
+    told: Option<(Time, PanTilt)>,
 }
 
 impl LimitEnforcer {
@@ -21,14 +22,14 @@ impl LimitEnforcer {
     const LEFT_DEG: f64 = 3.0;
 
     /// The camera told where it looks.
-    pub fn told(&mut self, at: Duration, position: PanTilt) {
+    pub fn told(&mut self, at: Time, position: PanTilt) {
         self.told = Some((at, position));
     }
 
     /// Where everything commanded so far takes the camera, where that is known. `delay`: of commands.
-    pub fn position(&self, history: &CommandHistory, delay: Duration, now: Duration) -> Option<PanTilt> {
+    pub fn position(&self, history: &CommandHistory, delay: Duration, now: Time) -> Option<PanTilt> {
         let (at, position) = self.told.filter(|(at, _)| now <= *at + CommandHistory::SPAN)?;
-        Some(position + history.rotation(at.saturating_sub(delay), now))
+        Some(position + history.rotation(at - delay, now))
     }
 
     /// `rate` without the part that would take an axis from `position` beyond its end in the next `lasting` seconds.
@@ -119,13 +120,16 @@ mod tests {
     #[test]
     fn between_answers_the_commands_tell_where_it_is() {
         let (mut guard, mut history) = (LimitEnforcer::default(), CommandHistory::default());
-        let ms = Duration::from_millis;
-        assert_eq!(guard.position(&history, ms(100), ms(0)), None);
+        let ms = Time::from_millis;
+        assert_eq!(guard.position(&history, Duration::from_millis(100), ms(0)), None);
         guard.told(ms(1000), PanTilt::new(5.0, 0.0));
         history.push(ms(800), PanTilt::new(10.0, 0.0));
-        assert_eq!(guard.position(&history, ms(100), ms(1400)), Some(PanTilt::new(10.0, 0.0)));
         assert_eq!(
-            guard.position(&history, ms(100), ms(60_000)),
+            guard.position(&history, Duration::from_millis(100), ms(1400)),
+            Some(PanTilt::new(10.0, 0.0))
+        );
+        assert_eq!(
+            guard.position(&history, Duration::from_millis(100), ms(60_000)),
             None,
             "nobody knows what it was told since"
         );
@@ -187,7 +191,7 @@ mod tests {
         ) {
             let (mut limits_enforcer, mut history) = (LimitEnforcer::default(), CommandHistory::default());
             let (hard, soft) = (limits(Some((-170.0, 170.0))), SoftLimits::default());
-            let (delay, mut now) = (Duration::from_millis(100), Duration::ZERO);
+            let (delay, mut now) = (Duration::from_millis(100), Time::ZERO);
             for (rate, pan, tells, wait) in steps {
                 now += Duration::from_millis(wait);
                 if tells {

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::Time;
 use crate::model::PanTilt;
 
 /// Notices a loop that oscillates about its target, as one does whose delays or speeds are wrong, and lowers the gain
@@ -11,7 +12,7 @@ pub struct OscillationGuard {
     pan: HalfCycles,
     tilt: HalfCycles,
     gain_scale: f64,
-    changed_at: Duration,
+    changed_at: Time,
 }
 
 impl Default for OscillationGuard {
@@ -20,7 +21,7 @@ impl Default for OscillationGuard {
             pan: HalfCycles::default(),
             tilt: HalfCycles::default(),
             gain_scale: 1.0,
-            changed_at: Duration::ZERO,
+            changed_at: Time::ZERO,
         }
     }
 }
@@ -40,7 +41,7 @@ impl OscillationGuard {
 
     /// Takes the error of a picture, and the target's own rate, where the background tells that; what each axis
     /// is `tolerated_deg` does not count. Returns whether the gain was lowered by this.
-    pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: PanTilt, at: Duration) -> bool {
+    pub fn see(&mut self, error: PanTilt, target: PanTilt, tolerated_deg: PanTilt, at: Time) -> bool {
         let swings = [
             self.pan.see(error.pan, target.pan, tolerated_deg.pan, at),
             self.tilt.see(error.tilt, target.tilt, tolerated_deg.tilt, at),
@@ -51,7 +52,7 @@ impl OscillationGuard {
             (self.pan, self.tilt, self.changed_at) = (HalfCycles::default(), HalfCycles::default(), at);
             return self.gain_scale < before;
         }
-        if self.gain_scale < 1.0 && at.saturating_sub(self.changed_at) > Self::CALM {
+        if self.gain_scale < 1.0 && at - self.changed_at > Self::CALM {
             self.gain_scale = (self.gain_scale * Self::RAISE).min(1.0);
             self.changed_at = at;
         }
@@ -90,7 +91,7 @@ struct HalfCycles {
     peak: f64,
     /// The slowest and the fastest that the target went by itself meanwhile.
     pace: (f64, f64),
-    since: Duration,
+    since: Time,
     /// The size of the one before, and how many in a row were no smaller.
     last: f64,
     steady: u32,
@@ -109,7 +110,7 @@ impl HalfCycles {
     /// So many half waves in a row are no accident.
     const ENOUGH: u32 = 4;
 
-    fn see(&mut self, error: f64, target: f64, tolerated: f64, at: Duration) -> bool {
+    fn see(&mut self, error: f64, target: f64, tolerated: f64, at: Time) -> bool {
         self.pace = (self.pace.0.min(target), self.pace.1.max(target));
         if error.abs() <= tolerated {
             return false;
@@ -118,7 +119,7 @@ impl HalfCycles {
             self.peak = self.peak.abs().max(error.abs()).copysign(error);
             return false;
         }
-        let lasted = at.saturating_sub(self.since);
+        let lasted = at - self.since;
         // A target that went to and fro itself leaves the middle as far as that.
         let by_itself = (self.pace.1 - self.pace.0) * lasted.as_secs_f64() >= self.peak.abs();
         let swings = (Self::SHORTEST..=Self::LONGEST).contains(&lasted) && !by_itself;
@@ -148,7 +149,7 @@ mod tests {
     ) -> usize {
         let mut see = |time: f64| {
             let [error, target] = [error(time), target(time)].map(|pan| PanTilt::new(pan, 0.0));
-            guard.see(error, target, PanTilt::new(1.0, 1.0), Duration::from_secs_f64(time))
+            guard.see(error, target, PanTilt::new(1.0, 1.0), Duration::from_secs_f64(time).into())
         };
         (0..500).filter(|frame| see(f64::from(*frame) / 25.0)).count()
     }
@@ -192,7 +193,7 @@ mod tests {
                 PanTilt::default(),
                 PanTilt::default(),
                 PanTilt::new(1.0, 1.0),
-                Duration::from_secs(second)
+                Time::from_millis(1000 * second)
             ));
         }
         assert_eq!(guard.gain_scale(), 1.0);
@@ -203,7 +204,7 @@ mod tests {
         fn trust_stays_in_range(errors in prop::collection::vec(-90.0..90.0f64, 0..400)) {
             let mut guard = OscillationGuard::default();
             for (frame, error) in (0..).zip(errors) {
-                guard.see(PanTilt::new(error, -error), PanTilt::default(), PanTilt::new(0.5, 0.5), Duration::from_millis(40 * frame));
+                guard.see(PanTilt::new(error, -error), PanTilt::default(), PanTilt::new(0.5, 0.5), Time::from_millis(40 * frame));
                 prop_assert!((OscillationGuard::LOWEST..=1.0).contains(&guard.gain_scale()));
             }
         }

@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::Time;
 use crate::model::{Delays, Position};
 
 /// Moves from position to position: the next begins when the camera is at rest and was looked through since.
@@ -15,18 +16,18 @@ pub struct PointToPoint {
 #[derive(Debug)]
 enum Phase {
     AtRest {
-        since: Duration,
+        since: Time,
     },
     /// `seen`: where the camera was, and when.
     UnderWay {
-        since: Duration,
-        seen: Option<(Position, Duration)>,
+        since: Time,
+        seen: Option<(Position, Time)>,
     },
 }
 
 impl Default for PointToPoint {
     fn default() -> Self {
-        Self { phase: Phase::AtRest { since: Duration::ZERO }, lasted: Self::USUAL }
+        Self { phase: Phase::AtRest { since: Time::ZERO }, lasted: Self::USUAL }
     }
 }
 
@@ -47,12 +48,12 @@ impl PointToPoint {
     const LONGEST: Duration = Duration::from_secs(3);
 
     /// Whether the picture taken then, shows the camera at rest.
-    pub fn shows_rest(&self, taken_at: Duration, delays: &Delays) -> bool {
-        matches!(self.phase, Phase::AtRest { since } if since.is_zero() || taken_at >= since + delays.sum())
+    pub fn shows_rest(&self, taken_at: Time, delays: &Delays) -> bool {
+        matches!(self.phase, Phase::AtRest { since } if since == Time::ZERO || taken_at >= since + delays.sum())
     }
 
     /// Whether the picture taken then shows the camera where it last rested.
-    pub fn shows_last_rest(&self, taken_at: Duration, delays: &Delays) -> bool {
+    pub fn shows_last_rest(&self, taken_at: Time, delays: &Delays) -> bool {
         match self.phase {
             Phase::AtRest { .. } => self.shows_rest(taken_at, delays),
             Phase::UnderWay { since, .. } => taken_at < since + delays.sum(),
@@ -77,21 +78,21 @@ impl PointToPoint {
     }
 
     /// A move that was sent then was accepted.
-    pub fn begin(&mut self, sent: Duration) {
+    pub fn begin(&mut self, sent: Time) {
         self.phase = Phase::UnderWay { since: sent, seen: None };
     }
 
     /// A stop was accepted.
-    pub fn rest(&mut self, now: Duration) {
+    pub fn rest(&mut self, now: Time) {
         self.phase = Phase::AtRest { since: now };
     }
 
     /// The camera told its position, or would not; returns whether it has come to rest by this. A command acts within
     /// the `latency`.
-    pub fn position(&mut self, position: Option<Position>, now: Duration, delays: &Delays) -> bool {
+    pub fn position(&mut self, position: Option<Position>, now: Time, delays: &Delays) -> bool {
         let Phase::UnderWay { since, seen } = &mut self.phase else { return false };
         let begun = *since;
-        let lasted = now.saturating_sub(begun);
+        let lasted = now - begun;
         let long = lasted > Self::LONGEST;
         let tolerance_deg = if long { Self::NOISE_DEG } else { Self::SAME_DEG };
         let rests_since = match seen.zip(position) {
@@ -99,7 +100,7 @@ impl PointToPoint {
             None => long.then_some(now),
         };
         if let Some(since) = rests_since {
-            self.lasted = since.saturating_sub(begun);
+            self.lasted = since - begun;
             self.rest(since);
             return true;
         }
@@ -128,8 +129,8 @@ mod tests {
         Delays::of_sum(Duration::from_millis(ms), Duration::ZERO)
     }
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     #[test]

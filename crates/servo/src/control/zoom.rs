@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use ptztrack_contract::Rect;
 
+use crate::Time;
 use crate::estimation::{Measurement, Samples, Visibility};
 
 /// Keeps the target as tall in the picture as is wished, and widens the view when it is not seen well.
@@ -13,7 +14,7 @@ use crate::estimation::{Measurement, Samples, Visibility};
 #[derive(Debug, Default)]
 pub struct ZoomController {
     /// Logarithm of the target's height in a picture that nothing magnifies, over time.
-    sizes: VecDeque<(Duration, f64)>,
+    sizes: VecDeque<(Time, f64)>,
     id: u64,
     zooming: bool,
     view: Outlook,
@@ -176,7 +177,7 @@ mod tests {
 
     fn target(height: f64, milliseconds: u64) -> Measurement {
         let bounds = Rect { x: 0.45, y: 0.5 - height / 2.0, width: 0.1, height };
-        Measurement { bounds, ..Measurement::at(0.5, 0.5, Duration::from_millis(milliseconds)) }
+        Measurement { bounds, ..Measurement::at(0.5, 0.5, Time::from_millis(milliseconds)) }
     }
 
     /// One that has seen a target for a second, at no magnification.

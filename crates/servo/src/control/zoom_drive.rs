@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::zoom::ZoomController;
+use crate::Time;
 use crate::estimation::{Measurement, ZoomEstimator};
 use crate::model::{CommandHistory, Delays, Lens, Range, SpeedMap};
 
@@ -56,14 +57,14 @@ impl ZoomDrive {
     }
 
     /// The camera told its zoom, or does not tell.
-    pub fn told(&mut self, at: Duration, travel: Option<f64>, delays: &Delays) {
+    pub fn told(&mut self, at: Time, travel: Option<f64>, delays: &Delays) {
         if let Some(travel) = travel {
             self.track.told(at, travel, delays);
         }
     }
 
     /// From then on the zoom moves at a part of its fastest.
-    pub fn commanded(&mut self, at: Duration, speed: f64) {
+    pub fn commanded(&mut self, at: Time, speed: f64) {
         self.track.commanded(at, speed);
     }
 
@@ -73,17 +74,17 @@ impl ZoomDrive {
     }
 
     /// Whether a picture shows the zoom moving, or some that is to come does.
-    pub fn moves(&self, taken_at: Duration, delays: &Delays, now: Duration) -> bool {
+    pub fn moves(&self, taken_at: Time, delays: &Delays, now: Time) -> bool {
         self.track.moves(delays.sent_by(taken_at)) || self.track.moves(now)
     }
 
     /// Whether it was last told to move.
-    pub fn is_moving(&self, now: Duration) -> bool {
+    pub fn is_moving(&self, now: Time) -> bool {
         self.track.moves(now)
     }
 
     /// The part of the zoom's travel that a picture shows.
-    pub fn travel_shown(&self, taken_at: Duration, delays: &Delays) -> Option<f64> {
+    pub fn travel_shown(&self, taken_at: Time, delays: &Delays) -> Option<f64> {
         self.track.travel(delays.sent_by(taken_at), delays)
     }
 
@@ -94,10 +95,10 @@ impl ZoomDrive {
         lens: &Lens,
         measurement: &Measurement,
         delays: &Delays,
-        now: Duration,
+        now: Time,
     ) -> Option<f64> {
         let travel = self.track.travel(now, delays)?;
-        let lead = now.saturating_sub(measurement.taken_at) + delays.sum();
+        let lead = now - measurement.taken_at + delays.sum();
         let rate = self.controller.rate(goal.target_height, lens.magnification(travel), lead);
         let there = lens.travel_magnified(travel, (rate * Self::AHEAD_S).exp())?;
         let per_s = (goal.travel.nearest(there) - travel) / Self::AHEAD_S;
@@ -111,7 +112,7 @@ impl ZoomDrive {
         goal: &ZoomGoal,
         lens: &Lens,
         delays: &Delays,
-        now: Duration,
+        now: Time,
         lead: Duration,
     ) -> Option<Jump> {
         let travel = self.track.travel(now, delays)?;
@@ -142,13 +143,13 @@ mod tests {
     }
 
     /// A drive that has seen a target of this height, at a part of the travel.
-    fn drive(travel: f64, height: f64) -> (ZoomDrive, Measurement, Duration) {
+    fn drive(travel: f64, height: f64) -> (ZoomDrive, Measurement, Time) {
         let mut drive = ZoomDrive::default();
-        drive.told(Duration::from_millis(100), Some(travel), &delays());
+        drive.told(Time::from_millis(100), Some(travel), &delays());
         let bounds = Rect { x: 0.45, y: 0.5 - height / 2.0, width: 0.1, height };
-        let mut seen = Measurement::at(0.5, 0.5, Duration::ZERO);
+        let mut seen = Measurement::at(0.5, 0.5, Time::ZERO);
         for picture in 10..40 {
-            seen = Measurement { bounds, taken_at: Duration::from_millis(40 * picture), ..seen };
+            seen = Measurement { bounds, taken_at: Time::from_millis(40 * picture), ..seen };
             drive.see(&seen, &lens(), &delays());
         }
         let now = seen.taken_at;
@@ -188,7 +189,7 @@ mod tests {
     #[test]
     fn a_zoom_that_is_not_told_is_left_alone() {
         let mut drive = ZoomDrive::default();
-        let seen = Measurement::at(0.5, 0.5, Duration::from_secs(1));
+        let seen = Measurement::at(0.5, 0.5, Time::from_millis(1000));
         drive.see(&seen, &lens(), &delays());
         assert_eq!(drive.speed(&GOAL, &lens(), &seen, &delays(), seen.taken_at), None);
     }

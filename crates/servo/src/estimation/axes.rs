@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use super::{Mounting, ObservedRotation};
+use crate::Time;
 use crate::model::{CommandHistory, PanTilt};
 
 /// Learns which way each axis turns the picture: cameras hang, and some makes have an axis the wrong way round, or each in
@@ -14,7 +15,7 @@ pub struct AxisEstimator {
     pan: AxisSense,
     tilt: AxisSense,
     /// Until it is known whether they are exchanged, one of them is moved at a time: whether it is pan, and since when.
-    alone: Option<(bool, Duration)>,
+    alone: Option<(bool, Time)>,
 }
 
 /// What was found out about an axis.
@@ -98,7 +99,7 @@ impl AxisEstimator {
         history: &CommandHistory,
         fov_deg: f64,
     ) -> Option<AxisFinding> {
-        let since = turn.from.saturating_sub(Self::LONGEST_DELAY);
+        let since = turn.from - Self::LONGEST_DELAY;
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
         let noise = Self::NOISE_FIELDS_S * fov_deg;
         if turn.rate.largest() > noise
@@ -122,7 +123,7 @@ impl AxisEstimator {
 
     /// A rate bounded by what is known of the axes. Of two that are exchanged and move at once, nobody can tell from the picture
     /// that they are not both the wrong way round.
-    pub fn cautious(&mut self, mut rate: PanTilt, now: Duration) -> PanTilt {
+    pub fn cautious(&mut self, mut rate: PanTilt, now: Time) -> PanTilt {
         if !self.exchange.is_known() {
             let since = self.alone.filter(|(_, since)| now < *since + Self::ALONE);
             let (pans, _) = *self.alone.insert(since.unwrap_or((rate.pan.abs() >= rate.tilt.abs(), now)));
@@ -156,8 +157,8 @@ fn one_way(mut rates: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     /// Twelve pictures a second of a camera told to pan at `told`, which the background shows to do `seen`.

@@ -5,15 +5,16 @@ use std::time::Duration;
 use ptztrack_contract::Vector;
 
 use super::{FieldOfViewEstimator, LatencyEstimator, Maps, Measurement, SpeedMapEstimator, Visibility};
+use crate::Time;
 use crate::model::{CommandHistory, Delays, PanTilt, SpeedMap, View};
 
 /// How the camera turned between two pictures, as the background shows it, or the target.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObservedRotation {
     /// The earlier picture's time.
-    pub from: Duration,
+    pub from: Time,
     /// The later picture's.
-    pub to: Duration,
+    pub to: Time,
     /// Degrees per second.
     pub rate: PanTilt,
 }
@@ -23,8 +24,8 @@ impl ObservedRotation {
     const LONGEST: Duration = Duration::from_millis(500);
 
     /// The turn that a picture, after the one before, shows by what moves in it like this against the camera.
-    fn of(velocity: Vector, measurement: &Measurement, view: &View, before: Duration) -> Option<Self> {
-        let lasted = measurement.taken_at.checked_sub(before)?;
+    fn of(velocity: Vector, measurement: &Measurement, view: &View, before: Time) -> Option<Self> {
+        let lasted = measurement.taken_at - before;
         let fits = !lasted.is_zero() && lasted <= Self::LONGEST;
         let rate = view.rate(measurement.centroid, velocity) * -1.0;
         (fits && rate.is_finite()).then_some(Self { from: before, to: measurement.taken_at, rate })
@@ -54,7 +55,7 @@ pub struct SelfCalibration {
     field: FieldOfViewEstimator,
     speeds: SpeedMapEstimator,
     /// The last picture's time.
-    before: Option<Duration>,
+    before: Option<Time>,
 }
 
 impl SelfCalibration {
@@ -135,7 +136,7 @@ impl SelfCalibration {
     }
 
     /// The camera said where it looks at a time.
-    pub fn positioned(&mut self, at: Duration, position: PanTilt) {
+    pub fn positioned(&mut self, at: Time, position: PanTilt) {
         self.field.positioned(at, position);
     }
 
@@ -169,7 +170,7 @@ mod tests {
             let curve = if linear { SpeedCurve::Linear } else { SpeedCurve::Cubic };
             let assumed = SpeedMap::new(450.0, curve);
             let mut calibration = SelfCalibration::new(Duration::from_millis(200));
-            let (mut history, mut map, mut now) = (CommandHistory::default(), assumed, Duration::ZERO);
+            let (mut history, mut map, mut now) = (CommandHistory::default(), assumed, Time::ZERO);
             for (x, y, step, tells, wait) in pictures {
                 now += Duration::from_millis(if wait < 500 { 40 } else { wait });
                 history.push_parts(now, (f64::from(step) / 100.0, f64::from(step) / -100.0), &map);

@@ -4,14 +4,15 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::ObservedRotation;
+use crate::Time;
 use crate::model::{Delays, PanTilt};
 
 /// Learns how wide the picture is: how far the camera turned, by its own word, against how far it seemed to.
 #[derive(Debug, Default)]
 pub(super) struct FieldOfViewEstimator {
     /// The turn seen up to a time, in degrees of the assumed field of view.
-    seen: VecDeque<(Duration, PanTilt)>,
-    positions: VecDeque<(Duration, PanTilt)>,
+    seen: VecDeque<(Time, PanTilt)>,
+    positions: VecDeque<(Time, PanTilt)>,
     /// Logarithms of the factor, with their weights.
     found: VecDeque<(f64, f64)>,
     logarithm: f64,
@@ -59,7 +60,7 @@ impl FieldOfViewEstimator {
     }
 
     /// The camera said where it looks at a time.
-    pub fn positioned(&mut self, at: Duration, position: PanTilt) {
+    pub fn positioned(&mut self, at: Time, position: PanTilt) {
         self.positions.push_back((at, position));
         if self.positions.len() > 4 {
             self.positions.pop_front();
@@ -86,13 +87,13 @@ impl FieldOfViewEstimator {
 
     /// The turn seen between the pictures that show two moments, and by how many degrees it may be wrong:
     /// how much of the latency is the picture's, not the command's, nobody knows.
-    fn turned(&self, start: Duration, end: Duration, delays: &Delays) -> Option<(PanTilt, f64)> {
+    fn turned(&self, start: Time, end: Time, delays: &Delays) -> Option<(PanTilt, f64)> {
         let turned = |late: Duration| Some(self.seen_until(end + late)? - self.seen_until(start + late)?);
         let doubt = (turned(delays.sum())? - turned(Duration::ZERO)?) / 4.0;
         Some((turned(delays.video)?, doubt.largest()))
     }
 
-    fn seen_until(&self, time: Duration) -> Option<PanTilt> {
+    fn seen_until(&self, time: Time) -> Option<PanTilt> {
         let above = self.seen.partition_point(|(at, _)| *at < time);
         let (high_at, high) = self.seen.get(above)?;
         let (low_at, low) = match above.checked_sub(1) {

@@ -153,5 +153,5 @@ impl LatencyEstimator {
 
 /// The rate commanded for a turn, if it shows after this delay.
 fn rate(turn: &ObservedRotation, delay: Duration, history: &CommandHistory) -> PanTilt {
-    history.rotation(turn.from.saturating_sub(delay), turn.to.saturating_sub(delay)) / turn.seconds()
+    history.rotation(turn.from - delay, turn.to - delay) / turn.seconds()
 }

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::time::Duration;
+use crate::Time;
 
 use ptztrack_contract::{Point, Rect, TargetState, Vector};
 
@@ -46,12 +46,12 @@ pub struct Measurement {
     /// Width by height of the picture as displayed.
     pub aspect: f64,
     /// When the picture was taken, as far as its timestamp tells.
-    pub taken_at: Duration,
+    pub taken_at: Time,
 }
 
 impl Measurement {
     /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.
-    pub fn at(x: f64, y: f64, taken_at: Duration) -> Self {
+    pub fn at(x: f64, y: f64, taken_at: Time) -> Self {
         Self {
             visibility: Visibility::Seen,
             id: 1,

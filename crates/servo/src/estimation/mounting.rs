@@ -72,11 +72,11 @@ fn quarter_back(measurement: &Measurement) -> Measurement {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
+    use crate::Time;
 
     fn seen() -> Measurement {
         let velocity = Vector { x: 0.1, y: 0.0 };
-        Measurement { velocity, ..Measurement::at(0.75, 0.5, Duration::ZERO) }
+        Measurement { velocity, ..Measurement::at(0.75, 0.5, Time::ZERO) }
     }
 
     fn close(a: Point, b: Point) -> bool {

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use crate::Time;
 use crate::model::PanTilt;
 
 /// Mean of a rate over a window of time (thesis 3.16: one second), whatever the frame rate.
@@ -13,9 +14,9 @@ use crate::model::PanTilt;
 #[derive(Debug)]
 pub struct RateAverage {
     window: Duration,
-    samples: VecDeque<(Duration, PanTilt)>,
+    samples: VecDeque<(Time, PanTilt)>,
     /// How the rate was changing at each sample of the last moments.
-    trends: VecDeque<(Duration, PanTilt)>,
+    trends: VecDeque<(Time, PanTilt)>,
 }
 
 impl RateAverage {
@@ -28,7 +29,7 @@ impl RateAverage {
     }
 
     /// Takes the rate at a time; times that go back begin anew.
-    pub fn push(&mut self, at: Duration, rate: PanTilt) {
+    pub fn push(&mut self, at: Time, rate: PanTilt) {
         if self.samples.back().is_some_and(|(last, _)| *last > at) {
             self.clear();
         }
@@ -44,7 +45,7 @@ impl RateAverage {
     }
 
     /// Takes a rate at which it is only thought to go on, and whose changes so far are no sign of more.
-    pub fn coast(&mut self, at: Duration, rate: PanTilt) {
+    pub fn coast(&mut self, at: Time, rate: PanTilt) {
         self.push(at, rate);
         self.trends.clear();
     }
@@ -91,7 +92,7 @@ impl RateAverage {
     /// The samples of one axis; `None` without any.
     fn axis(&self, part: fn(&PanTilt) -> f64) -> Option<Samples> {
         let (newest, _) = self.samples.back()?;
-        let at = |time: &Duration| -newest.saturating_sub(*time).as_secs_f64();
+        let at = |time: &Time| -(*newest - *time).as_secs_f64();
         Some(Samples::new(self.samples.iter().map(|(time, rate)| (at(time), part(rate)))))
     }
 
@@ -195,8 +196,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     fn average(rates: impl IntoIterator<Item = f64>) -> RateAverage {

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::{ObservedRotation, RecursiveLeastSquares};
+use crate::Time;
 use crate::model::{CommandHistory, Delays, PanTilt, SpeedMap};
 
 /// Learns how fast the camera really is, as a factor on the map that was assumed: on its bare curve, as the kink
@@ -191,8 +192,8 @@ impl SpeedMapEstimator {
     /// Compares how fast the camera turned with how fast it should have, where it turned evenly.
     fn see_rate(&mut self, turn: &ObservedRotation, about: &Seen) {
         let Seen { axis, latency, history, maps, fov_deg } = *about;
-        let (from, to) = (turn.from.saturating_sub(latency), turn.to.saturating_sub(latency));
-        let rates = history.rates_between(from.saturating_sub(SETTLING), to + EARLY).map(axis.rate);
+        let (from, to) = (turn.from - latency, turn.to - latency);
+        let rates = history.rates_between(from - SETTLING, to + EARLY).map(axis.rate);
         let (low, high) = extremes(rates);
         let ratio = if low > 0.0 { high / low } else { low / high };
         if low * high <= 0.0 || ratio > STEADY {
@@ -225,7 +226,7 @@ impl SpeedMapEstimator {
         if first.from + TRAVEL > last.to {
             return;
         }
-        let (from, to) = (first.from.saturating_sub(about.latency), last.to.saturating_sub(about.latency));
+        let (from, to) = (first.from - about.latency, last.to - about.latency);
         let seen: f64 =
             self.recent.iter().map(|turn| (about.axis.rate)(turn.rate).abs() * turn.seconds()).sum();
         let least = STRONG * NOISE_FIELDS_S * about.fov_deg * TRAVEL.as_secs_f64();
@@ -237,7 +238,7 @@ impl SpeedMapEstimator {
     }
 
     /// The way commanded between two times, to and fro; `None` of none.
-    fn way(&self, about: &Seen, from: Duration, to: Duration) -> Option<Way> {
+    fn way(&self, about: &Seen, from: Time, to: Time) -> Option<Way> {
         let mut way = Way { degrees: 0.0, features: [0.0; FEATURES] };
         for (levels, seconds) in about.history.levels_between(from, to) {
             let level = (about.axis.level)(levels);

@@ -5,6 +5,7 @@ use std::time::Duration;
 use ptztrack_contract::Vector;
 
 use super::{Measurement, RateAverage, Visibility};
+use crate::Time;
 use crate::model::{CommandHistory, Delays, PanTilt, View, rise_deg};
 
 /// How the target's motion is carried forward over the latency.
@@ -53,9 +54,9 @@ pub struct TargetEstimator {
     error: PanTilt,
     /// Where the target is, degrees above the horizon.
     elevation_deg: f64,
-    taken_at: Duration,
+    taken_at: Time,
     /// When the target was first seen, and how far off the middle.
-    first_seen: Option<(Duration, PanTilt)>,
+    first_seen: Option<(Time, PanTilt)>,
     /// Whether the last picture told how the background moved.
     background_seen: bool,
 }
@@ -72,7 +73,7 @@ impl TargetEstimator {
             id: 0,
             error: PanTilt::default(),
             elevation_deg: 0.0,
-            taken_at: Duration::ZERO,
+            taken_at: Time::ZERO,
             first_seen: None,
             background_seen: false,
         }
@@ -103,7 +104,7 @@ impl TargetEstimator {
             ),
             None => {
                 let (sent, uncertainty) = (delays.sent_by(measurement.taken_at), delays.uncertainty);
-                let (from, to) = (sent.saturating_sub(uncertainty), sent + uncertainty);
+                let (from, to) = (sent - uncertainty, sent + uncertainty);
                 let camera = history.rates_between(from, to).chain([history.reached_at(from)]);
                 self.likeliest(view.rate(measurement.centroid, measurement.velocity), camera)
             }
@@ -163,7 +164,7 @@ impl TargetEstimator {
     /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
     /// target has moved on since the picture was taken, and the camera has made, or will make, the turns
     /// it was already told and that the picture does not show yet (Smith predictor).
-    pub fn error_at_effect(&self, now: Duration, history: &CommandHistory, delays: &Delays) -> PanTilt {
+    pub fn error_at_effect(&self, now: Time, history: &CommandHistory, delays: &Delays) -> PanTilt {
         let shown = delays.sent_by(self.taken_at);
         let horizon = self.horizon(now, delays);
         let under_way = history.rotation(shown, now);
@@ -193,7 +194,7 @@ impl TargetEstimator {
     }
 
     /// Where the target is off the middle, and how it goes on.
-    pub fn offset(&self, now: Duration, history: &CommandHistory, delays: &Delays) -> Offset {
+    pub fn offset(&self, now: Time, history: &CommandHistory, delays: &Delays) -> Offset {
         let expected = self.error_at_effect(now, history, delays);
         let target = self.target_rate(self.horizon(now, delays));
         // Half round the camera, what goes up goes down in the picture.
@@ -217,12 +218,12 @@ impl TargetEstimator {
     fn reckoned(
         &self,
         expected: PanTilt,
-        now: Duration,
+        now: Time,
         history: &CommandHistory,
         delays: &Delays,
     ) -> Option<PanTilt> {
         let (first_at, first) = self.first_seen?;
-        let since = now.saturating_sub(first_at);
+        let since = now - first_at;
         if since > Self::RECKONED {
             return None;
         }
@@ -244,8 +245,8 @@ impl TargetEstimator {
     }
 
     /// From the picture until a command sent `now` shows.
-    fn horizon(&self, now: Duration, delays: &Delays) -> Duration {
-        now.saturating_sub(self.taken_at) + delays.sum()
+    fn horizon(&self, now: Time, delays: &Delays) -> Duration {
+        now - self.taken_at + delays.sum()
     }
 
     /// The target's own angular rate so long after the picture.
@@ -310,8 +311,8 @@ mod tests {
         Delays::of_sum(LATENCY, Duration::ZERO)
     }
 
-    fn seconds(seconds: f64) -> Duration {
-        Duration::from_secs_f64(seconds)
+    fn seconds<T: From<Duration>>(seconds: f64) -> T {
+        Duration::from_secs_f64(seconds).into()
     }
 
     /// The contract lets any finite number through.
@@ -442,7 +443,7 @@ mod tests {
     fn hidden(ego_velocity: Option<Vector>) -> (TargetEstimator, f64, f64) {
         let history = CommandHistory::default();
         let mut estimator = TargetEstimator::new(Prediction::Lead);
-        let at = |frame: u32| seconds(0.04 * f64::from(frame));
+        let at = |frame: u32| -> Time { seconds(0.04 * f64::from(frame)) };
         for frame in 1..=10 {
             let velocity = Vector { x: 0.02 * f64::from(frame), y: 0.0 };
             let seen = Measurement { velocity, ego_velocity, ..Measurement::at(0.6, 0.5, at(frame)) };

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::time::Duration;
-
+use crate::Time;
 use crate::model::{CommandHistory, Delays, PanTilt};
 
 /// Where the zoom is between the camera's answers: carried on by what it was told, at the speed it was found to have.
@@ -9,7 +8,7 @@ use crate::model::{CommandHistory, Delays, PanTilt};
 pub struct ZoomEstimator {
     /// Parts of its fastest, as the pan of a history.
     commanded: CommandHistory,
-    told: Option<(Duration, f64)>,
+    told: Option<(Time, f64)>,
     /// Parts of its travel per second, at its fastest.
     fastest_per_s: f64,
 }
@@ -31,15 +30,15 @@ impl ZoomEstimator {
     const TELLING: f64 = 0.002;
 
     /// From a time on the zoom moves at a part of its fastest (-1 to 1).
-    pub fn commanded(&mut self, at: Duration, speed: f64) {
+    pub fn commanded(&mut self, at: Time, speed: f64) {
         self.commanded.push(at, PanTilt::new(speed, 0.0));
     }
 
     /// The camera told its zoom at a time; a command acts late.
-    pub fn told(&mut self, at: Duration, travel: f64, delays: &Delays) {
+    pub fn told(&mut self, at: Time, travel: f64, delays: &Delays) {
         let delay = delays.command;
         if let Some((before, from)) = self.told {
-            let expected = self.moved(before.saturating_sub(delay), at.saturating_sub(delay));
+            let expected = self.moved(before - delay, at - delay);
             let found = (travel - from) / expected;
             if expected.abs() > Self::TELLING && found > 0.0 {
                 // Half way: the delay is not known exactly, and at its ends a lens stands still.
@@ -52,9 +51,9 @@ impl ZoomEstimator {
     }
 
     /// The part of the travel that has come of the commands sent until then, where the camera has ever told it.
-    pub fn travel(&self, sent_until: Duration, delays: &Delays) -> Option<f64> {
+    pub fn travel(&self, sent_until: Time, delays: &Delays) -> Option<f64> {
         let (at, travel) = self.told?;
-        Some(travel + self.moved(at.saturating_sub(delays.command), sent_until))
+        Some(travel + self.moved(at - delays.command, sent_until))
     }
 
     /// The speeds it was told, as the pan of a history.
@@ -63,7 +62,7 @@ impl ZoomEstimator {
     }
 
     /// Whether it was told to move at that time.
-    pub fn moves(&self, at: Duration) -> bool {
+    pub fn moves(&self, at: Time) -> bool {
         self.commanded.rate_at(at).pan != 0.0
     }
 
@@ -72,7 +71,7 @@ impl ZoomEstimator {
         self.fastest_per_s
     }
 
-    fn moved(&self, from: Duration, to: Duration) -> f64 {
+    fn moved(&self, from: Time, to: Time) -> f64 {
         self.commanded.rotation(from, to).pan * self.fastest_per_s
     }
 }
@@ -80,13 +79,14 @@ impl ZoomEstimator {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::time::Duration;
 
     fn late(ms: u64) -> Delays {
         Delays { command: Duration::from_millis(ms), ..Delays::default() }
     }
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     #[track_caller]

@@ -5,6 +5,7 @@ use std::iter;
 use std::time::Duration;
 
 use super::{PanTilt, SpeedMap};
+use crate::Time;
 
 /// The rates the camera was told, so that the rotation not yet visible in the picture is known.
 #[derive(Debug)]
@@ -16,7 +17,7 @@ pub struct CommandHistory {
 
 #[derive(Debug, Clone, Copy)]
 struct Entry {
-    since: Duration,
+    since: Time,
     /// What the motors have reached by then ...
     start: PanTilt,
     /// ... and what they are told.
@@ -35,12 +36,12 @@ impl CommandHistory {
     }
 
     /// From `at` on the camera turns with `rate`.
-    pub fn push(&mut self, at: Duration, rate: PanTilt) {
+    pub fn push(&mut self, at: Time, rate: PanTilt) {
         self.add(at, rate, None);
     }
 
     /// From `at` on the camera turns with these parts of its fastest, for pan and tilt.
-    pub fn push_parts(&mut self, at: Duration, (pan, tilt): (f64, f64), map: &SpeedMap) {
+    pub fn push_parts(&mut self, at: Time, (pan, tilt): (f64, f64), map: &SpeedMap) {
         let levels = (SpeedMap::level_of(pan), SpeedMap::level_of(tilt));
         self.add(at, rate_of(levels, map), Some(levels));
     }
@@ -57,7 +58,7 @@ impl CommandHistory {
         }
     }
 
-    fn add(&mut self, at: Duration, rate: PanTilt, levels: Option<(i8, i8)>) {
+    fn add(&mut self, at: Time, rate: PanTilt, levels: Option<(i8, i8)>) {
         let before = self.entries.back();
         let start = before.map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2));
         self.entries.push_back(Entry { since: at, start, rate, levels });
@@ -68,21 +69,21 @@ impl CommandHistory {
     }
 
     /// The rate that is commanded at a time; zero before the first.
-    pub fn rate_at(&self, at: Duration) -> PanTilt {
+    pub fn rate_at(&self, at: Time) -> PanTilt {
         self.entry_at(at).map_or(PanTilt::default(), |entry| entry.rate)
     }
 
-    fn entry_at(&self, at: Duration) -> Option<&Entry> {
+    fn entry_at(&self, at: Time) -> Option<&Entry> {
         self.entries.iter().rev().find(|entry| entry.since <= at)
     }
 
     /// The rate that the motors have reached at a time.
-    pub fn reached_at(&self, at: Duration) -> PanTilt {
+    pub fn reached_at(&self, at: Time) -> PanTilt {
         self.entry_at(at).map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2))
     }
 
     /// The rates in force at some moment between two times, in order.
-    pub fn rates_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = PanTilt> {
+    pub fn rates_between(&self, from: Time, to: Time) -> impl Iterator<Item = PanTilt> {
         let first = self.rate_at(from);
         let within = move |entry: &&Entry| entry.since > from && entry.since <= to;
         iter::once(first).chain(self.entries.iter().filter(within).map(|entry| entry.rate))
@@ -90,10 +91,10 @@ impl CommandHistory {
 
     /// The levels of the speed map in force between two times, last first, with how long each was, in seconds; what was
     /// not commanded in parts of the fastest is left out.
-    pub fn levels_between(&self, from: Duration, to: Duration) -> impl Iterator<Item = ((i8, i8), f64)> {
+    pub fn levels_between(&self, from: Time, to: Time) -> impl Iterator<Item = ((i8, i8), f64)> {
         let ends = iter::once(to).chain(self.entries.iter().rev().map(move |entry| entry.since.min(to)));
         self.entries.iter().rev().zip(ends).filter_map(move |(entry, end)| {
-            let lasted = end.saturating_sub(entry.since.max(from)).as_secs_f64();
+            let lasted = (end - entry.since.max(from)).as_secs_f64();
             entry.levels.filter(|_| lasted > 0.0).map(|levels| (levels, lasted))
         })
     }
@@ -108,7 +109,7 @@ impl CommandHistory {
     }
 
     /// The rotation by what was commanded between two times, degrees; from a later to an earlier it is the way back.
-    pub fn rotation(&self, from: Duration, to: Duration) -> PanTilt {
+    pub fn rotation(&self, from: Time, to: Time) -> PanTilt {
         if to < from {
             return PanTilt::default() - self.rotation(to, from);
         }
@@ -136,8 +137,8 @@ impl Default for CommandHistory {
 
 impl Entry {
     /// The rate by a time in force.
-    fn reached(&self, at: Duration, acceleration_deg_s2: f64) -> PanTilt {
-        let seconds = at.saturating_sub(self.since).as_secs_f64();
+    fn reached(&self, at: Time, acceleration_deg_s2: f64) -> PanTilt {
+        let seconds = (at - self.since).as_secs_f64();
         self.start.each(self.rate, |start, rate| {
             let change = rate - start;
             let reached = seconds * acceleration_deg_s2;
@@ -146,8 +147,8 @@ impl Entry {
     }
 
     /// The rotation from its beginning until then, degrees.
-    fn turned(&self, until: Duration, acceleration_deg_s2: f64) -> PanTilt {
-        let seconds = until.saturating_sub(self.since).as_secs_f64();
+    fn turned(&self, until: Time, acceleration_deg_s2: f64) -> PanTilt {
+        let seconds = (until - self.since).as_secs_f64();
         self.start.each(self.rate, |start, rate| {
             let ramp_s = (rate - start).abs() / acceleration_deg_s2;
             // As if it had had its rate from so much later on.
@@ -168,8 +169,8 @@ mod tests {
     use crate::model::SpeedCurve;
     use proptest::prelude::*;
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     #[test]

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use crate::Time;
+
 use std::time::Duration;
 
 /// How late everything is.
@@ -26,7 +28,7 @@ impl Delays {
     }
 
     /// When what a picture shows was sent, at the latest.
-    pub fn sent_by(&self, taken_at: Duration) -> Duration {
-        taken_at.saturating_sub(self.sum())
+    pub fn sent_by(&self, taken_at: Time) -> Time {
+        taken_at - self.sum()
     }
 }

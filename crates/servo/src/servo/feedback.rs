@@ -3,14 +3,14 @@
 //! What became of an actuation, and what the camera told.
 
 use std::mem;
-use std::time::Duration;
 
 use super::{Access, Actuation, ActuatorStatus, Capabilities, Motion, Servo};
+use crate::Time;
 use crate::model::{PanTilt, Position};
 
 impl Servo {
     /// The camera accepted what was sent then: that is when it can begin to act, however late the answer is.
-    pub fn accepted(&mut self, actuation: &Actuation, sent: Duration, now: Duration) {
+    pub fn accepted(&mut self, actuation: &Actuation, sent: Time, now: Time) {
         match actuation {
             Actuation::Move(Motion::Velocity { pan, tilt, zoom }) => {
                 let parts = self.axes.exchanged((*pan, *tilt));
@@ -37,7 +37,7 @@ impl Servo {
     }
 
     /// It may have acted on this, or may yet.
-    pub fn unanswered(&mut self, actuation: &Actuation, now: Duration) {
+    pub fn unanswered(&mut self, actuation: &Actuation, now: Time) {
         if let Actuation::Move(Motion::Velocity { zoom: Some(zoom), .. }) = actuation
             && *zoom != 0.0
         {
@@ -49,9 +49,9 @@ impl Servo {
     pub fn told_position(
         &mut self,
         position: Option<Position>,
-        at: Duration,
+        at: Time,
         actuator: &ActuatorStatus,
-        now: Duration,
+        now: Time,
     ) -> bool {
         if let Some(position) = position {
             self.take_position(position, at, actuator);
@@ -71,7 +71,7 @@ impl Servo {
         arrived
     }
 
-    fn take_position(&mut self, position: Position, at: Duration, actuator: &ActuatorStatus) {
+    fn take_position(&mut self, position: Position, at: Time, actuator: &ActuatorStatus) {
         let before = mem::replace(&mut self.camera.position, position);
         self.home.positioned(position);
         if position.zoom != before.zoom {

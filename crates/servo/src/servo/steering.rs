@@ -7,6 +7,7 @@ use std::time::Duration;
 use ptztrack_contract::Point;
 
 use super::{Access, Actuation, ActuatorStatus, Motion, Servo};
+use crate::Time;
 use crate::control::{ControlLaw, Jump, Mode, ZoomGoal};
 use crate::estimation::Measurement;
 use crate::model::{PanTilt, Position, View, around_deg, narrower};
@@ -22,7 +23,7 @@ impl Servo {
         &mut self,
         measurement: &Measurement,
         actuator: &ActuatorStatus,
-        now: Duration,
+        now: Time,
     ) -> Actuation {
         let law = self.control_law(&self.view(measurement), actuator.interval, now);
         let delays = self.delays();
@@ -38,7 +39,7 @@ impl Servo {
     }
 
     /// What the zoom is to do; `None` leaves it alone.
-    fn zoom_speed(&mut self, measurement: &Measurement, now: Duration) -> Option<f64> {
+    fn zoom_speed(&mut self, measurement: &Measurement, now: Time) -> Option<f64> {
         let delays = self.delays();
         let lens = self.camera.capabilities.lens();
         let wanted = self
@@ -88,7 +89,7 @@ impl Servo {
         Position { pan_deg, tilt_deg, ..position }
     }
 
-    fn control_law(&self, view: &View, interval: Duration, now: Duration) -> ControlLaw {
+    fn control_law(&self, view: &View, interval: Duration, now: Time) -> ControlLaw {
         let settings = &self.settings;
         let interval_s = interval.as_secs_f64();
         // No error is worth a move that would leave nearly as large a one on the other side.
@@ -116,7 +117,7 @@ impl Servo {
         &mut self,
         measurement: &Measurement,
         actuator: &ActuatorStatus,
-        now: Duration,
+        now: Time,
     ) -> Actuation {
         if actuator.may_move && !self.moves.under_way() {
             // By speed, before the mode was changed; or who knows, as a step went unanswered.
@@ -155,15 +156,15 @@ impl Servo {
     }
 
     /// How a step is to zoom: so that the height is right half way to the next one.
-    fn jump(&self, measurement: &Measurement, now: Duration) -> Option<Jump> {
+    fn jump(&self, measurement: &Measurement, now: Time) -> Option<Jump> {
         let delays = self.delays();
-        let shown_after = now.saturating_sub(measurement.taken_at) + delays.sum();
+        let shown_after = now - measurement.taken_at + delays.sum();
         let lead = shown_after + self.moves.interval(&delays) / 2;
         self.zoom.jump(&self.zoom_goal()?, &self.camera.capabilities.lens()?, &delays, now, lead)
     }
 
     /// Without a target.
-    pub(super) fn idle(&self, actuator: &ActuatorStatus, now: Duration) -> Actuation {
+    pub(super) fn idle(&self, actuator: &ActuatorStatus, now: Time) -> Actuation {
         if self.moves.under_way() && self.home.is_settled() {
             return Actuation::Continue;
         }
@@ -181,13 +182,13 @@ impl Servo {
     }
 
     /// Whether the camera is on its way home, or is to go there.
-    pub fn is_homeward(&self, actuator: &ActuatorStatus, now: Duration) -> bool {
+    pub fn is_homeward(&self, actuator: &ActuatorStatus, now: Time) -> bool {
         self.moves.under_way() && self.home.is_settled() || self.way_home(actuator, now).is_some()
     }
 
     /// The move home, where it is time. A zoom that goes on at its own speed, or may yet begin to, is no part of that
     /// move, and has to be ended first.
-    fn way_home(&self, actuator: &ActuatorStatus, now: Duration) -> Option<Actuation> {
+    fn way_home(&self, actuator: &ActuatorStatus, now: Time) -> Option<Actuation> {
         let zooms = self.zoom.is_moving(now) || actuator.in_doubt;
         let due = self.home.due(now, self.move_speed()).map(Actuation::Move);
         due.filter(|_| actuator.access == Access::Ours && !zooms)

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::PanTilt;
+use servo::{PanTilt, Time};
 
 use super::control_queue::ControlQueue;
 use super::operator::{CommandedMotion, OperatorDetector, Verdict};
@@ -14,7 +14,7 @@ pub struct Arbitration {
     /// The camera's own queue.
     pub queue: ControlQueue,
     /// An operator moved the camera; until then it is his.
-    operator_until: Option<Duration>,
+    operator_until: Option<Time>,
     /// Where the camera was first seen, while it may still be moving at a dead predecessor's word.
     found: Option<Found>,
     met: bool,
@@ -25,7 +25,7 @@ pub struct Arbitration {
 struct Found {
     position: PanTilt,
     zoom: Option<f64>,
-    at: Duration,
+    at: Time,
 }
 
 /// Who else moves the camera.
@@ -73,7 +73,7 @@ impl Arbitration {
     pub fn positioned(
         &mut self,
         (position, zoom): (PanTilt, Option<f64>),
-        (asked, answered): (Duration, Duration),
+        (asked, answered): (Time, Time),
         commands: CommandedMotion,
         give_way: Duration,
     ) -> Finding {
@@ -88,7 +88,7 @@ impl Arbitration {
         Finding::Operator
     }
 
-    fn is_orphan(&mut self, position: PanTilt, zoom: Option<f64>, now: Duration) -> bool {
+    fn is_orphan(&mut self, position: PanTilt, zoom: Option<f64>, now: Time) -> bool {
         if !self.met {
             self.met = true;
             self.found = Some(Found { position, zoom, at: now });
@@ -114,7 +114,7 @@ impl Arbitration {
     }
 
     /// We moved the camera, or may have, in a way that nobody can foresee.
-    pub fn excuse(&mut self, now: Duration) {
+    pub fn excuse(&mut self, now: Time) {
         self.watch.excuse(now);
     }
 
@@ -150,12 +150,12 @@ impl Arbitration {
     }
 
     /// Whether a camera just met is still watched for somebody else's move.
-    pub fn looks(&self, now: Duration) -> bool {
+    pub fn looks(&self, now: Time) -> bool {
         self.found.as_ref().is_some_and(|found| now <= found.at + Self::FIRST_LOOK)
     }
 
     /// Who else moves the camera, if anybody.
-    pub fn owner(&self, now: Duration) -> Option<ControlOwner> {
+    pub fn owner(&self, now: Time) -> Option<ControlOwner> {
         if self.queue.is_held() {
             return Some(ControlOwner::Queue);
         }
@@ -163,17 +163,17 @@ impl Arbitration {
     }
 
     /// Whether we may move the camera now; not while that is still being found out.
-    pub fn is_ours(&self, now: Duration) -> bool {
+    pub fn is_ours(&self, now: Time) -> bool {
         self.owner(now).is_none() && self.queue.lets_us() && !self.asks()
     }
 
     /// When an operator's time is over, where one is there.
-    pub fn operator_until(&self, now: Duration) -> Option<Duration> {
+    pub fn operator_until(&self, now: Time) -> Option<Time> {
         self.operator_until.filter(|until| now < *until)
     }
 
     /// Who holds the camera, if that is another than the last time this was asked.
-    pub fn change(&mut self, now: Duration) -> Option<Option<ControlOwner>> {
+    pub fn change(&mut self, now: Time) -> Option<Option<ControlOwner>> {
         let owner = self.owner(now);
         (std::mem::replace(&mut self.told, owner) != owner).then_some(owner)
     }
@@ -187,21 +187,21 @@ mod tests {
 
     const GIVE_WAY: Duration = Duration::from_secs(10);
 
-    fn s(s: u64) -> Duration {
-        Duration::from_secs(s)
+    fn s<T: From<Duration>>(s: u64) -> T {
+        Duration::from_secs(s).into()
     }
 
     fn tell_place(
         arbitration: &mut Arbitration,
         place: (PanTilt, Option<f64>),
-        at: Duration,
+        at: Time,
         give_way: Duration,
     ) -> Finding {
         let nothing = CommandHistory::default();
         arbitration.positioned(place, (at, at), CommandedMotion { pan_tilt: &nothing, zoom: None }, give_way)
     }
 
-    fn tell(arbitration: &mut Arbitration, pan: f64, at: Duration) -> Finding {
+    fn tell(arbitration: &mut Arbitration, pan: f64, at: Time) -> Finding {
         tell_place(arbitration, (PanTilt::new(pan, 0.0), Some(0.0)), at, GIVE_WAY)
     }
 

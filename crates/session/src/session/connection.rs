@@ -3,6 +3,8 @@
 use std::mem;
 use std::time::Duration;
 
+use servo::Time;
+
 use crate::Error;
 
 /// What became of the connection to the camera.
@@ -23,9 +25,9 @@ pub struct Connection {
     connected: bool,
     fault: Option<Fault>,
     /// When which kind was last reported.
-    told: Vec<(FaultKind, Duration)>,
+    told: Vec<(FaultKind, Time)>,
     pause: Duration,
-    retry_at: Duration,
+    retry_at: Time,
 }
 
 #[derive(Debug)]
@@ -74,11 +76,11 @@ impl Connection {
     /// What holds at any time.
     pub fn check_invariants(&self) {
         assert!(self.pause <= Self::LONGEST_PAUSE, "{self:?}");
-        assert!(self.fault.is_some() || self.retry_at.is_zero(), "a pause without a fault: {self:?}");
+        assert!(self.fault.is_some() || self.retry_at == Time::ZERO, "a pause without a fault: {self:?}");
     }
 
     /// Nothing may be sent before.
-    pub fn retry_at(&self) -> Duration {
+    pub fn retry_at(&self) -> Time {
         self.retry_at
     }
 
@@ -113,7 +115,7 @@ impl Connection {
     }
 
     /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
-    pub fn failed(&mut self, err: &Error, of_command: bool, now: Duration) -> Option<ConnectionChange> {
+    pub fn failed(&mut self, err: &Error, of_command: bool, now: Time) -> Option<ConnectionChange> {
         self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
         // Who has waited in vain has paused already; else silence would last longer than the camera's.
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
@@ -153,8 +155,8 @@ mod tests {
         Error::Camera("no".to_owned())
     }
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     #[test]
@@ -191,11 +193,11 @@ mod tests {
         let mut pauses = Vec::new();
         for _ in 0..6 {
             connection.failed(&broken(), true, ms(0));
-            pauses.push(connection.retry_at().as_millis());
+            pauses.push(connection.retry_at().since_zero().as_millis());
         }
         assert_eq!(pauses, [125, 250, 500, 1000, 1000, 1000]);
         connection.succeeded(true, false);
-        assert_eq!(connection.retry_at(), Duration::ZERO);
+        assert_eq!(connection.retry_at(), Time::ZERO);
     }
 
     #[test]
@@ -218,14 +220,14 @@ mod tests {
             connection.failed(&forbidden, true, ms(0)),
             Some(ConnectionChange::Refused(forbidden.clone()))
         );
-        assert_eq!(connection.retry_at(), Connection::FIRST_PAUSE);
+        assert_eq!(connection.retry_at(), Connection::FIRST_PAUSE.into());
         for time in [ms(125), ms(60_125), ms(120_125)] {
             assert_eq!(connection.failed(&forbidden, true, time), None);
             assert_eq!(connection.retry_at(), time + Connection::RARELY);
         }
         assert!(!connection.halted());
         assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
-        assert_eq!(connection.retry_at(), Duration::ZERO);
+        assert_eq!(connection.retry_at(), Time::ZERO);
     }
 
     #[test]

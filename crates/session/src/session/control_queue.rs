@@ -2,13 +2,15 @@
 
 use std::time::Duration;
 
+use servo::Time;
+
 use crate::{QueuePlace, QueueRequest};
 
 /// Our place in the camera's control queue, where it has one.
 #[derive(Debug, Default)]
 pub struct ControlQueue {
     state: State,
-    ask_at: Duration,
+    ask_at: Time,
     leaving: bool,
     /// A command was refused in our turn, and none was accepted since.
     doubted: bool,
@@ -59,7 +61,7 @@ impl ControlQueue {
     }
 
     /// The camera refused something with words; returns whether a queue may be the reason, and is worth asking.
-    pub fn refused(&mut self, now: Duration) -> bool {
+    pub fn refused(&mut self, now: Time) -> bool {
         match self.state {
             State::Unknown => self.state = State::Presumed,
             State::InControl if !self.doubted => self.state = State::Waiting,
@@ -87,11 +89,11 @@ impl ControlQueue {
     }
 
     /// What to ask, and when. The place is not given up before the camera is at rest: to stop it may take our turn.
-    pub fn next(&self, at_rest: bool) -> Option<(QueueRequest, Duration)> {
+    pub fn next(&self, at_rest: bool) -> Option<(QueueRequest, Time)> {
         let leaving = self.leaving && at_rest;
         match self.state {
             State::Unknown | State::Absent | State::Forbidden => None,
-            State::Waiting | State::InControl if leaving => Some((QueueRequest::Drop, Duration::ZERO)),
+            State::Waiting | State::InControl if leaving => Some((QueueRequest::Drop, Time::ZERO)),
             _ if leaving => None,
             State::Presumed | State::Outside => Some((QueueRequest::Request, self.ask_at)),
             State::Waiting | State::InControl => Some((QueueRequest::Query, self.ask_at)),
@@ -99,7 +101,7 @@ impl ControlQueue {
     }
 
     /// The camera answered; `None`: it said no more than yes.
-    pub fn answered(&mut self, request: QueueRequest, place: Option<QueuePlace>, now: Duration) {
+    pub fn answered(&mut self, request: QueueRequest, place: Option<QueuePlace>, now: Time) {
         self.state = match (request, place.map(|place| place.position)) {
             (QueueRequest::Drop, _) => State::Outside,
             (_, None | Some(1)) => State::InControl,
@@ -114,14 +116,14 @@ impl ControlQueue {
     }
 
     /// The camera did not say.
-    pub fn failed(&mut self, now: Duration) {
+    pub fn failed(&mut self, now: Time) {
         self.state = if self.state == State::Presumed { State::Absent } else { State::Outside };
         self.ask_at = now + Self::PAUSE;
         self.deaf = false;
     }
 
     /// The camera refused to let us in: so many are before us that there is no place.
-    pub fn turned_away(&mut self, now: Duration) {
+    pub fn turned_away(&mut self, now: Time) {
         self.failed(now);
         self.held = self.exists() && !self.leaving;
     }
@@ -141,7 +143,7 @@ impl ControlQueue {
     /// The connection was lost, and may be with it our place.
     pub fn forget(&mut self) {
         if self.exists() {
-            *self = Self { state: State::Outside, ask_at: Duration::ZERO, held: false, deaf: false, ..*self };
+            *self = Self { state: State::Outside, ask_at: Time::ZERO, held: false, deaf: false, ..*self };
         }
     }
 
@@ -181,8 +183,8 @@ impl ControlQueue {
 mod tests {
     use super::*;
 
-    fn s(s: u64) -> Duration {
-        Duration::from_secs(s)
+    fn s<T: From<Duration>>(s: u64) -> T {
+        Duration::from_secs(s).into()
     }
 
     fn place(position: u32) -> Option<QueuePlace> {
@@ -293,7 +295,10 @@ mod tests {
         assert!(!queue.is_held());
         queue.turned_away(s(6));
         assert!(queue.is_held() && !queue.lets_us());
-        assert_eq!(queue.next(true), Some((QueueRequest::Request, s(6) + ControlQueue::PAUSE)));
+        assert_eq!(
+            queue.next(true),
+            Some((QueueRequest::Request, Time::from_millis(6000) + ControlQueue::PAUSE))
+        );
         queue.answered(QueueRequest::Request, place(1), s(11));
         assert!(!queue.is_held() && queue.lets_us());
         queue.leave();

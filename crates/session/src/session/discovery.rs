@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use servo::Time;
+
 use crate::Query;
 
 /// What is still to be asked of the camera, just met or met again.
@@ -11,7 +13,7 @@ pub struct Discovery {
     /// What a camera just met is asked, what matters most first.
     questions: &'static [Query],
     pending: VecDeque<Pending>,
-    next_at: Duration,
+    next_at: Time,
     /// What was last told of the camera.
     told: Option<String>,
 }
@@ -41,7 +43,7 @@ impl Discovery {
     /// All of these are to be asked, what matters most first.
     pub fn new(questions: &'static [Query]) -> Self {
         let pending = questions.iter().copied().map(Pending::new).collect();
-        Self { questions, pending, next_at: Duration::ZERO, told: None }
+        Self { questions, pending, next_at: Time::ZERO, told: None }
     }
 
     /// What holds at any time.
@@ -54,7 +56,7 @@ impl Discovery {
     }
 
     /// What to ask next, and when.
-    pub fn next(&self) -> Option<(Query, Duration)> {
+    pub fn next(&self) -> Option<(Query, Time)> {
         self.pending.front().map(|pending| (pending.query, self.next_at))
     }
 
@@ -100,7 +102,7 @@ impl Discovery {
 
     /// This went unanswered: it is asked again after the others, if it is worth it. `counts`: as one of the tries.
     /// Returns whether nothing is left to ask.
-    pub fn unanswered(&mut self, query: Query, counts: bool, now: Duration) -> bool {
+    pub fn unanswered(&mut self, query: Query, counts: bool, now: Time) -> bool {
         self.next_at = now + Self::PAUSE;
         let Some(index) = self.pending.iter().position(|pending| pending.query == query) else {
             return false;
@@ -122,7 +124,7 @@ mod tests {
     const QUESTIONS: [Query; 5] =
         [Query::Position, Query::Limits, Query::Attributes, Query::Parameters, Query::MoveSpeed];
 
-    const NOW: Duration = Duration::from_secs(7);
+    const NOW: Time = Time::from_millis(7000);
 
     #[test]
     fn what_goes_unanswered_is_asked_again_last_and_not_for_ever() {
@@ -147,7 +149,7 @@ mod tests {
     fn a_witness_comes_before_all_else() {
         let mut discovery = Discovery::new(&QUESTIONS);
         discovery.ask_first(Query::Parameters);
-        assert_eq!(discovery.next(), Some((Query::Parameters, Duration::ZERO)));
+        assert_eq!(discovery.next(), Some((Query::Parameters, Time::ZERO)));
         assert!(!discovery.done(Query::Parameters) && !discovery.holds(Query::Parameters));
     }
 

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::time::Duration;
-
-use servo::{Actuation, Capabilities, Position, Presets};
+use servo::{Actuation, Capabilities, Position, Presets, Time};
 
 use super::CommandedMotion;
 
@@ -14,7 +12,7 @@ pub enum Fact {
         /// What it is to do.
         actuation: Actuation,
         /// When it was told: it can act from then on, however late its answer is.
-        sent: Duration,
+        sent: Time,
     },
     /// It did not answer to this: it may have acted on it, or may yet.
     Unanswered(Actuation),
@@ -23,7 +21,7 @@ pub enum Fact {
         /// As it told.
         position: Position,
         /// When it was so.
-        at: Duration,
+        at: Time,
     },
     /// It does not tell where it looks. [`Session::not_positioned`](super::Session::not_positioned) is to be called next.
     NoPosition,
@@ -36,7 +34,7 @@ pub enum Fact {
     /// Its presets; none where it will not tell them.
     Presets(Presets),
     /// It did not tell them, and is not to be asked again before then.
-    PresetsNotBefore(Duration),
+    PresetsNotBefore(Time),
     /// It will not go home.
     HomeRefused,
 }
@@ -55,5 +53,5 @@ pub struct Steering<'a> {
     /// The command that the camera answers was to take it home.
     pub leads_home: bool,
     /// When it is to be asked for its presets, where it is.
-    pub presets_due: Option<Duration>,
+    pub presets_due: Option<Time>,
 }

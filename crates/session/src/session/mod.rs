@@ -34,7 +34,7 @@ use description::Description;
 use discovery::Discovery;
 use mode_support::ModeSupport;
 use scheduler::Scheduler;
-use servo::{Access, ActuatorStatus, Mode, Position};
+use servo::{Access, ActuatorStatus, Mode, Position, Time};
 use stop_confirmation::{StopConfirmation, StopFinding};
 
 use crate::{Protocol, SessionEvent, SessionSettings, Stop};
@@ -58,9 +58,9 @@ pub struct Session {
     /// Where the camera last said it looks.
     position: Position,
     /// When to ask next where the camera looks.
-    next_poll: Duration,
+    next_poll: Time,
     /// When the camera last answered a question, or did not.
-    asked_at: Duration,
+    asked_at: Time,
     events: Vec<SessionEvent>,
 }
 
@@ -77,8 +77,8 @@ impl Session {
             modes: ModeSupport::new(mode),
             stop_confirmation: protocol.confirms_stops.then(StopConfirmation::default),
             position: Position::default(),
-            next_poll: Duration::ZERO,
-            asked_at: Duration::ZERO,
+            next_poll: Time::ZERO,
+            asked_at: Time::ZERO,
             events: Vec::new(),
         }
     }
@@ -94,7 +94,7 @@ impl Session {
         self.connection = Connection::default();
         self.discovery.renew();
         self.arbitration.queue.permitted();
-        self.next_poll = Duration::ZERO;
+        self.next_poll = Time::ZERO;
     }
 
     /// The axes are known to be otherwise: where the camera was before says nothing of who moved it since.
@@ -109,7 +109,7 @@ impl Session {
     }
 
     /// A predecessor left the camera in a move that this ends.
-    pub fn inherit(&mut self, stop: Stop, now: Duration) {
+    pub fn inherit(&mut self, stop: Stop, now: Time) {
         self.scheduler.inherited(stop, now);
     }
 
@@ -125,7 +125,7 @@ impl Session {
 
     /// A picture shows the background to move so many fields of view a second, or does not tell: whether a camera that said
     /// yes to a stop has stopped. Nothing else of a picture matters here.
-    pub fn see_background(&mut self, fields_s: Option<f64>, taken_at: Duration, now: Duration) {
+    pub fn see_background(&mut self, fields_s: Option<f64>, taken_at: Time, now: Time) {
         let is_ours = self.is_at_rest() && !self.is_taken_over(now);
         let Some(confirmation) = self.stop_confirmation.as_mut().filter(|_| is_ours) else { return };
         let finding = confirmation.see(fields_s, taken_at);
@@ -138,7 +138,7 @@ impl Session {
     }
 
     /// A stop that no picture tells of is repeated.
-    fn repeat_unseen_stop(&mut self, now: Duration) {
+    fn repeat_unseen_stop(&mut self, now: Time) {
         let is_at_rest = self.is_at_rest();
         let due = |confirmation: &&mut StopConfirmation| confirmation.unseen_at().is_some_and(|at| at <= now);
         if let Some(confirmation) = self.stop_confirmation.as_mut().filter(due).filter(|_| is_at_rest) {
@@ -148,7 +148,7 @@ impl Session {
     }
 
     /// What is to be known of the camera to decide what it is to do.
-    pub fn actuator(&self, now: Duration) -> ActuatorStatus {
+    pub fn actuator(&self, now: Time) -> ActuatorStatus {
         ActuatorStatus {
             access: self.access(now),
             mode: self.mode(now),
@@ -163,7 +163,7 @@ impl Session {
         self.settings.min_interval().max(self.scheduler.round_trip())
     }
 
-    fn access(&self, now: Duration) -> Access {
+    fn access(&self, now: Time) -> Access {
         if self.arbitration.owner(now).is_some() {
             Access::Others
         } else if self.arbitration.is_ours(now) {
@@ -174,7 +174,7 @@ impl Session {
     }
 
     /// How to move the camera: as is set, if it takes that.
-    fn mode(&self, now: Duration) -> Mode {
+    fn mode(&self, now: Time) -> Mode {
         self.modes.choose(self.tells_position(), now)
     }
 
@@ -219,7 +219,7 @@ impl Session {
     }
 
     /// Whether somebody else moves the camera.
-    pub fn is_taken_over(&self, now: Duration) -> bool {
+    pub fn is_taken_over(&self, now: Time) -> bool {
         self.arbitration.owner(now).is_some()
     }
 

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{Mode, Motion};
+use servo::{Mode, Motion, Time};
 
 use crate::{Command, Error, Parameters, Stop};
 
@@ -16,7 +16,7 @@ pub struct ModeSupport {
     /// Modes that its parameters deny.
     denied: Vec<Mode>,
     /// Modes whose words it refused, and when.
-    refused: Vec<(Mode, Duration)>,
+    refused: Vec<(Mode, Time)>,
     /// What may yet have been refused for another reason.
     doubt: Option<Doubt>,
 }
@@ -25,7 +25,7 @@ pub struct ModeSupport {
 struct Doubt {
     mode: Mode,
     refusal: Error,
-    since: Duration,
+    since: Time,
     /// It was refused again, too soon to count.
     again: bool,
     /// The camera did something else that it was asked since.
@@ -73,7 +73,7 @@ impl ModeSupport {
 
     /// The mode to move it by: the wanted one, or the best of the others where that is not to be had. A camera that
     /// does not tell its position is not sent from one to another.
-    pub fn choose(&self, tells_position: bool, now: Duration) -> Mode {
+    pub fn choose(&self, tells_position: bool, now: Time) -> Mode {
         let wanted = self.wanted;
         let possible = |mode: &Mode| tells_position || *mode != Mode::Absolute || wanted == Mode::Absolute;
         let mut modes = std::iter::once(wanted).chain(Self::ORDER);
@@ -87,14 +87,14 @@ impl ModeSupport {
     }
 
     /// When a move is worth sending: after two refusals in a row not before a third would count.
-    pub fn not_before(&self, command: &Command) -> Duration {
+    pub fn not_before(&self, command: &Command) -> Time {
         let doubt = self.doubt.as_ref().filter(|doubt| doubt.again && mode_of(command) == Some(doubt.mode));
-        doubt.map_or(Duration::ZERO, |doubt| doubt.since + Self::APART)
+        doubt.map_or(Time::ZERO, |doubt| doubt.since + Self::APART)
     }
 
     /// Whether it is known not to take the words of a mode.
-    pub fn lacks(&self, mode: Mode, now: Duration) -> bool {
-        let refused = |(refused, at): &(Mode, Duration)| *refused == mode && now < *at + Self::TRY_AGAIN;
+    pub fn lacks(&self, mode: Mode, now: Time) -> bool {
+        let refused = |(refused, at): &(Mode, Time)| *refused == mode && now < *at + Self::TRY_AGAIN;
         self.denied.contains(&mode) || self.refused.iter().any(refused)
     }
 
@@ -107,7 +107,7 @@ impl ModeSupport {
 
     /// The camera refused a command with words. Where one refusal comes on another, some time later, and it did
     /// something else in between, it is the command that it does not take.
-    pub fn refused(&mut self, command: &Command, refusal: &Error, now: Duration) -> Refusal {
+    pub fn refused(&mut self, command: &Command, refusal: &Error, now: Time) -> Refusal {
         let Some(mode) = mode_of(command) else { return Refusal::Other };
         if self.lacks(mode, now) {
             // Known; until it is tried again.
@@ -178,7 +178,7 @@ mod tests {
     const MOVE: Command = moving(Motion::Velocity { pan: 0.01, tilt: 0.0, zoom: None });
     const STEP: Command = moving(Motion::Absolute { pan_deg: 1.0, tilt_deg: 0.0, speed: 1.0, zoom: None });
     const PIXEL: Command = moving(Motion::Centre { x: 1, y: 1, width: 640, height: 480, magnify: None });
-    const SOON: Duration = Duration::from_secs(1);
+    const SOON: Time = Time::from_millis(1000);
 
     const fn moving(motion: Motion) -> Command {
         Command::Move { motion, free: false }
@@ -188,7 +188,7 @@ mod tests {
         refuse_at(modes, command, SOON)
     }
 
-    fn refuse_at(modes: &mut ModeSupport, command: &Command, at: Duration) -> Refusal {
+    fn refuse_at(modes: &mut ModeSupport, command: &Command, at: Time) -> Refusal {
         modes.refused(command, &Error::Camera("unknown".to_owned()), at)
     }
 
@@ -200,7 +200,7 @@ mod tests {
     }
 
     /// What is chosen where this is wanted.
-    fn choose(modes: &mut ModeSupport, wanted: Mode, tells_position: bool, now: Duration) -> Mode {
+    fn choose(modes: &mut ModeSupport, wanted: Mode, tells_position: bool, now: Time) -> Mode {
         modes.wanted = wanted;
         modes.choose(tells_position, now)
     }
@@ -210,17 +210,17 @@ mod tests {
         let mut modes = ModeSupport::new(Mode::Velocity);
         assert_eq!(refuse(&mut modes, &MOVE), Refusal::Doubtful);
         modes.obeyed();
-        assert_eq!(modes.not_before(&MOVE), Duration::ZERO, "at once, in case it was a moment's");
+        assert_eq!(modes.not_before(&MOVE), Time::ZERO, "at once, in case it was a moment's");
         assert_eq!(refuse_at(&mut modes, &MOVE, SOON + ModeSupport::APART / 2), Refusal::Doubtful);
         modes.obeyed();
         assert!(!modes.lacks(Mode::Velocity, SOON + ModeSupport::APART / 2));
         assert_eq!(modes.not_before(&MOVE), SOON + ModeSupport::APART);
-        assert_eq!(modes.not_before(&STEP), Duration::ZERO);
+        assert_eq!(modes.not_before(&STEP), Time::ZERO);
         assert_eq!(refuse_at(&mut modes, &MOVE, SOON + ModeSupport::APART), Refusal::OfMode(Mode::Velocity));
         let mut modes = ModeSupport::new(Mode::Velocity);
         refuse(&mut modes, &MOVE);
         modes.accepted(&MOVE);
-        assert_eq!(modes.not_before(&MOVE), Duration::ZERO);
+        assert_eq!(modes.not_before(&MOVE), Time::ZERO);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{CommandHistory, PanTilt};
+use servo::{CommandHistory, PanTilt, Time};
 
 /// What was commanded.
 #[derive(Debug, Clone, Copy)]
@@ -29,14 +29,14 @@ pub struct OperatorDetector {
     /// Whether the last position was off by a turn that nobody commanded, not by a zoom.
     turns_otherwise: bool,
     /// Until then it may turn any way at our word.
-    excused_until: Duration,
+    excused_until: Time,
 }
 
 #[derive(Debug, Clone, Copy)]
 struct Place {
     position: PanTilt,
     zoom: Option<f64>,
-    asked: Duration,
+    asked: Time,
 }
 
 impl Place {
@@ -82,7 +82,7 @@ impl OperatorDetector {
     pub fn position(
         &mut self,
         (position, zoom): (PanTilt, Option<f64>),
-        (asked, answered): (Duration, Duration),
+        (asked, answered): (Time, Time),
         commands: CommandedMotion,
     ) -> Verdict {
         let zoom = commands.zoom.and(zoom);
@@ -92,7 +92,7 @@ impl OperatorDetector {
             return Verdict::Ours;
         };
         let excused = before.asked <= self.excused_until;
-        let acting = (before.asked.saturating_sub(Self::LATEST), answered);
+        let acting = (before.asked - Self::LATEST, answered);
         let explains_zoom = |zoom| explains_zoom(&before, &place, acting, zoom);
         self.turns_otherwise = !excused && !explains_turn(&before, &place, acting, commands.pan_tilt);
         if !self.turns_otherwise && (excused || commands.zoom.is_none_or(explains_zoom)) {
@@ -115,7 +115,7 @@ impl OperatorDetector {
     }
 
     /// At this time the camera may turn any way at our word.
-    pub fn excuse(&mut self, now: Duration) {
+    pub fn excuse(&mut self, now: Time) {
         self.excused_until = self.excused_until.max(now + Self::LATEST);
     }
 
@@ -146,7 +146,7 @@ impl OperatorDetector {
 }
 
 /// Whether no command could move the camera then.
-fn is_still((since, answered): (Duration, Duration), commands: CommandedMotion) -> bool {
+fn is_still((since, answered): (Time, Time), commands: CommandedMotion) -> bool {
     let rests =
         |history: &CommandHistory| history.rates_between(since, answered).all(|rate| rate.largest() == 0.0);
     rests(commands.pan_tilt) && commands.zoom.is_none_or(rests)
@@ -155,7 +155,7 @@ fn is_still((since, answered): (Duration, Duration), commands: CommandedMotion) 
 fn explains_turn(
     before: &Place,
     place: &Place,
-    (since, answered): (Duration, Duration),
+    (since, answered): (Time, Time),
     commands: &CommandHistory,
 ) -> bool {
     let turn = before.position.turn_to(place.position);
@@ -163,7 +163,7 @@ fn explains_turn(
     let still = rates.iter().all(|rate| rate.largest() == 0.0);
     if !still {
         let steep = before.position.tilt.abs().max(place.position.tilt.abs()) > OperatorDetector::STEEP_DEG;
-        let long = answered.saturating_sub(before.asked) > OperatorDetector::LONGEST;
+        let long = answered - before.asked > OperatorDetector::LONGEST;
         if steep || long {
             return true;
         }
@@ -178,7 +178,7 @@ fn explains_turn(
 fn explains_zoom(
     before: &Place,
     place: &Place,
-    (since, answered): (Duration, Duration),
+    (since, answered): (Time, Time),
     commands: &CommandHistory,
 ) -> bool {
     let zoomed = before.zoom.zip(place.zoom).map_or(0.0, |(from, to)| to - from);
@@ -197,8 +197,8 @@ mod tests {
     use proptest::prelude::*;
     use servo::around_deg;
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     /// A watch that is told positions, one a second, each answered after 100 ms.
@@ -208,7 +208,7 @@ mod tests {
         commands: CommandHistory,
         zooms: CommandHistory,
         zoom: f64,
-        now: Duration,
+        now: Time,
     }
 
     impl Rig {
@@ -225,7 +225,7 @@ mod tests {
 
         fn tell_after(&mut self, wait: Duration, pan: f64, tilt: f64) -> Verdict {
             self.now += wait;
-            let asked = self.now.saturating_sub(ms(100));
+            let asked = self.now - Duration::from_millis(100);
             let place = (PanTilt::new(pan, tilt), Some(self.zoom));
             let commands = CommandedMotion { pan_tilt: &self.commands, zoom: Some(&self.zooms) };
             self.watch.position(place, (asked, self.now), commands)

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use servo::Actuation;
+use servo::{Actuation, Time};
 
 use super::{Fact, Session, Steering, StopConfirmation};
 use crate::{Command, Next, Query, Request, SessionEvent};
@@ -15,7 +15,7 @@ impl Session {
     const PATIENCE: u32 = 10;
 
     /// Takes notice of what has come of the time that has passed.
-    pub fn catch_up(&mut self, now: Duration) {
+    pub fn catch_up(&mut self, now: Time) {
         if let Some(owner) = self.arbitration.change(now) {
             self.events.push(owner.map_or(SessionEvent::Resumed, SessionEvent::TakenOver));
         }
@@ -23,7 +23,7 @@ impl Session {
     }
 
     /// What to send now, if anything, for the camera to do this.
-    pub fn next_request(&self, actuation: Actuation, steering: &Steering, now: Duration) -> Next {
+    pub fn next_request(&self, actuation: Actuation, steering: &Steering, now: Time) -> Next {
         if self.connection.halted() {
             return Next::Wait(None);
         }
@@ -44,12 +44,7 @@ impl Session {
     }
 
     /// The words for that, and when to say them.
-    fn command(
-        &self,
-        actuation: Actuation,
-        interval: Duration,
-        now: Duration,
-    ) -> (Command, Option<Duration>) {
+    fn command(&self, actuation: Actuation, interval: Duration, now: Time) -> (Command, Option<Time>) {
         let retry_at = self.connection.retry_at();
         let stop = Command::Stop(self.stop());
         match actuation {
@@ -75,7 +70,7 @@ impl Session {
     }
 
     /// What to ask next, and when.
-    fn question(&self, presets_due: Option<Duration>, now: Duration) -> (Query, Duration) {
+    fn question(&self, presets_due: Option<Time>, now: Time) -> (Query, Time) {
         let poll = (Query::Position, self.next_poll);
         let presets = presets_due.map(|at| (Query::Presets, at));
         // Of what is due the first; else what will be soonest.
@@ -93,14 +88,14 @@ impl Session {
     }
 
     /// Something is being sent.
-    pub fn sending(&mut self, request: &Request, now: Duration) {
+    pub fn sending(&mut self, request: &Request, now: Time) {
         if let Request::Command(command) = request {
             self.scheduler.attempted(command, now);
         }
     }
 
     /// The answer is waited for no longer, as something else is more urgent: no fault of the camera's.
-    pub fn abandoned(&mut self, request: &Request, now: Duration) -> Vec<Fact> {
+    pub fn abandoned(&mut self, request: &Request, now: Time) -> Vec<Fact> {
         match request {
             Request::Command(command) => vec![self.unanswered(command, now)],
             Request::Query(_) => Vec::new(),

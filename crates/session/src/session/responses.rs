@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use servo::{Actuation, Mode, Motion, PanTilt, Position, Presets};
+use servo::{Actuation, Mode, Motion, PanTilt, Position, Presets, Time};
 
 use super::arbitration::Finding;
 use super::connection::Connection;
@@ -33,7 +33,7 @@ impl Session {
         request: &Request,
         response: Result<Response, Error>,
         steering: &Steering,
-        (sent, now): (Duration, Duration),
+        (sent, now): (Time, Time),
     ) -> Vec<Fact> {
         if matches!(request, Request::Query(_)) {
             self.asked_at = now;
@@ -54,7 +54,7 @@ impl Session {
         command: &Command,
         err: &Error,
         steering: &Steering,
-        now: Duration,
+        now: Time,
     ) -> Vec<Fact> {
         let mut facts = Vec::new();
         if err.may_have_acted() {
@@ -77,7 +77,7 @@ impl Session {
         err: &Error,
         leads_home: bool,
         facts: &mut Vec<Fact>,
-        now: Duration,
+        now: Time,
     ) -> bool {
         let queue = &mut self.arbitration.queue;
         if queue.refused_command() || queue.refused(now) {
@@ -101,7 +101,7 @@ impl Session {
     }
 
     /// Whether a refusal is, or may be, only of the words of a mode.
-    fn refused_a_mode(&mut self, command: &Command, err: &Error, now: Duration) -> bool {
+    fn refused_a_mode(&mut self, command: &Command, err: &Error, now: Time) -> bool {
         match self.modes.refused(command, err, now) {
             Refusal::Other => false,
             Refusal::Doubtful => {
@@ -121,7 +121,7 @@ impl Session {
     }
 
     /// What the camera does from here on is unknown.
-    pub(super) fn unanswered(&mut self, command: &Command, now: Duration) -> Fact {
+    pub(super) fn unanswered(&mut self, command: &Command, now: Time) -> Fact {
         self.scheduler.failed(command, true, now);
         self.arbitration.excuse(now + Scheduler::DOUBT);
         Fact::Unanswered(command.actuation())
@@ -131,7 +131,7 @@ impl Session {
         &mut self,
         command: &Command,
         steering: &Steering,
-        (sent, now): (Duration, Duration),
+        (sent, now): (Time, Time),
     ) -> Vec<Fact> {
         let was_moving = self.scheduler.may_move();
         self.scheduler.accepted(command, now);
@@ -166,7 +166,7 @@ impl Session {
         query: Query,
         response: Response,
         steering: &Steering,
-        (sent, now): (Duration, Duration),
+        (sent, now): (Time, Time),
     ) -> Vec<Fact> {
         let mut facts = Vec::new();
         match response {
@@ -199,7 +199,7 @@ impl Session {
         &mut self,
         position: Position,
         steering: &Steering,
-        (sent, now): (Duration, Duration),
+        (sent, now): (Time, Time),
     ) -> Vec<Fact> {
         self.position = position;
         let mut facts = match position.pan_tilt() {
@@ -209,7 +209,7 @@ impl Session {
                 Vec::new()
             }
         };
-        facts.push(Fact::Position { position, at: (sent + now) / 2 });
+        facts.push(Fact::Position { position, at: sent.middle(now) });
         facts
     }
 
@@ -219,7 +219,7 @@ impl Session {
         self.scheduler.settle(true);
     }
 
-    fn not_told(&mut self, query: Query, err: &Error, now: Duration) -> Vec<Fact> {
+    fn not_told(&mut self, query: Query, err: &Error, now: Time) -> Vec<Fact> {
         if query == Query::Position {
             self.undecided();
         }
@@ -248,7 +248,7 @@ impl Session {
         Vec::new()
     }
 
-    fn will_not_tell(&mut self, query: Query, err: &Error, now: Duration) -> Vec<Fact> {
+    fn will_not_tell(&mut self, query: Query, err: &Error, now: Time) -> Vec<Fact> {
         let forbidden = matches!(err, Error::NotPermitted { .. } | Error::CredentialsMissing);
         match query {
             Query::Queue(_) if forbidden => self.arbitration.queue.forbidden(),
@@ -269,7 +269,7 @@ impl Session {
         }
     }
 
-    fn may_tell_later(&mut self, query: Query, now: Duration) -> Vec<Fact> {
+    fn may_tell_later(&mut self, query: Query, now: Time) -> Vec<Fact> {
         // Whether the camera is there at all.
         self.next_poll = now;
         match query {
@@ -285,14 +285,14 @@ impl Session {
     }
 
     /// This need not be asked again.
-    fn asked(&mut self, query: Query, now: Duration) {
+    fn asked(&mut self, query: Query, now: Time) {
         if self.discovery.done(query) {
             self.discovered(now);
         }
     }
 
     /// After the last question it is known whom we met.
-    fn discovered(&mut self, now: Duration) {
+    fn discovered(&mut self, now: Time) {
         let changed = self.discovery.changed(self.description.to_string());
         self.events.extend(changed.map(SessionEvent::Discovered));
         if !self.connection.connected() {
@@ -306,7 +306,7 @@ impl Session {
         &mut self,
         place: (PanTilt, Option<f64>),
         steering: &Steering,
-        (asked, now): (Duration, Duration),
+        (asked, now): (Time, Time),
     ) -> Vec<Fact> {
         let mut facts = Vec::new();
         if steering.is_under_way {
@@ -345,14 +345,14 @@ impl Session {
     }
 
     /// What the last position says was taken notice of: goes on to the next question.
-    pub fn positioned(&mut self, steering: &Steering, now: Duration) {
+    pub fn positioned(&mut self, steering: &Steering, now: Time) {
         self.poll_later(steering, now);
         self.succeeded(false, steering);
         self.asked(Query::Position, now);
     }
 
     /// The same, of a camera that does not tell it.
-    pub fn not_positioned(&mut self, steering: &Steering, now: Duration) {
+    pub fn not_positioned(&mut self, steering: &Steering, now: Time) {
         self.poll_later(steering, now);
         // One that told it before is well again soon.
         if !steering.is_under_way && !self.tells_position() {
@@ -361,7 +361,7 @@ impl Session {
         self.asked(Query::Position, now);
     }
 
-    fn poll_later(&mut self, steering: &Steering, now: Duration) {
+    fn poll_later(&mut self, steering: &Steering, now: Time) {
         self.next_poll = now
             + match (steering.is_under_way, self.scheduler.may_move()) {
                 (true, _) => Self::POLL_UNDER_WAY,
@@ -387,11 +387,11 @@ impl Session {
     }
 
     /// A camera that somebody may be about to move, or that may be, is asked more often.
-    fn is_wanted(&self, steering: &Steering, now: Duration) -> bool {
+    fn is_wanted(&self, steering: &Steering, now: Time) -> bool {
         steering.holds_target || self.arbitration.owner(now).is_some() || self.arbitration.looks(now)
     }
 
-    fn failed(&mut self, err: &Error, of_command: bool, now: Duration) {
+    fn failed(&mut self, err: &Error, of_command: bool, now: Time) {
         if !err.is_refusal() {
             self.arbitration.forget();
             self.modes.forget_refusals();

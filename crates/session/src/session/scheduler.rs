@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{Actuation, Motion};
+use servo::{Actuation, Motion, Time};
 
 use crate::{Command, Stop};
 
@@ -12,15 +12,15 @@ use crate::{Command, Stop};
 pub struct Scheduler {
     /// An accepted move is repeated this often: somebody else's command may have come in between, or it ends by itself.
     keep_alive: Duration,
-    accepted: Option<(Command, Duration)>,
-    last_attempt: Option<Duration>,
+    accepted: Option<(Command, Time)>,
+    last_attempt: Option<Time>,
     /// A move was sent that may have had an effect, and no stop was confirmed since.
     may_move: bool,
     stop_tried: bool,
     /// Somebody else moved the camera since, and whose move it is in now is being found out.
     contested: bool,
     /// A move went unanswered, and maybe stops after it: the camera may still act on it until then, even after a stop.
-    doubt_until: Option<Duration>,
+    doubt_until: Option<Time>,
     /// The words that end the last move, whatever the mode is by now.
     stop: Stop,
     /// How long the camera took to answer last.
@@ -47,7 +47,7 @@ impl Scheduler {
     }
 
     /// When to send a stop; `None`: no need to, or not known yet.
-    pub fn stop_due(&self, now: Duration, interval: Duration, retry_at: Duration) -> Option<Duration> {
+    pub fn stop_due(&self, now: Time, interval: Duration, retry_at: Time) -> Option<Time> {
         if self.contested {
             return None;
         }
@@ -58,20 +58,20 @@ impl Scheduler {
     }
 
     /// When to send this move.
-    pub fn move_due(&self, command: &Command, interval: Duration, retry_at: Duration) -> Duration {
+    pub fn move_due(&self, command: &Command, interval: Duration, retry_at: Time) -> Time {
         let repeat = match self.accepted {
             Some((accepted, at)) if accepted == *command => at + self.keep_alive,
-            _ => Duration::ZERO,
+            _ => Time::ZERO,
         };
         repeat.max(self.next_slot(interval)).max(retry_at)
     }
 
-    fn next_slot(&self, interval: Duration) -> Duration {
-        self.last_attempt.map_or(Duration::ZERO, |last| last + interval)
+    fn next_slot(&self, interval: Duration) -> Time {
+        self.last_attempt.map_or(Time::ZERO, |last| last + interval)
     }
 
     /// A command is being sent.
-    pub fn attempted(&mut self, command: &Command, now: Duration) {
+    pub fn attempted(&mut self, command: &Command, now: Time) {
         self.last_attempt = Some(now);
         self.stop_tried = command.is_stop();
         let Command::Move { motion, .. } = command else { return };
@@ -101,12 +101,12 @@ impl Scheduler {
     }
 
     /// The camera answered what was sent then.
-    pub fn answered(&mut self, sent: Duration, now: Duration) {
-        self.round_trip = now.saturating_sub(sent);
+    pub fn answered(&mut self, sent: Time, now: Time) {
+        self.round_trip = now - sent;
     }
 
     /// The camera said yes.
-    pub fn accepted(&mut self, command: &Command, now: Duration) {
+    pub fn accepted(&mut self, command: &Command, now: Time) {
         self.accepted = Some((*command, now));
         self.may_move = !command.is_stop();
         if self.doubt_until.is_some_and(|until| until <= now) {
@@ -120,7 +120,7 @@ impl Scheduler {
     }
 
     /// It did not; `may_have_acted` where that does not mean that nothing happened.
-    pub fn failed(&mut self, command: &Command, may_have_acted: bool, now: Duration) {
+    pub fn failed(&mut self, command: &Command, may_have_acted: bool, now: Time) {
         if may_have_acted {
             // What the camera does is unknown: the same command is worth sending again.
             self.accepted = None;
@@ -166,7 +166,7 @@ impl Scheduler {
     }
 
     /// The same, and not all that he said may have been acted on yet.
-    pub fn inherited(&mut self, stop: Stop, now: Duration) {
+    pub fn inherited(&mut self, stop: Stop, now: Time) {
         self.found_moving(stop);
         self.doubt_until = Some(now + Self::DOUBT);
     }
@@ -201,11 +201,11 @@ mod tests {
         Command::Move { motion: Motion::Velocity { pan, tilt: 0.0, zoom }, free: false }
     }
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
-    fn accept(scheduler: &mut Scheduler, command: Command, at: Duration) {
+    fn accept(scheduler: &mut Scheduler, command: Command, at: Time) {
         scheduler.attempted(&command, at);
         scheduler.accepted(&command, at);
     }

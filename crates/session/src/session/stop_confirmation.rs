@@ -2,11 +2,13 @@
 
 use std::time::Duration;
 
+use servo::Time;
+
 /// Whether a camera that was told to stop, and said yes, is seen to do so: some say yes and turn on.
 #[derive(Debug, Default)]
 pub struct StopConfirmation {
     /// When it last said yes, until it was seen at rest.
-    since: Option<Duration>,
+    since: Option<Time>,
     /// Pictures in a row that showed it to turn since.
     turning: u32,
     /// How often it was told again.
@@ -41,7 +43,7 @@ impl StopConfirmation {
     const IN_VAIN: u32 = 3;
 
     /// The camera accepted a stop.
-    pub fn stopped(&mut self, now: Duration) {
+    pub fn stopped(&mut self, now: Time) {
         if self.repeated < 2 * Self::IN_VAIN {
             (self.since, self.turning) = (Some(now), 0);
         }
@@ -53,7 +55,7 @@ impl StopConfirmation {
     }
 
     /// A picture shows the background to move so many fields of view a second, or does not tell.
-    pub fn see(&mut self, fields_s: Option<f64>, taken_at: Duration) -> StopFinding {
+    pub fn see(&mut self, fields_s: Option<f64>, taken_at: Time) -> StopFinding {
         let Some((since, fields_s)) = self.since.zip(fields_s) else { return StopFinding::Fine };
         if taken_at < since + Self::SHOWN_AFTER {
             return StopFinding::Fine;
@@ -71,7 +73,7 @@ impl StopConfirmation {
     }
 
     /// When the stop is to be repeated if no picture tells of it by then.
-    pub fn unseen_at(&self) -> Option<Duration> {
+    pub fn unseen_at(&self) -> Option<Time> {
         self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + Self::UNSEEN_AFTER)
     }
 
@@ -85,8 +87,8 @@ impl StopConfirmation {
 mod tests {
     use super::*;
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     /// What comes of pictures from then on that all show this.

@@ -6,6 +6,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use ptztrack_contract::lock::lock;
+use servo::Time;
 use tokio::time::sleep;
 
 /// A clock that runs, or that is held by a stream whose time is not the world's. It never goes back.
@@ -16,7 +17,7 @@ pub struct Clock {
 
 #[derive(Debug)]
 struct State {
-    reading: Duration,
+    reading: Time,
     /// The stream's own time, where it was last held.
     stream: Duration,
     /// Since when it has been running from that reading; `None` while it is held.
@@ -35,11 +36,11 @@ impl Clock {
     }
 
     fn at_zero(running_since: Option<Instant>) -> Self {
-        Self { state: Mutex::new(State { reading: Duration::ZERO, stream: Duration::ZERO, running_since }) }
+        Self { state: Mutex::new(State { reading: Time::ZERO, stream: Duration::ZERO, running_since }) }
     }
 
     /// What it shows.
-    pub fn now(&self) -> Duration {
+    pub fn now(&self) -> Time {
         self.with(|state| state.now())
     }
 
@@ -61,10 +62,10 @@ impl Clock {
 
     /// Sleeps until a time; for ever where there is none, or nobody knows when it comes. Whoever changes
     /// the clock has to wake the sleeper.
-    pub async fn sleep_until(&self, time: Option<Duration>) {
+    pub async fn sleep_until(&self, time: Option<Time>) {
         let left = self.with(|state| {
             state.running_since?;
-            Some(time?.saturating_sub(state.now()))
+            Some(time? - state.now())
         });
         match left {
             Some(left) => sleep(left).await,
@@ -78,7 +79,7 @@ impl Clock {
 }
 
 impl State {
-    fn now(&self) -> Duration {
+    fn now(&self) -> Time {
         self.reading + self.running_since.map_or(Duration::ZERO, |since| since.elapsed())
     }
 }
@@ -92,11 +93,11 @@ mod tests {
     #[test]
     fn held_it_stands_and_never_goes_back() {
         let clock = Clock::held();
-        assert_eq!(clock.now(), Duration::ZERO);
+        assert_eq!(clock.now(), Time::ZERO);
         clock.hold_at(SECOND);
-        assert_eq!(clock.now(), SECOND);
+        assert_eq!(clock.now(), Time::from(SECOND));
         clock.hold_at(SECOND / 2);
-        assert_eq!(clock.now(), SECOND);
+        assert_eq!(clock.now(), Time::from(SECOND));
     }
 
     #[test]
@@ -104,7 +105,7 @@ mod tests {
         let clock = Clock::held();
         for (stream, shown) in [(3600, 3600), (0, 3600), (2, 3602), (1, 3602), (3600, 7201)] {
             clock.hold_at(stream * SECOND);
-            assert_eq!(clock.now(), shown * SECOND);
+            assert_eq!(clock.now(), Time::from(shown * SECOND));
         }
     }
 
@@ -114,7 +115,7 @@ mod tests {
         clock.hold_at(SECOND);
         clock.run();
         let earlier = clock.now();
-        assert!(earlier >= SECOND);
+        assert!(earlier >= Time::from(SECOND));
         while clock.now() == earlier {
             std::hint::spin_loop();
         }

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tokio::sync::Notify;
 
 use ptztrack_contract::lock::lock;
-use servo::Measurement;
+use servo::{Measurement, Time};
 
 use super::Clock;
 use crate::http::Credentials;
@@ -64,7 +64,7 @@ impl Mailbox {
     }
 
     /// The time by which everything here and in the servo goes.
-    pub fn now(&self) -> Duration {
+    pub fn now(&self) -> Time {
         self.clock.now()
     }
 
@@ -187,7 +187,7 @@ impl Mailbox {
     }
 
     /// Resolves at a time, unless time is held.
-    pub(super) async fn sleep_until(&self, time: Option<Duration>) {
+    pub(super) async fn sleep_until(&self, time: Option<Time>) {
         self.clock.sleep_until(time).await;
     }
 

@@ -27,6 +27,8 @@ pub use self::statistics::Statistics;
 use self::dead_man::DeadMan;
 use self::state::TaskState;
 
+use servo::Time;
+
 use crate::http::{ClientSettings, Credentials, Location};
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
 use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status, Stop};
@@ -126,7 +128,7 @@ impl CameraTask {
         let mailbox = Arc::new(Mailbox::new(clock));
         let control = ControlLoop::new(settings, &C::PROTOCOL);
         let (status, estimates, stop) =
-            (control.status(Duration::ZERO), Some(control.estimates()), Some(control.stop()));
+            (control.status(Time::ZERO), Some(control.estimates()), Some(control.stop()));
         let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
@@ -307,7 +309,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
     }
 
     /// Until something comes up, or this time.
-    async fn wait(&self, until: Option<Duration>) {
+    async fn wait(&self, until: Option<Time>) {
         let until = until.into_iter().chain(self.state.deadline).min();
         tokio::select! {
             () = self.state.mailbox.arrived() => {}

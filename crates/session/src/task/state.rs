@@ -7,6 +7,8 @@ use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
+use servo::Time;
+
 use super::dead_man::DeadMan;
 use super::mailbox::{Mail, Mailbox};
 use super::{DeadManState, Event, LAST_RETRIES, STOP_GRACE, Statistics};
@@ -26,7 +28,7 @@ pub struct TaskState<O> {
     waiting: Vec<SyncSender<()>>,
     settling: Vec<Arc<SyncSender<()>>>,
     /// The end, once it has been asked for.
-    pub deadline: Option<Duration>,
+    pub deadline: Option<Time>,
     /// Nobody waits any more.
     gave_up: bool,
 }
@@ -133,7 +135,7 @@ impl<O: Fn(Event)> TaskState<O> {
     }
 
     /// Whether nobody needs the answer: the end has come, and nothing in flight can move the camera.
-    pub fn is_in_vain(&mut self, request: &Request, now: Duration) -> bool {
+    pub fn is_in_vain(&mut self, request: &Request, now: Time) -> bool {
         match request {
             Request::Command(_) => self.deadline.is_some_and(|deadline| deadline <= now),
             Request::Query(_) => {
@@ -145,12 +147,12 @@ impl<O: Fn(Event)> TaskState<O> {
 
     /// When to abandon what is in flight for a stop that waits behind it, after what was said of that before: a stop
     /// that is not due any more hurries nobody.
-    pub fn give_up_at(&self, request: &Request, before: Option<Duration>, now: Duration) -> Option<Duration> {
+    pub fn give_up_at(&self, request: &Request, before: Option<Time>, now: Time) -> Option<Time> {
         self.stop_waits_behind(request, now).then(|| before.unwrap_or(now + STOP_GRACE))
     }
 
     /// Whether something else than a stop is in flight while a stop is what the camera needs.
-    fn stop_waits_behind(&self, request: &Request, now: Duration) -> bool {
+    fn stop_waits_behind(&self, request: &Request, now: Time) -> bool {
         let may_move = match request {
             Request::Command(command) => !command.is_stop(),
             Request::Query(_) => !self.control.session().is_at_rest(),
@@ -158,15 +160,15 @@ impl<O: Fn(Event)> TaskState<O> {
         may_move && !self.control.has_errand(now)
     }
 
-    pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Duration) {
+    pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Time) {
         let now = self.mailbox.now();
-        self.count(request, answer.as_ref().err().cloned(), now.saturating_sub(sent));
+        self.count(request, answer.as_ref().err().cloned(), now - sent);
         self.control.on_response(request, answer, sent, now);
     }
 
-    pub fn abandoned(&mut self, request: &Request, sent: Duration) {
+    pub fn abandoned(&mut self, request: &Request, sent: Time) {
         let now = self.mailbox.now();
-        let waited = now.saturating_sub(sent);
+        let waited = now - sent;
         self.count(request, Some(Error::Timeout(waited)), waited);
         self.control.abandoned(request, now);
     }
@@ -251,8 +253,8 @@ mod tests {
     });
     const HALT: Command = Command::Stop(Stop::PanTilt);
 
-    fn ms(ms: u64) -> Duration {
-        Duration::from_millis(ms)
+    fn ms<T: From<Duration>>(ms: u64) -> T {
+        Duration::from_millis(ms).into()
     }
 
     const PROTOCOL: Protocol = Protocol {
@@ -287,10 +289,10 @@ mod tests {
         /// Does what is due at this time; returns the commands.
         fn serve_at(
             &mut self,
-            at: Duration,
+            at: Time,
             answer: impl Fn(&Command) -> Result<Response, Error>,
         ) -> Vec<Command> {
-            self.mailbox.hold_at(at);
+            self.mailbox.hold_at(at.since_zero());
             self.take_mail();
             self.check_deadline();
             let mut sent = Vec::new();
@@ -344,7 +346,7 @@ mod tests {
         let (mut state, told) = state();
         state.end_in_doubt();
         let mut now = ms(5000);
-        while now < ms(2000) + FINISH_BUDGET + LAST_RETRIES {
+        while now < Time::from_millis(2000) + FINISH_BUDGET + LAST_RETRIES {
             state.serve_at(now, |_| timeout());
             assert!(!state.is_over());
             now += ms(1000);
@@ -401,7 +403,7 @@ mod tests {
         assert_eq!(state.give_up_at(&MOVE, None, ms(1000)), None);
         state.see(Visibility::Gone);
         let at = state.give_up_at(&MOVE, None, ms(1000));
-        assert_eq!(at, Some(ms(1000) + STOP_GRACE));
+        assert_eq!(at, Some(Time::from_millis(1000) + STOP_GRACE));
         assert_eq!(state.give_up_at(&MOVE, at, ms(1400)), at);
         state.see(Visibility::Seen);
         assert_eq!(state.give_up_at(&MOVE, at, ms(1450)), None);

@@ -10,7 +10,8 @@ use std::time::Duration;
 use ptztrack_contract::{Point, Rect, Vector};
 
 use servo::{
-    Estimates, HardLimits, Measurement, PanTilt, Position, Range, ServoSettings, View, Visibility, around_deg,
+    Estimates, HardLimits, Measurement, PanTilt, Position, Range, ServoSettings, Time, View, Visibility,
+    around_deg,
 };
 use session::{Command, Error, Stop};
 use session::{Next, Query, Request, Response};
@@ -96,7 +97,7 @@ impl Setup {
     pub fn run(self, seconds: f64, target: impl Fn(f64) -> (PanTilt, f64)) -> Run {
         let mut simulation = Simulation::new(self);
         let mut run = Run::default();
-        while simulation.now.as_secs_f64() < Simulation::START_S + seconds {
+        while simulation.now.since_zero().as_secs_f64() < Simulation::START_S + seconds {
             simulation.tick(&|time| target(time - Simulation::START_S), &mut run);
         }
         run.reports = simulation.control.take_events();
@@ -155,17 +156,17 @@ struct Shot {
     ego: Vector,
     velocity: Vector,
     bounds: Rect,
-    at: Duration,
+    at: Time,
 }
 
 struct Simulation {
     setup: Setup,
     control: ControlLoop,
-    now: Duration,
+    now: Time,
     head: Head,
-    in_flight: Option<(Request, Duration)>,
+    in_flight: Option<(Request, Time)>,
     shots: VecDeque<Shot>,
-    last_shot: Option<(Duration, PanTilt, View, PanTilt, Point)>,
+    last_shot: Option<(Time, PanTilt, View, PanTilt, Point)>,
     noise: u64,
 }
 
@@ -182,7 +183,7 @@ impl Simulation {
         };
         Self {
             control: crate::control_loop(setup.settings.clone()),
-            now: Duration::from_secs(1),
+            now: Time::from_millis(1000),
             head: Head::new(setup.kinematics.clone(), OPTICS, limits, home, Duration::ZERO),
             in_flight: None,
             shots: VecDeque::new(),
@@ -194,8 +195,8 @@ impl Simulation {
 
     fn tick(&mut self, target: &impl Fn(f64) -> (PanTilt, f64), run: &mut Run) {
         self.now += TICK;
-        self.head.advance(self.now);
-        if self.now.as_millis().is_multiple_of(PICTURE.as_millis()) {
+        self.head.advance(self.now.since_zero());
+        if self.now.since_zero().as_millis().is_multiple_of(PICTURE.as_millis()) {
             self.expose(target);
         }
         while self.shots.front().is_some_and(|shot| shot.at + self.setup.video_delay <= self.now) {
@@ -217,7 +218,7 @@ impl Simulation {
     }
 
     fn expose(&mut self, target: &impl Fn(f64) -> (PanTilt, f64)) {
-        let time_s = self.now.as_secs_f64();
+        let time_s = self.now.since_zero().as_secs_f64();
         let (direction, height_deg) = target(time_s);
         let (pose, view, head) = (self.pose(), self.view(), self.head.now());
         let point = |direction: PanTilt| view.point(direction - pose);
@@ -284,10 +285,10 @@ impl Simulation {
             self.control.sending(&request, self.now);
             self.in_flight = Some((request, self.now));
             if let Request::Command(command) = request {
-                run.commands.push((self.now.as_secs_f64() - Self::START_S, command));
+                run.commands.push((self.now.since_zero().as_secs_f64() - Self::START_S, command));
                 if !(self.setup.refuses)(&command) {
                     for motion in motions(&command) {
-                        self.head.command(self.now, motion);
+                        self.head.command(self.now.since_zero(), motion);
                     }
                 }
             }

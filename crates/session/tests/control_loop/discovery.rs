@@ -4,15 +4,17 @@
 
 use std::time::Duration;
 
-use servo::{HardLimits, Home, Measurement, Motion, Position, Presets, Range, ServoSettings, Visibility};
+use servo::{
+    HardLimits, Home, Measurement, Motion, Position, Presets, Range, ServoSettings, Time, Visibility,
+};
 use session::session::ConnectionChange;
 use session::{Command, Error, Parameters, QueueRequest};
 use session::{Next, Query, Request, Response, SessionEvent};
 
 use session::{ControlLoop, LoopEvent};
 
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
+fn ms<T: From<Duration>>(ms: u64) -> T {
+    Duration::from_millis(ms).into()
 }
 
 fn timeout() -> Error {
@@ -49,7 +51,7 @@ fn told(request: &Request) -> Result<Response, Error> {
 
 struct Meeting {
     control: ControlLoop,
-    now: Duration,
+    now: Time,
     requests: Vec<Request>,
     reports: Vec<LoopEvent>,
 }
@@ -68,7 +70,7 @@ impl Meeting {
     fn run(
         &mut self,
         (seconds, per_answer): (u64, Duration),
-        seen: impl Fn(Duration) -> Measurement,
+        seen: impl Fn(Time) -> Measurement,
         mut answer: impl FnMut(&Request) -> Result<Response, Error>,
     ) {
         let end = self.now + Duration::from_secs(seconds);
@@ -113,13 +115,13 @@ impl Meeting {
     }
 }
 
-fn nobody(now: Duration) -> Measurement {
+fn nobody(now: Time) -> Measurement {
     Measurement { visibility: Visibility::Gone, ..Measurement::at(0.5, 0.5, now) }
 }
 
 /// Who is somewhere else at every moment: there is always something to send.
-fn somebody(now: Duration) -> Measurement {
-    let time_s = now.as_secs_f64();
+fn somebody(now: Time) -> Measurement {
+    let time_s = now.since_zero().as_secs_f64();
     Measurement::at(0.6 + 0.3 * (3.0 * time_s).sin().abs(), 0.5 + 0.1 * (2.3 * time_s).sin(), now)
 }
 

@@ -19,7 +19,8 @@ use std::time::Duration;
 
 use proptest::prelude::*;
 use servo::{
-    HardLimits, Measurement, Mode, Motion, Position, Range, ServoSettings, SpeedMap, TableRow, Visibility,
+    HardLimits, Measurement, Mode, Motion, Position, Range, ServoSettings, SpeedMap, TableRow, Time,
+    Visibility,
 };
 use session::session::{ConnectionChange, ControlOwner};
 use session::{
@@ -44,14 +45,14 @@ fn control_loop(settings: impl Into<LoopSettings>) -> ControlLoop {
     ControlLoop::new(settings, &vapix::Client::PROTOCOL)
 }
 
-fn ms(ms: u64) -> Duration {
-    Duration::from_millis(ms)
+fn ms<T: From<Duration>>(ms: u64) -> T {
+    Duration::from_millis(ms).into()
 }
 
 /// A camera that answers at once, and the loop that steers it.
 struct Rig {
     control: ControlLoop,
-    now: Duration,
+    now: Time,
     sent: Vec<Command>,
 }
 
@@ -457,7 +458,10 @@ fn a_target_goes_stale_while_an_answer_is_waited_for() {
     rig.see(0.9, 0.5);
     let stale_at = rig.now + ServoSettings::default().stale_timeout;
     assert_eq!(rig.control.stale_at(), Some(stale_at));
-    assert!(rig.control.servo().has_target(stale_at - ms(1)) && !rig.control.servo().has_target(stale_at));
+    assert!(
+        rig.control.servo().has_target(stale_at - Duration::from_millis(1))
+            && !rig.control.servo().has_target(stale_at)
+    );
 }
 
 #[test]
@@ -580,7 +584,7 @@ proptest! {
         for (late, right) in jumps {
             rig.now += ms(40);
             let x = if right { 0.9 } else { 0.1 };
-            rig.control.measure(Measurement::at(x, 0.5, rig.now.saturating_sub(ms(late))), rig.now);
+            rig.control.measure(Measurement::at(x, 0.5, rig.now - Duration::from_millis(late)), rig.now);
             rig.after(ms(0));
         }
         // Two seconds of pictures that are what they seem.
