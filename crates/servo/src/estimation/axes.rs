@@ -102,15 +102,19 @@ impl AxisEstimator {
         let since = turn.from - Self::LONGEST_DELAY;
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
         let noise = Self::NOISE_FIELDS_S * fov_deg;
-        if turn.rate.largest() > noise
-            && let (Some(told), Some(seen)) = (along_one(told.iter().copied()), along_one([turn.rate]))
-            && self.exchange.see(1.0, if told == seen { 1.0 } else { -1.0 })
-        {
-            (self.pan, self.tilt) = (AxisSense::default(), AxisSense::default());
-            return Some(AxisFinding::Exchanged);
-        }
-        if !self.exchange.is_known() {
-            return None;
+        let along = (along_one(told.iter().copied()), along_one([turn.rate]));
+        match along {
+            (Some(told), Some(seen)) if turn.rate.largest() > noise => {
+                if self.exchange.see(1.0, if told == seen { 1.0 } else { -1.0 }) {
+                    (self.pan, self.tilt) = (AxisSense::default(), AxisSense::default());
+                    return Some(AxisFinding::Exchanged);
+                }
+                if told != seen {
+                    return None;
+                }
+            }
+            _ if !self.exchange.is_known() => return None,
+            _ => {}
         }
         let pan = one_way(told.iter().map(|rate| rate.pan));
         let tilt = one_way(told.iter().map(|rate| rate.tilt));
@@ -136,10 +140,10 @@ impl AxisEstimator {
     }
 }
 
-/// Whether turns are all along one axis: `Some(true)` along pan, `Some(false)` along tilt.
+/// Whether turns are all along one axis: `Some(true)` along pan, `Some(false)` along tilt. What rests turns nothing.
 fn along_one(turns: impl IntoIterator<Item = PanTilt>) -> Option<bool> {
     let (mut pan, mut tilt) = (true, true);
-    for turn in turns {
+    for turn in turns.into_iter().filter(|turn| turn.largest() > 0.0) {
         let (x, y) = (turn.pan.abs(), turn.tilt.abs());
         pan &= x > AxisEstimator::ALONG_ONE * y;
         tilt &= y > AxisEstimator::ALONG_ONE * x;
@@ -147,10 +151,11 @@ fn along_one(turns: impl IntoIterator<Item = PanTilt>) -> Option<bool> {
     (pan != tilt).then_some(pan)
 }
 
-/// The first of rates that all have one sign.
-fn one_way(mut rates: impl Iterator<Item = f64>) -> Option<f64> {
+/// The first of rates that all have one sign, but for rests: what turns meanwhile does so by one of them.
+fn one_way(rates: impl Iterator<Item = f64>) -> Option<f64> {
+    let mut rates = rates.filter(|rate| *rate != 0.0);
     let first = rates.next()?;
-    (first != 0.0 && rates.all(|rate| rate * first > 0.0)).then_some(first)
+    rates.all(|rate| rate * first > 0.0).then_some(first)
 }
 
 #[cfg(test)]
@@ -217,6 +222,24 @@ mod tests {
         assert_eq!(axes.mounting(mirrored), Mounting::default(), "as it was set");
         assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(4.0, 4.0), 100), None);
         assert_eq!(axes.cautious(PanTilt::new(40.0, 40.0), ms(0)), PanTilt::new(40.0, 40.0));
+    }
+
+    /// As many pictures as decide, from the first that shows the camera's first move on.
+    #[test]
+    fn the_first_move_tells_at_once() {
+        for (seen_deg_s, finding) in [(4.0, None), (-4.0, Some(AxisFinding::Inverted))] {
+            let (mut axes, mut history) = (AxisEstimator::default(), CommandHistory::default());
+            history.push(ms(1000), PanTilt::new(6.0, 0.0));
+            let mut see = |picture: u64, rate: f64| {
+                let from = ms::<Time>(1000) + ms::<Duration>(80 * picture);
+                let turn = ObservedRotation { from, to: from + ms(80), rate: PanTilt::new(rate, 0.0) };
+                axes.see(&turn, &history, 55.0)
+            };
+            assert!((0..2).all(|late| see(late, 0.0).is_none()));
+            assert!((2..7).all(|picture| see(picture, seen_deg_s).is_none()));
+            assert_eq!(see(7, seen_deg_s), finding);
+            assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)).pan == 40.0, finding.is_none());
+        }
     }
 
     #[test]
