@@ -16,6 +16,10 @@ pub struct AxisEstimator {
     tilt: AxisSense,
     /// Until it is known whether they are exchanged, one of them is moved at a time: whether it is pan, and since when.
     alone: Option<(bool, Time)>,
+    /// Pictures in a row in which it rested although it was told to turn as fast as it may.
+    rests: u32,
+    /// How often that bound was doubled.
+    raised: u32,
 }
 
 /// What was found out about an axis.
@@ -69,6 +73,12 @@ impl AxisEstimator {
     /// for all that time is compared.
     const LONGEST_DELAY: Duration = Duration::from_millis(900);
 
+    /// A rate is that of the bound from this part of it on: what is told is told by levels.
+    const NEARLY: f64 = 0.8;
+
+    /// The bound is doubled no more often.
+    const MOST_RAISED: u32 = 3;
+
     /// One axis is moved alone for so long, that a picture may show what it does.
     const ALONE: Duration = Duration::from_millis(1500);
 
@@ -102,6 +112,7 @@ impl AxisEstimator {
         let since = turn.from - Self::LONGEST_DELAY;
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
         let noise = Self::NOISE_FIELDS_S * fov_deg;
+        self.heed_rest(&told, turn.rate.largest() <= noise);
         let along = (along_one(told.iter().copied()), along_one([turn.rate]));
         match along {
             (Some(told), Some(seen)) if turn.rate.largest() > noise => {
@@ -125,6 +136,22 @@ impl AxisEstimator {
         (see(&mut self.tilt, tilt, turn.rate.tilt) || changed).then_some(AxisFinding::Inverted)
     }
 
+    /// Some cameras rest where they are told to turn slowly. One that does so, told for longer than any delay to turn as fast as
+    /// it may until its axes are known, may turn twice as fast.
+    fn heed_rest(&mut self, told: &[PanTilt], rests: bool) {
+        let least = Self::NEARLY * self.cautious_deg_s();
+        let told = told.iter().all(|rate| rate.largest() >= least);
+        self.rests = if told && rests { self.rests + 1 } else { 0 };
+        if self.rests >= AxisSense::DECISIVE && self.raised < Self::MOST_RAISED {
+            (self.rests, self.raised) = (0, self.raised + 1);
+        }
+    }
+
+    /// How fast an axis may be until it is known, degrees per second.
+    fn cautious_deg_s(&self) -> f64 {
+        Self::CAUTIOUS_DEG_S * f64::from(1 << self.raised)
+    }
+
     /// A rate bounded by what is known of the axes. Of two that are exchanged and move at once, nobody can tell from the picture
     /// that they are not both the wrong way round.
     pub fn cautious(&mut self, mut rate: PanTilt, now: Time) -> PanTilt {
@@ -133,9 +160,9 @@ impl AxisEstimator {
             let (pans, _) = *self.alone.insert(since.unwrap_or((rate.pan.abs() >= rate.tilt.abs(), now)));
             rate = if pans { PanTilt::new(rate.pan, 0.0) } else { PanTilt::new(0.0, rate.tilt) };
         }
-        let bounded = |axis: AxisSense, rate: f64| {
-            if axis.is_known() { rate } else { rate.clamp(-Self::CAUTIOUS_DEG_S, Self::CAUTIOUS_DEG_S) }
-        };
+        let most = self.cautious_deg_s();
+        let bounded =
+            |axis: AxisSense, rate: f64| if axis.is_known() { rate } else { rate.clamp(-most, most) };
         PanTilt::new(bounded(self.pan, rate.pan), bounded(self.tilt, rate.tilt))
     }
 }
@@ -239,6 +266,19 @@ mod tests {
             assert!((2..7).all(|picture| see(picture, seen_deg_s).is_none()));
             assert_eq!(see(7, seen_deg_s), finding);
             assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)).pan == 40.0, finding.is_none());
+        }
+    }
+
+    #[test]
+    fn a_camera_that_does_not_turn_slowly_is_told_to_turn_faster() {
+        let mut axes = AxisEstimator::default();
+        let allowed = |axes: &mut AxisEstimator| axes.cautious(PanTilt::new(90.0, 0.0), ms(0)).pan;
+        watch(&mut axes, PanTilt::new(3.0, 0.0), PanTilt::default(), 50);
+        assert_eq!(allowed(&mut axes), 6.0, "so slow it was of itself");
+        for most in [12.0, 24.0, 48.0, 48.0] {
+            let told = PanTilt::new(allowed(&mut axes), 0.0);
+            assert_eq!(watch(&mut axes, told, PanTilt::default(), 11), None);
+            assert_eq!(allowed(&mut axes), most);
         }
     }
 
