@@ -80,7 +80,10 @@ impl AxisEstimator {
     const MOST_RAISED: u32 = 3;
 
     /// One axis is moved alone for so long, that a picture may show what it does.
-    const ALONE: Duration = Duration::from_millis(1500);
+    const ALONE: Duration = Duration::from_millis(2500);
+
+    /// No camera takes longer to begin to turn.
+    const LATEST: Duration = Duration::from_millis(1600);
 
     /// A turn is along one axis where it is so many times faster than along the other.
     const ALONG_ONE: f64 = 2.0;
@@ -112,7 +115,7 @@ impl AxisEstimator {
         let since = turn.from - Self::LONGEST_DELAY;
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
         let noise = Self::NOISE_FIELDS_S * fov_deg;
-        self.heed_rest(&told, turn.rate.largest() <= noise);
+        self.heed_rest(turn, history, noise);
         let along = (along_one(told.iter().copied()), along_one([turn.rate]));
         match along {
             (Some(told), Some(seen)) if turn.rate.largest() > noise => {
@@ -138,10 +141,11 @@ impl AxisEstimator {
 
     /// Some cameras rest where they are told to turn slowly. One that does so, told for longer than any delay to turn as fast as
     /// it may until its axes are known, may turn twice as fast.
-    fn heed_rest(&mut self, told: &[PanTilt], rests: bool) {
+    fn heed_rest(&mut self, turn: &ObservedRotation, history: &CommandHistory, noise: f64) {
         let least = Self::NEARLY * self.cautious_deg_s();
-        let told = told.iter().all(|rate| rate.largest() >= least);
-        self.rests = if told && rests { self.rests + 1 } else { 0 };
+        let mut told = history.rates_between(turn.from - Self::LATEST, turn.to);
+        let rests = turn.rate.largest() <= noise && told.all(|rate| rate.largest() >= least);
+        self.rests = if rests { self.rests + 1 } else { 0 };
         if self.rests >= AxisSense::DECISIVE && self.raised < Self::MOST_RAISED {
             (self.rests, self.raised) = (0, self.raised + 1);
         }
