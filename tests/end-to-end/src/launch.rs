@@ -24,6 +24,14 @@ pub fn plugin_folder() -> PathBuf {
     folder
 }
 
+/// Where a test leaves what nobody else is to find, by a name that says whose it is. It is not below the plugins' folder: GStreamer looks
+/// for plugins there, whoever starts meanwhile, and would remember those that a test has linked for itself.
+pub fn scratch(name: &str) -> PathBuf {
+    let folder = plugin_folder().with_file_name("tmp");
+    std::fs::create_dir_all(&folder).unwrap();
+    folder.join(format!("{}-{name}", std::process::id()))
+}
+
 /// A GStreamer or other tool with the plugins and a registry of our own, so that a user's stays as it is.
 pub fn tool(program: &str) -> Command {
     let folder = plugin_folder();

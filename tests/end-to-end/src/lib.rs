@@ -16,7 +16,7 @@ mod watchdog;
 
 pub use chance::Chance;
 pub use front::{Front, Way};
-pub use launch::{GstLaunch, plugin_folder, signal, tool};
+pub use launch::{GstLaunch, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::Program;
 pub use recording::pictures_in;

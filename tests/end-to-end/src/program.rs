@@ -8,7 +8,7 @@ use std::net::TcpStream;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use crate::{GstLaunch, PATIENCE, plugin_folder, scene, tool};
+use crate::{GstLaunch, PATIENCE, plugin_folder, scene, scratch, tool};
 
 /// It runs, with a folder of its own.
 pub struct Program {
@@ -34,7 +34,7 @@ impl Program {
         more: &[&str],
         environment: &[(&str, &Path)],
     ) -> Self {
-        let folder = plugin_folder().join(format!("program-{test}-{}", std::process::id()));
+        let folder = scratch(&format!("program-{test}"));
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("password"), scene::PASSWORD).unwrap();
         let cameras = folder.join("cameras.toml");

@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use end_to_end::following::{Following, MJPEG, RTSP, Video, python, rust, script};
-use end_to_end::{GstLaunch, PATIENCE, Way, plugin_folder, scene};
+use end_to_end::{GstLaunch, PATIENCE, Way, scene, scratch};
 use virtual_camera::VirtualCamera;
 
 /// Everything that can become of a camera, one after the other.
@@ -73,7 +73,7 @@ fn a_wrong_password_is_not_tried_for_ever() {
 /// Each part of a recording stays.
 #[test]
 fn a_recording_goes_on_in_another_file() {
-    let folder = plugin_folder().join(format!("recordings-{}", std::process::id()));
+    let folder = scratch("recordings");
     std::fs::create_dir_all(&folder).unwrap();
     let out = folder.join("a.mkv");
     let mut following = Following::start(|_| {

@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
 use end_to_end::scene::{assert_left_at_rest, wait_until_following};
-use end_to_end::{GstLaunch, PATIENCE, Watchdog, plugin_folder, scene, signal, tool};
+use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, scratch, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 /// How often the stick that an operator holds says where to.
@@ -203,7 +203,7 @@ fn without_a_watchdog_one_warning_says_so() {
 #[test]
 fn a_watchdog_that_never_starts_keeps_no_camera_from_following() {
     let cameras = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
-    let program = plugin_folder().join(format!("sleeper-{}", std::process::id()));
+    let program = scratch("sleeper");
     std::fs::write(&program, "#!/bin/sh\nexec sleep 60\n").unwrap();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     let mut command = tool("gst-launch-1.0");

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::time::{Duration, Instant};
 
-use end_to_end::{GstLaunch, PATIENCE, Program, plugin_folder, scene, signal};
+use end_to_end::{GstLaunch, PATIENCE, Program, scene, scratch, signal};
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
 
@@ -32,7 +32,7 @@ impl Broker {
         let program = program.expect("mosquitto is not installed: `make test` installs it");
         // It cannot choose a port itself.
         let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let settings = plugin_folder().join(format!("mosquitto-{port}.conf"));
+        let settings = scratch(&format!("mosquitto-{port}.conf"));
         std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\n{more}"))
             .unwrap();
         let child = Command::new(program).arg("-c").arg(&settings).spawn().unwrap();

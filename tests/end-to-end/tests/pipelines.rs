@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use end_to_end::following::{pipeline, python, rust, script};
-use end_to_end::{GstLaunch, PATIENCE, pictures_in, plugin_folder, scene, tool};
+use end_to_end::{GstLaunch, PATIENCE, pictures_in, plugin_folder, scene, scratch, tool};
 use virtual_camera::{OnvifSettings, Settings, VirtualCamera};
 
 /// A command that finds the camera by the pipelines' environment variables.
@@ -89,7 +89,7 @@ fn no_argument_has_the_password() {
 
 #[test]
 fn a_camera_may_have_an_address_of_ipv6() {
-    let folder = plugin_folder().join(format!("ipv6-{}", std::process::id()));
+    let folder = scratch("ipv6");
     std::fs::create_dir_all(&folder).unwrap();
     std::os::unix::fs::symlink("/bin/echo", folder.join("ptztrack-launch")).unwrap();
     let path = format!("{}:{}", folder.display(), std::env::var("PATH").unwrap());
@@ -104,7 +104,7 @@ fn a_camera_may_have_an_address_of_ipv6() {
 #[test]
 fn recording_is_complete_and_playable() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let recording = plugin_folder().join(format!("recording-{}.mkv", std::process::id()));
+    let recording = scratch("recording.mkv");
     let mut command = against(&camera, script("record-overlay.sh"));
     command.env("OUT", &recording);
     follows_until_interrupted(&camera, command);
@@ -186,7 +186,7 @@ fn footage(folder: &Path) -> PathBuf {
 fn the_demonstration_leaves_video_plot_and_summary() {
     let camera = plugin_folder().join("virtual-camera");
     assert!(camera.exists(), "the virtual camera is not built: run `cargo build` first");
-    let out = plugin_folder().join(format!("demo-{}", std::process::id()));
+    let out = scratch("demo");
     std::fs::create_dir_all(&out).unwrap();
     let mut command = tool("python3");
     command

@@ -8,14 +8,14 @@ use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-use end_to_end::plugin_folder;
+use end_to_end::scratch;
 
 /// A system with nothing but these programs.
 struct System(PathBuf);
 
 impl System {
     fn with(test: &str, programs: &[&str]) -> Self {
-        let folder = plugin_folder().join(format!("scripts-{test}-{}", std::process::id()));
+        let folder = scratch(&format!("scripts-{test}"));
         fs::create_dir_all(folder.join("bin")).unwrap();
         for program in programs {
             let found = ["/usr/bin", "/bin"].map(|folder| Path::new(folder).join(program));

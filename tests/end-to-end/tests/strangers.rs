@@ -152,7 +152,7 @@ fn visitors_who_say_nothing_take_no_descriptors_from_cameras() {
 fn a_camera_that_was_handed_over_stays_so_across_outages_a_changed_entry_and_a_restart() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let network = Network::before(&camera);
-    let state = end_to_end::plugin_folder().join(format!("state-{}", std::process::id()));
+    let state = end_to_end::scratch("state");
     fs::create_dir_all(&state).unwrap();
     let environment = [("STATE_DIRECTORY", state.as_path())];
     let file = |folder: &Path| Program::entry("door", &network.url(), &folder.join("password"));
@@ -333,7 +333,7 @@ fn pictures_and_commands_go_over_verified_tls() {
 fn the_password_is_in_no_log_of_the_video_elements() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     for codec in ["mjpeg", "h264"] {
-        let log = end_to_end::plugin_folder().join(format!("video-{codec}-{}.log", std::process::id()));
+        let log = end_to_end::scratch(&format!("video-{codec}.log"));
         let file = |folder: &Path| {
             Program::entry("door", &camera.url(), &folder.join("password"))
                 + &format!("codec = {codec:?}\nrtsp = {:?}\n", camera.rtsp_url())

@@ -13,7 +13,7 @@ use std::process::Command;
 
 use browser::Browser;
 use end_to_end::following::Network;
-use end_to_end::{GstLaunch, PATIENCE, Program, Way, pictures_in, plugin_folder, scene, tool};
+use end_to_end::{GstLaunch, PATIENCE, Program, Way, pictures_in, plugin_folder, scene, scratch, tool};
 use gst::prelude::*;
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
@@ -100,7 +100,7 @@ fn a_camera_that_lacks_an_element_is_given_up_and_no_matter_to_the_others() {
     // All plugins of this machine, but for the one that a recording needs.
     end_to_end::init();
     let missing = gst::ElementFactory::find("jpegparse").unwrap().plugin().unwrap().filename().unwrap();
-    let plugins = plugin_folder().join(format!("lacking-{}", std::process::id()));
+    let plugins = scratch("lacking");
     fs::create_dir_all(&plugins).unwrap();
     let place = |plugin: &Path| plugins.join(plugin.file_name().unwrap());
     for plugin in fs::read_dir(missing.parent().unwrap()).unwrap() {
@@ -331,7 +331,7 @@ fn the_cameras_own_stream_is_recorded_as_it_comes() {
         assert!(begin.elapsed() < PATIENCE, "only {} files", files());
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
-    let kept = plugin_folder().join(format!("kept-{}", std::process::id()));
+    let kept = scratch("kept");
     fs::rename(&folder, &kept).unwrap();
     program.end("TERM");
     let mut names: Vec<_> = fs::read_dir(&kept).unwrap().map(|entry| entry.unwrap().path()).collect();
@@ -344,7 +344,7 @@ fn the_cameras_own_stream_is_recorded_as_it_comes() {
 #[test]
 fn mistakes_are_named_and_the_example_is_right() {
     let example = ptztrack().arg("example-config").output().unwrap();
-    let file = plugin_folder().join(format!("example-{}.toml", std::process::id()));
+    let file = scratch("example.toml");
     fs::write(&file, &example.stdout).unwrap();
     let right = ptztrack().arg("check").arg(&file).output().unwrap();
     assert!(right.status.success(), "{right:?}");
