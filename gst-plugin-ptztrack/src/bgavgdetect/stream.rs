@@ -195,6 +195,7 @@ impl Stream {
             background: plane(seen.background),
         };
         if let Some(motion) = &motion {
+            self.scene.relight(self.detector.light().iter()).map_err(StreamError::Scene)?;
             let regions = motion.regions.iter().chain(&motion.outside);
             self.scene.forget_ghosts(regions).map_err(StreamError::Scene)?;
         }

@@ -10,6 +10,7 @@ use super::background::{Background, ForegroundTest};
 use super::carried_zones::CarriedZones;
 use super::contours::{Grid, fill_regions, find_regions};
 use super::extremes::Extremes;
+use super::ghosts::is_light;
 use super::morphology::clean;
 use super::persistence::Persistence;
 use super::reduce::{divisor, with_reduced};
@@ -114,6 +115,8 @@ pub struct Detector {
     segmentation: Segmentation,
     extremes: Extremes,
     zones: Option<ZoneCache>,
+    /// Where light has changed in the last picture.
+    light: Vec<Region>,
     /// Memory: what was told of a picture before, emptied, and regions.
     told: MotionMeta,
     spare: Vec<Region>,
@@ -185,9 +188,16 @@ impl Detector {
         self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?)?;
         let MotionMeta { regions: mut found, mut outside } = std::mem::take(&mut self.told);
         self.find_regions(config, &mut found)?;
+        self.spare.append(&mut self.light);
+        self.light.extend(found.extract_if(.., |region| is_light(scene, region)));
         let mut regions = self.persistence.confirmed(found, config.confirm_pictures);
         outside.extend(regions.extract_if(.., |region| !zones.allow(region.centroid)));
         Ok(Some(MotionMeta { regions: config.choice.of(regions), outside }))
+    }
+
+    /// Regions of the last picture in which nobody is: light has changed there.
+    pub fn light(&self) -> &[Region] {
+        &self.light
     }
 
     /// Takes back what it told, as memory for the next picture.

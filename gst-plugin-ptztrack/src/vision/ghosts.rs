@@ -23,8 +23,13 @@ const LEAST_EDGE: f64 = 8.0;
 const LEAST_PLACES: u32 = 16;
 /// Pixels that are looked at together to tell whether picture and background are the same but for their sharpness.
 const COARSE: i32 = 9;
+/// Likelihood of foreground where nothing is known.
+const UNKNOWN: f64 = 128.0;
 /// Share of their difference that is left then, below which they are the same.
 const UNSHARP: f64 = 0.4;
+
+/// Less of the difference than this ends at the contour of light that changed: a cloud's shadow has no outline, somebody has.
+const SOFT: f64 = 0.3;
 
 /// Whether nobody is where `region` is: it is a ghost, or what is known of the background there is not sharp.
 ///
@@ -70,6 +75,23 @@ fn is_ghost(scene: &SceneView, region: &Region) -> bool {
         }
     });
     places >= LEAST_PLACES && background >= LEAST_EDGE * f64::from(places) && background > STRONGER * picture
+}
+
+/// Whether picture and background go on differing beyond the contour of `region`: light has changed there, as it fades out
+/// over more pixels than the outline of anybody.
+pub fn is_light(scene: &SceneView, region: &Region) -> bool {
+    let (mut inside_sum, mut outside_sum, mut places) = (0.0, 0.0, 0_u32);
+    let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
+    across(&region.contour, grid, |inside, outside| {
+        let off = |place| {
+            let is_known = level(&scene.foreground, place)? != UNKNOWN;
+            is_known.then_some((level(&scene.luma, place)? - level(&scene.background, place)?).abs())
+        };
+        if let (Some(inside), Some(outside)) = (off(inside), off(outside)) {
+            (inside_sum, outside_sum, places) = (inside_sum + inside, outside_sum + outside, places + 1);
+        }
+    });
+    places >= LEAST_PLACES && inside_sum - outside_sum < SOFT * inside_sum
 }
 
 /// Calls `compare` with a place inside and one outside of a closed contour (normalised), at each pixel along it.
@@ -132,15 +154,18 @@ mod tests {
         }
     }
 
-    fn judge(picture: &Canvas, background: &Canvas, region: &Region) -> bool {
-        let scene = SceneView {
+    fn scene<'a>(picture: &'a Canvas, background: &'a Canvas) -> SceneView<'a> {
+        SceneView {
             camera_motion: None,
             luma: picture.luma(),
             chroma: None,
-            foreground: picture.luma(),
+            foreground: Luma::packed(&[255; SIZE.0 * SIZE.1], SIZE.0),
             background: background.luma(),
-        };
-        is_nobody(&scene, region).unwrap()
+        }
+    }
+
+    fn judge(picture: &Canvas, background: &Canvas, region: &Region) -> bool {
+        is_nobody(&scene(picture, background), region).unwrap()
     }
 
     #[test]
@@ -161,6 +186,27 @@ mod tests {
         let blurred = room(0.5).blurred(5);
         assert!(judge(&room(0.5), &blurred, &region()));
         assert!(!judge(&with_person(room(0.5)), &blurred, &region()));
+    }
+
+    /// Darker in the region's box, which fades out over so many pixels beyond it.
+    fn lit(mut picture: Canvas, fades_over: f64) -> Canvas {
+        let (left, top, width, height) = PERSON;
+        let beyond = |at: f64, from: f64, size: f64| (from - at).max(at - from - size).max(0.0);
+        for (index, pixel) in picture.pixels.iter_mut().enumerate() {
+            let (x, y) = ((index % SIZE.0) as f64, (index / SIZE.0) as f64);
+            let outside = beyond(x, left, width).hypot(beyond(y, top, height));
+            *pixel = (f64::from(*pixel) * (1.0 - 0.3 * (1.0 - outside / fades_over).max(0.0))) as u8;
+        }
+        picture
+    }
+
+    #[test]
+    fn a_clouds_shadow_fades_out_and_somebody_ends() {
+        let is_cloud = |picture: &Canvas| is_light(&scene(picture, &room(0.5)), &region());
+        assert!(is_cloud(&lit(room(0.5), 30.0)), "a cloud");
+        assert!(!is_cloud(&lit(room(0.5), 1.0)), "somebody's shadow");
+        assert!(!is_cloud(&with_person(room(0.5))), "somebody");
+        assert!(!is_cloud(&with_person(room(0.5)).blurred(5)), "somebody who moves");
     }
 
     #[test]

@@ -79,6 +79,14 @@ impl SceneModel {
         Ok(())
     }
 
+    /// Light has changed in these regions, which were found in the last picture: the background has changed with it.
+    pub fn relight<'a>(&mut self, regions: impl Iterator<Item = &'a Region>) -> opencv::Result<()> {
+        for region in regions {
+            self.background.relight(&region.contour)?;
+        }
+        Ok(())
+    }
+
     /// What the last picture showed.
     pub fn view(&self) -> SceneView<'_> {
         let luma = self.picture.luma();

@@ -8,6 +8,7 @@ use ptztrack_contract::ReleaseReason;
 use super::ego_motion::EgoMotion;
 use super::geometry::{breadth, centre, length};
 use super::target::YOUNG_S;
+use super::tracks::motion;
 
 /// Time over which the place of a target is averaged, seconds: longer than a sway, shorter than it takes the
 /// errors of the measured camera motion to add up.
@@ -108,7 +109,8 @@ impl DwellTime {
     /// Only frames in which it is seen tell whether the target stands: the others do not count.
     pub fn watch(&mut self, before: Rect2f, after: Rect2f, ego: EgoMotion, dt_s: f64) {
         let keep = MEMORY_S / (MEMORY_S + dt_s as f32);
-        let step = (centre(after) - ego.apply(centre(before))) / breadth(after).max(1.0);
+        // A side that moves alone shows or hides a part of what is in the box.
+        let step = motion(ego.apply_to(before), after) / breadth(after).max(1.0);
         self.offset = (self.offset + step) * keep;
         let scale = ego.scale_at(centre(before));
         let (across, down) =
@@ -240,6 +242,20 @@ mod tests {
         assert!(!given_up(|time| 0.3 * time), "a slow one, or near");
         assert!(!given_up(|time| 0.7 * (1.5 * time).sin()), "who turns back and goes past where they began");
         assert!(!given_up(|time| 1.5 * time.min(1.2)), "who stops after a few steps");
+    }
+
+    /// The draught moves now one half of a plant, now all of it.
+    #[test]
+    fn a_side_that_moves_alone_goes_nowhere() {
+        let mut dwell = DwellTime::on_trial();
+        let at = |frame: usize| {
+            let side = if (frame / 10).is_multiple_of(2) { 2.0 } else { 1.0 };
+            Rect2f::new(100.0, 100.0, side * WIDTH, 90.0)
+        };
+        assert!((0..100).any(|frame| {
+            dwell.watch(at(frame), at(frame + 1), EgoMotion::default(), DT);
+            dwell.exhausted(LIMITS).is_some()
+        }));
     }
 
     #[test]

@@ -9,16 +9,19 @@ mod burned_in;
 mod gain;
 mod model;
 mod noise;
+mod pooled;
 mod rows;
 mod warp;
 
 use std::time::Duration;
 
+use opencv::core::{Point as Pixel, Vector};
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use self::burned_in::BurnedIn;
 use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
 use self::noise::Noise;
+use self::pooled::Pooled;
 use self::warp::Warp;
 use super::Luma;
 use super::camera_motion::{displacement, to_pixels};
@@ -52,6 +55,7 @@ const UNSEEN_MOTION: f64 = 0.3;
 pub struct TravellingBackground {
     model: Model,
     noise: Noise,
+    pooled: Pooled,
     burned_in: BurnedIn,
     /// From the canvas to the last picture, pixels.
     to_picture: Homography,
@@ -118,6 +122,8 @@ impl TravellingBackground {
             self.lay(picture);
             self.compare(how);
         }
+        let rests = motion.is_none() || self.rested > REST;
+        self.pooled.raise(&mut self.model, &self.sampled, self.forth.spans(), rests);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
@@ -130,10 +136,27 @@ impl TravellingBackground {
     /// Makes what has stayed the same for a moment within `contour` (normalised, in the last picture) background, protected
     /// or not: nobody is there.
     pub fn adopt(&mut self, contour: &[Point]) -> opencv::Result<()> {
-        let Some(to_canvas) = self.to_picture.inverse() else { return Ok(()) };
+        match self.on_canvas(contour) {
+            Some(polygon) => self.model.adopt_within(&polygon),
+            None => Ok(()),
+        }
+    }
+
+    /// Makes the background within `contour` (normalised, in the last picture) as light as the last picture is there, but for what is
+    /// protected.
+    pub fn relight(&mut self, contour: &[Point]) -> opencv::Result<()> {
+        let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
+        match self.on_canvas(contour) {
+            Some(polygon) => self.model.relight_within(&polygon, &self.sampled, held),
+            None => Ok(()),
+        }
+    }
+
+    /// A polygon of the last picture (normalised) in pixels of the canvas.
+    fn on_canvas(&self, contour: &[Point]) -> Option<Vector<Pixel>> {
+        let to_canvas = self.to_picture.inverse()?;
         let grid = Grid { width: self.size.0 as f64, height: self.size.1 as f64 };
-        let pixels = contour.iter().map(|point| nearest(to_canvas.apply(grid.place(point))));
-        self.model.adopt_within(&pixels.collect())
+        Some(contour.iter().map(|point| nearest(to_canvas.apply(grid.place(point)))).collect())
     }
 
     /// A canvas of which nothing is known.

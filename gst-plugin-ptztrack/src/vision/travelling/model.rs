@@ -2,7 +2,7 @@
 
 //! What is known of each pixel of the background, and how a picture is held against it.
 
-use opencv::core::{CV_8UC1, Mat, Point as Pixel, Scalar, Vector};
+use opencv::core::{CV_8UC1, Mat, Point as Pixel, Rect as PixelRect, Scalar, Size, Vector};
 use opencv::imgproc;
 use opencv::prelude::*;
 
@@ -11,6 +11,7 @@ use ptztrack_contract::{Point, Rect};
 use super::noise::Noise;
 use super::rows;
 use super::warp::Warp;
+use crate::vision::Luma;
 
 /// An apparent background that nobody has looked at yet has this age.
 const UNSEEN: u8 = 0;
@@ -31,6 +32,16 @@ pub(super) struct Sampled {
     pub chroma: Option<[Vec<u8>; 2]>,
 }
 
+/// A part of a row of the model.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row<'a> {
+    /// 8.8 fixed point.
+    pub mean: &'a [u16],
+    /// The mean's range within one pixel.
+    pub range: &'a [u8],
+    pub likelihood: &'a [u8],
+}
+
 /// How a picture is held against the model.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Comparison {
@@ -44,6 +55,8 @@ pub(super) struct Comparison {
     pub patience: u8,
 }
 
+/// Pixels of a side over which light that changed is taken to be the same.
+const LIGHT_SIDE: i32 = 15;
 /// Ticks that every candidate waits: somebody walking past looks alike from picture to picture.
 const MIN_PATIENCE: u8 = 12;
 
@@ -97,6 +110,16 @@ impl Model {
             extremes: Default::default(),
             wide: Vec::new(),
             narrow: Vec::new(),
+        }
+    }
+
+    /// These columns of a row.
+    pub fn row(&self, y: usize, columns: std::ops::Range<usize>) -> Row<'_> {
+        let part = y * self.size.0 + columns.start..y * self.size.0 + columns.end;
+        Row {
+            mean: &self.luma[part.clone()],
+            range: &self.range[part.clone()],
+            likelihood: &self.likelihood[part],
         }
     }
 
@@ -264,11 +287,57 @@ impl Model {
         }
     }
 
-    /// Makes what has waited a moment within a polygon background.
-    pub fn adopt_within(&mut self, polygon: &Vector<Pixel>) -> opencv::Result<()> {
+    /// The canvas, 255 within a polygon and 0 elsewhere.
+    fn within(&self, polygon: &Vector<Pixel>) -> opencv::Result<Mat> {
         let (width, height) = (self.size.0 as i32, self.size.1 as i32);
         let mut mask = Mat::new_rows_cols_with_default(height, width, CV_8UC1, Scalar::all(0.0))?;
         imgproc::fill_poly_def(&mut mask, polygon, Scalar::all(255.0))?;
+        Ok(mask)
+    }
+
+    /// Makes the mean within a polygon as light as the picture is around each pixel, but for what is `held`.
+    pub fn relight_within(
+        &mut self,
+        polygon: &Vector<Pixel>,
+        picture: &Sampled,
+        held: Option<Rect>,
+    ) -> opencv::Result<()> {
+        let mask = self.within(polygon)?;
+        let bounds =
+            imgproc::bounding_rect(polygon)? & PixelRect::new(0, 0, self.size.0 as i32, self.size.1 as i32);
+        if bounds.empty() {
+            return Ok(());
+        }
+        let (left, top) = (bounds.x as usize, bounds.y as usize);
+        let blurred = |plane: &[u8]| -> opencv::Result<Mat> {
+            let part = Luma::packed(plane, self.size.0).crop(
+                left,
+                top,
+                bounds.width as usize,
+                bounds.height as usize,
+            );
+            let mut blurred = Mat::default();
+            part.with_mat(|part| imgproc::blur_def(part, &mut blurred, Size::new(LIGHT_SIDE, LIGHT_SIDE)))?;
+            Ok(blurred)
+        };
+        let (seen, known) = (blurred(&picture.luma)?, blurred(&self.shown)?);
+        let (seen, known) = (seen.data_bytes()?, known.data_bytes()?);
+        let inside = mask.data_bytes()?;
+        for (index, (&seen, &known)) in seen.iter().zip(known).enumerate() {
+            let (x, y) = (left + index % bounds.width as usize, top + index / bounds.width as usize);
+            let at = y * self.size.0 + x;
+            if inside[at] > 0 && !held.is_some_and(|held| lies_in(held, x, y)) {
+                let gain = f32::from(seen.max(1)) / f32::from(known.max(1));
+                self.luma[at] = (gain * f32::from(self.luma[at])).min(f32::from(u16::MAX)) as u16;
+                self.waited[at] = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes what has waited a moment within a polygon background.
+    pub fn adopt_within(&mut self, polygon: &Vector<Pixel>) -> opencv::Result<()> {
+        let mask = self.within(polygon)?;
         for (at, _) in mask.data_bytes()?.iter().enumerate().filter(|(_, inside)| **inside > 0) {
             if self.waited[at] >= MIN_PATIENCE {
                 self.adopt(at);

@@ -211,3 +211,82 @@ fn a_burned_in_clock_is_no_mover_and_the_target_stays_one() {
     let (clock, person) = turned(20..70);
     assert!(clock < 0.05 && person > 0.6, "{clock} {person}");
 }
+
+/// Left, top, width, height in pixels.
+type Bounds = (f64, f64, f64, f64);
+
+/// A plain wall of that lightness, with people before it who differ by so many grey levels, in the noise of little light (2.5 grey
+/// levels) that is left in a picture reduced by two.
+fn plain(lightness: f64, people: &[(Bounds, f64)], seed: u32) -> Canvas {
+    let mut picture = Canvas::seen(SIZE, &Homography::translation(0.0, 0.0), |_, _| lightness);
+    for &(bounds, off) in people {
+        picture.paint(bounds, |_, _| lightness + off);
+    }
+    picture.noisy(1.25, seed)
+}
+
+/// One that has seen the empty wall for two seconds.
+fn learned_plain() -> TravellingBackground {
+    let mut background = TravellingBackground::default();
+    for seed in 0..50 {
+        look(&mut background, &plain(100.0, &[], seed), Some((0.0, 0.0)));
+    }
+    background
+}
+
+#[test]
+fn somebody_fainter_than_the_noise_is_foreground() {
+    let mut background = learned_plain();
+    for step in 0..20 {
+        let person = (20.0 + 4.0 * f64::from(step), 30.0, 20.0, 60.0);
+        look(&mut background, &plain(100.0, &[(person, 4.0)], 100 + step), Some((0.0, 0.0)));
+        let (inside, all) = (foreground(&background, person), foreground(&background, ALL));
+        assert!(inside > 0.85 && all < 1.4 * 20.0 * 60.0 / (160.0 * 120.0), "{step}: {inside} {all}");
+    }
+}
+
+#[test]
+fn light_that_changes_by_little_is_nobody() {
+    let mut background = learned_plain();
+    for seed in 100..110 {
+        look(&mut background, &plain(103.0, &[], seed), Some((0.0, 0.0)));
+        assert!(foreground(&background, ALL) < 0.005, "{}", foreground(&background, ALL));
+    }
+}
+
+#[test]
+fn a_faint_shadow_beside_somebody_is_no_part_of_them() {
+    let mut background = learned_plain();
+    let shadow = (70.0, 80.0, 50.0, 10.0);
+    look(&mut background, &plain(100.0, &[(PERSON, 60.0), (shadow, -5.0)], 99), Some((0.0, 0.0)));
+    assert!(foreground(&background, PERSON) > 0.75, "{}", foreground(&background, PERSON));
+    let beyond = foreground(&background, (96.0, 80.0, 24.0, 10.0));
+    assert!(beyond < 0.05, "{beyond}");
+}
+
+#[test]
+fn where_light_has_changed_the_background_changes_but_for_what_is_protected() {
+    let (left, right) = ((10.0, 30.0, 40.0, 60.0), (110.0, 30.0, 40.0, 60.0));
+    let mut background = learned();
+    let mut lit = seen(0.0, 0.0, 77);
+    for (x, y, width, height) in [left, right] {
+        for row in y as usize..(y + height) as usize {
+            for pixel in &mut lit.pixels[row * SIZE.0..][x as usize..(x + width) as usize] {
+                *pixel /= 2;
+            }
+        }
+    }
+    background.protect(Some(normalised(right)));
+    look(&mut background, &lit, Some((0.0, 0.0)));
+    let inner = |(x, y, width, height): (f64, f64, f64, f64)| (x + 8.0, y + 8.0, width - 16.0, height - 16.0);
+    let (before, held) = (foreground(&background, inner(left)), foreground(&background, inner(right)));
+    assert!(before > 0.6 && held > 0.6, "{before} {held}");
+    for bounds in [left, right] {
+        let Rect { x, y, width, height } = normalised(bounds);
+        let corners = [(x, y), (x, y + height), (x + width, y + height), (x + width, y)];
+        background.relight(&corners.map(|(x, y)| Point { x, y })).unwrap();
+    }
+    look(&mut background, &lit, Some((0.0, 0.0)));
+    let (now, held) = (foreground(&background, inner(left)), foreground(&background, inner(right)));
+    assert!(now < 0.1 && held > 0.6, "{now} {held}");
+}

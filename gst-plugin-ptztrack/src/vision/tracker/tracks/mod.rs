@@ -37,7 +37,7 @@ use track::Evidence;
 
 pub(super) use heads::people;
 pub(super) use region::Region;
-pub(super) use track::Track;
+pub(super) use track::{Track, motion};
 
 use super::ego_motion::EgoMotion;
 use super::geometry::{Frame, centre, length, overlap, share_inside};

@@ -379,7 +379,7 @@ fn take(axis: &mut Axis, own: [bool; 2], [low, high]: [f32; 2], deviation: f32) 
 }
 
 /// How far both sides of a box have moved: one that moves alone shows or hides a part of what is in it.
-fn motion(then: Rect2f, now: Rect2f) -> Point2f {
+pub(in super::super) fn motion(then: Rect2f, now: Rect2f) -> Point2f {
     let both = |a: f32, b: f32| if a * b > 0.0 { a.abs().min(b.abs()).copysign(a) } else { 0.0 };
     let (from, to) = (now.tl() - then.tl(), now.br() - then.br());
     Point2f::new(both(from.x, to.x), both(from.y, to.y))
