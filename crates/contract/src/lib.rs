@@ -46,6 +46,8 @@ mod target;
 mod target_meta;
 #[cfg(feature = "gst")]
 mod tracks;
+#[cfg(feature = "gst")]
+mod view;
 
 pub use duration::mistaken_unit;
 pub use geometry::{Point, Rect, Vector, aspect};
@@ -67,6 +69,7 @@ mod forms {
     pub use crate::scene::{CameraMotion, Plane, SceneMeta};
     pub use crate::target_meta::{Feature, TargetMeta};
     pub use crate::tracks::{Track, TrackChange, TrackMessage, TrackState, TracksMeta};
+    pub use crate::view::View;
 }
 #[cfg(feature = "gst")]
 pub use forms::*;

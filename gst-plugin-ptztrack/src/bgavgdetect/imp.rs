@@ -25,7 +25,7 @@ use crate::lock::lock;
 use crate::luma_source;
 use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
-use crate::vision::{Duty, View, Zones};
+use crate::vision::{Duty, Zones};
 
 static CAT: LazyLock<gst::DebugCategory> = LazyLock::new(|| {
     gst::DebugCategory::new("bgavgdetect", gst::DebugColorFlags::empty(), Some("Motion detector"))
@@ -376,7 +376,7 @@ impl BgAvgDetect {
         gst::debug!(CAT, imp = self, "Camera {}", if camera.moving { "moves" } else { "is at rest" });
         lock(&self.duty).camera(camera, Duration::from_nanos(settle_time));
         let mut heard = lock(&self.heard);
-        heard.view = View::of(camera);
+        heard.view = camera.view();
         heard.camera.hear(camera);
     }
 

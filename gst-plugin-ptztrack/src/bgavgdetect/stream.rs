@@ -4,12 +4,12 @@ use std::time::Duration;
 
 use gst_video::prelude::*;
 use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
-use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta};
+use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta, View};
 
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel, View};
+use crate::vision::{CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);

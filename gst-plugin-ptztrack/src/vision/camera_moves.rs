@@ -17,9 +17,7 @@ impl CameraMoves {
     /// The servo says that the camera moves, or that it rests.
     pub fn hear(&mut self, camera: &CameraEvent) {
         self.holds = if camera.moving { CameraEvent::MOVING_HOLDS } else { Duration::ZERO };
-        let across = frames_per_s(camera.pan_rate_deg_s, camera.horizontal_fov_deg);
-        let down = frames_per_s(camera.tilt_rate_deg_s, camera.vertical_fov_deg);
-        self.picture_rate = across.zip(down).map(|(pan, tilt)| (-pan, tilt));
+        self.picture_rate = camera.picture_rate();
     }
 
     /// So much time of the stream has passed.
@@ -39,10 +37,6 @@ impl CameraMoves {
         let elapsed_s = elapsed.as_secs_f64();
         Some(Homography::translation(right * elapsed_s, down * elapsed_s))
     }
-}
-
-fn frames_per_s(rate_deg_s: f64, fov_deg: Option<f64>) -> Option<f64> {
-    fov_deg.filter(|fov_deg| *fov_deg > 0.0).map(|fov_deg| rate_deg_s / fov_deg)
 }
 
 #[cfg(test)]
@@ -84,9 +78,8 @@ mod tests {
         assert!(!camera.is_moving());
     }
 
-    /// A camera that turns to the right and up sees the world go to the left and down.
     #[test]
-    fn the_picture_goes_against_the_camera() {
+    fn the_picture_is_expected_to_go_on_as_the_camera_was_told() {
         let mut camera = CameraMoves::default();
         assert_eq!(camera.expected_motion(TICK), None);
         camera.hear(&MOVES);

@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use ptztrack_contract::{CameraEvent, CameraMotion, Homography, Point};
+use ptztrack_contract::{CameraMotion, Homography, Point, View};
 
 use super::camera_motion::displacement;
 use super::zones::Zones;
@@ -17,53 +17,6 @@ const RESTS: f64 = 0.002;
 const SAME_VIEW: f64 = 0.02;
 /// Of the picture, whose motion is taken.
 const MIDDLE: Point = Point { x: 0.5, y: 0.5 };
-
-/// Where a camera looks.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct View {
-    pan: f64,
-    tilt: f64,
-    /// Half the width and height of what it sees at a distance of 1.
-    reach: (f64, f64),
-}
-
-impl View {
-    /// Of a camera that rests and whose angles are known.
-    pub fn of(camera: &CameraEvent) -> Option<Self> {
-        let reach = |degrees: Option<f64>| {
-            degrees
-                .filter(|degrees| (1e-3..179.0).contains(degrees))
-                .map(|fov| (fov.to_radians() / 2.0).tan())
-        };
-        if camera.moving {
-            return None;
-        }
-        Some(Self {
-            pan: camera.pan_deg?.to_radians(),
-            tilt: camera.tilt_deg?.to_radians(),
-            reach: (reach(camera.horizontal_fov_deg)?, reach(camera.vertical_fov_deg)?),
-        })
-    }
-
-    /// The direction of a point of the picture: right, down, forward of pan and tilt 0.
-    fn direction(&self, point: Point) -> [f64; 3] {
-        let (x, y) = ((2.0 * point.x - 1.0) * self.reach.0, (2.0 * point.y - 1.0) * self.reach.1);
-        let (sin, cos) = self.tilt.sin_cos();
-        let (down, forward) = (y * cos - sin, y * sin + cos);
-        let (sin, cos) = self.pan.sin_cos();
-        [x * cos + forward * sin, down, forward * cos - x * sin]
-    }
-
-    /// Where a direction is seen; `None` behind the camera.
-    fn project(&self, [right, down, forward]: [f64; 3]) -> Option<Point> {
-        let (sin, cos) = self.pan.sin_cos();
-        let (x, forward) = (right * cos - forward * sin, right * sin + forward * cos);
-        let (sin, cos) = self.tilt.sin_cos();
-        let (y, z) = (down * cos + forward * sin, forward * cos - down * sin);
-        let place = |value: f64, reach: f64| (value / (z * reach) + 1.0) / 2.0;
-        (z > 1e-6).then(|| Point { x: place(x, self.reach.0), y: place(y, self.reach.1) })
-    }
-}
 
 /// Carries zones along: by the motion of the background while the camera turns, and by the servo's word once it rests, so
 /// that no errors add up.
@@ -118,7 +71,7 @@ impl CarriedZones {
     fn when_set(&self, point: Point) -> Option<Point> {
         let point = self.since.inverse()?.apply(point);
         match (self.rested_in, self.set_in) {
-            (Some(rested_in), Some(set_in)) => set_in.project(rested_in.direction(point)),
+            (Some(rested_in), Some(set_in)) => rested_in.place_in(&set_in, point),
             _ => Some(point),
         }
     }
@@ -127,19 +80,20 @@ impl CarriedZones {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
+    use ptztrack_contract::CameraEvent;
 
     const STEP: Duration = Duration::from_millis(100);
     const RIGHT_HALF: &str = "0.5,0 1,0 1,1 0.5,1";
 
     fn view(pan_deg: f64, tilt_deg: f64) -> Option<View> {
-        View::of(&CameraEvent {
+        let camera = CameraEvent {
             pan_deg: Some(pan_deg),
             tilt_deg: Some(tilt_deg),
             horizontal_fov_deg: Some(60.0),
             vertical_fov_deg: Some(40.0),
             ..CameraEvent::default()
-        })
+        };
+        camera.view()
     }
 
     fn motion(x: f64) -> CameraMotion {
@@ -212,25 +166,5 @@ mod tests {
         carried.set(&right, &right);
         carried.set(&right, &Zones::default());
         assert!(!carried.allow(at(0.1)) && carried.allow(at(0.9)));
-    }
-
-    #[test]
-    fn a_camera_that_turns_says_nothing_of_where_it_looks() {
-        let still = CameraEvent { pan_deg: Some(0.0), tilt_deg: Some(0.0), ..CameraEvent::default() };
-        assert_eq!(View::of(&still), None, "no field of view");
-        let known = CameraEvent { horizontal_fov_deg: Some(60.0), vertical_fov_deg: Some(40.0), ..still };
-        assert!(View::of(&known).is_some());
-        assert_eq!(View::of(&CameraEvent { moving: true, ..known }), None);
-    }
-
-    proptest! {
-        #[test]
-        fn a_point_is_seen_in_the_direction_that_it_has(
-            pan in -170.0..170.0f64, tilt in -80.0..30.0f64, x in 0.0..1.0f64, y in 0.0..1.0f64,
-        ) {
-            let view = view(pan, tilt).unwrap();
-            let seen = view.project(view.direction(Point { x, y })).unwrap();
-            prop_assert!((seen.x - x).abs() < 1e-9 && (seen.y - y).abs() < 1e-9);
-        }
     }
 }

@@ -68,7 +68,7 @@ mod zones;
 pub use background::{Background, ForegroundTest};
 pub use camera_motion::CameraMotionEstimator;
 pub use camera_moves::CameraMoves;
-pub use carried_zones::{CarriedZones, View};
+pub use carried_zones::CarriedZones;
 pub use contours::{Grid, fill_regions, regions};
 pub use detector::{Detector, DetectorConfig, DetectorError, RegionChoice};
 pub use draw::{Colour, OverlayRectangle, Pen, Shape};
