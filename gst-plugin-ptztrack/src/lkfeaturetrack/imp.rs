@@ -81,6 +81,7 @@ impl Settings {
                 TargetSelection::Largest => vision::Choice::Largest,
                 TargetSelection::First => vision::Choice::First,
                 TargetSelection::NearestCentre => vision::Choice::NearestCentre,
+                TargetSelection::Group => vision::Choice::Group,
                 TargetSelection::Manual => vision::Choice::Manual,
             },
             confirm_frames: self.confirm_frames,

@@ -15,6 +15,11 @@
 //! else. With `post-tracks` everybody who comes or goes is told of by an element message named `ptztrack-track` (`change`: `new`,
 //! `back`, `merged` with the number `into` which it went, `gone`).
 //!
+//! ## Groups
+//! With `selection=group` everybody who goes somewhere is followed, in one box that holds all of them: together with `auto-zoom` of a sink
+//! the camera keeps them all in the picture. The number is that of one of them. The box takes in who joins, and lets go of who has left or
+//! stands for longer than `stationary-timeout`, within about a second, so that the camera does not jump.
+//!
 //! ## States
 //! *Searching* → *tracking* → *occluded* (hidden: coasted for `coast-time` and looked for) → *tracking* again
 //! or *lost* for one frame → *searching*. Every change goes upstream as an event, so that the detector sleeps
@@ -72,6 +77,10 @@
 //! ```text
 //! gst-launch-1.0 -m videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack stationary-timeout=10000000000 max-tracking-time=120000000000 ! fakesink
 //! ```
+//! Keep everybody who goes about in the picture:
+//! ```text
+//! gst-launch-1.0 videotestsrc pattern=ball num-buffers=60 ! bgavgdetect ! lkfeaturetrack selection=group ! fakesink
+//! ```
 //! An operator chooses with a click, the detections of another element help:
 //! ```text
 //! gst-launch-1.0 videotestsrc num-buffers=30 ! lkfeaturetrack selection=manual roi-type=person ! videoconvert ! fakesink
@@ -102,6 +111,9 @@ pub enum TargetSelection {
     /// None until an operator or the application selects.
     #[enum_value(name = "None until a click or select-target selects", nick = "manual")]
     Manual,
+    /// All who go somewhere, in one box.
+    #[enum_value(name = "All detections that go somewhere, in one box", nick = "group")]
+    Group,
 }
 
 /// Which steps are taken.

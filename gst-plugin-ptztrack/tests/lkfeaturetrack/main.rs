@@ -220,6 +220,27 @@ fn everybody_is_told_of_and_whoever_is_asked_for_is_followed() {
     assert_eq!(warnings, 1);
 }
 
+/// Two people who go apart: the outer sides of what is told of the target, pixels.
+fn sides_of_two_who_part(selection: &str) -> Vec<(f64, f64)> {
+    let mut bench = Bench::new(|element| element.set_property_from_str("selection", selection));
+    let sides = (0..50).map(|n| {
+        let places = [(130 - 2 * n, 100), (160 + 2 * n, 100)];
+        let (width, height) = (PERSON.0 as u32, PERSON.1 as u32);
+        let seen = places.map(|(x, y)| ("motion", (x as u32, y as u32, width, height)));
+        let meta = bench.push(street(0, places), &seen);
+        (meta.bounds.x * WIDTH as f64, (meta.bounds.x + meta.bounds.width) * WIDTH as f64)
+    });
+    sides.collect()
+}
+
+#[test]
+fn a_group_is_followed_in_one_box() {
+    let (left, right) = sides_of_two_who_part("group")[49];
+    assert!((left - 32.0).abs() < 12.0 && (right - 290.0).abs() < 12.0, "{left} {right}");
+    let (left, right) = sides_of_two_who_part("largest")[49];
+    assert!(right - left < 60.0, "{left} {right}");
+}
+
 #[test]
 fn who_comes_and_goes_is_told_of_only_where_that_is_asked_for() {
     let mut bench = Bench::new(|_| ());
@@ -333,7 +354,7 @@ fn the_pipelines_of_the_documentation_run() {
         .filter_map(|line| line.strip_prefix("//! gst-launch-1.0 "))
         .map(|line| line.trim_start_matches("-m "))
         .collect();
-    assert_eq!(pipelines.len(), 4);
+    assert_eq!(pipelines.len(), 5);
     for description in pipelines {
         let pipeline = gst::parse::launch(description).expect(description);
         pipeline.set_state(gst::State::Playing).unwrap();

@@ -6,6 +6,7 @@
 //! |---|---|---|
 //! | whose each detection is | beyond | `tracks` |
 //! | choose a track that goes somewhere | 3.0, "an operator input which target to track" | `policy` |
+//! | or several, by a box that holds all | beyond | `group` |
 //! | figure and ground around it, by motion, colour and silhouette | beyond | `figure`, `colour` |
 //! | corners on the figure, outliers rejected | 3.5.1 | `corners` |
 //! | Lucas-Kanade in a patch around it | 3.5.2 | `patch`, `flow` |
@@ -27,6 +28,7 @@ mod figure;
 mod flow;
 mod geometry;
 mod grey_histogram;
+mod group;
 mod patch;
 mod points;
 mod policy;

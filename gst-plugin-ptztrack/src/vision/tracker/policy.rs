@@ -32,6 +32,8 @@ pub enum Choice {
     First,
     /// The one nearest to the middle of the frame.
     NearestCentre,
+    /// All of them: the one of largest area, and everybody else in the same box.
+    Group,
     /// None: an operator chooses.
     Manual,
 }
@@ -79,30 +81,42 @@ impl Policy {
         self.released = self.released.filter(|(_, left)| *left > dt_s).map(|(id, left)| (id, left - dt_s));
     }
 
+    /// The tracks that may be followed now: seen, and going somewhere where they `must_travel`.
+    pub fn ready<'a>(
+        &'a self,
+        tracks: &'a Tracks,
+        must_travel: bool,
+        frame: Frame,
+    ) -> impl Iterator<Item = &'a Track> {
+        tracks.seen().filter(move |track| {
+            let bounds = track.seen_bounds();
+            let region = tracks.region(track);
+            track.is_confirmed()
+                && region
+                    .is_some_and(|region| !region.outside && (!must_travel || region.restless <= RESTLESS))
+                && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
+                && self.released.is_none_or(|(released, _)| released != track.id)
+                && !self.is_parked(track)
+                && (!must_travel || track.travels())
+        })
+    }
+
+    /// Whether a track is where somebody stood that was let go.
+    pub fn is_parked(&self, track: &Track) -> bool {
+        self.parked.iter().any(|(_, place)| stands_at(*place, track.seen_bounds()))
+    }
+
     /// The track to follow now, one that is seen, and going somewhere where it `must_travel`: the one of the number `before` all
     /// others.
     pub fn choose<'a>(
-        &self,
+        &'a self,
         tracks: &'a Tracks,
         choice: Choice,
         before: Option<u64>,
         must_travel: bool,
         frame: Frame,
     ) -> Option<&'a Track> {
-        let ready = || {
-            tracks.seen().filter(|track| {
-                let bounds = track.seen_bounds();
-                let region = tracks.region(track);
-                track.is_confirmed()
-                    && region.is_some_and(|region| {
-                        !region.outside && (!must_travel || region.restless <= RESTLESS)
-                    })
-                    && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
-                    && self.released.is_none_or(|(released, _)| released != track.id)
-                    && !self.parked.iter().any(|(_, place)| stands_at(*place, bounds))
-                    && (!must_travel || track.travels())
-            })
-        };
+        let ready = || self.ready(tracks, must_travel, frame);
         let by = |value: fn(&Track, Frame) -> f64| {
             let best = move |track: &&Track| value(track, frame);
             ready().max_by(|a, b| best(a).total_cmp(&best(b)))
@@ -112,7 +126,7 @@ impl Policy {
         }
         let known = ready().find(|track| Some(track.id) == before);
         known.or_else(|| match choice {
-            Choice::Largest => by(|track, _| f64::from(track.seen_bounds().area())),
+            Choice::Largest | Choice::Group => by(|track, _| f64::from(track.seen_bounds().area())),
             Choice::First => by(|track, _| -(track.id as f64)),
             Choice::NearestCentre => {
                 by(|track, frame| -f64::from(length(centre(track.seen_bounds()) - centre(frame.bounds()))))

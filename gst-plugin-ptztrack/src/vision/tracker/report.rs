@@ -7,7 +7,8 @@ use ptztrack_contract::{
     Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
 };
 
-use super::geometry::Frame;
+use super::geometry::{Frame, centre};
+use super::group::GroupEstimate;
 use super::target::Follow;
 use super::tracks::Track;
 
@@ -49,6 +50,16 @@ pub struct Tracked {
     pub tracks: Vec<ptztrack_contract::Track>,
     /// Who came and went in this frame, by number; who merged, with the number that they go on under.
     pub track_changes: Vec<(TrackChange, u64, Option<u64>)>,
+}
+
+impl Tracked {
+    /// Tells of a group in place of the target in it.
+    pub(super) fn become_group(&mut self, group: &GroupEstimate, frame: Frame) {
+        let (own, ego) = (frame.vector(group.own_velocity), self.ego_velocity.unwrap_or_default());
+        self.bounds = frame.rect(group.bounds);
+        self.centroid = frame.point(centre(group.bounds));
+        self.velocity = Vector { x: own.x + ego.x, y: own.y + ego.y };
+    }
 }
 
 /// What is told of a track.

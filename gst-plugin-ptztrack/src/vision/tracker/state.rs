@@ -2,17 +2,18 @@
 
 //! The state machine around one target.
 
-use opencv::core::{Point2f, Rect2f};
+use opencv::core::Rect2f;
 use ptztrack_contract::{Feature, ReleaseReason, TargetChange, TargetState};
 
 use super::config::{Config, Profile, TargetRequest};
 use super::dwell_time::DwellTime;
 use super::ego_motion::EgoMotion;
-use super::geometry::{ASPECT, Frame, around};
-use super::policy::{Policy, clicked, tell_apart};
+use super::geometry::Frame;
+use super::group::Group;
+use super::policy::{Choice, Policy, tell_apart};
 use super::report::{Detection, Tracked, reported, tracked_of};
 use super::target::{Follow, Robust, Sight, Thesis};
-use super::tracks::{Region, Rules, Track, Tracks, people};
+use super::tracks::{Region, Rules, Tracks, people};
 use crate::vision::Observation;
 
 /// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
@@ -41,12 +42,23 @@ enum Phase {
     Occluded(Target, f64),
 }
 
+impl Phase {
+    /// The number of the track that is followed.
+    fn target(&self) -> Option<u64> {
+        match self {
+            Self::Searching => None,
+            Self::Tracking(target) | Self::Occluded(target, _) => Some(target.id),
+        }
+    }
+}
+
 /// Keeps account of everybody who is seen, chooses one of them and follows it. The same pictures always give the same answers.
 pub struct Tracker {
     config: Config,
     phase: Phase,
     tracks: Tracks,
     policy: Policy,
+    group: Group,
     request: Option<TargetRequest>,
     camera_rests: bool,
     /// Number of who was lost last.
@@ -68,6 +80,7 @@ impl Tracker {
             phase: Phase::Searching,
             tracks: Tracks::default(),
             policy: Policy::default(),
+            group: Group::default(),
             request: None,
             camera_rests: true,
             lost: None,
@@ -123,6 +136,7 @@ impl Tracker {
             // Another picture, or one from another time: nothing that was remembered holds.
             self.tracks.restart();
             self.policy.restart();
+            self.group.disband();
             self.lost = None;
         }
         self.watch(seen, detections, frame, if same_stream { dt_s } else { MIN_DT_S });
@@ -152,10 +166,9 @@ impl Tracker {
         if matches!(phase, Phase::Searching) && changes.is_empty() {
             phase = self.acquire_chosen(seen, frame, &mut tracked, &mut changes)?;
         }
-        let target = match &phase {
-            Phase::Tracking(target) | Phase::Occluded(target, _) => target.id,
-            Phase::Searching => 0,
-        };
+        let target = phase.target();
+        self.follow_group(target, seen, dt_s, frame, &mut tracked);
+        let target = target.unwrap_or(0);
         tracked.tracks = std::mem::take(&mut self.reported);
         tracked.tracks.clear();
         let told = self.tracks.iter().filter(|track| track.journey.unseen_s <= TOLD_S || track.id == target);
@@ -274,6 +287,27 @@ impl Tracker {
         })
     }
 
+    /// Where everybody is followed, tells of the box that holds all of them in place of the `target`'s.
+    fn follow_group(
+        &mut self,
+        target: Option<u64>,
+        seen: &Observation,
+        dt_s: f64,
+        frame: Frame,
+        tracked: &mut Tracked,
+    ) {
+        let Config { choice, must_travel, .. } = self.config;
+        if choice != Choice::Group {
+            return self.group.disband();
+        }
+        let ready = self.policy.ready(&self.tracks, must_travel, frame);
+        self.group.gather(&self.tracks, ready, target, |track| self.policy.is_parked(track));
+        let group = self.group.follow(&self.tracks, self.ego_motion(seen), dt_s as f32);
+        if let (Some(group), Some(_)) = (group, target) {
+            tracked.become_group(&group, frame);
+        }
+    }
+
     /// Whether a target that has yet to go somewhere does not, while somebody else does.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
@@ -284,29 +318,6 @@ impl Tracker {
                 .policy
                 .choose(&self.tracks, choice, None, must_travel, frame)
                 .is_some_and(|track| track.id != target.id)
-    }
-
-    /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
-    fn requested(&mut self, request: TargetRequest, phase: &Phase, frame: Frame) -> Option<u64> {
-        let numbers = || self.tracks.iter().map(|track| track.id);
-        let now = match phase {
-            Phase::Tracking(target) | Phase::Occluded(target, _) => target.id,
-            Phase::Searching => 0,
-        };
-        match request {
-            TargetRequest::Release => None,
-            TargetRequest::SelectTrack(id) => numbers().find(|other| *other == id && id != now),
-            TargetRequest::Next => {
-                let next = numbers().filter(|id| *id > now).min().or_else(|| numbers().min());
-                next.filter(|id| *id != now)
-            }
-            TargetRequest::Select(place) => {
-                let place = frame.point_to_pixels(place);
-                let bounds = clicked(&self.tracks, place).map(Track::seen_bounds);
-                let bounds = bounds.unwrap_or_else(|| self.box_at(place, frame));
-                Some(self.tracks.number_at(bounds, frame))
-            }
-        }
     }
 
     fn take_over(
@@ -323,11 +334,6 @@ impl Tracker {
             Some(target) => Ok(self.begin(target, frame, tracked, changes)),
             None => Ok(old),
         }
-    }
-
-    fn box_at(&self, place: Point2f, frame: Frame) -> Rect2f {
-        let height = self.config.manual_size as f32 * frame.height;
-        around(place, ASPECT * height, height)
     }
 
     fn let_go(
@@ -415,5 +421,6 @@ impl Tracker {
     }
 }
 
+mod requests;
 #[cfg(test)]
 mod tests;

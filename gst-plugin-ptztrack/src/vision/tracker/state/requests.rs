@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Whom an operator or the application asked for.
+
+use opencv::core::{Point2f, Rect2f};
+
+use super::{Phase, Tracker};
+use crate::vision::tracker::config::TargetRequest;
+use crate::vision::tracker::geometry::{ASPECT, Frame, around};
+use crate::vision::tracker::policy::clicked;
+use crate::vision::tracker::tracks::Track;
+
+impl Tracker {
+    /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
+    pub(super) fn requested(&mut self, request: TargetRequest, phase: &Phase, frame: Frame) -> Option<u64> {
+        let numbers = || self.tracks.iter().map(|track| track.id);
+        let now = phase.target().unwrap_or(0);
+        match request {
+            TargetRequest::Release => None,
+            TargetRequest::SelectTrack(id) => numbers().find(|other| *other == id && id != now),
+            TargetRequest::Next => {
+                let next = numbers().filter(|id| *id > now).min().or_else(|| numbers().min());
+                next.filter(|id| *id != now)
+            }
+            TargetRequest::Select(place) => {
+                let place = frame.point_to_pixels(place);
+                let bounds = clicked(&self.tracks, place).map(Track::seen_bounds);
+                let bounds = bounds.unwrap_or_else(|| self.box_at(place, frame));
+                Some(self.tracks.number_at(bounds, frame))
+            }
+        }
+    }
+
+    fn box_at(&self, place: Point2f, frame: Frame) -> Rect2f {
+        let height = self.config.manual_size as f32 * frame.height;
+        around(place, ASPECT * height, height)
+    }
+}
