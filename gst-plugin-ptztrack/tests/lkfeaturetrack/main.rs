@@ -5,6 +5,7 @@
 
 mod bench;
 mod giving_up;
+mod properties;
 
 use bench::*;
 use gst::prelude::*;
