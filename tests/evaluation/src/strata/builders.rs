@@ -104,10 +104,18 @@ pub(super) fn turning(draft: &mut Draft, chance: &mut Seeded) {
 }
 
 pub(super) fn faint(draft: &mut Draft, chance: &mut Seeded) {
+    hardly_seen(draft, chance.range(3.0, 5.0));
+}
+
+pub(super) fn pale(draft: &mut Draft, chance: &mut Seeded) {
+    hardly_seen(draft, chance.range(6.0, 12.0));
+}
+
+/// Somebody so many grey levels from the wall, in little light.
+fn hardly_seen(draft: &mut Draft, levels: f64) {
     draft.room.occlusion = Occlusion::None;
     draft.room.lighting = Lighting::Dim;
-    // From what nobody finds to what everybody does: a tracker is known by where it begins to.
-    draft.room.faint = Some(chance.range(3.0, 12.0));
+    draft.room.faint = Some(levels);
 }
 
 pub(super) fn reaching(draft: &mut Draft, chance: &mut Seeded) {

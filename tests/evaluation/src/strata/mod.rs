@@ -44,7 +44,8 @@ named! {
         Nobody = "nobody",
         /// One person far away in a yard, 20 to 40 pixels high.
         Far = "far",
-        /// One person who comes so near that they fill the picture.
+        /// One person who comes so near that they fill three quarters of the picture's height: no distance shows a camera on the
+        /// ceiling, zoomed out, more.
         Near = "near",
         /// One person in a yard: wind, clouds' shadows, rain, headlights, street lamps, infrared light.
         Outdoors = "outdoors",
@@ -52,12 +53,14 @@ named! {
         Vehicles = "vehicles",
         /// One person who is in view from the start, before a camera that turns from the start.
         Turning = "turning",
-        /// One person who is hardly to be told from the wall, in the noise of little light.
+        /// One person who is hardly to be told from the wall (3 to 5 grey levels), in the noise of little light.
         Faint = "faint",
         /// One person who holds their hands into the view for a while before they walk in, where other things move too.
         Reaching = "reaching",
         /// One person before a camera with a fault, or one that is late, slow or not as told.
         Faults = "faults",
+        /// One person who is little lighter or darker than the wall (6 to 12 grey levels), in the noise of little light.
+        Pale = "pale",
     }
 }
 
@@ -79,6 +82,7 @@ impl Stratum {
             Self::Faint => builders::faint,
             Self::Reaching => builders::reaching,
             Self::Faults => faults::faults,
+            Self::Pale => builders::pale,
         }
     }
 }
