@@ -128,6 +128,17 @@ fn order(identity: Identity, in_doubt: bool) -> StopOrder {
     StopOrder { identity, words: Stop::PanTilt, in_doubt }
 }
 
+/// The socket that is the lock of a camera, as a number, where anybody has it.
+fn lock_of(camera: &VirtualCamera) -> Option<u64> {
+    let sockets = fs::read_to_string("/proc/net/unix").unwrap();
+    let camera = camera.http_address().to_string();
+    // Num: RefCount Protocol Flags Type St Inode Path; one that listens accepts connections (__SO_ACCEPTCON).
+    let is_lock = |line: &&str| line.contains("@ptztrack-watchdog ") && line.contains(&camera);
+    let listens = |line: &&str| line.split_whitespace().nth(3) == Some("00010000");
+    let line = sockets.lines().filter(is_lock).find(listens)?;
+    line.split_whitespace().nth(6)?.parse().ok()
+}
+
 #[track_caller]
 fn ends(program: &PathBuf) {
     wait_until("the watchdog goes on", || process(program).is_none());
@@ -268,8 +279,11 @@ async fn of_two_applications_with_one_camera_each_has_its_move_stopped() {
     let other = Application::before("two-of-two", VirtualCamera::start(Settings::default()).unwrap());
     let mut lease = Lease::new(other.watchdog.clone());
     let order = order(application.client.identity(), false);
-    // The lock is taken in this time, and both go on.
-    for _ in 0..10 {
+    wait_until("the first has the camera's lock", || lock_of(&application.camera).is_some());
+    let (first, begin) = (lock_of(&application.camera), Instant::now());
+    // Until the other has taken the lock; and both go on.
+    while lock_of(&application.camera).is_none_or(|lock| Some(lock) == first) {
+        assert!(begin.elapsed() < PATIENCE, "the lock is never taken");
         lease.hold(order.clone());
         lease.settled().await;
         application.hold(false).await;

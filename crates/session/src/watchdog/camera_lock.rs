@@ -73,7 +73,7 @@ impl CameraLock {
 fn name(camera: &ClientSettings) -> PathBuf {
     // SAFETY: has no preconditions.
     let user = unsafe { libc::geteuid() };
-    let owner = format!("\0vapix-watchdog {user} ");
+    let owner = format!("\0ptztrack-watchdog {user} ");
     let mut name = format!("{} {}", camera.channel, camera.location);
     // Cut, two cameras could have one name.
     if owner.len() + name.len() > CameraLock::LONGEST_NAME {

@@ -63,7 +63,7 @@ impl Connection {
         connection.say(line)?;
         let stream = connection.stream.try_clone()?;
         let address = address.clone();
-        thread::Builder::new().name("vapix-watchdog".to_owned()).spawn(move || {
+        thread::Builder::new().name("watchdog".to_owned()).spawn(move || {
             let end = match (&address, its) {
                 (WatchdogAddress::Program(program), Some(its)) => run(program, its, &stream, &report),
                 _ => hear(&stream, &report)
