@@ -70,13 +70,18 @@ impl Default for Settings {
 const FOREIGN_DETECTOR_PAUSE_S: f64 = 1.0;
 
 impl Settings {
+    fn profile(&self) -> vision::Profile {
+        match self.profile {
+            Profile::Thesis => vision::Profile::Thesis,
+            Profile::Robust => vision::Profile::Robust,
+        }
+    }
+
     fn config(&self) -> vision::Config {
         let own_detector = *self.roi_type == *MOTION_ROI;
+        let profile = self.profile();
         vision::Config {
-            profile: match self.profile {
-                Profile::Thesis => vision::Profile::Thesis,
-                Profile::Robust => vision::Profile::Robust,
-            },
+            profile,
             choice: match self.selection {
                 TargetSelection::Largest => vision::Choice::Largest,
                 TargetSelection::First => vision::Choice::First,
@@ -88,7 +93,7 @@ impl Settings {
             coast_s: gst::ClockTime::from_nseconds(self.coast_time_ns).seconds_f64(),
             memory_s: gst::ClockTime::from_nseconds(self.memory_time_ns).seconds_f64(),
             manual_size: self.manual_size,
-            must_travel: self.profile == Profile::Robust && own_detector,
+            must_travel: profile.must_travel() && own_detector,
             detector_pause_s: if own_detector { 0.0 } else { FOREIGN_DETECTOR_PAUSE_S },
             limits: vision::TimeLimits {
                 stationary_s: limit_s(self.stationary_timeout_ns),
@@ -411,7 +416,7 @@ impl LkFeatureTrack {
         let picture =
             stream.source.picture(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
         let mut seen = Observation::from(picture.luma);
-        if settings.profile == Profile::Robust {
+        if settings.profile().sees_the_scene() {
             let expected = lock(&self.camera).expected_motion(step.into());
             match stream.scene.look(buffer, &picture, step.into(), expected) {
                 Ok(Ok(scene)) => seen.scene = Some(scene),

@@ -6,16 +6,7 @@ use ptztrack_contract::Point;
 
 use super::dwell_time::TimeLimits;
 use super::policy::Choice;
-
-/// How a target is followed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Profile {
-    /// Thesis 3.5 as written: corners, optical flow, mean of the points, mean-shift.
-    Thesis,
-    /// With all that tells a person from the wall behind: see [`super`].
-    #[default]
-    Robust,
-}
+use super::profile::Profile;
 
 /// How a [`Tracker`] works. Changes hold from the next target or frame on.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -32,6 +32,7 @@ mod group;
 mod patch;
 mod points;
 mod policy;
+mod profile;
 mod report;
 mod sample;
 mod state;
@@ -40,8 +41,9 @@ mod synthetic;
 mod target;
 mod tracks;
 
-pub use config::{Config, Profile, TargetRequest};
+pub use config::{Config, TargetRequest};
 pub use dwell_time::TimeLimits;
 pub use policy::Choice;
+pub use profile::Profile;
 pub use report::{Detection, Tracked};
 pub use state::Tracker;

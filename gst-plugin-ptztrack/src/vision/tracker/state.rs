@@ -5,15 +5,15 @@
 use opencv::core::Rect2f;
 use ptztrack_contract::{Feature, ReleaseReason, TargetChange, TargetState};
 
-use super::config::{Config, Profile, TargetRequest};
+use super::config::{Config, TargetRequest};
 use super::dwell_time::DwellTime;
 use super::ego_motion::EgoMotion;
 use super::geometry::Frame;
 use super::group::Group;
 use super::policy::{Choice, Policy, tell_apart};
 use super::report::{Detection, Tracked, reported, tracked_of};
-use super::target::{Follow, Robust, Sight, Thesis};
-use super::tracks::{Region, Rules, Tracks, people};
+use super::target::{Follow, Sight};
+use super::tracks::{Region, Rules, Tracks};
 use crate::vision::Observation;
 
 /// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
@@ -185,20 +185,10 @@ impl Tracker {
 
     /// Keeps account of everybody, whether a target is followed or not.
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
-        // The thesis takes what it sees as it is, and its corners in the contour.
-        let contour = |detection: &Detection| match self.config.profile {
-            Profile::Thesis => detection.contour.iter().map(|point| frame.point_to_pixels(*point)).collect(),
-            Profile::Robust => Vec::new(),
-        };
         let mut regions = std::mem::take(&mut self.regions);
         regions.clear();
         for detection in detections {
-            let known =
-                if self.config.profile == Profile::Robust { detection.contour.as_slice() } else { &[] };
-            let outline = known.iter().map(|point| frame.point_to_pixels(*point));
-            people(frame.rect_to_pixels(detection.bounds), outline, &mut self.people);
-            let people = self.people.iter();
-            regions.extend(people.map(|bounds| Region::new(*bounds, contour(detection), detection.outside)));
+            self.config.profile.read(detection, frame, &mut self.people, &mut regions);
         }
         let Config { confirm_frames, coast_s, memory_s, detector_pause_s, .. } = self.config;
         let coast_s = coast_s.max(DECAY_S);
@@ -387,13 +377,7 @@ impl Tracker {
     /// Takes up the track of that number; `None` where it cannot be followed.
     fn acquire(&mut self, seen: &Observation, id: u64) -> opencv::Result<Option<Target>> {
         let Some(track) = self.tracks.get(id) else { return Ok(None) };
-        let follow: Option<Box<dyn Follow>> = match self.config.profile {
-            Profile::Thesis => {
-                let contour = self.tracks.region(track).map_or(&[][..], |region| &region.contour);
-                Thesis::acquire(&seen.luma, track, contour)?.map(|target| Box::new(target) as _)
-            }
-            Profile::Robust => Robust::acquire(seen, track)?.map(|target| Box::new(target) as _),
-        };
+        let follow = self.config.profile.acquire(seen, track, self.tracks.region(track))?;
         let seen_at = track.seen_bounds();
         let Some(follow) = follow else { return Ok(None) };
         self.lost = None;

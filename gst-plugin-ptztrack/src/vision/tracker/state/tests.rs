@@ -2,6 +2,7 @@
 
 use super::super::dwell_time::TimeLimits;
 use super::super::policy::Choice;
+use super::super::profile::Profile;
 use super::super::synthetic::{Picture, Scene};
 use super::*;
 use crate::vision::{self, SceneModel};
