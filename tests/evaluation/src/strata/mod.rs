@@ -44,8 +44,7 @@ named! {
         Nobody = "nobody",
         /// One person far away in a yard, 20 to 40 pixels high.
         Far = "far",
-        /// One person who comes so near that they fill three quarters of the picture's height: no distance shows a camera on the
-        /// ceiling, zoomed out, more.
+        /// One person who comes so near that they fill the picture.
         Near = "near",
         /// One person in a yard: wind, clouds' shadows, rain, headlights, street lamps, infrared light.
         Outdoors = "outdoors",
@@ -118,8 +117,10 @@ impl SceneId {
 mod tests {
     use std::collections::BTreeSet;
 
+    use virtual_camera::{Clock, Pose};
+
     use super::*;
-    use crate::experiment::Target;
+    use crate::experiment::{Place, Target, exposure};
 
     fn setups(seed: u64) -> Vec<String> {
         let scenes = Stratum::ALL
@@ -144,6 +145,27 @@ mod tests {
                 SceneId { stratum, seed: 3, number: 2 }.experiment(Suite::OpenLoop, TrackerName::Ptztrack);
             assert_eq!((one.scene.duration - one.scene.begin).as_secs(), 10, "{stratum}");
             assert_eq!(one.scene.target == Target::Nobody, stratum == Stratum::Nobody);
+        }
+    }
+
+    #[test]
+    fn who_is_near_is_higher_than_the_picture_for_a_good_part_of_the_time() {
+        for (seed, number) in [(1, 1), (2, 3), (5, 2)] {
+            let id = SceneId { stratum: Stratum::Near, seed, number };
+            let one = id.experiment(Suite::OpenLoop, TrackerName::Ptztrack);
+            let Place::Camera(settings) = &one.scene.place else { panic!("no camera in {id}") };
+            let camera = one.camera(settings, Clock::Stepped).unwrap();
+            let (period, home) = (camera.frame_period(), camera.home());
+            let fills = |number: &u32| {
+                let from = |pose: &Pose| {
+                    camera.ground_truth_from(pose, exposure(*number, period), one.size).remove(0)
+                };
+                let (pan_deg, tilt_deg) = from(&home).direction_deg.unwrap();
+                from(&Pose { pan_deg, tilt_deg, ..home }).bounds.height >= f64::from(one.size.1)
+            };
+            let numbers: Vec<u32> = one.pictures(period).collect();
+            let share = numbers.iter().filter(|one| fills(one)).count() as f64 / numbers.len() as f64;
+            assert!(share > 0.25, "{id}: {share}");
         }
     }
 }
