@@ -66,12 +66,8 @@ pub struct Args {
     pub record: bool,
     /// Instead of running tests, write pictures of the room or of the photographs, to look at: every
     /// subject, light and occlusion, from far and near
-    #[arg(long, conflicts_with_all = ["test", "footage", "still_recording", "real_time", "record"])]
+    #[arg(long, conflicts_with_all = ["test", "footage", "still_recording", "record"])]
     pub gallery: bool,
-    /// By the clock instead of in virtual time, one run after the other: the camera streams by HTTP (mjpeg) or RTSP (mpeg4), and
-    /// pictures that the tracker has no time for are dropped and counted
-    #[arg(long, conflicts_with_all = ["record", "still_recording"])]
-    pub real_time: bool,
     /// Instead of the tests, follow one person in a still camera's recording, as seen by a camera that turns within it
     #[arg(long, value_name = "FILE", group = "recording", requires = "truth", conflicts_with_all = ["test"])]
     pub footage: Option<PathBuf>,
@@ -243,16 +239,10 @@ impl Args {
             size: self.size,
             delays,
             first_box: self.first_box.unwrap_or(usual),
-            real_time: self.real_time,
             servo: self.servo.clone(),
             films: self.record.then(|| self.out.join("films")),
             ..Experiment::new(scene, tracker, seed)
         }
-    }
-
-    /// How many runs go on at once: in real time they would take the processor from each other.
-    pub fn jobs(&self) -> usize {
-        if self.real_time { 1 } else { self.jobs }
     }
 
     /// Ways through photographs; `None` where none are asked for.

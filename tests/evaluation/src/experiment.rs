@@ -152,8 +152,6 @@ pub struct Experiment {
     pub servo: String,
     /// Who draws the first box.
     pub first_box: FirstBox,
-    /// Whether the clock is looked at: the camera streams, and pictures that come too early for the tracker are dropped.
-    pub real_time: bool,
     /// Folder of the videos, with everything drawn in (Matroska); none is made unless given.
     pub films: Option<PathBuf>,
     /// Folder of the recordings of scenes that are shown in open loop.
@@ -179,7 +177,6 @@ impl Experiment {
             elements: None,
             servo: String::new(),
             first_box: FirstBox::Detected,
-            real_time: false,
             films: None,
             recordings: None,
             replaced: Vec::new(),
@@ -293,7 +290,6 @@ impl Experiment {
             delays: self.delays,
             first_box: self.first_box,
             frame_rate: 0.0,
-            dropped: self.real_time.then_some(0),
             frames: Vec::new(),
             snapshots: Vec::new(),
             error: None,

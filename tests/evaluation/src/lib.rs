@@ -29,7 +29,6 @@ pub mod open_loop;
 mod people;
 mod pipeline;
 mod provenance;
-mod realtime;
 pub mod record;
 pub mod report;
 mod still;

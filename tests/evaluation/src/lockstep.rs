@@ -19,7 +19,6 @@ use crate::{
     experiment::{self, Experiment, Place},
     film, open_loop,
     pipeline::{Pipeline, PipelineError, SOURCE},
-    realtime,
     record::{Bounds, Estimate, FrameRecord, Run},
     still,
     trackers::{Cue, Phase, Tracker},
@@ -38,8 +37,6 @@ pub(crate) enum RunError {
     Size(u32, u32),
     #[error("the camera does not take `{0}`")]
     Aim(String),
-    #[error("in real time pictures come as mjpeg or mpeg4, not as they are")]
-    Raw,
     #[error("cannot film into {}: {source}", file.display())]
     Film { file: PathBuf, source: std::io::Error },
     #[error("cannot write {}: {source}", file.display())]
@@ -53,9 +50,6 @@ pub fn run(experiment: &Experiment) -> Run {
     let mut run = experiment.blank();
     let driven = match (&experiment.scene.place, &experiment.recordings) {
         (Place::Camera(camera), Some(folder)) => open_loop::drive(experiment, camera, folder, &mut run),
-        (Place::Camera(camera), None) if experiment.real_time => {
-            realtime::drive(experiment, camera, &mut run)
-        }
         (Place::Camera(camera), None) => drive(experiment, camera, &mut run),
         (Place::Recording(recording), _) => still::drive(experiment, recording, &mut run),
     };

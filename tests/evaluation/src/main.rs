@@ -71,7 +71,7 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     }
     report::make_room(&args.out)?;
     let store = Store::new(&args.results, args.fresh);
-    let runs = evaluation::run_all(&experiments, args.jobs(), &store, io::stderr());
+    let runs = evaluation::run_all(&experiments, args.jobs, &store, io::stderr());
     let report = report::write(&runs, &left_out, &args.out)?;
     for note in &report.notes {
         tell(io::stderr(), format_args!("evaluate: {note}"))?;
@@ -105,7 +105,7 @@ fn strata(args: &Args, suite: Suite) -> Result<bool, Box<dyn std::error::Error>>
         .map(|(_, one)| Experiment { films: films.clone(), servo: args.servo.clone(), ..one.clone() })
         .collect();
     let store = Store::new(&args.results, args.fresh);
-    let runs = evaluation::run_all(&experiments, args.jobs(), &store, io::stderr());
+    let runs = evaluation::run_all(&experiments, args.jobs, &store, io::stderr());
     let whole = runs.len() == experiments.len() && runs.iter().all(|run| run.error.is_none());
     let scene = |((id, experiment), run): ((SceneId, Experiment), Run)| SceneRun {
         id,

@@ -61,8 +61,6 @@ pub struct Metrics {
     pub box_precision: Option<f64>,
     /// Commands that reached the camera, a second.
     pub commands_per_s: Option<f64>,
-    /// Of the pictures that the network brought, the share that never reached the tracker; `None` in virtual time.
-    pub dropped: Option<f64>,
     /// Counted pictures, N_F.
     pub frames: usize,
     /// Pictures that contain the target, nF.
@@ -92,7 +90,6 @@ impl Metrics {
             success: success(frames),
             box_precision: box_precision(frames),
             commands_per_s: commands_per_s(frames, run.frame_rate),
-            dropped: run.dropped.and_then(|dropped| share(dropped as usize, dropped as usize + frames.len())),
             frames: frames.len(),
             frames_with_target: frames.iter().filter(|frame| contains_target(frame)).count(),
         }
@@ -186,8 +183,7 @@ pub fn time_to_acquire_s(frames: &[FrameRecord]) -> Option<f64> {
     Some(first.time_s - frames.first()?.time_s)
 }
 
-/// Commands that reached the camera over the counted time, which goes on for one period after the last picture. Pictures
-/// that were dropped took their time too.
+/// Commands that reached the camera over the counted time, which goes on for one period after the last picture.
 pub fn commands_per_s(frames: &[FrameRecord], frame_rate: f64) -> Option<f64> {
     let elapsed_s = frames.last()?.time_s - frames.first()?.time_s + 1.0 / frame_rate;
     let commands: u32 = frames.iter().map(|frame| frame.commands).sum();

@@ -313,8 +313,6 @@ pub struct Run {
     pub first_box: FirstBox,
     /// Pictures a second.
     pub frame_rate: f64,
-    /// Pictures that were there but never reached the tracker; only in real time, `None` in virtual time.
-    pub dropped: Option<u64>,
     /// The counted pictures.
     pub frames: Vec<FrameRecord>,
     /// Some of them to look at.

@@ -38,10 +38,7 @@ impl Store {
     /// The kept result, if there is one that was made with what there is now. What cannot be read is not there.
     pub fn get(&self, experiment: &Experiment) -> Option<Run> {
         // A film is only made by running it.
-        let kept = !self.fresh
-            && is_kept(experiment)
-            && experiment.films.is_none()
-            && experiment.motchallenge.is_none();
+        let kept = !self.fresh && experiment.films.is_none() && experiment.motchallenge.is_none();
         let bytes = fs::read(self.file(experiment)).ok().filter(|_| kept)?;
         let kept: Kept<Run> = postcard::from_bytes(&bytes).ok()?;
         (kept.key == key(experiment)).then_some(kept.run)
@@ -52,7 +49,7 @@ impl Store {
     /// # Errors
     /// Where it cannot be written.
     pub fn put(&self, experiment: &Experiment, run: &Run) -> io::Result<()> {
-        if run.error.is_some() || !is_kept(experiment) {
+        if run.error.is_some() {
             return Ok(());
         }
         let bytes = postcard::to_stdvec(&Kept { key: key(experiment), run }).map_err(io::Error::other)?;
@@ -67,11 +64,6 @@ impl Store {
     fn file(&self, experiment: &Experiment) -> PathBuf {
         self.folder.join(place(&experiment.blank()) + ".run")
     }
-}
-
-/// By the clock no run is like another.
-fn is_kept(experiment: &Experiment) -> bool {
-    !experiment.real_time
 }
 
 /// All that a result depends on, in words.

@@ -153,7 +153,7 @@ fn in_a_recording_as_it_is_the_box_is_judged() {
     let mut lines = results.lines();
     assert!(lines.next().unwrap().contains(",identity_switches,box_precision_20px_pct,"));
     assert!(lines.next().unwrap().starts_with("\"as-it-is, person 7\",,ptztrack,1,raw,480,320,given,0,0,"));
-    assert!(lines.next().unwrap().contains(",0.000000,100.000000,,"), "{results}");
+    assert!(lines.next().unwrap().contains(",0.000000,100.000000,recording,"), "{results}");
     let page = fs::read_to_string(out.join("index.html")).unwrap();
     assert!(page.contains("<th scope=\"row\">as-it-is, person 7</th>"));
 }

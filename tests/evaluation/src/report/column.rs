@@ -135,10 +135,6 @@ pub const BOX_PRECISION: Column = Column {
     value: |m| percent(m.box_precision),
 };
 
-/// Pictures that never reached the tracker; only in real time.
-pub const DROPPED: Column =
-    Column { key: "dropped_pct", heading: "dropped %", decimals: 1, value: |m| percent(m.dropped) };
-
 /// What the thesis gives too.
 pub const OF_THESIS: [Column; 7] = [P, DP, TF, MEAN_DGC, VAR_DGC, MEAN_DGP, VAR_DGP];
 
@@ -168,7 +164,7 @@ pub const OF_SUMMARY: [Column; 9] = [P, P_PREDICTED, DP, TF, SUCCESS, MEAN_DGC, 
 pub const WITH_INTERVAL: [Column; 4] = [DP, TF, SUCCESS, MEAN_DGC];
 
 /// Everything.
-pub const ALL: [Column; 18] = [
+pub const ALL: [Column; 17] = [
     P,
     DP,
     TF,
@@ -186,5 +182,4 @@ pub const ALL: [Column; 18] = [
     COMMANDS,
     SWITCHES,
     BOX_PRECISION,
-    DROPPED,
 ];

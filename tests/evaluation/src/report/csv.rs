@@ -14,8 +14,7 @@ use crate::{
 /// Digits after the point; as many as the thesis gives.
 const DECIMALS: usize = 6;
 
-const SETUP: [&str; 7] =
-    ["codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms", "real_time"];
+const SETUP: [&str; 6] = ["codec", "width", "height", "first_box", "video_delay_ms", "command_delay_ms"];
 /// What every line on a run begins with.
 const RUN: [&str; 3] = ["title", "test", "tracker"];
 
@@ -28,7 +27,7 @@ pub fn results(judged: &[Judged]) -> String {
             .chain(SETUP)
             .chain(["frames", "frames_with_target"])
             .chain(figures)
-            .chain(["dropped", "suite", "path", "tracker_made_of", "servo", "laboratory", "error"]),
+            .chain(["suite", "path", "tracker_made_of", "servo", "laboratory", "error"]),
     );
     for one in judged {
         let run = one.run;
@@ -37,7 +36,6 @@ pub fn results(judged: &[Judged]) -> String {
         cells.extend(setup(&one.setup));
         cells.extend([one.metrics.frames, one.metrics.frames_with_target].map(|number| number.to_string()));
         cells.extend(column::ALL.iter().map(|column| number(column.of(&one.metrics))));
-        cells.push(run.dropped.map(|dropped| dropped.to_string()).unwrap_or_default());
         let Provenance { tracker, servo, laboratory } = run.provenance.clone();
         cells.extend([run.suite.to_string(), run.path.clone(), tracker, servo, laboratory]);
         cells.push(run.error.clone().unwrap_or_default());
@@ -139,7 +137,7 @@ fn estimate(frame: &FrameRecord) -> [String; 9] {
     [state, x, y, left, top, width, height, estimate.id.to_string(), estimate.features.to_string()]
 }
 
-fn setup(setup: &Setup) -> [String; 7] {
+fn setup(setup: &Setup) -> [String; 6] {
     let (video, command) = (setup.delays.video.as_millis(), setup.delays.command.as_millis());
     [
         setup.codec.to_string(),
@@ -148,7 +146,6 @@ fn setup(setup: &Setup) -> [String; 7] {
         setup.first_box.to_string(),
         video.to_string(),
         command.to_string(),
-        setup.real_time.to_string(),
     ]
 }
 

@@ -103,11 +103,6 @@ pub const DEFINITIONS: &[(&str, &str)] = &[
          lost from then on.",
     ),
     (
-        "In real time",
-        "Pictures that were dropped are missing from all counts. A picture is held to be the newest that the camera had when \
-         it came.",
-    ),
-    (
         "Read together",
         "P, DP and distances only count pictures with the person in them (or tracked): who loses the person early and says \
          so can have good ones. TF tells of the rest.",

@@ -26,24 +26,19 @@ pub struct Setup {
     pub size: (u32, u32),
     /// How late things are.
     pub delays: Delays,
-    /// By the clock, so that pictures may be dropped.
-    pub real_time: bool,
 }
 
 impl Setup {
     fn of(run: &Run) -> Self {
         let Run { suite, codec, size, first_box, delays, .. } = *run;
-        Self { suite, first_box, codec, size, delays, real_time: run.dropped.is_some() }
+        Self { suite, first_box, codec, size, delays }
     }
 
     /// Name of a folder for runs of that seed.
     pub fn folder(&self, seed: u64) -> String {
-        let Self { suite, codec, size: (width, height), first_box, delays, real_time, .. } = self;
+        let Self { suite, codec, size: (width, height), first_box, delays, .. } = self;
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
-        let real_time = if *real_time { "realtime-" } else { "" };
-        format!(
-            "{suite}/{real_time}seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms"
-        )
+        format!("{suite}/seed{seed}-{codec}-{width}x{height}-{first_box}-video{video}ms-command{command}ms")
     }
 }
 
@@ -53,8 +48,7 @@ impl fmt::Display for Setup {
         let (video, command) = (delays.video.as_millis(), delays.command.as_millis());
         write!(
             f,
-            "{suite}, first box {first_box}, {codec}, {width}x{height}, delays: video {video} ms, command {command} ms{}",
-            if self.real_time { ", in real time" } else { "" }
+            "{suite}, first box {first_box}, {codec}, {width}x{height}, delays: video {video} ms, command {command} ms",
         )
     }
 }

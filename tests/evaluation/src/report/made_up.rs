@@ -23,7 +23,6 @@ pub(crate) fn run(frames: Vec<FrameRecord>) -> Run {
         first_box: FirstBox::Given,
         frame_rate: 10.0,
         snapshots: Vec::new(),
-        dropped: None,
         frames,
         error: None,
     }

@@ -42,18 +42,13 @@ pub fn overview(section: &Section) -> Table {
             seeds.iter().map(u64::to_string).collect::<Vec<_>>().join(", "),
             section.setup
         ),
-        headings: summary_headings(section),
+        headings: summary_headings(),
         rows,
     }
 }
 
-fn summary_columns(section: &Section) -> impl Iterator<Item = &'static Column> + use<> {
-    let dropped = section.setup.real_time.then_some(&column::DROPPED);
-    column::OF_SUMMARY.iter().chain(dropped)
-}
-
-fn summary_headings(section: &Section) -> Vec<String> {
-    headings(&["tracker", "runs"], summary_columns(section).map(|column| column.heading.into()))
+fn summary_headings() -> Vec<String> {
+    headings(&["tracker", "runs"], column::OF_SUMMARY.iter().map(|column| column.heading.into()))
 }
 
 fn figures(section: &Section, name: String, runs: &[&Judged]) -> Vec<String> {
@@ -64,12 +59,12 @@ fn figures(section: &Section, name: String, runs: &[&Judged]) -> Vec<String> {
         }
         _ => column.show(column.mean(runs.iter().map(|one| &one.metrics))),
     };
-    [name, runs.len().to_string()].into_iter().chain(summary_columns(section).map(cell)).collect()
+    [name, runs.len().to_string()].into_iter().chain(column::OF_SUMMARY.iter().map(cell)).collect()
 }
 
 fn printed_line(section: &Section) -> Vec<String> {
     let rows = section.printed();
-    let cells = summary_columns(section).map(|column| {
+    let cells = column::OF_SUMMARY.iter().map(|column| {
         let known = column::OF_THESIS.iter().any(|other| other.key == column.key);
         column.show(column.mean(rows.iter().map(|row| &row.metrics)).filter(|_| known))
     });

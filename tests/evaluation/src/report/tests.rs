@@ -99,12 +99,11 @@ fn has_every_run_and_figure() {
     assert_eq!(lines.len(), 1 + 6);
     // 35 right and 5 wrong of 40; d_gp is 5 of 100 pixels; all 40 lie on the person; the boxes are the same; d_gc 0.1 is
     // not central.
-    let ours = "test 1,1,ptztrack,1,mjpeg,80,60,given,100,60,false,40,35,87.500000,100.000000,0.000000,\
+    let ours = "test 1,1,ptztrack,1,mjpeg,80,60,given,100,60,40,35,87.500000,100.000000,0.000000,\
                 0.100000,0.000000,0.050000,0.000000,100.000000,100.000000,,,0.000000,0.000000,100.000000,10.000000,,";
     assert!(lines[1].starts_with(ours), "{}", lines[1]);
     assert!(lines[1].ends_with(",room,1,t,s,l,"), "{}", lines[1]);
-    let still =
-        "test 1,1,still,1,mjpeg,80,60,given,100,60,false,40,35,,0.000000,0.000000,0.100000,0.000000,,,,";
+    let still = "test 1,1,still,1,mjpeg,80,60,given,100,60,40,35,,0.000000,0.000000,0.100000,0.000000,,,,";
     assert!(lines[2].starts_with(still), "{}", lines[2]);
     let losses = folder.read("losses.csv");
     assert_eq!(
@@ -124,21 +123,6 @@ fn has_every_run_and_figure() {
         report.summary
     );
     assert!(folder.read("summary.md").starts_with(&report.summary));
-}
-
-#[test]
-fn what_was_dropped_is_told_where_the_clock_was_looked_at() {
-    let folder = Folder::new("dropped");
-    let runs = [Run { dropped: Some(10), ..run(1, TrackerName::Ptztrack) }];
-    let summary = write(&runs, &[], &folder.0).unwrap().summary;
-    assert!(
-        summary.contains("command 60 ms, in real time)") && summary.contains("| dropped % |"),
-        "{summary}"
-    );
-    let ours = summary.lines().find(|line| line.starts_with("| ptztrack")).unwrap();
-    // 10 beside the 40 that were seen.
-    assert!(ours.trim_end_matches([' ', '|']).ends_with("20.0"), "{ours}");
-    assert!(folder.read("results.csv").contains(",20.000000,10,"));
 }
 
 #[test]

@@ -23,10 +23,10 @@ pub const HELD_OUT: RangeInclusive<u64> = 11..=20;
 pub struct StrataArgs {
     /// Show scenes of the strata to detector and tracker alone, from recordings that are made once: seeds 1 to 10 are for tuning,
     /// 11 to 20 are held out: run them once, at the end, and never look into them
-    #[arg(long, group = "shown", conflicts_with_all = ["test", "gallery", "real_time", "recording", "photographs"])]
+    #[arg(long, group = "shown", conflicts_with_all = ["test", "gallery", "recording", "photographs"])]
     pub open_loop: bool,
     /// The same scenes with a camera that is steered by what the tracker says
-    #[arg(long, conflicts_with_all = ["open_loop", "test", "gallery", "real_time", "recording", "photographs"])]
+    #[arg(long, conflicts_with_all = ["open_loop", "test", "gallery", "recording", "photographs"])]
     pub closed_loop: bool,
     /// Only these strata
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
