@@ -8,14 +8,15 @@ mod common;
 
 use std::sync::Once;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Duration;
 
 use common::stage::{Shown, Stage, mean_distance, pacing};
 use common::{Heard, Rig, target};
 use ptztrack_contract::TargetState;
 use virtual_camera::{Auth, Kinematics, OnvifSettings, ProportionalSpeed, Quirk, Settings, SpeedMap};
 
-/// How long somebody is followed: twice to and fro, and as long again as a camera takes to be known.
-const FOLLOWED_S: f64 = 30.0;
+/// How long somebody is followed: to and fro, and to and fro again.
+const FOLLOWED_S: f64 = 60.0;
 
 fn camera(onvif: OnvifSettings, full_speed_deg_s: f64) -> Settings {
     static REGISTER: Once = Once::new();
@@ -114,6 +115,15 @@ fn cameras_much_faster_and_slower_than_is_assumed() {
     });
 }
 
+#[test]
+fn commands_that_act_late() {
+    each(&[5, 100, 400, 800], |delay_ms| {
+        let mut settings = camera(OnvifSettings::default(), 120.0);
+        settings.kinematics.command_delay = Duration::from_millis(delay_ms);
+        follows(&format!("{delay_ms} ms"), settings, 0.25);
+    });
+}
+
 /// The camera turns away from the person at first; how far is bounded by moves that are slow until it is known better.
 #[test]
 fn a_mirrored_pan_is_corrected_within_five_seconds() {
@@ -122,7 +132,7 @@ fn a_mirrored_pan_is_corrected_within_five_seconds() {
     let farthest = shown.iter().map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
     assert!(farthest < 20.0, "{farthest} degrees away");
     let begins = shown.iter().find(|shown| shown.distance() > 0.05).unwrap().at;
-    let later = shown.iter().filter(|shown| shown.at > begins + std::time::Duration::from_secs(5));
+    let later = shown.iter().filter(|shown| shown.at > begins + Duration::from_secs(5));
     let farthest = later.map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
     assert!(farthest < 10.0, "{farthest} degrees away after 5 s");
     assert!(
