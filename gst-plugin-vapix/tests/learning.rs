@@ -95,6 +95,14 @@ fn a_longer_latency_is_found() {
     assert_learned(CUBIC, 300, |rig, latency| rig.with("latency", latency.as_nanos() as u64 - 300_000_000));
 }
 
+/// Whatever is told of it, here what most cameras need.
+#[test]
+fn cameras_that_act_at_once_and_very_late_are_found_out() {
+    for command_delay_ms in [5, 800] {
+        assert_learned(CUBIC, command_delay_ms, |rig, _| rig.with("latency", 200_000_000_u64));
+    }
+}
+
 /// Newer firmware tells both.
 #[test]
 fn a_camera_that_tells_its_field_of_view_and_speeds_is_believed() {
