@@ -64,7 +64,12 @@ impl BurnedIn {
 fn columns(bounds: Rect, row: usize, width: usize) -> Range<usize> {
     let rows = bounds.y..bounds.y + bounds.height;
     let column = |x: f64| (x.max(0.0) as usize).min(width);
-    if rows.contains(&(row as f64)) { column(bounds.x)..column(bounds.x + bounds.width) } else { 0..0 }
+    if !rows.contains(&(row as f64)) {
+        return 0..0;
+    }
+    let start = column(bounds.x);
+    // The box comes from whoever tracks, who may tell of one that has no width left in the picture.
+    start..column(bounds.x + bounds.width).max(start)
 }
 
 #[multiversion(targets("x86_64+avx2"))]
@@ -129,6 +134,14 @@ mod tests {
     fn whoever_walks_along_with_the_camera_is() {
         let strides = |picture: usize, index: usize| logo(picture, index + picture / 5);
         assert!(after(200, None, strides).iter().all(|value| *value == 255));
+    }
+
+    #[test]
+    fn a_box_of_no_width_keeps_nothing() {
+        let held = |width: f64| Some(Rect { x: 151.0, y: 5.0, width, height: 10.0 });
+        for width in [0.0, -1e-3, -400.0] {
+            assert!(after(99, held(width), logo).iter().all(|value| *value == 0), "{width}");
+        }
     }
 
     #[test]
