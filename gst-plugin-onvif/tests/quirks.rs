@@ -127,15 +127,18 @@ fn commands_that_act_late() {
 /// The camera turns away from the person at first; how far is bounded by moves that are slow until it is known better.
 #[test]
 fn a_mirrored_pan_is_corrected_within_five_seconds() {
-    let mut stage = Stage::new(camera(OnvifSettings::with(&[Quirk::PanMirrored]), 120.0), log_in);
-    let shown = stage.follow(FOLLOWED_S);
-    let farthest = shown.iter().map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
-    assert!(farthest < 20.0, "{farthest} degrees away");
-    let begins = shown.iter().find(|shown| shown.distance() > 0.05).unwrap().at;
-    let later = shown.iter().filter(|shown| shown.at > begins + Duration::from_secs(5));
-    let farthest = later.map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
-    assert!(farthest < 10.0, "{farthest} degrees away after 5 s");
-    assert!(
-        stage.heard.iter().any(|heard| matches!(heard, Heard::Info(text) if text.contains("invert-pan")))
-    );
+    each(&[60, 800], |delay_ms| {
+        let mut settings = camera(OnvifSettings::with(&[Quirk::PanMirrored]), 120.0);
+        settings.kinematics.command_delay = Duration::from_millis(delay_ms);
+        let mut stage = Stage::new(settings, log_in);
+        let shown = stage.follow(FOLLOWED_S);
+        let farthest = shown.iter().map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
+        assert!(farthest < 20.0, "{delay_ms} ms late: {farthest} degrees away");
+        let begins = shown.iter().find(|shown| shown.distance() > 0.05).unwrap().at;
+        let later = shown.iter().filter(|shown| shown.at > begins + Duration::from_secs(5));
+        let farthest = later.map(|shown| 55.2 * shown.offset.0.abs()).fold(0.0, f64::max);
+        assert!(farthest < 10.0, "{delay_ms} ms late: {farthest} degrees away after 5 s");
+        let told = |heard: &Heard| matches!(heard, Heard::Info(text) if text.contains("invert-pan"));
+        assert!(stage.heard.iter().any(told), "{delay_ms} ms late");
+    });
 }

@@ -67,7 +67,7 @@ impl AxisSense {
 
 impl AxisEstimator {
     /// Until it is known which way an axis turns the picture, no more degrees per second: who runs away does so slowly.
-    pub const CAUTIOUS_DEG_S: f64 = 6.0;
+    pub const CAUTIOUS_DEG_S: f64 = 10.0;
 
     /// What was commanded so long before a picture shows in it, however late the camera is: only what was told the same way
     /// for all that time is compared.
@@ -77,7 +77,7 @@ impl AxisEstimator {
     const NEARLY: f64 = 0.8;
 
     /// The bound is doubled no more often.
-    const MOST_RAISED: u32 = 3;
+    const MOST_RAISED: u32 = 2;
 
     /// One axis is moved alone for so long, that a picture may show what it does.
     const ALONE: Duration = Duration::from_millis(2500);
@@ -193,6 +193,8 @@ fn one_way(rates: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
+    const CAUTIOUS: f64 = AxisEstimator::CAUTIOUS_DEG_S;
+
     fn ms<T: From<Duration>>(ms: u64) -> T {
         Duration::from_millis(ms).into()
     }
@@ -222,7 +224,7 @@ mod tests {
         let mut axes = AxisEstimator::default();
         let slanted = PanTilt::new(5.0, 4.0);
         assert_eq!(watch(&mut axes, slanted, slanted, 100), None, "nothing can be told by that");
-        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(6.0, 0.0));
+        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(CAUTIOUS, 0.0));
         let (told, seen) = (PanTilt::new(5.0, 0.5), PanTilt::new(0.3, -4.0));
         assert_eq!(watch(&mut axes, told, seen, 5), None);
         assert_eq!(watch(&mut axes, told, seen, 1), Some(AxisFinding::Exchanged));
@@ -236,9 +238,9 @@ mod tests {
     fn an_axis_that_turns_as_it_is_told_is_known_so() {
         let mut axes = AxisEstimator::default();
         let fast = PanTilt::new(40.0, -40.0);
-        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(6.0, 0.0), "one at a time");
+        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(CAUTIOUS, 0.0), "one at a time");
         assert_eq!(watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(4.0, 1.0), 12), None);
-        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(40.0, -6.0), "tilt was never told to turn");
+        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(40.0, -CAUTIOUS), "tilt was never told to turn");
         assert_eq!(axes.mounting(Mounting::default()), Mounting::default());
     }
 
@@ -260,7 +262,7 @@ mod tests {
     fn the_first_move_tells_at_once() {
         for (seen_deg_s, finding) in [(4.0, None), (-4.0, Some(AxisFinding::Inverted))] {
             let (mut axes, mut history) = (AxisEstimator::default(), CommandHistory::default());
-            history.push(ms(1000), PanTilt::new(6.0, 0.0));
+            history.push(ms(1000), PanTilt::new(CAUTIOUS, 0.0));
             let mut see = |picture: u64, rate: f64| {
                 let from = ms::<Time>(1000) + ms::<Duration>(80 * picture);
                 let turn = ObservedRotation { from, to: from + ms(80), rate: PanTilt::new(rate, 0.0) };
@@ -278,8 +280,8 @@ mod tests {
         let mut axes = AxisEstimator::default();
         let allowed = |axes: &mut AxisEstimator| axes.cautious(PanTilt::new(90.0, 0.0), ms(0)).pan;
         watch(&mut axes, PanTilt::new(3.0, 0.0), PanTilt::default(), 50);
-        assert_eq!(allowed(&mut axes), 6.0, "so slow it was of itself");
-        for most in [12.0, 24.0, 48.0, 48.0] {
+        assert_eq!(allowed(&mut axes), CAUTIOUS, "so slow it was of itself");
+        for most in [2.0 * CAUTIOUS, 4.0 * CAUTIOUS, 4.0 * CAUTIOUS] {
             let told = PanTilt::new(allowed(&mut axes), 0.0);
             assert_eq!(watch(&mut axes, told, PanTilt::default(), 11), None);
             assert_eq!(allowed(&mut axes), most);
