@@ -33,11 +33,10 @@ const SEEN_PER_S: f32 = 6.0;
 const STANDS_OUT_PER_S: f32 = 2.0;
 /// Deviation of where somebody is by their looks, in heights.
 const LOOKS_NOISE: f32 = 0.08;
-/// Intersection over union below which what is seen has another size than the track, and for how long it must be so, seconds, until
-/// that is its size: what is larger shows more of it, what is smaller may be what something hides.
-const UNLIKE: f32 = 0.5;
-const GROWS_S: f64 = 0.4;
-const SHRINKS_S: f64 = 5.0;
+/// What is seen has another size than the track where their intersection over union is below this, and that is its size once it has been so
+/// for so long, seconds. What is larger shows more of it; what is smaller may be what something hides.
+const GROWS: (f32, f64) = (0.65, 0.4);
+const SHRINKS: (f32, f64) = (0.5, 5.0);
 /// How much of the height must be seen for looks to be learned.
 const WHOLE: f32 = 0.7;
 /// Who was seen beside the target for so long, seconds, is somebody else.
@@ -311,13 +310,13 @@ impl Track {
     /// What is seen of it alone is `whole`: where that is much larger or smaller for long, this is its size.
     pub fn resize(&mut self, whole: Rect2f, dt_s: f64) {
         let bounds = self.bounds();
-        if overlap(bounds, whole) >= UNLIKE {
+        let (unlike, after_s) = if whole.height > bounds.height { GROWS } else { SHRINKS };
+        if overlap(bounds, whole) >= unlike {
             self.journey.unlike_s = 0.0;
             return;
         }
         self.journey.unlike_s += dt_s;
-        let grows = whole.height > bounds.height;
-        if self.journey.unlike_s >= if grows { GROWS_S } else { SHRINKS_S } {
+        if self.journey.unlike_s >= after_s {
             self.become_whole(whole);
         }
     }
