@@ -12,6 +12,7 @@ use ptztrack_contract::{Point, Region};
 use super::Luma;
 use super::contours::Grid;
 use super::scene_model::SceneView;
+use super::travelling::UNKNOWN;
 
 /// How far inside and outside of the contour grey levels are compared, pixels: it is not more exact than this.
 const BESIDE: f64 = 2.0;
@@ -23,8 +24,6 @@ const LEAST_EDGE: f64 = 8.0;
 const LEAST_PLACES: u32 = 16;
 /// Pixels that are looked at together to tell whether picture and background are the same but for their sharpness.
 const COARSE: i32 = 9;
-/// Likelihood of foreground where nothing is known.
-const UNKNOWN: f64 = 128.0;
 /// Share of their difference that is left then, below which they are the same.
 const UNSHARP: f64 = 0.4;
 
@@ -84,7 +83,7 @@ pub fn is_light(scene: &SceneView, region: &Region) -> bool {
     let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
     across(&region.contour, grid, |inside, outside| {
         let off = |place| {
-            let is_known = level(&scene.foreground, place)? != UNKNOWN;
+            let is_known = level(&scene.foreground, place)? != f64::from(UNKNOWN);
             is_known.then_some((level(&scene.luma, place)? - level(&scene.background, place)?).abs())
         };
         if let (Some(inside), Some(outside)) = (off(inside), off(outside)) {

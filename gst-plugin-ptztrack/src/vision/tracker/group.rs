@@ -5,7 +5,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{around, centre};
+use super::geometry::{around, centre, mean};
 use super::tracks::{Track, Tracks};
 
 /// Time constant with which the box takes in who joins and lets go of who has left, seconds: the camera is not to jump.
@@ -59,17 +59,16 @@ impl Group {
             self.disband();
             return None;
         };
-        let sum = members().map(Track::velocity).fold(Point2f::default(), |sum, velocity| sum + velocity);
-        let own_velocity = sum / members().count() as f32;
+        let own_velocity = mean(members().map(Track::velocity)).unwrap_or_default();
         let bounds = match self.bounds.zip(ego) {
             Some((last, ego)) => {
                 // Each side goes as whoever is outermost there.
-                let rate = |out: fn(Rect2f) -> f32| {
+                let step = |out: fn(Rect2f) -> f32| {
                     let outermost = members().max_by(|a, b| out(a.bounds()).total_cmp(&out(b.bounds())));
                     outermost.map_or_else(Point2f::default, Track::velocity) * dt_s
                 };
-                let first = Point2f::new(rate(|bounds| -bounds.x).x, rate(|bounds| -bounds.y).y);
-                let end = Point2f::new(rate(|bounds| bounds.br().x).x, rate(|bounds| bounds.br().y).y);
+                let first = Point2f::new(step(|bounds| -bounds.x).x, step(|bounds| -bounds.y).y);
+                let end = Point2f::new(step(|bounds| bounds.br().x).x, step(|bounds| bounds.br().y).y);
                 let last = ego.apply_to(last);
                 let expected = Rect2f::from_points(last.tl() + first, last.br() + end);
                 glide(expected, all, dt_s / (dt_s + GLIDE_S))

@@ -19,7 +19,8 @@ use opencv::core::{Point as Pixel, Vector};
 use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
 
 use self::burned_in::BurnedIn;
-use self::model::{Comparison, Model, Sampled, TICKS, UNKNOWN};
+pub use self::model::UNKNOWN;
+use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
 use self::pooled::Pooled;
 use self::warp::Warp;

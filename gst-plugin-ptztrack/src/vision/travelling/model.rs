@@ -19,7 +19,7 @@ const UNSEEN: u8 = 0;
 pub(super) const KNOWN: u8 = 4;
 pub(super) const MAX_AGE: u8 = 250;
 /// Likelihood of a pixel of which nothing is known.
-pub(super) const UNKNOWN: u8 = 128;
+pub const UNKNOWN: u8 = 128;
 /// Pixels of each row that the noise is learned from: one in so many.
 const SAMPLING: usize = 7;
 /// Where the background's own range around a pixel is larger, its deviations say little of noise.

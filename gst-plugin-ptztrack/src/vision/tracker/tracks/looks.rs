@@ -6,13 +6,13 @@ use opencv::core::Rect2f;
 
 use crate::vision::tracker::colour::Histogram;
 use crate::vision::tracker::sample::Sampler;
+use crate::vision::travelling::UNKNOWN;
 use crate::vision::{Luma, Observation};
 
 /// Samples across and down a region.
 const GRID: (usize, usize) = (12, 24);
-/// Likelihood of foreground where the background is not known, and from which a sample counts as person.
-const UNKNOWN: u8 = 128;
-const PERSON: u8 = 129;
+/// Likelihood of foreground from which a sample counts as person.
+const PERSON: u8 = UNKNOWN + 1;
 /// Share of the samples of a half that must be person for its colours to be known.
 const LEAST_SHARE: f32 = 0.15;
 /// Time constant in which a view follows what is seen, seconds.
