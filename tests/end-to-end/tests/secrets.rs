@@ -3,7 +3,9 @@
 //! The password stays where it was put: not in a log at any level, not in a graph of the pipeline.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use end_to_end::{PATIENCE, Running, scene, tool};
+use std::fs;
+
+use end_to_end::{PATIENCE, Program, Running, scene, tool};
 use gst::prelude::*;
 use virtual_camera::VirtualCamera;
 
@@ -19,8 +21,8 @@ fn not_in_a_log_of_everything() {
         .env("GST_DEBUG_NO_COLOR", "1")
         .status()
         .unwrap();
-    let text = std::fs::read(&log).unwrap();
-    std::fs::remove_file(&log).unwrap();
+    let text = fs::read(&log).unwrap();
+    fs::remove_file(&log).unwrap();
     assert!(status.success());
     assert!(camera.status().requests > 0, "the camera must have been asked to prove anything");
     let text = String::from_utf8_lossy(&text);
@@ -36,4 +38,18 @@ fn not_in_a_graph_of_the_pipeline() {
     let graph = running.pipeline().debug_to_dot_data(gst::DebugGraphDetails::all());
     assert!(graph.contains(scene::USER), "the graph must show properties to prove anything");
     assert!(!graph.contains(scene::PASSWORD));
+}
+
+/// What is left of a process that has crashed may be read by others.
+#[test]
+fn not_in_a_core_dump_of_the_program() {
+    let camera = VirtualCamera::start(scene::nobody()).unwrap();
+    let program =
+        Program::start("core", |folder| Program::entry("door", &camera.url(), &folder.join("password")), &[]);
+    let limits = fs::read_to_string(format!("/proc/{}/limits", program.launch.id())).unwrap();
+    let core = limits.lines().find_map(|line| line.strip_prefix("Max core file size")).unwrap();
+    // Of 1 byte nothing is kept, and nothing is given to a program that keeps them (core(5)).
+    let limits: Vec<_> = core.split_whitespace().take(2).collect();
+    assert_eq!(limits, ["1", "1"]);
+    program.end("TERM");
 }

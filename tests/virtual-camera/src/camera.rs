@@ -529,7 +529,7 @@ impl VirtualCamera {
         self.camera.update(|state| state.device.queue.as_mut().map(|queue| queue.operator(there)));
     }
 
-    /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is not touched.
+    /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is touched by [`Fault::Locked`] only.
     pub fn set_fault(&self, fault: Fault) {
         self.camera.fault.send_replace(fault);
     }

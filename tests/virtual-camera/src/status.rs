@@ -87,6 +87,8 @@ pub enum Fault {
         /// An address.
         location: String,
     },
+    /// Every login is refused, the right one too: the account is locked, or the camera is starting.
+    Locked,
     /// 403 for everybody once there were this many wrong logins since the camera's start.
     LockOut(u64),
     /// 200 with a text that never ends; nothing is done.

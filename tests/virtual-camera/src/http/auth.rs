@@ -93,12 +93,17 @@ impl Guard {
         self.wrong_logins.load(Ordering::Relaxed)
     }
 
-    /// The 401 for a request that may not pass. `now` is the camera's time.
-    pub fn refuse(&self, request: &Request, now: Duration) -> Option<Response> {
+    /// The 401 for a request that may not pass.
+    pub fn refuse(&self, request: &Request, fault: &Fault) -> Option<Response> {
+        let now = time(fault);
         let authorization =
             request.headers().get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
         let target = request.uri().path_and_query().map_or("/", |target| target.as_str());
-        let refusal = self.check(authorization, request.method().as_str(), target, now).err()?;
+        let checked = match fault {
+            Fault::Locked => Err(Refusal::Unknown),
+            _ => self.check(authorization, request.method().as_str(), target, now),
+        };
+        let refusal = checked.err()?;
         if authorization.is_some() && refusal == Refusal::Unknown {
             self.wrong_logins.fetch_add(1, Ordering::Relaxed);
         }
@@ -209,8 +214,8 @@ pub(super) fn time(fault: &Fault) -> Duration {
 
 /// Middleware for what faults do not touch.
 pub(super) async fn require(State(site): State<Arc<Site>>, request: Request, next: Next) -> Response {
-    let now = time(&site.camera.fault.borrow());
-    if let Some(refusal) = site.guard.refuse(&request, now) {
+    let fault = site.camera.fault.borrow().clone();
+    if let Some(refusal) = site.guard.refuse(&request, &fault) {
         site.camera.note_refused();
         return refusal;
     }

@@ -79,7 +79,7 @@ async fn answer(
     let camera = &site.camera;
     let _counted = camera.request_begins();
     let fault = camera.fault.borrow().clone();
-    let refusal = site.guard.refuse(&request, auth::time(&fault));
+    let refusal = site.guard.refuse(&request, &fault);
     let cookie = cookie(&request);
     let query = match arguments(request).await {
         Ok(query) => query,
@@ -180,7 +180,7 @@ pub(super) fn trouble(fault: &Fault, wrong_logins: u64) -> Trouble {
     let status = |code: u16| StatusCode::from_u16(code).unwrap_or(StatusCode::INTERNAL_SERVER_ERROR);
     match fault {
         Fault::None | Fault::Delay(_) | Fault::CloseAfterResponse => Trouble::None,
-        Fault::LineFeeds | Fault::ClockAhead(_) => Trouble::None,
+        Fault::LineFeeds | Fault::ClockAhead(_) | Fault::Locked => Trouble::None,
         Fault::Refuse | Fault::Reboot | Fault::Reset => Trouble::Cut(Ending::Reset),
         Fault::Garbage(bytes) => Trouble::Cut(Ending::Garbage(bytes.clone())),
         Fault::Hang | Fault::BlackHole => Trouble::Silence,

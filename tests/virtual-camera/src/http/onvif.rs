@@ -13,12 +13,12 @@ use axum::{
 use roxmltree::Document;
 
 use super::{
-    Site, auth,
+    Site,
     cgi::{Trouble, trouble},
     connection::{Connection, Ending},
 };
 use crate::{
-    Auth, Clock,
+    Auth, Clock, Fault,
     onvif::{self, Message, OnvifSettings, Quirk, Refusal},
     seeded::Seeded,
 };
@@ -75,12 +75,12 @@ pub(super) async fn service(
             let strict = settings.has(Quirk::ClockAhead) || settings.has(Quirk::ClockBehind);
             let in_time = !strict || token.off_by_s(onvif::clock(settings)) <= TOKEN_WINDOW_S;
             let right = token.user == camera.settings.user && token.knows(&camera.settings.password);
-            if !right || !in_time {
+            if !right || !in_time || fault == Fault::Locked {
                 camera.note_refused();
                 return refuse(settings, "NotAuthorized", "the sender is not authorized", &connection);
             }
         } else if let Some(refusal) =
-            site.guard.refuse(&Request::from_parts(parts, Body::empty()), auth::time(&fault))
+            site.guard.refuse(&Request::from_parts(parts, Body::empty()), &fault)
         {
             camera.note_refused();
             return refusal;
