@@ -431,9 +431,9 @@ async fn one_that_runs_elsewhere_serves_whoever_connects() {
     fs::remove_file(socket).unwrap();
 }
 
-/// Many connect, and it has a descriptor left for none of them.
+/// Many connect, and it has a descriptor left for none of them, nor for the stop that a camera needs just then.
 #[tokio::test]
-async fn one_without_descriptors_goes_on_once_it_has_some() {
+async fn one_without_descriptors_stops_its_camera_once_it_has_some() {
     let socket =
         PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join(format!("watchdog-{}-few.sock", std::process::id()));
     let mut service = Process::new("sh")
@@ -442,15 +442,17 @@ async fn one_without_descriptors_goes_on_once_it_has_some() {
         .spawn()
         .unwrap();
     wait_until("it does not listen", || socket.metadata().is_ok_and(|found| found.file_type().is_socket()));
+    let mut application = Application::new("few");
+    application.watchdog = Watchdog::new(WatchdogAddress::Socket(socket.clone()));
+    application.lease = Lease::new(application.watchdog.clone());
+    application = application.moving().await;
     let many: Vec<_> = (0..32).map_while(|_| std::os::unix::net::UnixStream::connect(&socket).ok()).collect();
     assert!(many.len() > 16, "{}", many.len());
     let last = format!("/proc/{}/fd/15", service.id());
     wait_until("it has descriptors left", || fs::symlink_metadata(&last).is_ok());
+    let (camera, program) = application.die();
+    assert!(!camera.wait_for(Duration::from_secs(1), |status| !status.moving), "it had a descriptor left");
     drop(many);
-    let mut application = Application::new("few");
-    application.watchdog = Watchdog::new(WatchdogAddress::Socket(socket.clone()));
-    application.lease = Lease::new(application.watchdog.clone());
-    let (camera, program) = application.moving().await.die();
     rests(&camera);
     for file in [program, socket] {
         fs::remove_file(file).unwrap();

@@ -5,6 +5,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod chance;
+mod disk;
 pub mod following;
 mod front;
 mod launch;
@@ -15,6 +16,7 @@ pub mod scene;
 mod watchdog;
 
 pub use chance::Chance;
+pub use disk::Disk;
 pub use front::{Front, Way};
 pub use launch::{GstLaunch, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};

@@ -217,13 +217,17 @@ mod tests {
 
     /// Why the program is no watchdog.
     fn end_of(program: &str, line: &[u8]) -> String {
-        let connection = Connection::begin(&WatchdogAddress::Program(program.into()), line).unwrap();
+        end(program, &Connection::begin(&WatchdogAddress::Program(program.into()), line).unwrap())
+    }
+
+    /// Why there is no connection any more, to `whom`.
+    fn end(whom: &str, connection: &Connection) -> String {
         let begin = Instant::now();
         loop {
             if let Some(end) = Heard::end(&connection.heard()) {
                 return end.to_string();
             }
-            assert!(begin.elapsed() < LONG, "{program} never ends");
+            assert!(begin.elapsed() < LONG, "{whom} never ends");
             thread::yield_now();
         }
     }
@@ -236,6 +240,20 @@ mod tests {
         assert!(said.contains("exit status: 1"), "{said}");
         let said = end_of("/bin/true", b"");
         assert!(said.contains("it ended as soon as it was started"), "{said}");
+    }
+
+    /// As one that was not started anew when the plugin was upgraded.
+    #[test]
+    fn one_that_ends_the_connection_without_an_answer_is_to_be_started_anew() {
+        let socket = std::env::temp_dir().join(format!("ptztrack-old-watchdog-{}", std::process::id()));
+        let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        let connection =
+            Connection::begin(&WatchdogAddress::Socket(socket.clone()), b"words of a newer one\n").unwrap();
+        let (old, _) = listener.accept().unwrap();
+        BufReader::new(old).read_until(b'\n', &mut Vec::new()).unwrap();
+        let said = end("it", &connection);
+        std::fs::remove_file(socket).unwrap();
+        assert!(said.contains("another version") && said.contains("start it anew"), "{said}");
     }
 
     /// Were it told once it runs, it would know nothing where the application dies in the meantime.

@@ -79,9 +79,7 @@ pub(super) async fn service(
                 camera.note_refused();
                 return refuse(settings, "NotAuthorized", "the sender is not authorized", &connection);
             }
-        } else if let Some(refusal) =
-            site.guard.refuse(&Request::from_parts(parts, Body::empty()), &fault)
-        {
+        } else if let Some(refusal) = site.guard.refuse(&Request::from_parts(parts, Body::empty()), &fault) {
             camera.note_refused();
             return refusal;
         }

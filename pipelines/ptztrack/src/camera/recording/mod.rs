@@ -125,17 +125,7 @@ impl Recorder {
     fn write(&self, feed: &Feed) -> Result<(), String> {
         files::make_room(&self.settings, &self.camera);
         let said = |err: glib::Error| err.message().to_owned();
-        let parser = match self.codec {
-            Codec::Mjpeg => "jpegparse",
-            Codec::Mpeg4 => "mpeg4videoparse",
-            Codec::H264 => "h264parse",
-            Codec::H265 => "h265parse",
-        };
-        let description = format!(
-            "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
-             ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
-        );
-        let pipeline = gst::parse::launch(&description).map_err(said)?;
+        let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
         files::configure(&pipeline, &self.settings, &self.camera);
         let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
@@ -168,6 +158,19 @@ impl Recorder {
     fn tell(&self, level: Level, event: &str, detail: &str) {
         self.log.tell(&Event::new(level, Some(&self.camera), event, detail));
     }
+}
+
+fn description(codec: Codec) -> String {
+    let parser = match codec {
+        Codec::Mjpeg => "jpegparse",
+        Codec::Mpeg4 => "mpeg4videoparse",
+        Codec::H264 => "h264parse",
+        Codec::H265 => "h265parse",
+    };
+    format!(
+        "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
+         ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
+    )
 }
 
 impl Recordings {
@@ -223,5 +226,28 @@ struct Tap(Arc<Feed>);
 impl Drop for Tap {
     fn drop(&mut self) {
         self.0.end();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pictures of a mebibyte, more than wait for a disk; nothing runs that would write them.
+    #[test]
+    fn what_a_slow_disk_does_not_take_is_dropped_and_not_waited_for() {
+        gst::init().unwrap();
+        let pipeline = gst::parse::launch(&description(Codec::Mjpeg)).unwrap();
+        let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
+        let source = source.downcast::<gst_app::AppSrc>().unwrap();
+        let feed = Feed::default();
+        feed.start(source.clone());
+        let picture = gst::Buffer::from_slice(vec![0; 1 << 20]);
+        let sample = gst::Sample::builder().buffer(&picture).build();
+        for _ in 0..3 * (LONGEST_QUEUE >> 20) {
+            feed.copy(&sample);
+        }
+        let waiting = source.current_level_bytes();
+        assert!((LONGEST_QUEUE / 2..=LONGEST_QUEUE).contains(&waiting), "{waiting}");
     }
 }
