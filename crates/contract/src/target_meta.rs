@@ -27,6 +27,8 @@ pub struct TargetMeta {
     pub velocity: Vector,
     /// Motion of the background in the picture, same unit; `None` where it could not be seen.
     pub ego_velocity: Option<Vector>,
+    /// For how long the picture has shown the same, camera and people at rest alike; `None` where nobody looked.
+    pub unchanged_for: Option<gst::ClockTime>,
     /// 0 (a guess) to 1 (certain).
     pub confidence: f64,
     /// The feature points.
@@ -47,6 +49,7 @@ impl Default for TargetMeta {
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
+            unchanged_for: None,
             confidence: 0.0,
             features: Vec::new(),
             aspect: None,
@@ -66,6 +69,9 @@ impl BufferMeta for TargetMeta {
         structure.set("velocity", codec::vector(self.velocity));
         if let Some(ego) = self.ego_velocity {
             structure.set("ego-velocity", codec::vector(ego));
+        }
+        if let Some(time) = self.unchanged_for {
+            structure.set("unchanged-for", time);
         }
         structure.set("confidence", self.confidence);
         let features = self.features.iter().map(|feature| {
@@ -94,6 +100,7 @@ impl BufferMeta for TargetMeta {
             centroid: reader.point("centroid")?,
             velocity: reader.vector("velocity")?,
             ego_velocity: reader.vector_optional("ego-velocity")?,
+            unchanged_for: reader.get_optional("unchanged-for")?,
             confidence: reader.number("confidence")?,
             features: features.collect(),
             aspect: reader.number_optional("aspect")?,

@@ -82,13 +82,16 @@ prop_compose! {
         centroid in point(),
         velocity in vector(),
         ego_velocity in prop::option::of(vector()),
+        unchanged_for in prop::option::of(clock_time()),
         confidence in 0.0..1.0f64,
         features in prop::collection::vec((point(), any::<bool>()), 0..20),
         aspect in prop::option::of(0.1..10.0f64),
         capture_time in prop::option::of(clock_time()),
     ) -> TargetMeta {
         let features = features.into_iter().map(|(position, kept)| Feature { position, kept }).collect();
-        TargetMeta { state, id, bounds, centroid, velocity, ego_velocity, confidence, features, aspect, capture_time }
+        TargetMeta {
+            state, id, bounds, centroid, velocity, ego_velocity, unchanged_for, confidence, features, aspect, capture_time,
+        }
     }
 }
 

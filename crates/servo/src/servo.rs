@@ -12,8 +12,8 @@ use crate::control::{
     ZoomDrive,
 };
 use crate::estimation::{
-    AxisEstimator, AxisFinding, Estimates, Measurement, Mounting, SelfCalibration, TargetEstimator,
-    Visibility,
+    AxisEstimator, AxisFinding, Estimates, FrozenPictureDetector, Measurement, Mounting, SelfCalibration,
+    TargetEstimator, Visibility,
 };
 use crate::model::{
     CameraModel, Capabilities, CommandHistory, Delays, Lens, PanTilt, SpeedMap, View, magnified,
@@ -30,6 +30,7 @@ pub struct Servo {
     axes: AxisEstimator,
     /// What was found out about the axes, and nobody was told yet.
     axis_finding: Option<AxisFinding>,
+    frozen_picture: FrozenPictureDetector,
     estimator: TargetEstimator,
     controller: Controller,
     limits: LimitEnforcer,
@@ -65,6 +66,7 @@ impl Servo {
             calibration: SelfCalibration::new(settings.latency),
             axes: AxisEstimator::default(),
             axis_finding: None,
+            frozen_picture: FrozenPictureDetector::default(),
             estimator: TargetEstimator::new(settings.prediction),
             controller: Controller::default(),
             limits: LimitEnforcer::default(),
@@ -106,6 +108,11 @@ impl Servo {
     /// oscillates.
     pub fn measure(&mut self, measurement: Measurement, actuator: &ActuatorStatus, now: Time) -> Option<f64> {
         let measurement = self.mounting().along_axes(measurement);
+        if self.heed_frozen_picture(&measurement) {
+            self.lose();
+            self.home.not_alone();
+            return None;
+        }
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => measurement.taken_at.min(now),
             (Visibility::Predicted, Some(target)) => target.last_seen,
@@ -128,6 +135,21 @@ impl Servo {
         let undecided_since = self.target.as_ref().and_then(|target| target.undecided_since);
         self.target = Some(Target { measurement, last_seen, considered: false, undecided_since });
         oscillates.then(|| self.controller.oscillation.gain_scale())
+    }
+
+    /// Whether nobody can steer by this picture, as it stays the same though the camera was told to turn.
+    fn heed_frozen_picture(&mut self, measurement: &Measurement) -> bool {
+        // A camera that is not known yet may only have to be told to turn faster.
+        if !(self.settings.learn_axes && self.axes.seeks_speed()) {
+            let (fov_deg, delays) = (self.fov_deg(None), self.delays());
+            self.frozen_picture.see(measurement, fov_deg, &self.camera.history, &delays);
+        }
+        self.frozen_picture.is_frozen()
+    }
+
+    /// Whether the picture stayed the same though the camera was told to turn.
+    pub fn is_picture_frozen(&self) -> bool {
+        self.frozen_picture.is_frozen()
     }
 
     /// How the picture lies to the camera's axes, as far as is known by now.

@@ -35,6 +35,10 @@ pub enum LoopEvent {
     NoSuchPreset(String),
     /// An axis turns the picture otherwise than was set: it is steered accordingly from now on.
     Axes(AxisFinding),
+    /// The picture stays the same though the camera was told to turn: it is stopped, and nobody is followed.
+    PictureFrozen,
+    /// The picture changes again.
+    PictureLive,
     /// The camera swung to and fro about the target: from now on only this part of the gain is used.
     Oscillating(f64),
 }
@@ -90,7 +94,13 @@ impl ControlLoop {
         self.session.see_background(shown, measurement.taken_at, now);
         let actuator = self.session.actuator(now);
         let overtakes = self.servo.is_behind();
+        let was_frozen = self.servo.is_picture_frozen();
         let gain_scale = self.servo.measure(measurement, &actuator, now);
+        match (was_frozen, self.servo.is_picture_frozen()) {
+            (false, true) => self.events.push(LoopEvent::PictureFrozen),
+            (true, false) => self.events.push(LoopEvent::PictureLive),
+            _ => {}
+        }
         self.overtaken += u64::from(overtakes && self.servo.holds_target());
         self.events.extend(gain_scale.map(LoopEvent::Oscillating));
         if let Some(finding) = self.servo.take_axis_finding() {

@@ -61,6 +61,7 @@ pub trait Measuring: PtzSink {
                 bounds: target.bounds,
                 velocity: target.velocity,
                 ego_velocity: target.ego_velocity,
+                unchanged_for: target.unchanged_for.map(Duration::from),
                 size: picture.size,
                 aspect: picture.aspect,
                 taken_at: mailbox.now() - age,

@@ -61,6 +61,16 @@ pub trait Telling: PtzSink {
                 gst::ResourceError::Settings,
                 ("an axis of the camera turns the picture the other way than is set: it is steered accordingly from here on. `invert-pan` or `invert-tilt` would have it known from the start")
             ),
+            Event::Loop(LoopEvent::PictureFrozen) => gst::element_imp_warning!(
+                self,
+                gst::StreamError::Failed,
+                ("the picture stays the same although the camera was told to turn: its video is frozen, or it does not turn. It is stopped, and steered again as soon as the picture changes. Check the video and whether the camera can turn that way")
+            ),
+            Event::Loop(LoopEvent::PictureLive) => gst::element_imp_info!(
+                self,
+                gst::StreamError::Failed,
+                ("the picture changes again: the camera is steered by it")
+            ),
             Event::Loop(LoopEvent::Session(SessionEvent::StopInVain)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,

@@ -85,6 +85,7 @@ pub(super) fn attach(
         centroid: tracked.centroid,
         velocity: tracked.velocity,
         ego_velocity: tracked.ego_velocity,
+        unchanged_for: tracked.unchanged_for.and_then(|time| time.try_into().ok()),
         confidence: tracked.confidence,
         features: tracked.features,
         aspect: aspect((info.width(), info.height()), info.par().into()),

@@ -57,6 +57,7 @@ mod reduce;
 mod scene;
 mod scene_model;
 mod segmentation;
+mod stillness;
 mod surface;
 #[cfg(test)]
 mod synthetic;

@@ -103,7 +103,11 @@ impl Running {
 
     /// The same, of what is amiss with others: where a busy machine is late, the loop itself may swing and say so.
     pub fn complaints(&mut self) -> Vec<String> {
-        self.warnings().iter().filter(|warning| !warning.contains("swings to and fro")).cloned().collect()
+        self.warnings()
+            .iter()
+            .filter(|warning| !warning.contains("oscillates about the target"))
+            .cloned()
+            .collect()
     }
 }
 

@@ -60,6 +60,19 @@ pub fn mjpeg(camera: &VirtualCamera) -> String {
     )
 }
 
+/// The same by RTSP, in MPEG-4 or H.264.
+pub fn rtsp(camera: &VirtualCamera, codec: &str) -> String {
+    let decoder = match codec {
+        "mpeg4" => "rtpmp4vdepay ! avdec_mpeg4",
+        _ => "rtph264depay ! avdec_h264",
+    };
+    format!(
+        "rtspsrc location={}/axis-media/media.amp?videocodec={codec} user-id={USER} user-pw={PASSWORD} latency=0 \
+         ! {decoder} ! queue leaky=downstream max-size-buffers=1",
+        camera.rtsp_url()
+    )
+}
+
 /// The sink part.
 pub fn servo(camera: &VirtualCamera) -> String {
     format!("vapixptzsink name=servo location={} user={USER} password={PASSWORD}", camera.url())

@@ -56,6 +56,7 @@ pub(crate) struct Camera {
     pub world: Box<dyn World>,
     time: Time,
     stopping: AtomicBool,
+    frozen: AtomicBool,
     state: Mutex<State>,
     changed: Condvar,
     noise_filter: Mutex<NoiseFilter>,
@@ -109,6 +110,7 @@ impl Camera {
             settings,
             world,
             stopping: AtomicBool::new(false),
+            frozen: AtomicBool::new(false),
             state: Mutex::new(state),
             changed: Condvar::new(),
             noise_filter: Mutex::default(),
@@ -409,6 +411,21 @@ impl Camera {
         Exposure::at(time, self.pose_at(time))
     }
 
+    /// What is sent of the picture whose exposure began at `time`: of a frozen video what was sent `last`.
+    pub fn sent_picture(
+        &self,
+        time: Duration,
+        size: (u32, u32),
+        last: &mut Option<Picture>,
+    ) -> Result<Picture, FootageError> {
+        if let Some(last) = last.as_ref().filter(|_| self.frozen.load(Ordering::Relaxed)) {
+            return Ok(last.clone());
+        }
+        let picture = self.picture(time, size)?;
+        *last = Some(picture.clone());
+        Ok(picture)
+    }
+
     /// When the picture leaves the sensor that leaves the camera now.
     pub fn newest_exposure(&self) -> Duration {
         self.now().saturating_sub(self.settings.video.delay)
@@ -532,6 +549,11 @@ impl VirtualCamera {
     /// How `ptz.cgi` and `param.cgi` misbehave from now on. Video is touched by [`Fault::Locked`] only.
     pub fn set_fault(&self, fault: Fault) {
         self.camera.fault.send_replace(fault);
+    }
+
+    /// From now on, whoever watches gets the same picture again and again, each with its own timestamp; or no longer.
+    pub fn freeze_video(&self, frozen: bool) {
+        self.camera.frozen.store(frozen, Ordering::Relaxed);
     }
 
     /// Forgets all RTSP sessions, as if its video server had been restarted; connections stay.

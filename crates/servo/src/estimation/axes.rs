@@ -151,6 +151,12 @@ impl AxisEstimator {
         }
     }
 
+    /// Whether a camera that rests may be told to turn faster yet.
+    pub fn seeks_speed(&self) -> bool {
+        let is_known = self.exchange.is_known() || self.pan.is_known() || self.tilt.is_known();
+        !is_known && self.raised < Self::MOST_RAISED
+    }
+
     /// How fast an axis may be until it is known, degrees per second.
     fn cautious_deg_s(&self) -> f64 {
         Self::CAUTIOUS_DEG_S * f64::from(1 << self.raised)

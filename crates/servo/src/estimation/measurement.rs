@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::time::Duration;
+
 use crate::Time;
 
 use ptztrack_contract::{Point, Rect, TargetState, Vector};
@@ -41,6 +43,8 @@ pub struct Measurement {
     pub velocity: Vector,
     /// The background's motion in the picture, same unit, where it was seen.
     pub ego_velocity: Option<Vector>,
+    /// For how long the picture has shown the same, where that was seen.
+    pub unchanged_for: Option<Duration>,
     /// Size of the picture in pixels.
     pub size: (u32, u32),
     /// Width by height of the picture as displayed.
@@ -59,6 +63,7 @@ impl Measurement {
             bounds: Rect { x: x - 0.05, y: y - 0.1, width: 0.1, height: 0.2 },
             velocity: Vector::default(),
             ego_velocity: None,
+            unchanged_for: None,
             size: (640, 480),
             aspect: 4.0 / 3.0,
             taken_at,

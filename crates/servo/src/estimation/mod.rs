@@ -18,6 +18,7 @@
 mod axes;
 mod calibration;
 mod field_of_view;
+mod frozen_picture;
 mod latency;
 mod measurement;
 mod mounting;
@@ -31,6 +32,7 @@ pub use axes::{AxisEstimator, AxisFinding};
 use calibration::ObservedRotation;
 pub use calibration::{Estimates, SelfCalibration};
 use field_of_view::FieldOfViewEstimator;
+pub use frozen_picture::FrozenPictureDetector;
 use latency::LatencyEstimator;
 pub use measurement::{Measurement, Visibility};
 pub use mounting::Mounting;

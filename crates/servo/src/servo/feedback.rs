@@ -22,7 +22,10 @@ impl Servo {
             _ => self.camera.history.push(sent, PanTilt::default()),
         }
         match actuation {
-            Actuation::Move(motion) if motion.is_point_to_point() => self.moves.begin(sent),
+            Actuation::Move(motion) if motion.is_point_to_point() => {
+                self.moves.begin(sent);
+                self.frozen_picture.sent_off(sent);
+            }
             // A move under way, from before the mode was changed, is over.
             _ => self.moves.rest(now),
         }

@@ -265,6 +265,7 @@ impl Simulation {
             bounds: shot.bounds,
             velocity: shot.velocity,
             ego_velocity: Some(shot.ego).filter(|_| self.setup.sees_ground),
+            unchanged_for: None,
             size: (640, 480),
             aspect: ASPECT,
             taken_at: self.now,

@@ -180,6 +180,33 @@ fn a_stale_target_stops_it() {
 }
 
 #[test]
+fn a_camera_is_stopped_and_nobody_is_followed_while_the_picture_is_frozen() {
+    let mut rig = Rig::new(ServoSettings::default());
+    let begin = rig.now;
+    let see = |rig: &mut Rig, unchanged_for: Duration| {
+        let measurement = Measurement::at(0.9, 0.5, rig.now);
+        rig.control.measure(Measurement { unchanged_for: Some(unchanged_for), ..measurement }, rig.now);
+        let sent = rig.after(ms(40));
+        (sent.last().copied(), rig.reports())
+    };
+    let frozen = loop {
+        let lasted = rig.now - begin;
+        assert!(lasted < ms(2000), "it turns on by a frozen picture");
+        let (sent, events) = see(&mut rig, lasted);
+        if events.contains(&LoopEvent::PictureFrozen) {
+            break sent;
+        }
+    };
+    assert_eq!(frozen, Some(HALT));
+    for _ in 0..100 {
+        let lasted = rig.now - begin;
+        assert_eq!(see(&mut rig, lasted), (None, vec![]), "it is told once");
+    }
+    let (sent, events) = see(&mut rig, Duration::ZERO);
+    assert!(matches!(sent, Some(Command::Move { .. })) && events.contains(&LoopEvent::PictureLive));
+}
+
+#[test]
 fn a_predicted_target_is_followed_no_longer_than_a_stale_one() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.see(0.9, 0.5);

@@ -2,6 +2,8 @@
 
 //! What goes into a tracker and what comes out of it, in frame sizes.
 
+use std::time::Duration;
+
 use opencv::core::Point2f;
 use ptztrack_contract::{
     Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
@@ -42,6 +44,8 @@ pub struct Tracked {
     pub velocity: Vector,
     /// Motion of the background at its place, where that could be seen.
     pub ego_velocity: Option<Vector>,
+    /// For how long the picture has shown the same, where that was seen.
+    pub unchanged_for: Option<Duration>,
     /// 0 to 1.
     pub confidence: f64,
     /// The feature points, kept and rejected.
@@ -105,6 +109,7 @@ pub(super) fn tracked_of(
         centroid: frame.point(estimate.centroid),
         velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
         ego_velocity: ego.map(|ego| frame.vector(ego)),
+        unchanged_for: None,
         confidence: f64::from(estimate.confidence),
         features,
         tracks: Vec::new(),
@@ -124,6 +129,7 @@ impl Default for Tracked {
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
+            unchanged_for: None,
             confidence: 0.0,
             features: Vec::new(),
             tracks: Vec::new(),

@@ -15,6 +15,7 @@ use super::report::{Detection, Tracked, reported, tracked_of};
 use super::target::{Follow, Sight};
 use super::tracks::{Region, Rules, Tracks};
 use crate::vision::Observation;
+use crate::vision::stillness::Stillness;
 
 /// Shortest time between two frames, seconds: timestamps may repeat, velocities must stay finite.
 const MIN_DT_S: f64 = 1e-3;
@@ -59,6 +60,7 @@ pub struct Tracker {
     tracks: Tracks,
     policy: Policy,
     group: Group,
+    stillness: Stillness,
     request: Option<TargetRequest>,
     camera_rests: bool,
     /// Number of who was lost last.
@@ -81,6 +83,7 @@ impl Tracker {
             tracks: Tracks::default(),
             policy: Policy::default(),
             group: Group::default(),
+            stillness: Stillness::default(),
             request: None,
             camera_rests: true,
             lost: None,
@@ -137,6 +140,7 @@ impl Tracker {
             self.tracks.restart();
             self.policy.restart();
             self.group.disband();
+            self.stillness = Stillness::default();
             self.lost = None;
         }
         self.watch(seen, detections, frame, if same_stream { dt_s } else { MIN_DT_S });
@@ -175,7 +179,9 @@ impl Tracker {
         tracked.tracks.extend(told.map(|track| reported(track, target, frame)));
         tracked.track_changes.extend(self.tracks.events().iter().copied());
         self.phase = phase;
-        Ok(Tracked { changes, ..tracked })
+        let scene = seen.scene.as_ref();
+        let unchanged_for = scene.map(|scene| self.stillness.see(&scene.luma, dt_s));
+        Ok(Tracked { changes, unchanged_for, ..tracked })
     }
 
     /// How the background moved, by what is seen of it or by what is known of the camera.

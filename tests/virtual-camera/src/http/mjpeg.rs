@@ -59,7 +59,7 @@ fn stream(camera: &Arc<Camera>, wish: Wish, end: &End, encoder: &JpegEncoder, cl
     let _viewer = camera.viewer_begins();
     let mut pace = Pace::new(wish.frame_rate, camera.newest_exposure());
     let first = pace.next_exposure();
-    let mut sent = 0;
+    let (mut sent, mut last) = (0, None);
     loop {
         let exposure = pace.next_exposure();
         let over = end.after.is_some_and(|after| exposure.saturating_sub(first) > after)
@@ -67,8 +67,10 @@ fn stream(camera: &Arc<Camera>, wish: Wish, end: &End, encoder: &JpegEncoder, cl
         if over || client.is_closed() || !camera.wait_until(camera.arrival(exposure)) {
             return;
         }
-        let picture =
-            camera.picture(exposure, wish.size).ok().and_then(|picture| encoder.encode(&picture).ok());
+        let picture = camera
+            .sent_picture(exposure, wish.size, &mut last)
+            .ok()
+            .and_then(|picture| encoder.encode(&picture).ok());
         let Some(jpeg) = picture else {
             return;
         };

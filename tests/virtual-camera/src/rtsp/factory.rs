@@ -116,13 +116,16 @@ fn feed(camera: &Arc<Camera>, source: &glib::WeakRef<gst_app::AppSrc>, wish: Wis
     };
     let mut pace = Pace::new(wish.frame_rate, camera.newest_exposure());
     // Pictures are due when they are taken; the first one is due when it comes.
-    let mut origin = None;
+    let (mut origin, mut last) = (None, None);
     loop {
         let exposure = pace.next_exposure();
         if !camera.wait_until(camera.arrival(exposure)) {
             return;
         }
-        let buffer = camera.picture(exposure, wish.size).ok().and_then(|picture| picture.to_buffer(&info));
+        let buffer = camera
+            .sent_picture(exposure, wish.size, &mut last)
+            .ok()
+            .and_then(|picture| picture.to_buffer(&info));
         let (Some(mut buffer), Some(source)) = (buffer, source.upgrade()) else {
             return;
         };
