@@ -1,21 +1,20 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What is fuzzed: each parser of something a camera says. `cargo +nightly fuzz run TARGET` feeds one of
-//! them; a test of the crate vapix runs all of them over the seeds in `corpus`.
-#![allow(missing_docs)]
+//! What is fuzzed: each parser of something that others say. `scripts/fuzz` feeds them; a test of the whole runs all of them over the
+//! seeds in `corpus`.
+#![allow(missing_docs, clippy::expect_used)]
 
-use onvif::{Abilities, Answer, parse_abilities};
-use servo::TableRow;
-use session::http::{CompleteResponse, Credentials, Secret, answer_to_challenge, answer_to_cookie};
-use vapix::{
-    parse_attributes, parse_limits, parse_move_speed, parse_parameters, parse_position, parse_presets,
-    parse_queue_place,
-};
+mod camera;
+mod others;
+mod structure;
+
+pub use camera::*;
+pub use others::*;
 
 /// A target: takes anything, says whether it was understood, and never panics.
 pub type Target = fn(&[u8]) -> bool;
 
-pub const TARGETS: [(&str, Target); 10] = [
+pub const TARGETS: [(&str, Target); 20] = [
     ("challenge", challenge),
     ("position", position),
     ("limits", limits),
@@ -26,88 +25,19 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("presets", presets),
     ("cookies", cookies),
     ("onvif", onvif),
+    ("location", location),
+    ("rtsp", rtsp),
+    ("picture", picture),
+    ("configuration", configuration),
+    ("page", page),
+    ("log_in", log_in),
+    ("broker", broker),
+    ("word", word),
+    ("watchdog", watchdog),
+    ("structure", structure),
 ];
 
-/// As the client reads a body.
+/// As who hears it reads it.
 fn text(bytes: &[u8]) -> std::borrow::Cow<'_, str> {
     String::from_utf8_lossy(bytes)
-}
-
-pub fn challenge(bytes: &[u8]) -> bool {
-    let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
-    answer_to_challenge(text(bytes).trim_end(), credentials, "/axis-cgi/com/ptz.cgi?query=position").is_ok()
-}
-
-pub fn position(bytes: &[u8]) -> bool {
-    let Ok(position) = parse_position(&text(bytes)) else { return false };
-    let told = [position.pan_deg, position.tilt_deg, position.zoom];
-    assert!(told.into_iter().flatten().all(f64::is_finite), "{position:?}");
-    true
-}
-
-pub fn limits(bytes: &[u8]) -> bool {
-    let Ok(limits) = parse_limits(&text(bytes)) else { return false };
-    let told = [limits.pan_deg, limits.tilt_deg, limits.zoom, limits.field_angle_deg];
-    assert!(told.into_iter().flatten().all(|range| range.min < range.max), "{limits:?}");
-    true
-}
-
-pub fn attributes(bytes: &[u8]) -> bool {
-    let Ok(attributes) = parse_attributes(&text(bytes)) else { return false };
-    for table in [&attributes.speeds, &attributes.zooms] {
-        let grows = |pair: &[_]| matches!(pair, [a, b] if grow(a, b));
-        assert!(table.windows(2).all(grows), "{table:?}");
-    }
-    true
-}
-
-fn grow(a: &TableRow, b: &TableRow) -> bool {
-    a.setting < b.setting && a.value <= b.value
-}
-
-pub fn move_speed(bytes: &[u8]) -> bool {
-    parse_move_speed(&text(bytes)).inspect(|speed| assert!(*speed > 0.0 && *speed <= 1.0)).is_ok()
-}
-
-pub fn parameters(bytes: &[u8]) -> bool {
-    parse_parameters(&text(bytes), "1").is_ok()
-}
-
-pub fn queue(bytes: &[u8]) -> bool {
-    let Ok(place) = parse_queue_place(&text(bytes)) else { return false };
-    assert!((5..=3600).contains(&place.poll_every.as_secs()), "{place:?}");
-    true
-}
-
-pub fn presets(bytes: &[u8]) -> bool {
-    let Ok(presets) = parse_presets(&text(bytes)) else { return false };
-    assert!(presets.0.iter().all(|(_, name)| presets.number(name).is_some()), "{presets:?}");
-    true
-}
-
-/// One that comes back to us in a header must stay one.
-pub fn cookies(bytes: &[u8]) -> bool {
-    let Some(cookie) = answer_to_cookie(text(bytes).trim_end()) else { return false };
-    assert!(cookie.find('=').is_some_and(|end| end > 0) && !cookie.contains(';'), "{cookie}");
-    true
-}
-
-/// Any answer of ONVIF's may come in place of any other.
-pub fn onvif(bytes: &[u8]) -> bool {
-    let answer = CompleteResponse { status: 200, body: text(bytes).into_owned() };
-    let Ok(Answer::Body(body)) = onvif::read_answer(&answer) else { return false };
-    let abilities = parse_abilities(&body);
-    let told = onvif::parse_position(&body, &abilities);
-    let position = told.unwrap_or_default();
-    let places = [position.pan_deg, position.tilt_deg, position.zoom];
-    assert!(places.into_iter().flatten().all(f64::is_finite), "{position:?}");
-    abilities != Abilities::default()
-        || told.is_some()
-        || onvif::parse_date(&body).is_some()
-        || onvif::parse_services(&body).is_some()
-        || !onvif::parse_profiles(&body).is_empty()
-        || !onvif::parse_streams(&body).is_empty()
-        || onvif::parse_stream_address(&body).is_some()
-        || onvif::parse_presets(&body).is_some()
-        || !onvif::parse_announcements(&text(bytes)).is_empty()
 }

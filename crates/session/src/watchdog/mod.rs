@@ -24,7 +24,7 @@ mod serve;
 pub use lease::{Lease, Standing};
 pub use link::{Unavailable, Watchdog, WatchdogAddress};
 pub use program::run;
-pub use protocol::StopOrder;
+pub use protocol::{Answer, Message, StopOrder};
 pub use serve::{Armed, serve};
 
 use std::time::Duration;

@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use tokio::sync::watch;
 
 use super::running::Running;
+use super::servo_stats::ServoStats;
 use super::stopwatch::Stopwatch;
 
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
@@ -197,14 +198,14 @@ impl Known {
     }
 
     /// What the sink says of itself, where one runs.
-    pub fn servo(&self) -> Option<gst::Structure> {
+    pub fn servo(&self) -> Option<ServoStats> {
         let running = lock(&self.running).clone();
         running?.servo_stats()
     }
 
     /// Whether the camera rests.
     pub fn is_at_rest(&self) -> bool {
-        self.servo().and_then(|servo| servo.get::<String>("state").ok()).as_deref() == Some("at-rest")
+        self.servo().and_then(|servo| servo.state).as_deref() == Some("at-rest")
     }
 
     /// Its state in words.
@@ -221,7 +222,7 @@ impl Known {
             ("occluded", Some(id)) => format!("target {id} is hidden"),
             _ => "looks for somebody".to_owned(),
         };
-        let camera = self.servo().and_then(|servo| servo.get::<String>("state").ok());
+        let camera = self.servo().and_then(|servo| servo.state);
         let camera = match (*lock(&self.steering), camera.as_deref()) {
             (Steering::HandedOver, _) => "the camera is handed over",
             (Steering::GoHome(_), _) => "the camera goes home",

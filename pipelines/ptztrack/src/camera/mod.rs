@@ -10,6 +10,7 @@ pub mod process;
 mod recording;
 mod refusals;
 mod running;
+mod servo_stats;
 mod stopwatch;
 mod video;
 
@@ -21,6 +22,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
+pub use bounds::picture_size;
 pub use known::{Control, Known, Steering};
 use messages::Listener;
 use pipeline::NotBuilt;

@@ -17,6 +17,7 @@ use super::bounds;
 use super::known::{Known, Steering};
 use super::recording::{self, Recorder};
 use super::running::Running;
+use super::servo_stats::ServoStats;
 use super::video;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol};
 
@@ -340,8 +341,8 @@ impl Running for Elements {
         servo.set_property_from_str("steering", to);
     }
 
-    fn servo_stats(&self) -> Option<gst::Structure> {
-        self.servo.as_ref().map(|servo| servo.property("stats"))
+    fn servo_stats(&self) -> Option<ServoStats> {
+        self.servo.as_ref().map(|servo| servo.property::<gst::Structure>("stats").as_ref().into())
     }
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Debug;
 
 use super::Steering;
+use super::servo_stats::ServoStats;
 
 /// What runs a camera, a pipeline of this process or another process: what can be told to it, and asked.
 pub trait Running: Debug + Send + Sync {
@@ -20,6 +21,6 @@ pub trait Running: Debug + Send + Sync {
     /// Whether there is a home to go to, and whether the camera can be handed over.
     fn abilities(&self) -> (bool, bool);
 
-    /// What `vapixptzsink` says of itself.
-    fn servo_stats(&self) -> Option<gst::Structure>;
+    /// What the sink says of itself.
+    fn servo_stats(&self) -> Option<ServoStats>;
 }

@@ -130,7 +130,7 @@ impl Http {
     }
 
     /// Where it listens by default.
-    const LISTEN: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 9100);
+    pub const LISTEN: SocketAddr = SocketAddr::new(std::net::IpAddr::V4(std::net::Ipv4Addr::LOCALHOST), 9100);
 
     /// Nobody elsewhere sees and steers without a password.
     pub fn check(&self) -> Result<(), String> {

@@ -87,7 +87,7 @@ impl Collector for Cameras {
         gauge(e, "picture_up", "Whether pictures come", None, picture)?;
         let target = self.states(&TARGET_STATES, |known| Some(lock(&known.state).target.clone()));
         gauge(e, "target_state", "State of the target: 1 for the one it is in", None, target)?;
-        let camera = self.states(&CAMERA_STATES, |known| known.servo()?.get("state").ok());
+        let camera = self.states(&CAMERA_STATES, |known| known.servo()?.state);
         gauge(e, "camera_state", "State of the camera: 1 for the one it is in", None, camera)?;
         counter(e, "commands", "Commands that the camera took", None, self.servo("commands-sent", 1.0))?;
         counter(
@@ -147,7 +147,7 @@ impl Cameras {
 
     /// A number in what the sink says of itself.
     fn servo(&self, field: &str, unit: f64) -> Values {
-        self.each(|known| Some(known.servo()?.get::<u64>(field).ok()? as f64 * unit))
+        self.each(|known| Some(*known.servo()?.numbers.get(field)? as f64 * unit))
     }
 }
 

@@ -6,12 +6,16 @@ mod access;
 mod metrics;
 
 use std::convert::Infallible;
+use std::future::poll_fn;
 use std::net::IpAddr;
+use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::task::Poll;
 use std::time::Duration;
 
 use access::Access;
+pub use access::lets_in;
 use axum::body::{Body, Bytes};
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
@@ -25,6 +29,7 @@ use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
 use serde_json::json;
 use socket2::SockRef;
+use tokio::io::{AsyncRead, AsyncReadExt, AsyncWrite, AsyncWriteExt};
 use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
@@ -32,6 +37,7 @@ use tokio::task::JoinHandle;
 use crate::camera::{Known, Look, Steering};
 use crate::config::Http;
 use crate::fleet::Fleet;
+use crate::log::Log;
 use ptztrack_contract::lock::lock;
 
 /// Who asks for a picture waits for it this long.
@@ -94,17 +100,52 @@ pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>) {
         let visit = Visit { local, welcome: Arc::default() };
         // Who takes nothing of what was sent is gone; where that cannot be asked for, the system has its own limit.
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(LONGEST_STALL));
-        let service = router.clone().layer(Extension(visit.clone()));
-        let connection = http1::Builder::new()
-            .timer(TokioTimer::new())
-            .header_read_timeout(LONGEST_HEAD)
-            .serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        let connection = answer(stream, router.clone(), visit.clone());
         let connection = tokio::spawn(async move {
-            // How it ended is a matter of who connected.
-            let _ = connection.await;
+            connection.await;
             drop(place);
         });
         visits.push((visit, connection));
+    }
+}
+
+/// Whoever is connected, until they go.
+async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin, router: Router, visit: Visit) {
+    let service = router.layer(Extension(visit));
+    let connection = http1::Builder::new()
+        .timer(TokioTimer::new())
+        .header_read_timeout(LONGEST_HEAD)
+        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+    // How it ended is a matter of who connected.
+    let _ = connection.await;
+}
+
+/// Page and metrics without cameras have less.
+const LONGEST_ANSWER: usize = 1024 * 1024;
+
+/// All that is answered to somebody who says this and no more, on a page without cameras or password.
+pub fn answer_to(said: &[u8]) -> Vec<u8> {
+    let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
+    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))));
+    let visit = Visit { local: http.listen.ip(), welcome: Arc::default() };
+    let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
+    let talk = async {
+        let mut connection = pin!(answer(theirs, router, visit));
+        // Nothing in memory fails to be written or read.
+        let _ = ours.write_all(said).await;
+        // All is answered that can be, before it is heard that there is no more.
+        let ended = poll_fn(|context| Poll::Ready(connection.as_mut().poll(context).is_ready())).await;
+        let _ = ours.shutdown().await;
+        if !ended {
+            connection.await;
+        }
+        let mut answered = Vec::new();
+        let _ = ours.read_to_end(&mut answered).await;
+        answered
+    };
+    match tokio::runtime::Builder::new_current_thread().enable_time().build() {
+        Ok(runtime) => runtime.block_on(talk),
+        Err(_) => Vec::new(),
     }
 }
 
@@ -214,4 +255,21 @@ async fn order(
         _ => return StatusCode::NOT_FOUND.into_response(),
     }
     StatusCode::NO_CONTENT.into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answer(request: &str) -> String {
+        let said = format!("{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+        String::from_utf8(answer_to(said.as_bytes())).unwrap()
+    }
+
+    #[test]
+    fn the_page_is_in_no_frame_of_somebody_else() {
+        let answer = answer("GET /");
+        assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
+        assert!(answer.contains("\r\ncontent-security-policy: frame-ancestors 'none'\r\n"), "{answer}");
+    }
 }

@@ -11,7 +11,7 @@
 
 mod http;
 mod rtsp;
-mod rtsp_message;
+pub mod rtsp_message;
 
 use std::future::Future;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};

@@ -16,6 +16,7 @@ const MAX_BODY_BYTES: usize = 1024 * 1024;
 pub enum Item {
     /// A packet of a stream, with its four bytes of head (section 10.12).
     Packet(Vec<u8>),
+    /// A request or a response.
     Message(Message),
 }
 
@@ -24,7 +25,9 @@ pub enum Item {
 pub struct Message {
     /// The first line.
     pub start: String,
+    /// In their order, names as they came.
     pub headers: Vec<(String, String)>,
+    /// What follows the headers.
     pub body: Vec<u8>,
 }
 
@@ -34,6 +37,10 @@ impl Item {
     /// # Errors
     /// Those of the connection, and what is no RTSP.
     pub async fn read(wire: &mut (impl AsyncBufRead + Unpin)) -> io::Result<Option<Self>> {
+        // Empty lines before anything are nothing (RFC 2326, section 4.1).
+        while let Some(b'\r' | b'\n') = wire.fill_buf().await?.first() {
+            wire.consume(1);
+        }
         match wire.fill_buf().await?.first() {
             None => Ok(None),
             Some(b'$') => {
@@ -44,7 +51,7 @@ impl Item {
                 wire.read_exact(&mut packet[4..]).await?;
                 Ok(Some(Self::Packet(packet)))
             }
-            Some(_) => Message::read(wire).await.map(|message| message.map(Self::Message)),
+            Some(_) => Ok(Some(Self::Message(Message::read(wire).await?))),
         }
     }
 
@@ -58,7 +65,8 @@ impl Item {
 }
 
 impl Message {
-    async fn read(wire: &mut (impl AsyncBufRead + Unpin)) -> io::Result<Option<Self>> {
+    /// Where something is that is neither an end nor an empty line.
+    async fn read(wire: &mut (impl AsyncBufRead + Unpin)) -> io::Result<Self> {
         let (mut start, mut headers, mut read) = (String::new(), Vec::new(), 0);
         loop {
             let mut line = Vec::new();
@@ -66,12 +74,7 @@ impl Message {
             let bytes = (&mut *wire).take(left).read_until(b'\n', &mut line).await?;
             read += bytes;
             if bytes == 0 || !line.ends_with(b"\n") {
-                // Nothing but empty lines before the end is an end.
-                return if start.is_empty() && bytes == 0 {
-                    Ok(None)
-                } else {
-                    Err(no_rtsp("a head without an end"))
-                };
+                return Err(no_rtsp("a head without an end"));
             }
             let line = String::from_utf8(line).map_err(|_| no_rtsp("a head that is no text"))?;
             let line = line.trim_end_matches(['\r', '\n']);
@@ -89,7 +92,7 @@ impl Message {
         let length = length.ok().filter(|length| *length <= MAX_BODY_BYTES);
         message.body.resize(length.ok_or_else(|| no_rtsp("a body of no length"))?, 0);
         wire.read_exact(&mut message.body).await?;
-        Ok(Some(message))
+        Ok(message)
     }
 
     /// The first header of that name.
@@ -157,6 +160,13 @@ mod tests {
         assert_eq!(request.request(), Some(("DESCRIBE", "rtsp://a/b?c=d")));
         assert_eq!((request.status(), response.status(), response.request()), (None, Some(200), None));
         assert_eq!(request.header("cseq"), Some("2"));
+    }
+
+    /// Passed on as the first line of a message, it would be a packet to who reads it next.
+    #[tokio::test]
+    async fn empty_lines_before_something_are_nothing() {
+        let items = all(b"\r\n\n$\0\0\x01x\r\n\r\nRTSP/1.0 200 OK\r\n\r\n\r\n").await.unwrap();
+        assert!(matches!(&items[..], [Item::Packet(_), Item::Message(_)]), "{items:?}");
     }
 
     #[tokio::test]

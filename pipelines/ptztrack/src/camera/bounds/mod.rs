@@ -37,6 +37,15 @@ pub fn keep(pipeline: &gst::Pipeline, source: Option<&gst::Element>) {
     }
 }
 
+/// Width and height that a stream announces, of the codec with this number.
+pub fn picture_size(codec: u8, stream: &[u8]) -> Option<(u32, u32)> {
+    let codec = Codec::ALL[usize::from(codec) % Codec::ALL.len()];
+    // It is as sure of what stands before the stream.
+    let head = codec.size_in_head(stream).ok().flatten();
+    let size = sizes::larger(head, codec.size_in(stream).ok().flatten())?;
+    Some((size.width, size.height))
+}
+
 /// What comes is counted until a decoder gets a picture.
 fn count(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
     pad.add_probe(gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST, move |pad, info| {

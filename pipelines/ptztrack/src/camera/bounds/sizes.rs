@@ -60,6 +60,16 @@ pub fn codec_data(caps: &gst::CapsRef) -> Option<gst::Buffer> {
 }
 
 impl Codec {
+    /// Every one.
+    pub const ALL: [Self; 6] = [
+        Self::Jpeg,
+        Self::Mpeg4,
+        Self::H264(Framing::StartCodes),
+        Self::H264(Framing::Lengths),
+        Self::H265(Framing::StartCodes),
+        Self::H265(Framing::Lengths),
+    ];
+
     /// `None`: no codec whose sizes are known.
     pub fn of(caps: &gst::CapsRef) -> Option<Self> {
         let structure = caps.structure(0)?;

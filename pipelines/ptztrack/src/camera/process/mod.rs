@@ -32,6 +32,7 @@ use socket2::SockRef;
 
 use super::known::{Known, SEARCHING, Steering};
 use super::running::Running;
+use super::servo_stats::ServoStats;
 use crate::config::CameraSettings;
 use crate::event::{Event, Level};
 use crate::log::Log;
@@ -159,6 +160,15 @@ impl Processes {
     }
 }
 
+/// Has a line heard that a camera's process may have said; whether it is a word.
+pub fn hear(line: &[u8]) -> bool {
+    let Ok(word) = serde_json::from_slice(line) else { return false };
+    if let Word::Report(report) = word {
+        report.tell(&Known::new("camera"), 0);
+    }
+    true
+}
+
 fn hangs() -> io::Error {
     io::Error::other("its process hangs")
 }
@@ -243,7 +253,7 @@ impl Running for Remote {
         lock(&self.last).as_ref().map(|report| report.abilities).unwrap_or_default()
     }
 
-    fn servo_stats(&self) -> Option<gst::Structure> {
-        lock(&self.last).as_ref()?.servo_stats()
+    fn servo_stats(&self) -> Option<ServoStats> {
+        lock(&self.last).as_ref()?.servo.clone()
     }
 }

@@ -9,6 +9,7 @@ use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
 use crate::camera::known::{Control, Known, State, Steering};
+use crate::camera::servo_stats::ServoStats;
 use crate::config::CameraSettings;
 use crate::event::Event;
 
@@ -59,8 +60,8 @@ pub struct Report {
     failures: u64,
     since_picture: Duration,
     times: Vec<(u64, f64)>,
-    /// As text, which a structure is read from again.
-    servo: Option<String>,
+    /// What the sink says of itself.
+    pub servo: Option<ServoStats>,
     pub abilities: (bool, bool),
     /// How many orders had been heard.
     orders: u64,
@@ -104,16 +105,11 @@ impl Report {
             failures: count(&known.failures),
             since_picture: known.since_picture(),
             times: known.times.iter().map(super::super::Stopwatch::read).collect(),
-            servo: known.servo().map(|servo| servo.to_string()),
+            servo: known.servo(),
             abilities: known.abilities(),
             orders,
             stuck: known.is_stuck(),
         }
-    }
-
-    /// What `vapixptzsink` said of itself.
-    pub fn servo_stats(&self) -> Option<gst::Structure> {
-        self.servo.as_ref()?.parse().ok()
     }
 
     /// Makes it known here, where so many orders were given.

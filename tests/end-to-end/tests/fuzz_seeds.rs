@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! The fuzz targets are kept compiling, and read what real cameras say; also cut short and damaged.
+//! The fuzz targets are kept compiling, and read what others really say; also cut short and damaged.
 #![allow(missing_docs, dead_code, clippy::unwrap_used, clippy::expect_used)]
 
-#[path = "../../../tests/fuzz/src/lib.rs"]
+#[path = "../../fuzz/src/lib.rs"]
 mod targets;
 
 use std::fs;
@@ -12,7 +12,7 @@ use std::path::Path;
 use targets::TARGETS;
 
 fn seeds(target: &str) -> Vec<(String, Vec<u8>)> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fuzz/corpus").join(target);
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
     let entries = fs::read_dir(&folder).unwrap().map(Result::unwrap);
     entries.map(|entry| (entry.path().display().to_string(), fs::read(entry.path()).unwrap())).collect()
 }
@@ -48,7 +48,7 @@ fn nothing_made_of_a_seed_breaks_a_parser() {
 /// A target without its file would never be fuzzed, and a file without its target never be compiled here.
 #[test]
 fn every_target_has_its_program() {
-    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/fuzz");
+    let fuzz = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz");
     let manifest = fs::read_to_string(fuzz.join("Cargo.toml")).unwrap();
     for (name, _) in TARGETS {
         let program = fs::read_to_string(fuzz.join(format!("fuzz_targets/{name}.rs"))).unwrap();
