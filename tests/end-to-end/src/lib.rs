@@ -4,6 +4,7 @@
 //! inside the test, and waiting for something to happen without sleeping.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod broker;
 mod chance;
 mod disk;
 pub mod following;
@@ -15,6 +16,7 @@ mod recording;
 pub mod scene;
 mod watchdog;
 
+pub use broker::Broker;
 pub use chance::Chance;
 pub use disk::Disk;
 pub use front::{Front, Way};

@@ -3,7 +3,7 @@
 //! The watchdog of one test's application: under a name of its own, by which its processes are found.
 
 use std::fs;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::{Duration, Instant};
 
@@ -32,6 +32,11 @@ impl Watchdog {
     pub fn of(&self, mut application: Command) -> Command {
         application.env("VAPIX_WATCHDOG", &self.program);
         application
+    }
+
+    /// The program by its own name.
+    pub fn program(&self) -> &Path {
+        &self.program
     }
 
     /// Those that run.

@@ -3,74 +3,21 @@
 //! What the program tells an MQTT broker, the one of Debian.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::net::{TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command};
-use std::time::{Duration, Instant};
+use std::path::Path;
 
-use end_to_end::{GstLaunch, PATIENCE, Program, scene, scratch, signal};
+use end_to_end::{Broker, Program, scene, signal};
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
 
-/// Debian's `mosquitto`, which has no part of anybody's `PATH` but root's.
-const MOSQUITTO: [&str; 2] = ["/usr/sbin/mosquitto", "mosquitto"];
-
-struct Broker {
-    child: Child,
-    settings: PathBuf,
-    port: u16,
-}
-
-impl Broker {
-    fn start() -> Self {
-        Self::start_with("")
-    }
-
-    /// With more settings.
-    fn start_with(more: &str) -> Self {
-        let program = MOSQUITTO.into_iter().find(|program| Command::new(program).arg("-h").output().is_ok());
-        let program = program.expect("mosquitto is not installed: `make test` installs it");
-        // It cannot choose a port itself.
-        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-        let settings = scratch(&format!("mosquitto-{port}.conf"));
-        std::fs::write(&settings, format!("listener {port} 127.0.0.1\nallow_anonymous true\n{more}"))
-            .unwrap();
-        let child = Command::new(program).arg("-c").arg(&settings).spawn().unwrap();
-        let broker = Self { child, settings, port };
-        let begin = Instant::now();
-        while TcpStream::connect(("127.0.0.1", port)).is_err() {
-            assert!(begin.elapsed() < PATIENCE, "mosquitto does not listen");
-            std::thread::sleep(Duration::from_millis(20));
-        }
-        broker
-    }
-
-    /// A line for each message, topic and payload: what is kept there, then what comes.
-    fn listen(&self, topic: &str) -> GstLaunch {
-        let mut command = Command::new("mosquitto_sub");
-        command.args(["-h", "127.0.0.1", "-p", &self.port.to_string(), "-t", topic, "-v"]);
-        GstLaunch::spawn(command)
-    }
-
-    /// Ours, before this camera.
-    fn program(&self, test: &str, camera: &VirtualCamera) -> Program {
-        let file = |folder: &Path| {
-            let camera = Program::entry("door", &camera.url(), &folder.join("password"));
-            format!("{camera}[mqtt]\nhost = \"127.0.0.1\"\nport = {}\n", self.port)
-        };
-        let mut program = Program::start(test, file, &[]);
-        program.launch.wait_for_line("connected to the MQTT broker 127.0.0.1");
-        program
-    }
-}
-
-impl Drop for Broker {
-    fn drop(&mut self) {
-        // It may be gone already; its file is only litter.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        let _ = std::fs::remove_file(&self.settings);
-    }
+/// Ours, before this camera and this broker.
+fn program(broker: &Broker, test: &str, camera: &VirtualCamera) -> Program {
+    let file = |folder: &Path| {
+        let camera = Program::entry("door", &camera.url(), &folder.join("password"));
+        format!("{camera}[mqtt]\nhost = \"127.0.0.1\"\nport = {}\n", broker.port)
+    };
+    let mut program = Program::start(test, file, &[]);
+    program.launch.wait_for_line("connected to the MQTT broker 127.0.0.1");
+    program
 }
 
 /// The payload in a line of [`Broker::listen`].
@@ -83,7 +30,7 @@ fn events_states_and_discovery_reach_a_broker() {
     let broker = Broker::start();
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let mut events = broker.listen("ptztrack/camera/door/event");
-    let program = broker.program("mqtt", &camera);
+    let program = program(&broker, "mqtt", &camera);
     let mut states = broker.listen("ptztrack/camera/door/state");
     let state = payload(&states.wait_for_line("\"following\":\"ON\""));
     assert_eq!(state["picture"], "ON", "{state}");
@@ -106,7 +53,7 @@ fn events_states_and_discovery_reach_a_broker() {
 fn a_broker_hears_that_the_program_has_died() {
     let broker = Broker::start();
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
-    let program = broker.program("mqtt-dies", &camera);
+    let program = program(&broker, "mqtt-dies", &camera);
     let mut availability = broker.listen("ptztrack/availability");
     availability.wait_for_line("ptztrack/availability online");
     signal(program.launch.id(), "KILL");
@@ -117,7 +64,7 @@ fn a_broker_hears_that_the_program_has_died() {
 fn a_camera_that_is_gone_from_the_file_is_gone_from_the_broker() {
     let broker = Broker::start();
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
-    let mut program = broker.program("mqtt-removed", &camera);
+    let mut program = program(&broker, "mqtt-removed", &camera);
     let mut states = broker.listen("ptztrack/camera/door/state");
     states.wait_for_line("\"picture\":\"ON\"");
     let file = program.folder().join("cameras.toml");

@@ -2,15 +2,16 @@
 
 //! One of the cameras, what happens to it, and who follows with it.
 
-use std::process::Command;
+use std::fs;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread::sleep;
 use std::time::{Duration, Instant};
 
-use end_to_end::following::Network;
+use end_to_end::following::{MJPEG, Network, RTSP};
 use end_to_end::scene::{self, left_at_rest};
-use end_to_end::{Chance, GstLaunch, Watchdog, Way, plugin_folder, tool};
+use end_to_end::{Broker, Chance, Program, Watchdog, Way};
 use virtual_camera::{Fault, VirtualCamera};
 
 use crate::account::Account;
@@ -24,14 +25,21 @@ const LOST: Duration = Duration::from_secs(60);
 /// A camera of a dead application rests by then: a lease, and what a busy machine needs.
 const RESTS: Duration = Duration::from_secs(10);
 
-/// A camera, the ways to it and who follows with it.
+/// How often somebody asks the page for everything.
+const VISITS: Duration = Duration::from_secs(1);
+const PAGES: [&str; 4] = ["/", "/cameras", "/cameras/door/picture", "/metrics"];
+/// What a picture may be as large as.
+const SIZES: [&str; 2] = ["320x240", "240x180"];
+
+/// A camera, the ways to it and the program that follows with it.
 pub struct Camera {
     number: usize,
     camera: Arc<VirtualCamera>,
     network: Network,
     chance: Chance,
-    follower: Option<GstLaunch>,
-    command: Command,
+    program: Option<Program>,
+    broker: u16,
+    watchdog: PathBuf,
     process: Arc<AtomicU32>,
 }
 
@@ -50,19 +58,45 @@ pub struct Probe {
 }
 
 impl Camera {
-    /// Odd ones have followers that are killed now and then; the third and fourth speak RTSP.
-    pub fn start(number: usize, seed: u64, duration: Duration, watchdog: &Watchdog) -> Self {
-        let settings = scene::walking_person_for(duration + 4 * LOST);
-        let camera = Arc::new(VirtualCamera::start(settings).unwrap());
-        let network = Network::before(&camera);
-        let seed = seed * 10 + number as u64;
-        let mut command = watchdog.of(tool(plugin_folder().join("unattended").to_str().unwrap()));
-        command.args([if by_rtsp(number) { "h264" } else { "mjpeg" }, &seed.to_string()]);
-        network.surround(&mut command);
-        let follower = GstLaunch::spawn(&mut command);
-        let process = Arc::new(AtomicU32::new(follower.id()));
-        let chance = Chance::new(seed);
-        Self { number, camera, network, chance, follower: Some(follower), command, process }
+    /// Odd ones have programs that are killed now and then; the third and fourth speak RTSP.
+    pub fn start(number: usize, seed: u64, lasts: Duration, watchdog: &Watchdog, broker: &Broker) -> Self {
+        let camera = Arc::new(VirtualCamera::start(scene::walking_person_for(lasts)).unwrap());
+        let mut this = Self {
+            number,
+            network: Network::before(&camera),
+            camera,
+            chance: Chance::new(seed * 10 + number as u64),
+            program: None,
+            broker: broker.port,
+            watchdog: watchdog.program().to_owned(),
+            process: Arc::default(),
+        };
+        this.start_program();
+        this
+    }
+
+    fn start_program(&mut self) {
+        let environment = [("VAPIX_WATCHDOG", self.watchdog.as_path())];
+        let file = |folder: &Path| self.file(folder);
+        let program = Program::start_in(&format!("soak-{}", self.number), file, &[], &environment);
+        self.process.store(program.launch.id(), Ordering::Relaxed);
+        self.program = Some(program);
+    }
+
+    /// What it is told: to record, and to tell a broker.
+    fn file(&self, folder: &Path) -> String {
+        let recording = folder.join("recordings");
+        let video = match by_rtsp(self.number) {
+            true => format!("codec = \"h264\"\nrtsp = \"rtsp://{}\"\n", self.network.rtsp.address()),
+            false => String::new(),
+        };
+        Program::entry("door", &self.network.url(), &folder.join("password"))
+            + &video
+            + &format!("[camera.door.recording]\nfolder = {recording:?}\nsegment = \"10s\"\nkeep = \"1m\"\n")
+            + &format!(
+                "[mqtt]\nhost = \"127.0.0.1\"\nport = {}\ntopic = \"soak/{}\"\n",
+                self.broker, self.number
+            )
     }
 
     pub fn probe(&self) -> Probe {
@@ -70,22 +104,65 @@ impl Camera {
     }
 
     /// One thing after the other, until it is over.
-    pub fn run(mut self, over: &AtomicBool) -> Account {
-        let known: &[Known] = if by_rtsp(self.number) { OF_RTSPSRC } else { &[] };
-        let mut account = Account::of(self.number, known);
+    pub fn run(mut self, is_over: impl Fn() -> bool) -> Account {
+        let mut account = self.account();
         account.came_back("start", self.is_followed(Instant::now()));
-        while !over.load(Ordering::Relaxed) {
-            sleep(Duration::from_secs(self.chance.within(PEACE_S)));
+        while !is_over() {
+            let peace = Duration::from_secs(self.chance.within(PEACE_S));
+            self.visit_page(peace);
             let happening = Happening::next(&mut self.chance, self.number % 2 == 1);
             self.let_happen(&happening, &mut account);
             account.came_back(happening.name(), self.is_followed(Instant::now()));
         }
-        let follower = self.follower.take().unwrap();
-        follower.signal("TERM");
-        let (status, output) = follower.finish();
-        account.ended(status.success(), &output);
+        self.end(account)
+    }
+
+    /// Connections that end as soon as there is a picture again, so many times; now and then the settings change.
+    pub fn reconnect(mut self, times: u64) -> Account {
+        let mut account = self.account();
+        account.came_back("start", self.is_followed(Instant::now()));
+        let front = if by_rtsp(self.number) { RTSP } else { MJPEG };
+        for _ in 0..times {
+            let before = front(&self.network).video_requests();
+            let happening = match self.chance.within((0, 100)) {
+                0 => Happening::Reload,
+                even if even % 2 == 0 => Happening::Reset,
+                _ => Happening::Close,
+            };
+            self.visit_page(Duration::ZERO);
+            self.let_happen(&happening, &mut account);
+            let begin = Instant::now();
+            front(&self.network).wait_for_picture(before);
+            account.came_back(happening.name(), Some(begin.elapsed()));
+        }
+        self.end(account)
+    }
+
+    fn account(&self) -> Account {
+        let known: &[Known] = if by_rtsp(self.number) { OF_RTSPSRC } else { &[] };
+        Account::of(self.number, known)
+    }
+
+    fn end(mut self, mut account: Account) -> Account {
+        if let Some(program) = self.program.take() {
+            let (status, output) = program.end_somehow("TERM");
+            account.ended(status.success(), &output);
+        }
         account.rests(left_at_rest(&self.camera, RESTS));
         account
+    }
+
+    /// Somebody looks at the page for so long.
+    fn visit_page(&self, lasts: Duration) {
+        let Some(program) = &self.program else { return };
+        let begin = Instant::now();
+        loop {
+            PAGES.iter().for_each(|page| drop(program.ask("GET", page)));
+            if begin.elapsed() >= lasts {
+                return;
+            }
+            sleep(VISITS);
+        }
     }
 
     fn let_happen(&mut self, happening: &Happening, account: &mut Account) {
@@ -115,20 +192,28 @@ impl Camera {
                 self.camera.operate(turn);
             }
             Happening::Forget => self.camera.forget_rtsp_sessions(),
+            Happening::Reload => self.reload(),
             Happening::Kill => self.kill(account),
         }
     }
 
+    /// The file is another, and is read again.
+    fn reload(&self) {
+        let Some(program) = &self.program else { return };
+        let file = program.folder().join("cameras.toml");
+        let text = fs::read_to_string(&file).unwrap();
+        let [one, other] = SIZES;
+        let (from, to) = if text.contains(one) { (one, other) } else { (other, one) };
+        fs::write(file, text.replace(from, to)).unwrap();
+        program.launch.signal("HUP");
+    }
+
     fn kill(&mut self, account: &mut Account) {
-        if let Some(follower) = self.follower.take() {
-            follower.signal("KILL");
-            let (_, output) = follower.finish();
-            account.said(&output);
+        if let Some(program) = self.program.take() {
+            account.said(&program.end_somehow("KILL").1);
         }
         account.rests(left_at_rest(&self.camera, RESTS));
-        let follower = GstLaunch::spawn(&mut self.command);
-        self.process.store(follower.id(), Ordering::Relaxed);
-        self.follower = Some(follower);
+        self.start_program();
     }
 
     /// How long until it is moved again, where it is.

@@ -23,6 +23,8 @@ pub enum Happening {
     Operator,
     /// It has forgotten its RTSP sessions.
     Forget,
+    /// Its entry in the file is another, with pictures of another size.
+    Reload,
     /// The application is killed; another is started.
     Kill,
 }
@@ -30,7 +32,7 @@ pub enum Happening {
 impl Happening {
     /// The next; `killed` where applications may be.
     pub fn next(chance: &mut Chance, killed: bool) -> Self {
-        match chance.within((0, if killed { 11 } else { 9 })) {
+        match chance.within((0, if killed { 12 } else { 10 })) {
             0 => Self::Network(Way::Stalled),
             1 => Self::Network(Way::Refused),
             2 => Self::Reset,
@@ -40,6 +42,7 @@ impl Happening {
             6 => Self::Answers(Fault::Hang),
             7 => Self::Operator,
             8 => Self::Forget,
+            9 => Self::Reload,
             _ => Self::Kill,
         }
     }
@@ -56,6 +59,7 @@ impl Happening {
             Self::Answers(_) => "503 to PTZ",
             Self::Operator => "operator",
             Self::Forget => "RTSP sessions forgotten",
+            Self::Reload => "settings changed, SIGHUP",
             Self::Kill => "SIGKILL",
         }
     }

@@ -43,7 +43,7 @@ impl Known {
 mod tests {
     use super::*;
 
-    const LINE: &str = "(unattended:4711): GStreamer-CRITICAL **: 12:34:56.789: \
+    const LINE: &str = "(ptztrack:4711): GStreamer-CRITICAL **: 12:34:56.789: \
                         gst_event_set_seqnum: assertion 'seqnum != GST_SEQNUM_INVALID' failed";
 
     #[test]

@@ -21,6 +21,10 @@ pub struct Sample {
     pub memory_mb: f64,
     pub threads: f64,
     pub files: f64,
+    /// Of all time so far, s.
+    processor_s: f64,
+    /// Processor cores since the sample before.
+    pub cores: f64,
     /// Requests to the camera so far.
     pub requests: u64,
 }
@@ -39,13 +43,19 @@ impl Samples {
             status.lines().find_map(|line| line.strip_prefix(name)?.split_whitespace().next()?.parse().ok())
         };
         let (Some(memory_kb), Some(threads)) = (field("VmRSS:"), field("Threads:")) else { return };
+        let (time_s, processor_s) = (time.as_secs_f64(), processor_s(process).unwrap_or_default());
+        let before = self.0.iter().rfind(|sample| sample.process == process);
+        let cores =
+            before.map_or(0.0, |sample| (processor_s - sample.processor_s) / (time_s - sample.time_s));
         self.0.push(Sample {
-            time_s: time.as_secs_f64(),
+            time_s,
             camera: probe.number,
             process,
             memory_mb: memory_kb / 1024.0,
             threads,
             files: files.count() as f64,
+            processor_s,
+            cores,
             requests: probe.camera.status().requests,
         });
     }
@@ -74,6 +84,16 @@ impl Samples {
         let plot = Command::new("gnuplot").current_dir(out).args(["-e", PLOT]).status();
         assert!(plot.is_ok_and(|status| status.success()), "gnuplot is needed for the plot");
     }
+}
+
+/// What a process has taken of the processors (proc_pid_stat(5), `utime` and `stime`).
+fn processor_s(process: u32) -> Option<f64> {
+    let stat = fs::read_to_string(format!("/proc/{process}/stat")).ok()?;
+    let mut fields = stat.rsplit_once(')')?.1.split_whitespace().skip(11);
+    let ticks: f64 = fields.next()?.parse::<f64>().ok()? + fields.next()?.parse::<f64>().ok()?;
+    // SAFETY: takes and gives numbers only.
+    let a_second = unsafe { libc::sysconf(libc::_SC_CLK_TCK) };
+    Some(ticks / a_second as f64)
 }
 
 const PLOT: &str = "
