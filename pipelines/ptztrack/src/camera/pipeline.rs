@@ -211,7 +211,8 @@ fn end_in_silence(pipeline: &gst::Pipeline) {
         }
     });
     let source = source.downgrade();
-    glib::MainContext::ref_thread_default().spawn_local(async move {
+    // Not a local one: where the stream never ends it outlives the thread, and whoever has the context last ends it.
+    glib::MainContext::ref_thread_default().spawn(async move {
         loop {
             let last = *lock(&last);
             let (Some(source), Some(last)) = (source.upgrade(), last) else { break };
@@ -363,5 +364,27 @@ mod tests {
         assert!(ours.contains("! lkfeaturetrack stationary-timeout=120000000000 !"), "{ours}");
         let own = "fakesrc name=source ! fakesink";
         assert_eq!(described(&format!("pipeline = \"{own}\"")), own);
+    }
+
+    /// As at the end of a camera whose stream does not end.
+    #[test]
+    fn who_waits_for_packets_may_be_ended_by_another_thread() {
+        gst::init().unwrap();
+        let pipeline = gst::parse::launch("fakesrc name=source ! identity name=received ! fakesink").unwrap();
+        let pipeline = pipeline.downcast::<gst::Pipeline>().unwrap();
+        let context = glib::MainContext::new();
+        std::thread::spawn({
+            let (context, pipeline) = (context.clone(), pipeline.clone());
+            move || {
+                let waits = || {
+                    end_in_silence(&pipeline);
+                    while context.iteration(false) {}
+                };
+                context.with_thread_default(waits).unwrap();
+            }
+        })
+        .join()
+        .unwrap();
+        drop(context);
     }
 }
