@@ -104,6 +104,27 @@ impl Program {
         }
     }
 
+    /// The process of a camera that has one of its own.
+    #[track_caller]
+    pub fn process_of(&self, camera: &str) -> u32 {
+        let wanted = format!("ptztrack\0camera\0{camera}\0");
+        let parent = format!("PPid:\t{}", self.launch.id());
+        let is = |process: &u32| {
+            let read = |file: &str| fs::read_to_string(format!("/proc/{process}/{file}")).unwrap_or_default();
+            read("cmdline") == wanted && read("status").lines().any(|line| line == parent)
+        };
+        let begin = Instant::now();
+        loop {
+            let processes = fs::read_dir("/proc").unwrap();
+            let numbers = processes.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+            if let Some(found) = numbers.into_iter().find(is) {
+                return found;
+            }
+            assert!(begin.elapsed() < PATIENCE, "no process for {camera}");
+            std::thread::sleep(std::time::Duration::from_millis(20));
+        }
+    }
+
     /// Ends it by a signal; gives what it said.
     #[track_caller]
     pub fn end(self, signal: &str) -> String {

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 
 use end_to_end::following::Network;
-use end_to_end::{PATIENCE, Program, plugin_folder, scene};
+use end_to_end::{PATIENCE, Program, plugin_folder, scene, signal};
 use virtual_camera::{Fault, VirtualCamera};
 
 /// As one that is starting refuses everybody, and one that was attacked locks the account.
@@ -56,4 +56,27 @@ fn a_name_that_is_looked_up_for_ever_keeps_nobody_waiting() {
     assert_eq!(network.http.video_requests(), 2, "it is touched");
     program.end("TERM");
     scene::assert_left_at_rest(&camera);
+}
+
+/// A driver that never comes back, as far as the others can tell.
+#[test]
+fn a_camera_whose_own_process_hangs_is_given_another() {
+    let [good, door] = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        Program::entry("good", &good.url(), &password)
+            + &Program::entry("door", &door.url(), &password)
+            + "isolation = \"process\"\n"
+    };
+    let mut program = Program::start("hangs", file, &[]);
+    [&good, &door].into_iter().for_each(scene::wait_until_following);
+    let process = program.process_of("door");
+    signal(process, "STOP");
+    program.launch.wait_for_line("door: error: its process hangs; it is started again");
+    program.launch.wait_for_line("door: the picture is there");
+    assert_ne!(program.process_of("door"), process);
+    scene::wait_until_following(&door);
+    assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
+    program.end("TERM");
+    [good, door].iter().for_each(scene::assert_left_at_rest);
 }

@@ -235,27 +235,6 @@ fn a_picture_that_claims_to_be_huge_takes_nothing_from_anybody() {
     program.end("TERM");
 }
 
-/// The process of a camera that has one of its own.
-#[track_caller]
-fn process_of(program: &Program, camera: &str) -> u32 {
-    let wanted = format!("ptztrack\0camera\0{camera}\0");
-    let parent = format!("PPid:\t{}", program.launch.id());
-    let is = |process: &u32| {
-        let read = |file: &str| fs::read_to_string(format!("/proc/{process}/{file}")).unwrap_or_default();
-        read("cmdline") == wanted && read("status").lines().any(|line| line == parent)
-    };
-    let begin = Instant::now();
-    loop {
-        let processes = fs::read_dir("/proc").unwrap();
-        let numbers = processes.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
-        if let Some(found) = numbers.into_iter().find(is) {
-            return found;
-        }
-        assert!(begin.elapsed() < PATIENCE, "no process for {camera}");
-        std::thread::sleep(Duration::from_millis(20));
-    }
-}
-
 /// A decoder that crashes, as far as the system can tell.
 #[test]
 fn a_camera_with_a_process_of_its_own_dies_alone_and_comes_back() {
@@ -269,13 +248,13 @@ fn a_camera_with_a_process_of_its_own_dies_alone_and_comes_back() {
     };
     let mut program = Program::start("isolated", file, &[]);
     [&good, &door].into_iter().for_each(scene::wait_until_following);
-    let process = process_of(&program, "door");
+    let process = program.process_of("door");
     let requests = network.http.video_requests();
     end_to_end::signal(process, "ABRT");
     let line = program.launch.wait_for_line("door: error: its process ended: signal: 6");
     assert!(line.contains("it is started again"), "{line}");
     program.launch.wait_for_line("door: the picture is there");
-    assert_ne!(process_of(&program, "door"), process);
+    assert_ne!(program.process_of("door"), process);
     scene::wait_until_following(&door);
     assert_eq!(network.http.video_requests(), requests, "the other one is touched");
 
@@ -287,13 +266,13 @@ fn a_camera_with_a_process_of_its_own_dies_alone_and_comes_back() {
     assert_eq!(program.ask("GET", "/cameras/door/picture").0, 200);
     assert_eq!(program.ask("POST", "/cameras/door/hand-over").0, 204);
     scene::assert_left_at_rest(&door);
-    let last = process_of(&program, "door");
+    let last = program.process_of("door");
     end_to_end::signal(last, "KILL");
     program.launch.wait_for_line("door: the picture is there");
     program.wait_for("/cameras", |cameras| cameras.contains("the camera is handed over"));
     assert_eq!(program.ask("POST", "/cameras/door/take-back").0, 204);
     scene::wait_until_following(&door);
-    let last = process_of(&program, "door");
+    let last = program.process_of("door");
     let said = program.end("TERM");
     assert!(!Path::new(&format!("/proc/{last}")).exists(), "{said}");
     assert!(said.contains("door: has stopped"), "{said}");
