@@ -8,7 +8,10 @@
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
-use std::path::Path;
+use std::fs::File;
+use std::io::Write;
+use std::os::unix::fs::PermissionsExt;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread;
 use std::time::Duration;
@@ -20,15 +23,15 @@ use virtual_camera::{Fault, VirtualCamera};
 const HEADER: &str = "# Ways to die
 
 What happens to a camera whose application dies while the camera turns. Measured by `cargo run -p end-to-end --example dying`, over
-HTTP with the default properties; the worst of three runs, from the death (in an outage: from the end of the outage) until the camera is
-at rest. In the last column the watchdog could not be started.
+HTTP with the default properties; the worst of three runs, from the death (where the camera cannot be reached or refuses to stop: from the
+end of that) until the camera is at rest. In the last column the watchdog could not be started.
 
 | Way to die | What stops the camera | It rests after | Without `vapix-watchdog` |
 |---|---|---|---|";
 
 const FOOTER: &str = "
 `vapix-watchdog` notices at once that a process has ended; that a process is stopped or hangs, it notices when the lease runs out,
-after 2 s. In an outage it retries twice a second, for a minute.
+after 2 s. A watchdog that is slow to start stops the camera as soon as it runs. In an outage it retries twice a second, for a minute.
 
 What is not covered: loss of power or of the network for longer than that minute, and everything that ends the watchdog together with
 the application, such as the end of PID 1 of a container. Run the watchdog outside that container, with `vapix-watchdog --listen` and
@@ -36,10 +39,14 @@ the application, such as the end of PID 1 of a container. Run the watchdog outsi
 
 /// It must turn as fast as this to be left turning, °/s.
 const TURNS: f64 = 3.0;
-/// A camera that rested for so long rests: longer than a lease lasts.
-const SETTLED: Duration = Duration::from_secs(3);
-/// A camera that still turns after this is not stopped.
-const LIMIT: Duration = Duration::from_secs(10);
+/// A process that asks for memory without end gets no more.
+const MEMORY: u64 = 400 << 20;
+/// So long a slow watchdog takes to start: longer than the camera is held at rest for it.
+const SLOW_START_S: u32 = 3;
+/// Stops that a camera refuses before it takes one.
+const REFUSED_STOPS: u64 = 3;
+/// A camera that nobody tried to stop for so long is left alone.
+const LEFT_ALONE: Duration = Duration::from_secs(5);
 /// Between two looks.
 const LOOK: Duration = Duration::from_millis(20);
 
@@ -52,49 +59,91 @@ enum Application {
     Launch(&'static str),
     /// The program `application`, told to do this.
     Program(&'static str),
+    /// The same in a cgroup that gives it no more than [`MEMORY`].
+    Confined(&'static str),
     /// PID 1 of a container, with the watchdog in it.
     Container,
     /// The same with the watchdog outside.
     ContainerOnly,
 }
 
+/// What becomes of it.
+#[derive(Clone, Copy)]
+enum Death {
+    /// It gets this signal, ...
+    Signal(&'static str),
+    /// ... while its watchdog takes long to start, ...
+    SlowWatchdog(&'static str),
+    /// ... while nobody can reach the camera, which answers again when the process has ended, ...
+    Outage(&'static str),
+    /// ... and the camera answers like this to the first stops.
+    Refused(fn() -> Fault, &'static str),
+    /// It hangs by itself when the camera first moves, and says `dying` just before.
+    Hang,
+    /// It is killed for what it does when the camera first moves.
+    Killed,
+}
+
 /// A way to die.
 struct Case {
     name: &'static str,
     application: Application,
-    signal: &'static str,
+    death: Death,
 }
 
-const fn case(name: &'static str, application: Application, signal: &'static str) -> Case {
-    Case { name, application, signal }
+const fn case(name: &'static str, application: Application, death: Death) -> Case {
+    Case { name, application, death }
 }
+
+use Death::Signal;
 
 const PLAIN: Application = Application::Launch("");
 /// It has a child that holds what it had open.
 const FORKED: Application = Application::Program("fork");
-const OUTAGE: &str = "`exit()` right after NULL in an outage";
+const UNAVAILABLE: fn() -> Fault = || Fault::Status(503);
+const ERROR: fn() -> Fault = || Fault::ErrorBody("Error: busy".to_owned());
 
-const CASES: [Case; 14] = [
-    case("Ctrl-C", Application::Script, "INT"),
-    case("SIGTERM, caught as in `pipelines/` and the examples", Application::Script, "TERM"),
-    case("SIGHUP, caught as in `pipelines/` and the examples", Application::Script, "HUP"),
-    case("SIGTERM, not caught", PLAIN, "TERM"),
+const CASES: [Case; 20] = [
+    case("Ctrl-C", Application::Script, Signal("INT")),
+    case(
+        "Ctrl-C, the first stops are answered by 503",
+        Application::Script,
+        Death::Refused(UNAVAILABLE, "INT"),
+    ),
+    case("SIGTERM, caught as in `pipelines/` and the examples", Application::Script, Signal("TERM")),
+    case("SIGHUP, caught as in `pipelines/` and the examples", Application::Script, Signal("HUP")),
+    case("SIGTERM, not caught", PLAIN, Signal("TERM")),
     // Not of `gst-launch-1.0`, which takes it for a wish to see a graph.
-    case("SIGHUP, not caught", Application::Program("reap"), "HUP"),
-    case("SIGKILL; the out-of-memory killer", PLAIN, "KILL"),
-    case("SIGSEGV", PLAIN, "SEGV"),
-    case("abort", PLAIN, "ABRT"),
-    case("SIGSTOP; it hangs", PLAIN, "STOP"),
-    case(OUTAGE, PLAIN, "INT"),
-    case("SIGKILL, a forked child holds its descriptors", FORKED, "KILL"),
-    case("SIGKILL of PID 1 of a container, the watchdog in it", Application::Container, "KILL"),
-    case("SIGKILL of PID 1 of a container, `dead-man-socket` out of it", Application::ContainerOnly, "KILL"),
-    case("SIGKILL, `mode=absolute`", Application::Launch("mode=absolute"), "KILL"),
+    case("SIGHUP, not caught", Application::Program("reap"), Signal("HUP")),
+    case("SIGKILL", PLAIN, Signal("KILL")),
+    case(OUT_OF_MEMORY, Application::Confined("hoard"), Death::Killed),
+    case("SIGKILL, the first stops are answered by 503", PLAIN, Death::Refused(UNAVAILABLE, "KILL")),
+    case("SIGKILL, the first stops are answered by `Error:`", PLAIN, Death::Refused(ERROR, "KILL")),
+    case("SIGKILL while a watchdog starts that takes 3 s", PLAIN, Death::SlowWatchdog("KILL")),
+    case("SIGSEGV", PLAIN, Signal("SEGV")),
+    case("SIGABRT", PLAIN, Signal("ABRT")),
+    case("SIGSTOP", PLAIN, Signal("STOP")),
+    case("its streaming thread hangs", Application::Program("hang"), Death::Hang),
+    case("`exit()` right after NULL in an outage", PLAIN, Death::Outage("INT")),
+    case("SIGKILL, a forked child holds its descriptors", FORKED, Signal("KILL")),
+    case("SIGKILL of PID 1 of a container, the watchdog in it", Application::Container, Signal("KILL")),
+    case(
+        "SIGKILL of PID 1 of a container, `dead-man-socket` out of it",
+        Application::ContainerOnly,
+        Signal("KILL"),
+    ),
+    case("SIGKILL, `mode=absolute`", Application::Launch("mode=absolute"), Signal("KILL")),
 ];
+
+const OUT_OF_MEMORY: &str = "the out-of-memory killer, in a cgroup";
 
 fn main() {
     println!("{HEADER}");
     for case in &CASES {
+        if case.application.is_confined() && Confinement::new("probe").is_none() {
+            println!("| {} | | not run: memory cgroups cannot be made here | |", case.name);
+            continue;
+        }
         let (with, without) = thread::scope(|scope| {
             let with = [0, 1, 2].map(|run| scope.spawn(move || case.run(run, true)));
             let without = scope.spawn(|| case.run(3, false));
@@ -133,44 +182,77 @@ impl Case {
     /// How long the camera takes to rest, where it does.
     fn run(&self, run: usize, watchdog: bool) -> Option<Duration> {
         let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-        let socket = std::env::temp_dir().join(format!("ptztrack-dying-{}-{run}", std::process::id()));
+        let id = format!("{}-{run}", std::process::id());
+        let socket = std::env::temp_dir().join(format!("ptztrack-dying-{id}"));
         let elsewhere = self.application == Application::ContainerOnly && watchdog;
         let _elsewhere = elsewhere.then(|| listen(&socket));
-        let mut command = self.application.command(&camera, &socket);
+        let confinement = self.application.is_confined().then(|| Confinement::new(&id).unwrap());
+        let mut command = self.application.command(&camera, &socket, confinement.as_ref());
+        let slow = slow_watchdog(&id);
         if !watchdog {
             command.env("VAPIX_WATCHDOG", "/nonexistent/vapix-watchdog");
+        } else if matches!(self.death, Death::SlowWatchdog(_)) {
+            command.env("VAPIX_WATCHDOG", &slow);
         }
         let mut launch = GstLaunch::spawn(command);
         let child = (self.application == FORKED)
             .then(|| launch.wait_for_line("child ").trim_start_matches("child ").parse().unwrap());
-        let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > TURNS);
+        // Before a slow watchdog is there the camera has only begun to turn.
+        let least = if matches!(self.death, Death::SlowWatchdog(_)) { 0.0 } else { TURNS };
+        let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > least);
         assert!(turns, "{}: the camera never turned", self.name);
         let (since, _alive) = self.die(&camera, launch);
-        let rests = rests(&camera, since);
+        let rests = scene::rests(&camera, since);
         if let Some(child) = child {
             signal(child, "KILL");
         }
-        let _ = std::fs::remove_file(socket);
+        for file in [socket, slow] {
+            let _ = std::fs::remove_file(file);
+        }
         rests
     }
 
-    /// When it was dead, or the outage over that it died in; and what may live on.
-    fn die(&self, camera: &VirtualCamera, launch: GstLaunch) -> (Duration, Option<GstLaunch>) {
-        if self.name == OUTAGE {
-            camera.set_fault(Fault::BlackHole);
-            launch.signal(self.signal);
-            launch.finish();
-            camera.set_fault(Fault::None);
-            return (camera.now(), None);
+    /// When it was dead, or the camera could be stopped again; and what may live on.
+    fn die(&self, camera: &VirtualCamera, mut launch: GstLaunch) -> (Duration, Option<GstLaunch>) {
+        match self.death {
+            Signal(name) | Death::SlowWatchdog(name) => {
+                let now = camera.now();
+                launch.signal(name);
+                (now, Some(launch))
+            }
+            Death::Outage(name) => {
+                camera.set_fault(Fault::BlackHole);
+                launch.signal(name);
+                launch.finish();
+                camera.set_fault(Fault::None);
+                (camera.now(), None)
+            }
+            Death::Refused(fault, name) => {
+                let before = camera.status().commands;
+                camera.set_fault(fault());
+                launch.signal(name);
+                camera.wait_for(LEFT_ALONE, |status| status.commands >= before + REFUSED_STOPS);
+                camera.set_fault(Fault::None);
+                (camera.now(), Some(launch))
+            }
+            Death::Hang => {
+                launch.wait_for_line("dying");
+                (camera.now(), Some(launch))
+            }
+            Death::Killed => {
+                launch.finish();
+                (camera.now(), None)
+            }
         }
-        let now = camera.now();
-        launch.signal(self.signal);
-        (now, Some(launch))
     }
 }
 
 impl Application {
-    fn command(self, camera: &VirtualCamera, socket: &Path) -> Command {
+    fn is_confined(self) -> bool {
+        matches!(self, Self::Confined(_))
+    }
+
+    fn command(self, camera: &VirtualCamera, socket: &Path, confinement: Option<&Confinement>) -> Command {
         let pipeline = format!("{} {}", scene::follow(camera), self.properties(socket));
         match self {
             Self::Script => {
@@ -184,9 +266,11 @@ impl Application {
                 command.arg("-f").args(pipeline.split_whitespace());
                 command
             }
-            Self::Program(what) => {
-                let mut command = tool(plugin_folder().join("application").to_str().unwrap());
-                command.args([what, &camera.url(), scene::USER]).env("CAMERA_PASSWORD", scene::PASSWORD);
+            Self::Program(what) | Self::Confined(what) => {
+                let application = plugin_folder().join("application");
+                let mut command = confinement.map_or_else(|| tool("env"), Confinement::enter);
+                command.arg(application).args([what, &camera.url(), scene::USER]);
+                command.env("CAMERA_PASSWORD", scene::PASSWORD);
                 command
             }
             Self::Container | Self::ContainerOnly => {
@@ -218,19 +302,49 @@ fn listen(socket: &Path) -> GstLaunch {
     watchdog
 }
 
-/// How long after this moment the camera came to rest, and stayed so.
-fn rests(camera: &VirtualCamera, since: Duration) -> Option<Duration> {
-    loop {
-        let moving = |status: &virtual_camera::Status| status.moving;
-        if !camera.wait_for(LIMIT, |status| !moving(status)) {
-            return None;
-        }
-        let rested = camera.now();
-        if !camera.wait_for(SETTLED, moving) {
-            return Some(rested.saturating_sub(since));
-        }
-        if rested > since + LIMIT {
-            return None;
-        }
+/// A watchdog that takes long to start.
+fn slow_watchdog(id: &str) -> PathBuf {
+    let program = end_to_end::scratch(&format!("slow-watchdog-{id}"));
+    let watchdog = plugin_folder().join("vapix-watchdog");
+    let script = format!("#!/bin/sh\nsleep {SLOW_START_S}\nexec {} \"$@\"\n", watchdog.display());
+    std::fs::write(&program, script).unwrap();
+    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
+    program
+}
+
+/// A cgroup that gives its processes so much memory, until this is dropped.
+struct Confinement {
+    folder: PathBuf,
+}
+
+impl Confinement {
+    /// Where the memory controller is, of cgroup v2 and of v1, and the file that limits it.
+    const CONTROLLERS: [(&str, &str); 2] =
+        [("/sys/fs/cgroup", "memory.max"), ("/sys/fs/cgroup/memory", "memory.limit_in_bytes")];
+
+    /// Where this process may make one.
+    fn new(id: &str) -> Option<Self> {
+        Self::CONTROLLERS.iter().find_map(|(controller, limit)| {
+            let folder = Path::new(controller).join(format!("ptztrack-dying-{id}"));
+            std::fs::create_dir(&folder).ok()?;
+            let confinement = Self { folder };
+            // Where there is no such controller, there is no such file.
+            let file = File::options().write(true).open(confinement.folder.join(limit));
+            file.and_then(|mut file| write!(file, "{MEMORY}")).ok().map(|()| confinement)
+        })
+    }
+
+    /// What is run by this is in it.
+    fn enter(&self) -> Command {
+        let mut command = tool("sh");
+        command.args(["-c", "echo $$ > \"$0/cgroup.procs\" && exec \"$@\""]).arg(&self.folder);
+        command
+    }
+}
+
+impl Drop for Confinement {
+    fn drop(&mut self) {
+        // Its watchdog ends in its own time: an empty group that is left over costs nothing.
+        let _ = std::fs::remove_dir(&self.folder);
     }
 }

@@ -24,6 +24,12 @@ impl Network {
         Self { http: Front::new(camera.http_address()), rtsp: Front::new(camera.rtsp_address()) }
     }
 
+    /// Both lead to another camera from now on.
+    pub fn lead_to(&self, camera: &VirtualCamera) {
+        self.http.lead_to(camera.http_address());
+        self.rtsp.lead_to(camera.rtsp_address());
+    }
+
     /// Where the camera is for who has to pass here.
     pub fn url(&self) -> String {
         format!("http://{}", self.http.address())

@@ -3,13 +3,15 @@
 //! What stands between a camera and its user: the network, and the camera's own power supply.
 
 use std::io::{Read, Write};
-use std::net::{Shutdown, SocketAddr, TcpListener, TcpStream};
+use std::net::{Ipv4Addr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, mpsc};
 use std::thread::JoinHandle;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use socket2::SockRef;
+
+use crate::Chance;
 
 /// What asks for video, by HTTP and by RTSP: with this a client there begins.
 const VIDEO: [&[u8]; 2] = [b"GET /axis-cgi/mjpg/video.cgi", b"OPTIONS rtsp://"];
@@ -23,6 +25,8 @@ pub enum Way {
     Refused,
     /// Connections come about and stay, and nothing passes.
     Stalled,
+    /// Everything passes so late, and up to the second so much later; in order.
+    Late(Duration, Duration),
 }
 
 /// The only way to one port of a camera, for video and PTZ alike.
@@ -34,13 +38,13 @@ pub struct Front {
 
 struct State {
     address: SocketAddr,
-    camera: SocketAddr,
     traffic: Mutex<Traffic>,
     changed: Condvar,
 }
 
 struct Traffic {
     way: Way,
+    camera: SocketAddr,
     streams: Vec<TcpStream>,
     /// Requests for video so far.
     video_requests: u64,
@@ -54,11 +58,21 @@ const PICTURE_BYTES: usize = 4000;
 impl Front {
     /// A way to the port of a camera.
     pub fn new(camera: SocketAddr) -> Self {
-        let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+        Self::at((Ipv4Addr::LOCALHOST, 0), camera)
+    }
+
+    /// The same, that begins at this address; port 0 is a free one.
+    pub fn at(address: impl Into<SocketAddr>, camera: SocketAddr) -> Self {
+        let listener = TcpListener::bind(address.into()).unwrap();
         let address = listener.local_addr().unwrap();
-        let traffic =
-            Mutex::new(Traffic { way: Way::Open, streams: Vec::new(), video_requests: 0, video_bytes: 0 });
-        let state = Arc::new(State { address, camera, traffic, changed: Condvar::new() });
+        let traffic = Mutex::new(Traffic {
+            way: Way::Open,
+            camera,
+            streams: Vec::new(),
+            video_requests: 0,
+            video_bytes: 0,
+        });
+        let state = Arc::new(State { address, traffic, changed: Condvar::new() });
         let listener = Mutex::new(Some(listen(state.clone(), listener)));
         Self { state, listener }
     }
@@ -86,6 +100,12 @@ impl Front {
             let _ = TcpStream::connect(self.state.address);
             let _ = thread.join();
         }
+    }
+
+    /// Leads to another camera from now on; who is connected is reset.
+    pub fn lead_to(&self, camera: SocketAddr) {
+        self.state.traffic.lock().unwrap().camera = camera;
+        self.reset();
     }
 
     /// Requests for video so far.
@@ -148,7 +168,8 @@ fn again(address: SocketAddr) -> TcpListener {
 fn listen(state: Arc<State>, listener: TcpListener) -> JoinHandle<()> {
     std::thread::spawn(move || {
         for client in listener.incoming().map_while(Result::ok) {
-            let camera = TcpStream::connect(state.camera);
+            let camera = state.traffic.lock().unwrap().camera;
+            let camera = TcpStream::connect(camera);
             let mut traffic = state.traffic.lock().unwrap();
             if traffic.way == Way::Refused {
                 return;
@@ -176,18 +197,45 @@ fn clones((from, to): (&TcpStream, &TcpStream)) -> (TcpStream, TcpStream) {
 
 impl State {
     /// `asked`: the number of the connection's newest request for video.
-    fn pass_on(&self, mut from: &TcpStream, mut to: &TcpStream, asked: &AtomicU64) {
+    fn pass_on(self: &Arc<Self>, mut from: &TcpStream, to: &TcpStream, asked: &AtomicU64) {
+        // What is late waits here, so that what comes meanwhile is no later for that.
+        let (sender, waiting) = mpsc::channel::<(Instant, Vec<u8>)>();
+        let writer = to.try_clone().unwrap();
+        let state = self.clone();
+        let writing = std::thread::spawn(move || {
+            for (due, bytes) in waiting {
+                std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                state.wait_until_free();
+                if (&writer).write_all(&bytes).is_err() {
+                    return;
+                }
+            }
+        });
+        let mut chance = Chance::new(0);
         let mut bytes = [0; 16 * 1024];
         while let Ok(read @ 1..) = from.read(&mut bytes) {
             self.count(&bytes[..read], asked);
-            drop(
-                self.changed
-                    .wait_while(self.traffic.lock().unwrap(), |traffic| traffic.way == Way::Stalled)
-                    .unwrap(),
-            );
-            if to.write_all(&bytes[..read]).is_err() {
-                return;
+            self.wait_until_free();
+            let due = Instant::now() + self.late(&mut chance);
+            if sender.send((due, bytes[..read].to_vec())).is_err() {
+                break;
             }
+        }
+        drop(sender);
+        // It panics nowhere; what is still under way arrives.
+        let _ = writing.join();
+    }
+
+    fn wait_until_free(&self) {
+        let traffic = self.traffic.lock().unwrap();
+        drop(self.changed.wait_while(traffic, |traffic| traffic.way == Way::Stalled).unwrap());
+    }
+
+    /// How late what comes now is to be.
+    fn late(&self, chance: &mut Chance) -> Duration {
+        match self.traffic.lock().unwrap().way {
+            Way::Late(at_least, more) => at_least + more.mul_f64(chance.within((0, 1000)) as f64 / 1000.0),
+            Way::Open | Way::Refused | Way::Stalled => Duration::ZERO,
         }
     }
 
@@ -208,6 +256,6 @@ impl State {
 /// A lost connection, not one that ends.
 fn reset(stream: &TcpStream) {
     let socket = SockRef::from(stream);
-    let _ = socket.set_linger(Some(std::time::Duration::ZERO));
+    let _ = socket.set_linger(Some(Duration::ZERO));
     let _ = socket.shutdown(Shutdown::Both);
 }

@@ -50,6 +50,15 @@ pub fn signal(process: u32, name: &str) {
     assert!(status.success());
 }
 
+/// The processes that this one has started, and that run.
+pub fn children_of(process: u32) -> Vec<u32> {
+    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).unwrap().map_while(Result::ok);
+    let children = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
+    children
+        .flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
+        .collect()
+}
+
 /// A running `gst-launch-1.0` (or a script that ends in one) whose output can be waited for.
 pub struct GstLaunch {
     child: Child,

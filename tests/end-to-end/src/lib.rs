@@ -5,10 +5,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 mod broker;
+mod cable;
 mod chance;
 mod disk;
 pub mod following;
 mod front;
+mod in_view;
 mod launch;
 mod pipeline;
 mod program;
@@ -17,10 +19,12 @@ pub mod scene;
 mod watchdog;
 
 pub use broker::Broker;
+pub use cable::Cable;
 pub use chance::Chance;
 pub use disk::Disk;
 pub use front::{Front, Way};
-pub use launch::{GstLaunch, plugin_folder, scratch, signal, tool};
+pub use in_view::InView;
+pub use launch::{GstLaunch, children_of, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::Program;
 pub use recording::pictures_in;

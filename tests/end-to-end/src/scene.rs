@@ -4,7 +4,9 @@
 
 use std::time::{Duration, Instant};
 
-use virtual_camera::{ReceivedCommand, Settings, SyntheticSettings, Video, VirtualCamera, Waypoint, World};
+use virtual_camera::{
+    ReceivedCommand, Settings, Status, SyntheticSettings, Video, VirtualCamera, Waypoint, World,
+};
 
 use crate::PATIENCE;
 
@@ -28,6 +30,14 @@ pub fn walking_person_for(time: Duration) -> Settings {
     }
     path.dedup_by_key(|point| point.time);
     world(path)
+}
+
+/// A camera before a person who walks up and down in its first view.
+pub fn near_person() -> Settings {
+    let ends = [(0, -12.0), (5, 12.0)];
+    let lap = |lap: u64| ends.map(|(seconds, pan_deg)| (10 * lap + seconds, pan_deg));
+    let point = |(seconds, pan_deg)| Waypoint { time: Duration::from_secs(seconds), pan_deg, tilt_deg: -2.0 };
+    world((0..60).flat_map(lap).map(point).collect())
 }
 
 /// A camera before a person who stands still, whom nobody notices who looks for what moves.
@@ -83,6 +93,13 @@ pub fn follow(camera: &VirtualCamera) -> String {
     format!("{} ! bgavgdetect ! lkfeaturetrack ! {}", mjpeg(camera), servo(camera))
 }
 
+/// The same by ONVIF.
+pub fn follow_onvif(camera: &VirtualCamera) -> String {
+    let location = camera.onvif_url().unwrap_or_else(|| camera.url());
+    let servo = format!("onvifptzsink location={location} user={USER} password={PASSWORD}");
+    format!("{} ! bgavgdetect ! lkfeaturetrack ! {servo}", mjpeg(camera))
+}
+
 /// Between two looks at the camera.
 const MOMENT: Duration = Duration::from_millis(100);
 
@@ -110,6 +127,28 @@ pub fn left_at_rest(camera: &VirtualCamera, patience: Duration) -> bool {
         }
         if Instant::now() >= end {
             return false;
+        }
+    }
+}
+
+/// A camera that rested for so long rests: longer than a lease lasts.
+const SETTLED: Duration = Duration::from_secs(3);
+/// A camera that still turns after this is not stopped.
+const LIMIT: Duration = Duration::from_secs(10);
+
+/// How long after this moment the camera came to rest, and stayed so; `None` where it did not.
+pub fn rests(camera: &VirtualCamera, since: Duration) -> Option<Duration> {
+    let moving = |status: &Status| status.moving;
+    loop {
+        if !camera.wait_for(LIMIT, |status| !moving(status)) {
+            return None;
+        }
+        let rested = camera.now();
+        if !camera.wait_for(SETTLED, moving) {
+            return Some(rested.saturating_sub(since));
+        }
+        if rested > since + LIMIT {
+            return None;
         }
     }
 }

@@ -302,6 +302,7 @@ impl TryFrom<Options> for Settings {
                 size: options.size,
                 frame_rate: options.fps,
                 compression: options.compression,
+                h264_profile: Video::default().h264_profile,
                 delay: milliseconds(options.video_delay),
                 exposure: milliseconds(options.exposure),
                 jitter: milliseconds(options.video_jitter),

@@ -149,6 +149,8 @@ pub struct Video {
     pub frame_rate: Option<f64>,
     /// VAPIX compression, 0 (best picture) to 100.
     pub compression: u32,
+    /// Profile of its H.264.
+    pub h264_profile: &'static str,
     /// From light on the sensor to data on the wire.
     pub delay: Duration,
     /// By how much more, at most, pictures come late; that changes twice a second.
@@ -203,6 +205,7 @@ impl Default for Video {
             size: None,
             frame_rate: None,
             compression: 30,
+            h264_profile: "constrained-baseline",
             delay: Duration::from_millis(100),
             jitter: Duration::ZERO,
             stall: None,

@@ -21,6 +21,7 @@ pub(crate) struct Wish {
     pub size: (u32, u32),
     pub frame_rate: f64,
     pub compression: u32,
+    pub h264_profile: &'static str,
 }
 
 impl Wish {
@@ -30,6 +31,7 @@ impl Wish {
             size: camera.world.view_size(),
             frame_rate: camera.frame_rate(),
             compression: camera.settings.video.compression,
+            h264_profile: camera.settings.video.h264_profile,
         };
         if let Some(size) = argument(args, "resolution", parse_size)? {
             wish.size = size;

@@ -32,6 +32,9 @@ impl FrozenPictureDetector {
         self.sent_off.get_or_insert(at);
     }
 
+    /// Whoever turns round, late as commands may be, rests for a shorter moment.
+    const LONGER_THAN: Duration = Duration::from_millis(300);
+
     /// Takes a picture `fov_deg` wide, and the rates that the camera was told.
     pub fn see(&mut self, picture: &Measurement, fov_deg: f64, history: &CommandHistory, delays: &Delays) {
         let Some(unchanged_for) = picture.unchanged_for else { return };
@@ -44,8 +47,8 @@ impl FrozenPictureDetector {
             turn.largest() >= Self::SEEN_FIELDS * fov_deg
         };
         let mut delays = (0..).map(|step| Self::STEP * step).take_while(|delay| *delay <= shown_after);
-        let has_moved =
-            self.sent_off.is_some_and(|sent| taken_at >= sent + shown_after) || delays.all(turned);
+        let has_moved = self.sent_off.is_some_and(|sent| taken_at >= sent + shown_after)
+            || unchanged_for > Self::LONGER_THAN && delays.all(turned);
         // Once frozen it stays so until something changes.
         self.frozen = !unchanged_for.is_zero() && (self.frozen || has_moved);
     }
@@ -89,7 +92,7 @@ mod tests {
     fn a_picture_that_stays_the_same_while_the_camera_turns_is_noticed_within_two_seconds() {
         assert_eq!(noticed(20.0, 0, &delays(200)), Some(1320));
         assert_eq!(noticed(3.0, 0, &delays(200)), Some(1960));
-        assert_eq!(noticed(-20.0, 3000, &delays(200)), Some(2120), "while it turned already");
+        assert_eq!(noticed(-20.0, 3000, &delays(200)), Some(2320), "while it turned already");
     }
 
     #[test]

@@ -7,6 +7,8 @@
 //! `application cycle URL USER N`: starts and stops N times, with the caps changing mid-stream each time.
 //! `application fork URL USER`: follows with the camera; when it first moves, forks a child, which keeps everything open.
 //! `application reap URL USER`: follows with the camera, and has the system reap all children before anybody can wait for them.
+//! `application hoard URL USER`: the same, but takes all memory that it can get.
+//! `application hang URL USER`: the same, but its streaming thread waits for ever.
 //! The password is read from the environment variable `CAMERA_PASSWORD`.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -35,12 +37,14 @@ fn main() {
                 run(&pipeline);
             }
         }
-        ["fork", url, user] => follow(url, user, fork),
+        ["fork", url, user] => follow(url, user, |_| fork()),
         ["reap", url, user] => {
             // SAFETY: no code of ours runs on a signal.
             unsafe { libc::signal(libc::SIGCHLD, libc::SIG_IGN) };
-            follow(url, user, || println!("moving"));
+            follow(url, user, |_| println!("moving"));
         }
+        ["hoard", url, user] => follow(url, user, hoard),
+        ["hang", url, user] => follow(url, user, hang),
         _ => panic!("what is to be done? {arguments:?}"),
     }
     // SAFETY: nothing of GStreamer is used after this; it lets the leak tracer report.
@@ -62,7 +66,7 @@ fn pipeline(source: &gst::Element, url: &str, user: &str) -> gst::Pipeline {
 }
 
 /// Follows for ever, and does something when the camera first moves.
-fn follow(url: &str, user: &str, first_move: impl FnOnce()) {
+fn follow(url: &str, user: &str, first_move: impl FnOnce(&gst::Pipeline)) {
     let pipeline = pipeline(&camera_source(url, user), url, user);
     pipeline.set_state(gst::State::Playing).unwrap();
     let bus = pipeline.bus().unwrap();
@@ -74,7 +78,7 @@ fn follow(url: &str, user: &str, first_move: impl FnOnce()) {
     for message in bus.iter_timed(gst::ClockTime::NONE) {
         assert_ne!(message.type_(), gst::MessageType::Error, "{message:?}");
         if let Some(first_move) = first_move.take_if(|_| moves(&message)) {
-            first_move();
+            first_move(&pipeline);
         }
     }
 }
@@ -89,6 +93,24 @@ fn fork() {
         },
         child => println!("child {child}"),
     }
+}
+
+/// Takes a gibibyte of memory, and is to be killed for that.
+fn hoard(_: &gst::Pipeline) {
+    println!("dying");
+    let hoard: Vec<_> = (0..64).map(|_| vec![1u8; 16 << 20]).collect();
+    println!("alive with {} pieces", hoard.len());
+}
+
+/// No picture comes through any more.
+fn hang(pipeline: &gst::Pipeline) {
+    let source = pipeline.by_name("newest").and_then(|queue| queue.static_pad("src")).unwrap();
+    source.add_probe(gst::PadProbeType::BUFFER, |_, _| {
+        println!("dying");
+        loop {
+            std::thread::park();
+        }
+    });
 }
 
 /// The camera's pictures.

@@ -33,9 +33,10 @@ impl Codec {
         let encoder = match self {
             Self::H264 => format!(
                 "x264enc tune=zerolatency sliced-threads=false threads=1 speed-preset=ultrafast key-int-max={} bitrate={} \
-                 ! video/x-h264,profile=constrained-baseline ! rtph264pay config-interval=-1 pt=96",
+                 ! video/x-h264,profile={} ! rtph264pay config-interval=-1 pt=96",
                 Self::key_interval(wish),
-                Self::bits_per_second(wish) / 1000
+                Self::bits_per_second(wish) / 1000,
+                wish.h264_profile
             ),
             Self::H265 => format!(
                 "x265enc tune=zerolatency speed-preset=ultrafast key-int-max={} bitrate={} option-string=pools=1:frame-threads=1:log-level=error \

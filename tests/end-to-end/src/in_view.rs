@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Whether who is followed is in the camera's view.
+
+use std::thread;
+use std::time::Duration;
+
+use virtual_camera::VirtualCamera;
+
+/// Between two looks.
+const LOOK: Duration = Duration::from_millis(40);
+
+/// What was seen of somebody for a while.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct InView {
+    /// Part of the time that they were in view.
+    pub share: f64,
+    /// The longest time that they were not.
+    pub longest_out: Duration,
+    /// How fast the camera turned at most meanwhile, °/s.
+    pub fastest_deg_s: f64,
+}
+
+impl InView {
+    /// Looks at the only person before a camera for so long.
+    pub fn watch(camera: &VirtualCamera, time: Duration) -> Self {
+        let (begin, size) = (camera.now(), camera.view_size());
+        let (mut seen, mut looks, mut last_seen, mut found) = (0u32, 0u32, begin, Self::default());
+        while camera.now() < begin + time {
+            // The newest picture of which everything is known.
+            let now = camera.now();
+            let people = camera.ground_truth(now.saturating_sub(camera.video_delay()), size);
+            if people.first().is_some_and(|person| person.in_view > 0.5) {
+                (seen, last_seen) = (seen + 1, now);
+            }
+            looks += 1;
+            found.longest_out = found.longest_out.max(now - last_seen);
+            let status = camera.status();
+            let rate = status.pan_rate_deg_s.hypot(status.tilt_rate_deg_s);
+            found.fastest_deg_s = found.fastest_deg_s.max(rate);
+            thread::sleep(LOOK);
+        }
+        found.share = f64::from(seen) / f64::from(looks.max(1));
+        found
+    }
+}
