@@ -147,6 +147,11 @@ impl Servo {
         self.frozen_picture.is_frozen()
     }
 
+    /// The camera does not answer: what it does, nobody knows.
+    pub fn out_of_touch(&mut self, now: Time) {
+        self.frozen_picture.out_of_touch(now);
+    }
+
     /// Whether the picture stayed the same though the camera was told to turn.
     pub fn is_picture_frozen(&self) -> bool {
         self.frozen_picture.is_frozen()

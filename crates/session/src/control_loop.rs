@@ -94,6 +94,9 @@ impl ControlLoop {
         self.session.see_background(shown, measurement.taken_at, now);
         let actuator = self.session.actuator(now);
         let overtakes = self.servo.is_behind();
+        if !self.session.is_connected() {
+            self.servo.out_of_touch(now);
+        }
         let was_frozen = self.servo.is_picture_frozen();
         let gain_scale = self.servo.measure(measurement, &actuator, now);
         match (was_frozen, self.servo.is_picture_frozen()) {

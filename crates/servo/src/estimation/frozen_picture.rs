@@ -13,6 +13,8 @@ pub struct FrozenPictureDetector {
     frozen: bool,
     /// When the camera was first sent to a position since the picture changed.
     sent_off: Option<Time>,
+    /// When the camera last did not answer.
+    out_of_touch: Option<Time>,
 }
 
 impl FrozenPictureDetector {
@@ -27,13 +29,18 @@ impl FrozenPictureDetector {
     const SEEN_FIELDS: f64 = 0.04;
     const WITHIN: Duration = Duration::from_millis(800);
 
+    /// Whoever turns round, late as commands may be, rests for a shorter moment.
+    const LONGER_THAN: Duration = Duration::from_millis(300);
+
     /// The camera was told then to go to a position.
     pub fn sent_off(&mut self, at: Time) {
         self.sent_off.get_or_insert(at);
     }
 
-    /// Whoever turns round, late as commands may be, rests for a shorter moment.
-    const LONGER_THAN: Duration = Duration::from_millis(300);
+    /// The camera does not answer: whether it goes on as it was told last, nobody knows.
+    pub fn out_of_touch(&mut self, at: Time) {
+        self.out_of_touch = Some(at);
+    }
 
     /// Takes a picture `fov_deg` wide, and the rates that the camera was told.
     pub fn see(&mut self, picture: &Measurement, fov_deg: f64, history: &CommandHistory, delays: &Delays) {
@@ -42,6 +49,10 @@ impl FrozenPictureDetector {
         let (taken_at, unchanged_since) = (picture.taken_at, picture.taken_at - unchanged_for);
         self.sent_off = self.sent_off.filter(|sent| *sent >= unchanged_since);
         let since = unchanged_since.max(taken_at - Self::WITHIN);
+        if self.out_of_touch.is_some_and(|at| at >= taken_at - Self::WITHIN - shown_after) {
+            self.frozen &= !unchanged_for.is_zero();
+            return;
+        }
         let turned = |delay| {
             let turn = history.rotation(since - delay, taken_at - delay);
             turn.largest() >= Self::SEEN_FIELDS * fov_deg
@@ -101,6 +112,26 @@ mod tests {
         assert_eq!(noticed(2.0, 0, &delays(200)), None, "some cameras do not turn so slowly");
         assert_eq!(noticed(0.0, 0, &delays(200)), None);
         assert_eq!(noticed(20.0, 6000, &delays(200)), None);
+    }
+
+    /// It may be at the end of its range by now, or have stopped by itself.
+    #[test]
+    fn what_a_camera_does_that_does_not_answer_tells_nothing() {
+        let (mut detector, mut history) = (FrozenPictureDetector::default(), CommandHistory::default());
+        history.push(ms(0), PanTilt::new(20.0, 0.0));
+        let mut noticed = |at: u64, answers: bool| {
+            if !answers {
+                detector.out_of_touch(ms(at));
+            }
+            let unchanged_for = Some(ms::<Duration>(at - 1000));
+            let picture = Measurement { unchanged_for, ..Measurement::at(0.9, 0.5, ms(at)) };
+            detector.see(&picture, FOV_DEG, &history, &delays(200));
+            detector.is_frozen()
+        };
+        let pictures = |from: u64, to: u64| (from / 40..to / 40).map(|picture| 40 * picture);
+        assert!(!pictures(1000, 5000).any(|at| noticed(at, false)));
+        assert!(!pictures(5000, 6900).any(|at| noticed(at, true)), "nor what it did a moment before");
+        assert!(pictures(6900, 7100).any(|at| noticed(at, true)));
     }
 
     #[test]
