@@ -6,6 +6,8 @@ use opencv::core::{self, Mat, Point2f, Rect};
 use opencv::imgproc;
 use opencv::prelude::*;
 
+use crate::vision::Luma;
+
 /// Cells of the grid along the longer side of the picture.
 const CELLS: i32 = 10;
 /// Side of the window that the gradients are summed over.
@@ -27,8 +29,8 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    pub fn of(picture: &Mat) -> Self {
-        let (width, height) = (picture.cols(), picture.rows());
+    pub fn of(luma: &Luma) -> Self {
+        let (width, height) = (luma.width() as i32, luma.height() as i32);
         Self { width, height, side: (width.max(height) + CELLS - 1) / CELLS }
     }
 
@@ -90,13 +92,15 @@ pub(super) fn noise(corners: &[Corner]) -> f64 {
 }
 
 /// The best corner of a cell; `None` where the cell is too small for one.
-pub(super) fn best(picture: &Mat, grid: Grid, cell: usize) -> opencv::Result<Option<Corner>> {
+pub(super) fn best(luma: &Luma, grid: Grid, cell: usize) -> opencv::Result<Option<Corner>> {
     let bounds = grid.bounds(cell);
     if bounds.width < BLOCK || bounds.height < BLOCK {
         return Ok(None);
     }
     let mut eigenvalues = Mat::default();
-    imgproc::corner_min_eigen_val(&picture.roi(bounds)?, &mut eigenvalues, BLOCK, 3, core::BORDER_DEFAULT)?;
+    luma.with_mat(|picture| {
+        imgproc::corner_min_eigen_val(&picture.roi(bounds)?, &mut eigenvalues, BLOCK, 3, core::BORDER_DEFAULT)
+    })?;
     let (mut eigenvalue, mut place) = (0.0, core::Point::default());
     core::min_max_loc(&eigenvalues, None, Some(&mut eigenvalue), None, Some(&mut place), &core::no_array())?;
     let mean = core::mean_def(&eigenvalues)?[0];

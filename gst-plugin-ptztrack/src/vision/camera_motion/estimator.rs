@@ -5,7 +5,8 @@ use ptztrack_contract::{CameraMotion, Homography, Point};
 
 use super::corners::{self, Corner, Grid};
 use super::fit::{self, Agreement, Centred, Fit, Pair};
-use super::flow::{self, Pyramid};
+use super::flow;
+use super::lucas_kanade::{Pyramid, Template};
 use crate::vision::Luma;
 
 /// Farther than this many pixels from the key picture, anywhere in the picture, the next picture becomes the
@@ -21,17 +22,27 @@ const NEW_WEIGHT: f64 = 0.5;
 const FOREGROUND_WEIGHT: f64 = 0.1;
 
 /// A point that is followed from the key picture on.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug)]
 struct Tracked {
     /// In the key picture, pixels.
     place: Point2f,
+    /// What it looks like there.
+    template: Template,
     /// Belief that it is background: 1 for sure.
     weight: f64,
 }
 
 impl Tracked {
-    fn new(corner: &Corner) -> Self {
-        Self { place: corner.place, weight: NEW_WEIGHT }
+    /// With memory for what it looks like.
+    fn new(corner: &Corner, pyramid: &Pyramid, template: Template) -> Self {
+        let mut point = Self { place: corner.place, template, weight: NEW_WEIGHT };
+        point.look(pyramid);
+        point
+    }
+
+    /// Takes what is at its place for what it looks like.
+    fn look(&mut self, pyramid: &Pyramid) {
+        flow::take(&mut self.template, pyramid, self.place);
     }
 }
 
@@ -39,12 +50,14 @@ impl Tracked {
 /// errors add up.
 #[derive(Debug)]
 struct Key {
-    pyramid: Pyramid,
+    grid: Grid,
     points: Vec<Tracked>,
     /// From it to the last picture, pixels.
     to_last: Homography,
     /// Eigenvalue up to which a corner may be noise.
     noise: f64,
+    /// Memory: of points that were given up.
+    spare: Vec<Template>,
 }
 
 /// What one picture says of the key picture's points; kept as memory for the next.
@@ -65,6 +78,8 @@ struct Comparison {
 #[derive(Debug, Default)]
 pub struct CameraMotionEstimator {
     key: Option<Key>,
+    /// Of the last picture; memory for the next.
+    pyramid: Pyramid,
     /// Motion of the last picture, pixels: the camera goes on as it did.
     last: Homography,
     comparison: Comparison,
@@ -86,11 +101,12 @@ impl CameraMotionEstimator {
         expected: Option<Homography>,
     ) -> opencv::Result<Option<CameraMotion>> {
         let size = (luma.width() as f64, luma.height() as f64);
-        let pyramid = luma.with_mat(Pyramid::of)?;
-        let grid = Grid::of(&pyramid.picture()?);
-        let Some(mut key) = self.key.take().filter(|key| key.grid() == Some(grid)) else {
+        flow::fill(&mut self.pyramid, luma);
+        let pyramid = &self.pyramid;
+        let grid = Grid::of(luma);
+        let Some(mut key) = self.key.take().filter(|key| key.grid == grid) else {
             self.last = Homography::IDENTITY;
-            self.key = Some(Key::first(pyramid, grid)?);
+            self.key = Some(Key::first(luma, pyramid, grid)?);
             return Ok(None);
         };
         if let Some(foreground) = foreground {
@@ -99,13 +115,13 @@ impl CameraMotionEstimator {
         let told = expected.map(|motion| to_pixels(&motion, size));
         let guesses = [Some(self.last), told, Some(Homography::IDENTITY)].into_iter().flatten();
         let comparison = &mut self.comparison;
-        let Some(fit) = key.compare(&pyramid, guesses, Centred::of(size.0, size.1), comparison)? else {
+        let Some(fit) = key.compare(pyramid, guesses, Centred::of(size.0, size.1), comparison) else {
             self.last = Homography::IDENTITY;
-            self.key = Some(Key::first(pyramid, grid)?);
+            self.key = Some(Key::first(luma, pyramid, grid)?);
             return Ok(None);
         };
         let Some(back) = key.to_last.inverse() else {
-            self.key = Some(Key::first(pyramid, grid)?);
+            self.key = Some(Key::first(luma, pyramid, grid)?);
             return Ok(None);
         };
         self.last = back.then(&fit.homography);
@@ -119,38 +135,36 @@ impl CameraMotionEstimator {
             ],
             inliers: u32::try_from(inliers).unwrap_or(u32::MAX),
         };
-        self.key = Some(key.next(pyramid, grid, &fit, comparison)?);
+        self.key = Some(key.next(luma, pyramid, &fit, comparison)?);
         Ok(Some(motion))
     }
 }
 
 impl Key {
-    fn first(pyramid: Pyramid, grid: Grid) -> opencv::Result<Self> {
-        let picture = pyramid.picture()?;
+    fn first(luma: &Luma, pyramid: &Pyramid, grid: Grid) -> opencv::Result<Self> {
         let mut corners = Vec::new();
         for cell in 0..grid.cells() {
-            corners.extend(corners::best(&picture, grid, cell)?);
+            corners.extend(corners::best(luma, grid, cell)?);
         }
         let noise = corners::noise(&corners);
-        let points = corners.iter().filter(|corner| corner.stands_out(noise)).map(Tracked::new).collect();
-        Ok(Self { pyramid, points, to_last: Homography::IDENTITY, noise })
-    }
-
-    fn grid(&self) -> Option<Grid> {
-        self.pyramid.picture().ok().map(|picture| Grid::of(&picture))
+        let good = corners.iter().filter(|corner| corner.stands_out(noise));
+        let points = good.map(|corner| Tracked::new(corner, pyramid, Template::default())).collect();
+        Ok(Self { grid, points, to_last: Homography::IDENTITY, noise, spare: Vec::new() })
     }
 
     /// Finds corners in some of the cells that are not `taken`.
-    fn top_up(&mut self, grid: Grid, taken: &[bool]) -> opencv::Result<()> {
-        let picture = self.pyramid.picture()?;
+    fn top_up(&mut self, luma: &Luma, pyramid: &Pyramid, taken: &[bool]) -> opencv::Result<()> {
+        let grid = self.grid;
         // Another few each time: in some cells there is nothing to find.
         let free = (0..grid.cells()).filter(|cell| !taken[*cell]);
         let count = free.clone().count();
         let start = self.points.first().map_or(0, |point| point.place.x as usize) % count.max(1);
         for cell in free.cycle().skip(start).take(TOP_UP.min(count)) {
-            let corner = corners::best(&picture, grid, cell)?;
-            self.points
-                .extend(corner.filter(|corner| corner.stands_out(self.noise)).as_ref().map(Tracked::new));
+            let corner = corners::best(luma, grid, cell)?.filter(|corner| corner.stands_out(self.noise));
+            if let Some(corner) = corner {
+                let template = self.spare.pop().unwrap_or_default();
+                self.points.push(Tracked::new(&corner, pyramid, template));
+            }
         }
         Ok(())
     }
@@ -175,28 +189,29 @@ impl Key {
         guesses: impl Iterator<Item = Homography> + Clone,
         centred: Centred,
         Comparison { ends, pairs, agreement, .. }: &mut Comparison,
-    ) -> opencv::Result<Option<Fit>> {
-        let places = self.points.iter().map(|point| point.place);
+    ) -> Option<Fit> {
         let from_key = guesses.map(|motion| self.to_last.then(&motion));
         for guess in from_key.clone() {
-            let guesses = places.clone().map(|place| fit::apply(&guess, place));
-            flow::follow(&self.pyramid, pyramid, places.clone(), guesses, ends)?;
+            let found =
+                |point: &Tracked| flow::follow(&point.template, pyramid, fit::apply(&guess, point.place));
+            ends.clear();
+            ends.extend(self.points.iter().map(found));
             pairs.clear();
             pairs.extend(self.points.iter().zip(&*ends).filter_map(|(point, end)| {
                 Some(Pair { from: point.place, to: (*end)?, weight: point.weight })
             }));
             if let Some(fit) = fit::fit(pairs, from_key.clone(), centred, agreement) {
-                return Ok(Some(fit));
+                return Some(fit);
             }
         }
-        Ok(None)
+        None
     }
 
-    /// What the picture after `pyramid` is compared with.
+    /// What the picture after this one is compared with.
     fn next(
         mut self,
-        pyramid: Pyramid,
-        grid: Grid,
+        luma: &Luma,
+        pyramid: &Pyramid,
         fit: &Fit,
         Comparison { ends, agreement, taken, .. }: &mut Comparison,
     ) -> opencv::Result<Self> {
@@ -204,6 +219,7 @@ impl Key {
         for ((point, _), &agrees) in found.zip(&agreement.agrees) {
             point.weight += 0.3 * (f64::from(u8::from(agrees)) - point.weight);
         }
+        let grid = self.grid;
         let near = travel(&fit.homography, grid) <= MAX_TRAVEL;
         if near && agreement.count() as f64 >= MIN_AGREEING * self.points.len() as f64 {
             self.to_last = fit.homography;
@@ -212,15 +228,23 @@ impl Key {
         taken.clear();
         taken.resize(grid.cells(), false);
         let (mut ends, mut agrees) = (ends.iter(), agreement.agrees.iter());
+        let spare = &mut self.spare;
         self.points.retain_mut(|point| {
-            let Some(place) = ends.next().copied().flatten() else { return false };
-            let agrees = agrees.next().is_some_and(|agrees| *agrees);
-            let Some(cell) = grid.cell(place).filter(|_| agrees) else { return false };
-            point.place = place;
-            !std::mem::replace(&mut taken[cell], true)
+            let place = ends.next().copied().flatten();
+            let agrees = place.is_some() && agrees.next().is_some_and(|agrees| *agrees);
+            let cell = place.filter(|_| agrees).and_then(|place| Some((place, grid.cell(place)?)));
+            let kept = cell.filter(|(_, cell)| !std::mem::replace(&mut taken[*cell], true));
+            match kept {
+                Some((place, _)) => {
+                    point.place = place;
+                    point.look(pyramid);
+                }
+                None => spare.push(std::mem::take(&mut point.template)),
+            }
+            kept.is_some()
         });
-        (self.pyramid, self.to_last) = (pyramid, Homography::IDENTITY);
-        self.top_up(grid, taken)?;
+        self.to_last = Homography::IDENTITY;
+        self.top_up(luma, pyramid, taken)?;
         Ok(self)
     }
 }

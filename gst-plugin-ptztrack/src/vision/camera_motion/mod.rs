@@ -5,13 +5,14 @@
 //! | step | file |
 //! |---|---|
 //! | corners, one in each cell of a grid, topped up where they were lost | `corners` |
-//! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow` |
+//! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow`, `lucas_kanade` |
 //! | the motion that most of them share, and how well it is known | `fit` |
 
 mod corners;
 mod estimator;
 mod fit;
 mod flow;
+mod lucas_kanade;
 
 pub use estimator::CameraMotionEstimator;
 pub(super) use estimator::{displacement, to_pixels};

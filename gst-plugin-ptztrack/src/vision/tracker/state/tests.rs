@@ -352,7 +352,7 @@ fn whoever_walks_while_hidden_does_not_stand() {
     let tracker = Tracker::new(Config { limits, coast_s: 3.0, ..config() });
     let mut chain = Chain { scene: SceneModel::default(), tracker };
     let nobody = street((0.0, 0.0), &[]);
-    for _ in 0..10 {
+    for _ in 0..30 {
         step(&mut chain, &nobody);
     }
     let mut stand = |seconds: f64, x: f32| {

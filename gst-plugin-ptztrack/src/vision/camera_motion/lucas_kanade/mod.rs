@@ -1,0 +1,26 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Sparse pyramidal Lucas-Kanade (thesis 3.5.2, equations 3.8 to 3.11; Bouguet, "Pyramidal implementation of the Lucas Kanade feature
+//! tracker", 2000), as OpenCV's `calcOpticalFlowPyrLK` does it.
+//!
+//! What a point looks like in the first picture, its [`Template`], is worked out once, however many pictures it is looked for in;
+//! OpenCV works out the gradients of the whole first picture, and of each point, for every picture anew. Tests hold it against OpenCV.
+
+mod kernels;
+mod pyramid;
+mod template;
+
+#[cfg(test)]
+mod tests;
+
+pub(super) use pyramid::Pyramid;
+#[cfg(test)]
+use template::Found;
+pub(super) use template::{Precision, Template};
+
+/// Longest side of a window, pixels.
+pub(super) const MAX_SIDE: usize = 31;
+/// Numbers that the kernels work on at once.
+const LANES: usize = 8;
+/// Room for a row of the largest window, with its neighbours on both sides.
+const MAX_ROW: usize = (MAX_SIDE + 2).next_multiple_of(LANES) + LANES;
