@@ -106,9 +106,13 @@ impl Pooled {
         self.gather(model, picture, spans, (across, down));
         self.find_light(across, down);
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
-        for (index, cell) in self.cells.iter_mut().enumerate() {
-            let light = self.light[index / across / TILE * across.div_ceil(TILE) + index % across / TILE];
-            cell.z = if cell.off.is_nan() { 0.0 } else { (cell.off - light) / noise.0[cell.bin] };
+        for (y, row) in self.cells.chunks_exact_mut(across.max(1)).enumerate() {
+            let light = &self.light[y / TILE * across.div_ceil(TILE)..];
+            for (cells, light) in row.chunks_mut(TILE).zip(light) {
+                for cell in cells {
+                    cell.z = if cell.off.is_nan() { 0.0 } else { (cell.off - light) / noise.0[cell.bin] };
+                }
+            }
         }
         noise.learn(&self.cells);
         self.forget_shadows(across);
@@ -136,7 +140,7 @@ impl Pooled {
                     );
                 }
             }
-            self.cells.extend((0..across).map(|x| self.columns.cell(x)));
+            self.cells.extend(self.columns.cells().take(across));
         }
     }
 
@@ -199,8 +203,12 @@ impl Pooled {
     fn mark(&self, model: &mut Model, across: usize) {
         let limit = EVEN.sqrt();
         let tells = |cell: &Cell| cell.z.abs() >= limit;
-        let rows = || self.cells.chunks_exact(across);
+        let rows = || self.cells.chunks_exact(across.max(1));
         for (y, (upper, lower)) in rows().zip(rows().skip(1)).enumerate() {
+            // Most rows tell of nobody.
+            if !upper.iter().chain(lower).any(tells) {
+                continue;
+            }
             for x in (0..across.saturating_sub(1))
                 .filter(|&x| upper[x..x + 2].iter().chain(&lower[x..x + 2]).any(tells))
             {
@@ -256,18 +264,26 @@ impl Columns {
         );
     }
 
-    /// The cell of that number in the row.
-    fn cell(&self, x: usize) -> Cell {
-        let part = x * CELL..(x + 1) * CELL;
-        let sum = |plane: &[u16]| plane.iter().sum::<u16>();
-        let known = sum(&self.known[part.clone()]);
+    /// The cells of the row.
+    fn cells(&self) -> impl Iterator<Item = Cell> {
+        let off = self.off.as_chunks::<CELL>().0.iter();
+        let counts =
+            [&self.texture, &self.known, &self.plain].map(|plane| plane.as_chunks::<CELL>().0.iter());
+        let [texture, known, plain] = counts.map(|plane| plane.map(|cell| cell.iter().sum::<u16>()));
+        let sums = off.map(|cell| cell.iter().sum::<i32>()).zip(texture).zip(known.zip(plain));
+        sums.map(|((off, texture), (known, plain))| Cell::of(off, texture, known, plain))
+    }
+}
+
+impl Cell {
+    /// From the sums of differences (8.8) and textures of its `known` pixels, and how many there are, and how many are `plain` foreground.
+    fn of(off: i32, texture: u16, known: u16, plain: u16) -> Self {
         if known < LEAST_KNOWN {
-            let is_plain = sum(&self.plain[part]) >= LEAST_KNOWN;
-            return Cell { off: f32::NAN, is_plain, ..Cell::default() };
+            return Self { off: f32::NAN, is_plain: plain >= LEAST_KNOWN, ..Self::default() };
         }
-        let off = self.off[part.clone()].iter().sum::<i32>() as f32 / (256.0 * f32::from(known));
-        let texture = f32::from(sum(&self.texture[part])) / f32::from(known);
-        Cell { off, bin: ((texture / BIN) as usize).min(BINS - 1), z: 0.0, is_plain: false }
+        let texture = f32::from(texture) / f32::from(known);
+        let bin = ((texture / BIN) as usize).min(BINS - 1);
+        Self { off: off as f32 / (256.0 * f32::from(known)), bin, z: 0.0, is_plain: false }
     }
 }
 
