@@ -159,7 +159,7 @@ fuzz: packages-build
 prove: export DURATION := 600
 prove: packages-test
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
-	@scripts/install-packages systemd
+	@scripts/install-packages iproute2 systemd
 	$(CARGO) build --workspace --all-targets
 	INPUTS=$(INPUTS) scripts/prove $(CHECKS)
 
