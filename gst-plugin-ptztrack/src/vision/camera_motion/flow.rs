@@ -11,7 +11,7 @@ use crate::vision::Luma;
 const WINDOW: usize = 13;
 /// Halvings of the picture: the coarsest level sees motions of half its window, 8 times as large here.
 const HALVINGS: usize = 3;
-const PRECISION: Precision = Precision { steps: 15, step: 0.02, eigenvalue: 0.1 };
+const PRECISION: Precision = Precision { steps: 15, step: 0.02 };
 /// Mean absolute difference of the two windows, grey levels, above which a point is lost. Generous: what does
 /// not fit the others is sorted out by the fit, and blur changes looks.
 const MAX_RESIDUAL: f32 = 24.0;

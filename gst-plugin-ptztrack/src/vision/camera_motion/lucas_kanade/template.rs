@@ -7,6 +7,8 @@ use super::pyramid::{Level, Pyramid};
 
 /// Steps closer together than this, there and back, are one place, pixels.
 const TO_AND_FRO: f32 = 0.01;
+/// Smaller eigenvalue of the gradient matrix below which (3.11) is not worth solving, squared grey levels per pixel: OpenCV's 1e-4.
+const MIN_EIGENVALUE: f32 = 0.1;
 
 /// When a level is left for the next finer one.
 #[derive(Debug, Clone, Copy)]
@@ -15,8 +17,6 @@ pub(in super::super) struct Precision {
     pub steps: usize,
     /// ... or when one is no longer than so many pixels.
     pub step: f32,
-    /// Smaller eigenvalue of the gradient matrix below which (3.11) is not worth solving, squared grey levels per pixel.
-    pub eigenvalue: f32,
 }
 
 impl Precision {
@@ -37,28 +37,12 @@ pub(in super::super) struct Found {
 /// What is around a point, at every level of a pyramid; kept as memory for another.
 #[derive(Debug, Default)]
 pub(in super::super) struct Template {
-    windows: Vec<Window>,
+    /// Inverse of the gradient matrix G at each level, per pixel (3.11): its upper triangle; `None` where that is not worth solving, or
+    /// the point lies outside.
+    inverses: Vec<Option<[f32; 3]>>,
     /// Rows of all windows: what is known, and its gradients; see [`kernels`].
     rows: Vec<i16>,
     side: usize,
-}
-
-/// What is around a point at one level.
-#[derive(Debug, Clone, Copy)]
-struct Window {
-    /// Upper triangle of the gradient matrix G, per pixel (3.11); `None` where the point lies outside.
-    matrix: Option<[f32; 3]>,
-}
-
-impl Window {
-    /// The inverse of its matrix, if that is worth anything.
-    fn inverse(self, eigenvalue: f32) -> Option<[f32; 3]> {
-        let [xx, xy, yy] = self.matrix?;
-        let smaller = 0.5 * (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
-        let determinant = xx * yy - xy * xy;
-        (smaller >= eigenvalue && determinant > f32::EPSILON)
-            .then(|| [yy / determinant, -xy / determinant, xx / determinant])
-    }
 }
 
 impl Template {
@@ -67,7 +51,7 @@ impl Template {
         self.side = side;
         let length = side * kernels::row_length(side);
         self.rows.resize(from.levels().len() * length, 0);
-        self.windows.clear();
+        self.inverses.clear();
         for ((index, level), rows) in from.levels().iter().enumerate().zip(self.rows.chunks_exact_mut(length))
         {
             let first = first_pixel(point * scale(index), side);
@@ -75,7 +59,7 @@ impl Template {
                 let inside = (inside(x, level.width), inside(y, level.height));
                 kernels::take(level.from(x - 1, y - 1), level.stride(), part, inside, side, rows)
             });
-            self.windows.push(Window { matrix });
+            self.inverses.push(matrix.and_then(inverse));
         }
     }
 
@@ -83,11 +67,10 @@ impl Template {
     pub fn follow(&self, to: &Pyramid, guess: Point2f, precision: Precision) -> Option<Found> {
         let length = self.side * kernels::row_length(self.side);
         let levels =
-            self.windows.iter().zip(to.levels()).zip(self.rows.chunks_exact(length)).enumerate().rev();
+            self.inverses.iter().zip(to.levels()).zip(self.rows.chunks_exact(length)).enumerate().rev();
         let mut place: Option<Point2f> = None;
-        for (index, ((window, level), rows)) in levels {
+        for (index, ((inverse, level), rows)) in levels {
             let begin = place.map_or(guess * scale(index), |coarser| coarser * 2.0);
-            let inverse = window.inverse(precision.eigenvalue);
             let settled =
                 inverse.and_then(|inverse| self.settle(rows, level, begin, inverse, precision.at(index)));
             if index == 0 {
@@ -133,6 +116,14 @@ impl Template {
         let (x, y, part) = start(first_pixel(place, self.side), level, self.side)?;
         Some(kernels::residual(rows, level.from(x, y), level.stride(), part, self.side))
     }
+}
+
+/// The inverse of a gradient matrix, if that is worth anything.
+fn inverse([xx, xy, yy]: [f32; 3]) -> Option<[f32; 3]> {
+    let smaller = 0.5 * (xx + yy - ((xx - yy).powi(2) + 4.0 * xy * xy).sqrt());
+    let determinant = xx * yy - xy * xy;
+    (smaller >= MIN_EIGENVALUE && determinant > f32::EPSILON)
+        .then(|| [yy / determinant, -xy / determinant, xx / determinant])
 }
 
 /// Of a level.

@@ -11,7 +11,7 @@ use crate::vision::Luma;
 use crate::vision::synthetic::{Canvas, texture};
 
 const SIZE: (usize, usize) = (200, 150);
-const PRECISION: Precision = Precision { steps: 20, step: 0.01, eigenvalue: 0.1 };
+const PRECISION: Precision = Precision { steps: 20, step: 0.01 };
 const HALVINGS: usize = 3;
 
 fn picture(shift: (f64, f64), seed: u32) -> Canvas {
