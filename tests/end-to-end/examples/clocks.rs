@@ -20,7 +20,7 @@ use virtual_camera::{Fault, VirtualCamera};
 const WATCHED: Duration = Duration::from_secs(12);
 /// And so long before it.
 const BEFORE: Duration = Duration::from_secs(3);
-const HOUR: Duration = Duration::from_secs(3600);
+const HOUR: gst::ClockTime = gst::ClockTime::from_seconds(3600);
 /// The machine is suspended for so long.
 const SUSPENDED: Duration = Duration::from_secs(10);
 /// Whoever is so far off the middle, in parts of the picture, has the camera turn for long.
@@ -30,23 +30,15 @@ const FAR: f64 = 0.25;
 type Stamp = fn(u64, gst::ClockTime) -> Option<gst::ClockTime>;
 
 const STAMPS: [(&str, Stamp); 6] = [
-    ("timestamps jump an hour ahead", |_, time| time.checked_add(hour())),
-    ("timestamps jump an hour back", |_, time| Some(time.saturating_sub(hour()))),
+    ("timestamps jump an hour ahead", |_, time| time.checked_add(HOUR)),
+    ("timestamps jump an hour back", |_, time| Some(time.saturating_sub(HOUR))),
     ("timestamps are missing", |_, _| None),
     ("timestamps are all the same", |_, _| Some(gst::ClockTime::SECOND)),
-    ("timestamps run backwards", |picture, _| {
-        HOUR_NS.checked_sub(picture * 66_000_000).map(gst::ClockTime::from_nseconds)
-    }),
+    ("timestamps run backwards", |picture, _| HOUR.checked_sub(gst::ClockTime::from_mseconds(66 * picture))),
     ("timestamps are in no order", |picture, time| {
         time.checked_add(gst::ClockTime::from_mseconds(picture * 7919 % 5000))
     }),
 ];
-
-const HOUR_NS: u64 = 3_600_000_000_000;
-
-fn hour() -> gst::ClockTime {
-    gst::ClockTime::from_nseconds(HOUR_NS)
-}
 
 fn main() {
     println!("| what goes wrong | in view | out of view for at most | warnings |\n|---|---|---|---|");
@@ -54,13 +46,13 @@ fn main() {
         follows(what, &scene::mjpeg, |_, running| restamp(running, stamp));
     }
     follows("the pipeline's clock jumps an hour ahead", &scene::mjpeg, |_, running| {
-        jump(running, |base| base.saturating_sub(hour()))
+        jump(running, |base| base.saturating_sub(HOUR))
     });
     follows("the pipeline's clock jumps an hour back", &scene::mjpeg, |_, running| {
-        jump(running, |base| base + hour())
+        jump(running, |base| base + HOUR)
     });
     follows("the camera's clock jumps by an hour", &scene::mjpeg, |camera, _| {
-        camera.set_fault(Fault::ClockAhead(HOUR));
+        camera.set_fault(Fault::ClockAhead(HOUR.into()));
     });
     let rtsp = |camera: &VirtualCamera| scene::rtsp(camera, "h264");
     follows("RTP's timestamp and sequence wrap", &rtsp, |_, _| ());

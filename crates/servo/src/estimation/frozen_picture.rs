@@ -49,10 +49,7 @@ impl FrozenPictureDetector {
         let (taken_at, unchanged_since) = (picture.taken_at, picture.taken_at - unchanged_for);
         self.sent_off = self.sent_off.filter(|sent| *sent >= unchanged_since);
         let since = unchanged_since.max(taken_at - Self::WITHIN);
-        if self.out_of_touch.is_some_and(|at| at >= taken_at - Self::WITHIN - shown_after) {
-            self.frozen &= !unchanged_for.is_zero();
-            return;
-        }
+        let in_touch = self.out_of_touch.is_none_or(|at| at < taken_at - Self::WITHIN - shown_after);
         let turned = |delay| {
             let turn = history.rotation(since - delay, taken_at - delay);
             turn.largest() >= Self::SEEN_FIELDS * fov_deg
@@ -61,7 +58,7 @@ impl FrozenPictureDetector {
         let has_moved = self.sent_off.is_some_and(|sent| taken_at >= sent + shown_after)
             || unchanged_for > Self::LONGER_THAN && delays.all(turned);
         // Once frozen it stays so until something changes.
-        self.frozen = !unchanged_for.is_zero() && (self.frozen || has_moved);
+        self.frozen = !unchanged_for.is_zero() && (self.frozen || in_touch && has_moved);
     }
 
     /// Whether the last picture was.
