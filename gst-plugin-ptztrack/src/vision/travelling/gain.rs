@@ -2,43 +2,15 @@
 
 //! How much lighter or darker the pictures have become as a whole: lamps, clouds, and cameras that expose anew as they turn.
 
-use super::model::KNOWN;
+use super::samples::{MIN_SAMPLES, Sample};
 
-/// Pixels of each row, and rows, that are looked at: one in so many.
-const SAMPLING: usize = 5;
-/// Grey levels between which a pixel tells of light: below is noise, above the sensor is full.
-const TELLS: std::ops::Range<f32> = 16.0..240.0;
-/// Fewer pixels than this tell nothing.
-const MIN_SAMPLES: usize = 64;
 /// Grey levels within which a pixel shows the background.
 const ALIKE: f32 = 6.0;
 
-/// A pixel of the background, and what is seen of it now.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sample {
-    mean: f32,
-    seen: f32,
-}
-
-/// The factor by which the mean `mean` (8.8 fixed point) has to be multiplied to look like `seen`: the median ratio, where
+/// The factor by which the background's mean has to be multiplied to look like what is seen: the median ratio, where
 /// that explains more than half of what differs; else 1. Somebody who comes before the background is no change of light,
-/// however much of it they hide. `samples` is memory.
-pub(super) fn light_gain(
-    seen: &[u8],
-    mean: &[u16],
-    age: &[u8],
-    spans: &[(usize, usize)],
-    samples: &mut Vec<Sample>,
-) -> f32 {
-    let width = mean.len() / spans.len().max(1);
-    samples.clear();
-    for (y, &(start, end)) in spans.iter().enumerate().step_by(SAMPLING) {
-        let places = (start..end).skip(y % SAMPLING).step_by(SAMPLING).map(|x| y * width + x);
-        samples.extend(places.filter(|&at| age[at] >= KNOWN).filter_map(|at| {
-            let sample = Sample { mean: f32::from(mean[at]) / 256.0, seen: f32::from(seen[at]) };
-            (TELLS.contains(&sample.mean) && TELLS.contains(&sample.seen)).then_some(sample)
-        }));
-    }
+/// however much of it they hide. Puts the samples in another order.
+pub(super) fn light_gain(samples: &mut [Sample]) -> f32 {
     if samples.len() < MIN_SAMPLES {
         return 1.0;
     }
@@ -53,6 +25,8 @@ pub(super) fn light_gain(
 
 #[cfg(test)]
 mod tests {
+    use super::super::model::KNOWN;
+    use super::super::samples;
     use super::*;
     use proptest::prelude::*;
 
@@ -64,7 +38,9 @@ mod tests {
 
     fn gain(seen: &[u8], age: u8) -> f32 {
         let mean: Vec<u16> = room().iter().map(|&grey| u16::from(grey) << 8).collect();
-        light_gain(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1], &mut Vec::new())
+        let mut samples = Vec::new();
+        samples::take(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1], &mut samples);
+        light_gain(&mut samples)
     }
 
     #[test]

@@ -5,12 +5,14 @@
 //! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not
 //! the canvas on the picture, so that what is known is not blurred by being resampled in every picture.
 
+mod another_view;
 mod burned_in;
 mod gain;
 mod model;
 mod noise;
 mod pooled;
 mod rows;
+mod samples;
 mod warp;
 
 use std::time::Duration;
@@ -23,6 +25,7 @@ pub use self::model::UNKNOWN;
 use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
 use self::pooled::Pooled;
+use self::samples::Sample;
 use self::warp::Warp;
 use super::Luma;
 use super::camera_motion::{displacement, to_pixels};
@@ -48,8 +51,6 @@ const MISPLACED_AT_REST: f32 = 0.2;
 const MISPLACED: f32 = 1.0;
 /// Foreground beyond this fraction of the picture is a new picture: lights, a cut.
 const NEW_PICTURE: f64 = 0.6;
-/// Where the motion of the camera is not known, more than this fraction says that it did not rest.
-const UNSEEN_MOTION: f64 = 0.3;
 
 /// Tells foreground from background, whether the camera turns or not.
 #[derive(Debug, Default)]
@@ -69,8 +70,8 @@ pub struct TravellingBackground {
     back: Warp,
     foreground: Vec<u8>,
     shown: Vec<u8>,
-    /// Memory of [`gain::light_gain`].
-    light: Vec<gain::Sample>,
+    /// Pixels of the last picture beside what was known of them.
+    samples: Vec<Sample>,
     /// Of the canvas onto another.
     anew: Warp,
 }
@@ -109,15 +110,9 @@ impl TravellingBackground {
         self.stay_on_canvas();
         let how = self.comparison(motion, elapsed);
         self.lay(picture);
-        self.model.relight(gain::light_gain(
-            &self.sampled.luma,
-            &self.model.luma,
-            &self.model.age,
-            self.forth.spans(),
-            &mut self.light,
-        ));
+        self.heed_light();
         self.compare(how);
-        let stale = self.changed() > if motion.is_some() { NEW_PICTURE } else { UNSEEN_MOTION };
+        let stale = self.changed() > NEW_PICTURE || motion.is_none() && self.shows_another_view();
         if stale {
             self.start();
             self.lay(picture);
@@ -225,6 +220,24 @@ impl TravellingBackground {
             }
             sampled
         });
+    }
+
+    /// Whether the picture shows none of what is known where it should lie.
+    fn shows_another_view(&mut self) -> bool {
+        self.sample();
+        another_view::is_another_view(&self.samples, &self.noise)
+    }
+
+    /// Makes what is known as light as the picture.
+    fn heed_light(&mut self) {
+        self.sample();
+        self.model.relight(gain::light_gain(&mut self.samples));
+    }
+
+    /// Takes pixels all over the picture beside what is known of them.
+    fn sample(&mut self) {
+        let Model { luma, age, .. } = &self.model;
+        samples::take(&self.sampled.luma, luma, age, self.forth.spans(), &mut self.samples);
     }
 
     /// Holds the picture on the canvas against what is known.

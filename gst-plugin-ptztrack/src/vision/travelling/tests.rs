@@ -157,6 +157,18 @@ fn an_unknown_motion_is_rest_where_the_picture_says_so_and_a_new_world_where_not
 }
 
 #[test]
+fn another_view_of_little_contrast_is_a_new_world_too() {
+    let wall =
+        |seed| Canvas::seen(SIZE, &Homography::IDENTITY, move |x, y| 80.0 + 0.12 * texture(seed, x, y));
+    let mut background = TravellingBackground::default();
+    for seed in 0..25 {
+        look(&mut background, &wall(1).noisy(2.0, seed), Some((0.0, 0.0)));
+    }
+    look(&mut background, &wall(77).noisy(2.0, 30), None);
+    assert!(background.foreground().expect("seen").bytes().iter().all(|value| *value == 128));
+}
+
+#[test]
 fn what_somebody_left_becomes_background_at_once_where_nobody_is() {
     let mut background = TravellingBackground::default();
     for seed in 0..25 {
