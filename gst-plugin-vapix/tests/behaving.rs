@@ -449,3 +449,23 @@ fn it_goes_home_or_stays_at_a_word_and_follows_again() {
     stage.run(1.0, &aside());
     assert!(stage.moves().last().unwrap().contains("continuous"), "{:?}", stage.moves());
 }
+
+/// As for somebody whom another camera sees: there, and as wide as is said, and on to the next place without a word in between.
+#[test]
+fn it_looks_where_it_is_told_and_follows_from_there() {
+    let mut stage = Stage::new(Settings::default(), |rig| rig.with("look-at", "-8,1,20"));
+    stage.run(1.0, &aside());
+    stage.rig.sink.set_property_from_str("steering", "look-at");
+    stage.run(6.0, &aside());
+    let there = stage.camera.status();
+    assert!((there.pan_deg + 8.0).abs() < 0.01 && !there.moving, "{there:?}: {:?}", stage.moves());
+    assert!((there.horizontal_fov_deg - 20.0).abs() < 1.0, "{there:?}");
+    stage.rig.sink.set_property_from_str("look-at", "4,-2,nonsense");
+    stage.rig.sink.set_property_from_str("look-at", "4,-2");
+    stage.run(6.0, &aside());
+    let there = stage.camera.status();
+    assert!((there.pan_deg - 4.0).abs() < 0.01 && !there.moving, "{there:?}: {:?}", stage.moves());
+    stage.rig.sink.set_property_from_str("steering", "follow");
+    stage.run(1.0, &aside());
+    assert!(stage.moves().last().unwrap().contains("continuous"), "{:?}", stage.moves());
+}

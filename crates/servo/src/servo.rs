@@ -90,7 +90,8 @@ impl Servo {
         }
         let before = mem::replace(&mut self.settings, settings);
         let now = &self.settings;
-        self.home.configure(now.home.as_ref(), now.home_timeout, now.limits);
+        let home = now.home.clone().map(|home| home.through(self.camera.capabilities.lens().as_ref()));
+        self.home.configure(home.as_ref(), now.home_timeout, now.limits);
         if !now.learn {
             self.calibration = SelfCalibration::new(now.latency);
         }

@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! `home` and the zoom as properties and statistics have them.
+//! `home`, `look-at` and the zoom as properties and statistics have them.
 
-use servo::{Home, Position};
+use servo::{Home, PanTilt, Position};
 
 /// The zoom's last step, zoomed in, as users have it; the first is 1.
 const LAST_STEP: f64 = 9999.0;
@@ -35,6 +35,26 @@ pub fn parse_home(text: &str) -> Result<Home, String> {
     }
 }
 
+/// Reads `pan,tilt` or `pan,tilt,field of view`, all in degrees.
+///
+/// # Errors
+/// What is wrong with it, in words.
+pub fn parse_look_at(text: &str) -> Result<Home, String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let (direction, fov_deg) = match numbers.as_deref() {
+        Some([pan, tilt]) => (PanTilt::new(*pan, *tilt), None),
+        Some([pan, tilt, fov_deg]) => (PanTilt::new(*pan, *tilt), Some(*fov_deg)),
+        _ => return Err(format!("`{text}` is neither pan,tilt nor pan,tilt,field of view in degrees")),
+    };
+    let sees = fov_deg.is_none_or(|fov_deg| fov_deg > 0.0 && fov_deg < 180.0);
+    if !direction.is_finite() || direction.largest() > 180.0 || !sees {
+        return Err(
+            "pan and tilt must be from -180 to 180 degrees, the field of view from 0 to 180".to_owned()
+        );
+    }
+    Ok(Home::View { direction, fov_deg })
+}
+
 fn position(pan: f64, tilt: f64, step: Option<f64>) -> Result<Home, String> {
     let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
     let zooms = step.is_none_or(|step| (1.0..=LAST_STEP).contains(&step));
@@ -44,7 +64,7 @@ fn position(pan: f64, tilt: f64, step: Option<f64>) -> Result<Home, String> {
     Ok(Home::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom: step.map(travel) }))
 }
 
-/// What [`parse_home`] reads.
+/// What [`parse_home`] and [`parse_look_at`] read.
 pub fn home_text(home: &Home) -> String {
     match home {
         Home::Start => "start".to_owned(),
@@ -53,6 +73,10 @@ pub fn home_text(home: &Home) -> String {
             format!("{},{}{zoom}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))
         }
         Home::Preset(name) => name.clone(),
+        Home::View { direction, fov_deg } => {
+            let fov = fov_deg.map_or_else(String::new, |fov_deg| format!(",{fov_deg}"));
+            format!("{},{}{fov}", direction.pan, direction.tilt)
+        }
     }
 }
 
@@ -86,8 +110,14 @@ mod tests {
         }
 
         #[test]
+        fn a_view_is_told_as_it_was_set(pan in -180.0..180.0f64, tilt in -180.0..180.0f64, fov in prop::option::of(1u32..=179)) {
+            let text = format!("{pan},{tilt}") + &fov.map_or_else(String::new, |fov| format!(",{fov}"));
+            prop_assert_eq!(home_text(&parse_look_at(&text).unwrap()), text);
+        }
+
+        #[test]
         fn any_text_is_a_home_or_refused(text in ".{0,40}") {
-            let _ = parse_home(&text);
+            let _ = (parse_home(&text), parse_look_at(&text));
         }
     }
 }

@@ -48,14 +48,16 @@ pub trait Measuring: PtzSink {
                 format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
             });
         }
-        if steering == Steering::Off {
-            return;
-        }
+        let visibility = match steering {
+            Steering::Follow => target.state.into(),
+            // On the way there it does not matter who is there.
+            Steering::Home | Steering::LookAt => Visibility::Gone,
+            Steering::Off => return,
+        };
         self.with_task(|task| {
             let mailbox = task.mailbox();
             mailbox.see(Measurement {
-                // On the way home it does not matter who is there.
-                visibility: if steering == Steering::Home { Visibility::Gone } else { target.state.into() },
+                visibility,
                 id: target.id,
                 centroid: target.centroid,
                 bounds: target.bounds,

@@ -13,7 +13,7 @@ use ptztrack_contract::mistaken_unit;
 use session::http::{Authentication, Location, Secret};
 
 use crate::Particulars;
-use crate::home::{home_text, parse_home, travel, zoom_step};
+use crate::home::{home_text, parse_home, parse_look_at, travel, zoom_step};
 use crate::settings::{Settings, Steering};
 
 /// When a value that was set counts, and who must hear of it.
@@ -190,6 +190,11 @@ impl<'a> Table<'a> {
                 text("home", AtOnce, "Where the camera waits for a target: pan,tilt or pan,tilt,zoom in degrees and zoom steps, start (where it looked when it connected), or the name of a preset (unset: it stays where the last target was)"),
                 |s| s.servo.home.as_ref().map(home_text).to_value(),
                 |s, value| { s.servo.home = string(value).filter(|text| !text.is_empty()).map(|text| parse_home(&text)).transpose()?; Ok(()) },
+            ),
+            special(
+                text("look-at", AtOnce, "Where `steering=look-at` turns the camera: pan,tilt or pan,tilt,field of view, in degrees"),
+                |s| s.look_at.as_ref().map(home_text).to_value(),
+                |s, value| { s.look_at = string(value).filter(|text| !text.is_empty()).map(|text| parse_look_at(&text)).transpose()?; Ok(()) },
             ),
             t.duration("home-timeout", AtOnce, "The camera goes home when there has been no target for this long, in nanoseconds, up to a day", Duration::ZERO..=millis(86_400_000), |s| &mut s.servo.home_timeout),
             t.switch("home-at-start", AtStart, "Go home on start-up too, without waiting for `home-timeout`", |s| &mut s.servo.home_at_start),

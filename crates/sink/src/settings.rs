@@ -5,7 +5,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use servo::{Range, ServoSettings, SoftLimits};
+use servo::{Home, Range, ServoSettings, SoftLimits};
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
 use session::{LoopSettings, SessionSettings};
 
@@ -19,6 +19,8 @@ pub enum Steering {
     Follow,
     /// Home, whoever is there.
     Home,
+    /// To where `look-at` says, whoever is there.
+    LookAt,
     /// Not at all.
     Off,
 }
@@ -44,6 +46,8 @@ pub struct Settings {
     pub ca_file: Option<String>,
     /// To what the camera is steered.
     pub steering: Steering,
+    /// Where that is, of [`Steering::LookAt`].
+    pub look_at: Option<Home>,
     /// Whether time is the stream's.
     pub lockstep: bool,
     /// Whether another process stops the camera where this one cannot.
@@ -78,6 +82,7 @@ impl Settings {
             insecure: false,
             ca_file: None,
             steering: Steering::default(),
+            look_at: None,
             lockstep: false,
             dead_man: true,
             dead_man_socket: None,
@@ -99,6 +104,10 @@ impl Settings {
         match self.steering {
             Steering::Follow => {}
             Steering::Home => servo.home_timeout = Duration::ZERO,
+            Steering::LookAt => {
+                servo.home = self.look_at.clone();
+                servo.home_timeout = Duration::ZERO;
+            }
             Steering::Off => servo.home = None,
         }
         LoopSettings { servo, session: self.session }

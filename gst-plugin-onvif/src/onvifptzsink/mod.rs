@@ -83,6 +83,9 @@ pub enum Steering {
     /// Home.
     #[enum_value(name = "To `home`, whoever is there", nick = "home")]
     Home,
+    /// To a place that is told.
+    #[enum_value(name = "To `look-at`, whoever is there", nick = "look-at")]
+    LookAt,
     /// Not at all.
     #[enum_value(name = "Not at all: the camera is stopped, and left to others", nick = "off")]
     Off,
@@ -119,7 +122,7 @@ sink::same_values! {
     Mode = servo::Mode { Velocity, Absolute, Centre }
     Prediction = servo::Prediction { Average, Lead }
     SpeedCurve = servo::SpeedCurve { Linear, Cubic }
-    Steering = sink::Steering { Follow, Home, Off }
+    Steering = sink::Steering { Follow, Home, LookAt, Off }
 }
 
 glib::wrapper! {

@@ -75,6 +75,7 @@
 //! After `home-timeout` without a target the camera goes to `home`, if that is set: `pan,tilt` or `pan,tilt,zoom`, the
 //! name of a preset, or `start`, where it looked when it connected. With `home-at-start` it also goes there on start-up.
 //! `home` is kept within the limits, unless it is a preset. `steering=home` sends it there at once, whoever is there;
+//! `steering=look-at` turns it to where `look-at` says, as for somebody whom another camera sees.
 //! `steering=off` stops it and leaves it to others, until `steering=follow`.
 //!
 //! ## Operators
@@ -152,6 +153,9 @@ pub enum Steering {
     /// Home.
     #[enum_value(name = "To `home`, whoever is there", nick = "home")]
     Home,
+    /// To a place that is told.
+    #[enum_value(name = "To `look-at`, whoever is there", nick = "look-at")]
+    LookAt,
     /// Not at all.
     #[enum_value(name = "Not at all: the camera is stopped, and left to others", nick = "off")]
     Off,
@@ -188,7 +192,7 @@ sink::same_values! {
     Mode = servo::Mode { Velocity, Absolute, Centre }
     Prediction = servo::Prediction { Average, Lead }
     SpeedCurve = servo::SpeedCurve { Linear, Cubic }
-    Steering = sink::Steering { Follow, Home, Off }
+    Steering = sink::Steering { Follow, Home, LookAt, Off }
 }
 
 glib::wrapper! {

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::Motion;
 use crate::Time;
-use crate::model::{PanTilt, Position, Presets, SoftLimits};
+use crate::model::{Lens, PanTilt, Position, Presets, SoftLimits};
 
 /// Where the camera waits for a target.
 #[derive(Debug, Clone, PartialEq)]
@@ -15,6 +15,27 @@ pub enum Home {
     Position(Position),
     /// One of the camera's own presets.
     Preset(String),
+    /// A direction, seen as wide as this where it zooms: horizontal field of view in degrees.
+    View {
+        /// Where it is.
+        direction: PanTilt,
+        /// `None` leaves the zoom as it is.
+        fov_deg: Option<f64>,
+    },
+}
+
+impl Home {
+    /// The same, with the zoom that shows a [`Home::View`] through this lens.
+    pub fn through(self, lens: Option<&Lens>) -> Self {
+        match self {
+            Self::View { direction, fov_deg } => Self::Position(Position {
+                pan_deg: Some(direction.pan),
+                tilt_deg: Some(direction.tilt),
+                zoom: lens.zip(fov_deg).and_then(|(lens, fov_deg)| lens.travel(fov_deg)),
+            }),
+            other => other,
+        }
+    }
 }
 
 /// Sends the camera home when nobody was seen for a while, once.
@@ -147,6 +168,10 @@ impl HomeReturn {
             Home::Start => self.start.and_then(|start| self.go_to(start, speed)),
             Home::Position(position) => self.go_to(*position, speed),
             Home::Preset(_) => self.preset.map(|number| Motion::Preset { number }),
+            Home::View { direction, .. } => {
+                let (pan_deg, tilt_deg) = (Some(direction.pan), Some(direction.tilt));
+                self.go_to(Position { pan_deg, tilt_deg, zoom: None }, speed)
+            }
         }
     }
 
@@ -243,6 +268,19 @@ mod tests {
         let mut home_return = going(Some(beyond.clone()), s(0), false);
         home_return.configure(Some(&beyond), s(0), limits);
         assert_eq!(alone(&mut home_return, 3, 5), [(3, there)]);
+    }
+
+    #[test]
+    fn a_view_is_as_wide_as_the_lens_allows() {
+        let lens = Lens::linear(60.0, Range { min: 0.0, max: 1.0 }, 20.0);
+        let view = |fov_deg| Home::View { direction: PanTilt::new(5.0, 1.0), fov_deg };
+        for (fov_deg, zoom) in [(None, None), (Some(60.0), Some(0.0)), (Some(0.1), Some(1.0))] {
+            assert_eq!(view(fov_deg).through(Some(&lens)), Home::Position(at(5.0, 1.0, zoom)));
+        }
+        let home = view(Some(30.0));
+        assert_eq!(home.clone().through(None), Home::Position(at(5.0, 1.0, None)));
+        let there = Motion::Absolute { pan_deg: 5.0, tilt_deg: 1.0, speed: 1.0, zoom: None };
+        assert_eq!(alone(&mut going(Some(home), s(0), false), 3, 5), [(3, there)]);
     }
 
     #[test]
