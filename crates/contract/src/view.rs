@@ -19,6 +19,18 @@ impl View {
         other.project(self.direction(point))
     }
 
+    /// Pan and tilt, in degrees, that would bring what is seen at `point` (normalised) to the middle.
+    pub fn angles_of(&self, point: Point) -> (f64, f64) {
+        let [right, down, forward] = self.direction(point);
+        (right.atan2(forward).to_degrees(), (-down).atan2(right.hypot(forward)).to_degrees())
+    }
+
+    /// Where what is seen in the middle at this pan and tilt, in degrees, is in the picture; `None` behind the camera.
+    pub fn place_of(&self, pan_deg: f64, tilt_deg: f64) -> Option<Point> {
+        let (pan, tilt) = (pan_deg.to_radians(), tilt_deg.to_radians());
+        self.project([pan.sin() * tilt.cos(), -tilt.sin(), pan.cos() * tilt.cos()])
+    }
+
     /// The direction of a point of the picture: right, down, forward of pan and tilt 0.
     fn direction(&self, point: Point) -> [f64; 3] {
         let (x, y) = ((2.0 * point.x - 1.0) * self.reach.0, (2.0 * point.y - 1.0) * self.reach.1);
@@ -109,6 +121,14 @@ mod tests {
         assert_eq!(KNOWN.view().unwrap().place_in(&behind, Point { x: 0.5, y: 0.5 }), None);
     }
 
+    #[test]
+    fn the_middle_is_where_the_camera_looks() {
+        let view = CameraEvent { pan_deg: Some(20.0), tilt_deg: Some(-30.0), ..KNOWN }.view().unwrap();
+        let (pan, tilt) = view.angles_of(Point { x: 0.5, y: 0.5 });
+        assert!((pan - 20.0).abs() < 1e-9 && (tilt + 30.0).abs() < 1e-9, "{pan}, {tilt}");
+        assert!(view.place_of(25.0, -30.0).unwrap().x > 0.5 && view.place_of(20.0, -25.0).unwrap().y < 0.5);
+    }
+
     proptest! {
         #[test]
         fn a_point_is_seen_in_the_direction_that_it_has(
@@ -116,6 +136,9 @@ mod tests {
         ) {
             let view = CameraEvent { pan_deg: Some(pan), tilt_deg: Some(tilt), ..KNOWN }.view().unwrap();
             let seen = view.place_in(&view, Point { x, y }).unwrap();
+            prop_assert!((seen.x - x).abs() < 1e-9 && (seen.y - y).abs() < 1e-9);
+            let (pan_deg, tilt_deg) = view.angles_of(Point { x, y });
+            let seen = view.place_of(pan_deg, tilt_deg).unwrap();
             prop_assert!((seen.x - x).abs() < 1e-9 && (seen.y - y).abs() < 1e-9);
         }
     }

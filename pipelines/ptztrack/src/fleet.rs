@@ -10,6 +10,9 @@ use crate::config::CameraSettings;
 use crate::control_file::ControlFile;
 use crate::log::Log;
 
+/// That of the sinks.
+const TARGET_HEIGHT: f64 = 0.4;
+
 /// All cameras, by name.
 #[derive(Debug)]
 pub struct Fleet {
@@ -81,6 +84,15 @@ impl Fleet {
     /// What is known of one.
     pub fn of(&self, name: &str) -> Option<Arc<Known>> {
         lock(&self.cameras).get(name).map(|camera| camera.known.clone())
+    }
+
+    /// At which height in its picture a camera keeps whom it follows, where it zooms.
+    pub fn target_height(&self, name: &str) -> Option<f64> {
+        let cameras = lock(&self.cameras);
+        let settings = &cameras.get(name)?.settings;
+        let zooms = settings.sink_property("auto-zoom") == Some("true");
+        let height = settings.sink_property("target-height").and_then(|height| height.parse().ok());
+        zooms.then(|| height.unwrap_or(TARGET_HEIGHT))
     }
 
     /// Those whose thread does nothing any more, though it should.

@@ -11,6 +11,7 @@ mod control_file;
 mod discovery;
 mod event;
 mod fleet;
+mod handover;
 mod http;
 mod log;
 mod mqtt;
@@ -83,7 +84,7 @@ fn run(options: Options) -> Result<(), Failure> {
         }
         Task::Follow(follow_one) => {
             let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
-            let config = Config { cameras, http: None, mqtt: None };
+            let config = Config { cameras, http: None, mqtt: None, hand_over: Vec::new() };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Task::Discover { wait } => Ok(runtime(1)?.block_on(discovery::discover(wait))?),

@@ -14,6 +14,7 @@ use tokio::time::{Interval, interval};
 
 use crate::config::{Config, Http, NotLoaded, Watchdogs};
 use crate::fleet::Fleet;
+use crate::handover::HandingOver;
 use crate::http;
 use crate::log::Log;
 use crate::mqtt::Publisher;
@@ -77,6 +78,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
         started.inspect_err(tell).ok()
     });
     fleet.apply(config.cameras.clone());
+    let tell = |err: &std::io::Error| log.error("not-handing-over", format!("nobody is handed over: {err}"));
+    let handing_over = HandingOver::start(&config, fleet.clone(), log.clone()).inspect_err(tell).ok();
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
     let mut second = interval(Duration::from_secs(1));
@@ -92,7 +95,10 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     loop {
         tokio::select! {
             () = end(&mut terminate, &mut interrupt) => break,
-            config = finished(&mut reading) => current = config.unwrap_or(current),
+            config = finished(&mut reading) => if let Some(config) = config {
+                handing_over.iter().for_each(|handing_over| handing_over.change(&config));
+                current = config;
+            },
             _ = hangup.recv(), if reading.is_none() => reading = read(&current, false),
             _ = passwords.tick(), if reading.is_none() => {
                 if current.cameras.iter().any(|camera| camera.no_password.is_some()) {
@@ -117,7 +123,10 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     log.show_status(Vec::new());
     log.info("ending", "ends: every camera is brought to rest");
     let ending = fleet.clone();
-    let ended = tokio::task::spawn_blocking(move || ending.end());
+    let ended = tokio::task::spawn_blocking(move || {
+        ending.end();
+        handing_over.into_iter().for_each(HandingOver::end);
+    });
     if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
         log.error("not-ended", "a camera's pipeline hangs: its watchdog stops the camera");
     }

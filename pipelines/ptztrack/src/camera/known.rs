@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -12,6 +13,7 @@ use tokio::sync::watch;
 
 use super::running::Running;
 use super::servo_stats::ServoStats;
+use super::sight::Sight;
 use super::stopwatch::Stopwatch;
 
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
@@ -45,9 +47,24 @@ pub struct Known {
     pub ended: Ended,
     /// How many look at the picture.
     pub looking: AtomicUsize,
+    /// What was seen last, and when, of a camera that people are handed over from or to.
+    pub sight: watch::Sender<Arc<(Instant, Sight)>>,
+    /// Whom another camera saw before this one took them up.
+    pub origin: Mutex<Option<Origin>>,
     /// The last picture for who looks, as JPEG.
     pub view: watch::Sender<Bytes>,
     pub times: Vec<Stopwatch>,
+}
+
+/// Somebody, as two cameras know them.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Origin {
+    /// The number that they have here ...
+    pub target: u64,
+    /// ... and there.
+    pub id: u64,
+    /// Who called.
+    pub camera: String,
 }
 
 /// What its messages told.
@@ -66,17 +83,36 @@ pub struct State {
 }
 
 /// Who has the camera.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub enum Steering {
     /// It follows.
     #[default]
     Follow,
     /// It was sent home then.
     GoHome(Instant),
+    /// Another camera sees somebody there; since then.
+    LookAt(Gaze, Instant),
     /// It is somebody else's, who asked for it.
     HandedOver,
     /// Somebody else was moving it when the last pipeline ended; until then it is left alone.
     Operator(Instant),
+}
+
+/// Where a camera is to look, in degrees.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Gaze {
+    pub pan_deg: f64,
+    pub tilt_deg: f64,
+    /// Horizontal; `None` leaves the zoom as it is.
+    pub fov_deg: Option<f64>,
+}
+
+impl fmt::Display for Gaze {
+    /// As the property `look-at` has it.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{},{}", self.pan_deg, self.tilt_deg)?;
+        self.fov_deg.map_or(Ok(()), |fov_deg| write!(f, ",{fov_deg}"))
+    }
 }
 
 /// What is known of who has a camera, and outlives pipelines and the program.
@@ -109,6 +145,8 @@ impl Known {
             operator: AtomicBool::default(),
             ended: Ended::default(),
             looking: AtomicUsize::default(),
+            sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
+            origin: Mutex::default(),
             view: watch::Sender::new(Bytes::new()),
             times: Stopwatch::all(),
         }
@@ -208,6 +246,13 @@ impl Known {
         self.servo().and_then(|servo| servo.state).as_deref() == Some("at-rest")
     }
 
+    fn origin_in_words(&self, target: u64) -> String {
+        match &*lock(&self.origin) {
+            Some(origin) if origin.target == target => format!(" ({} of {})", origin.id, origin.camera),
+            _ => String::new(),
+        }
+    }
+
     /// Its state in words.
     pub fn in_words(&self) -> String {
         let state = lock(&self.state).clone();
@@ -218,7 +263,7 @@ impl Known {
             return format!("no picture: {}", state.trouble.as_deref().unwrap_or("none came yet"));
         }
         let target = match (state.target.as_str(), state.target_id) {
-            ("tracking", Some(id)) => format!("follows target {id}"),
+            ("tracking", Some(id)) => format!("follows target {id}{}", self.origin_in_words(id)),
             ("occluded", Some(id)) => format!("target {id} is hidden"),
             _ => "looks for somebody".to_owned(),
         };
@@ -226,6 +271,7 @@ impl Known {
         let camera = match (*lock(&self.steering), camera.as_deref()) {
             (Steering::HandedOver, _) => "the camera is handed over",
             (Steering::GoHome(_), _) => "the camera goes home",
+            (Steering::LookAt(..), _) => "the camera turns to whom another one sees",
             (Steering::Operator(_), _) => "an operator has the camera",
             (_, Some("at-rest")) => "the camera rests",
             (_, Some("moving")) => "the camera turns",

@@ -11,6 +11,7 @@ mod recording;
 mod refusals;
 mod running;
 mod servo_stats;
+mod sight;
 mod stopwatch;
 mod video;
 
@@ -23,7 +24,7 @@ use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
 pub use bounds::picture_size;
-pub use known::{Control, Known, Steering};
+pub use known::{Control, Gaze, Known, Origin, Steering};
 use messages::Listener;
 use pipeline::NotBuilt;
 use pipeline_supervisor::Supervisor;
@@ -33,6 +34,7 @@ use ptztrack_contract::lock::lock;
 use recording::Recorder;
 use refusals::Refusals;
 use running::Running;
+pub use sight::{Person, Sight};
 pub use stopwatch::Stopwatch;
 use tokio::sync::watch;
 
@@ -242,6 +244,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
             let there = since.elapsed() > SETS_OUT && known.is_at_rest();
             there || since.elapsed() > LONGEST_WAY_HOME
         }
+        Steering::LookAt(_, since) => since.elapsed() > LONGEST_WAY_HOME,
         Steering::Operator(until) => until <= Instant::now(),
         Steering::Follow | Steering::HandedOver => false,
     };

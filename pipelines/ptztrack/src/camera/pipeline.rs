@@ -18,8 +18,9 @@ use super::known::{Known, Steering};
 use super::recording::{self, Recorder};
 use super::running::Running;
 use super::servo_stats::ServoStats;
+use super::sight;
 use super::video;
-use crate::config::{CameraSettings, Codec, Credentials, Protocol};
+use crate::config::{CameraSettings, Codec, Credentials, Kind, Protocol};
 
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
 const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0";
@@ -50,7 +51,9 @@ pub fn description(camera: &CameraSettings) -> String {
     let recording = camera.recording.as_ref();
     let mut text = source(camera.codec, recording.is_some_and(|recording| !recording.overlay));
     write_all(&mut text, &format!(" ! {NEWEST} name=newest ! bgavgdetect ! {TRACKER} ! tee name=followed "));
-    write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", camera.protocol.sink()));
+    if camera.kind == Kind::Ptz {
+        write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", camera.protocol.sink()));
+    }
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
     if recording.is_some_and(|recording| recording.overlay) {
         let encoder = recording::ENCODER;
@@ -138,6 +141,9 @@ pub fn build(
         end_in_silence(&pipeline);
     }
     count(&pipeline, known);
+    if let Some(tracker) = of_factory(&pipeline, "lkfeaturetrack").filter(|_| camera.hands_over) {
+        sight::watch(&tracker, known);
+    }
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
@@ -337,9 +343,17 @@ impl Running for Elements {
         let to = match steering {
             Steering::Follow => "follow",
             Steering::GoHome(_) => "home",
+            Steering::LookAt(gaze, _) => {
+                servo.set_property("look-at", gaze.to_string());
+                "look-at"
+            }
             Steering::HandedOver | Steering::Operator(_) => "off",
         };
-        servo.set_property_from_str("steering", to);
+        // On its way it is told another place without a stop in between.
+        let looks = servo.property_value("steering").serialize().is_ok_and(|steering| steering == "look-at");
+        if !(looks && to == "look-at") {
+            servo.set_property_from_str("steering", to);
+        }
     }
 
     fn servo_stats(&self) -> Option<ServoStats> {
@@ -356,6 +370,12 @@ mod tests {
         gst::init().expect("GStreamer");
         let text = format!("[camera.door]\naddress = \"http://192.168.0.90\"\n{more}");
         description(&Config::parse(&text).expect("right").cameras[0])
+    }
+
+    #[test]
+    fn a_fixed_camera_is_moved_by_nobody() {
+        let fixed = described("kind = \"fixed\"\n");
+        assert!(fixed.contains("lkfeaturetrack") && !fixed.contains("vapixptzsink"), "{fixed}");
     }
 
     #[test]

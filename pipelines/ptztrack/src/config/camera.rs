@@ -24,6 +24,7 @@ const UGLY: &str = "gstreamer1.0-plugins-ugly";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CameraSettings {
     pub name: String,
+    pub kind: Kind,
     /// What it is spoken to by.
     pub protocol: Protocol,
     /// `http://` or `https://`; with ONVIF there may be a path, of its device service.
@@ -45,6 +46,18 @@ pub struct CameraSettings {
     /// In a window, too.
     pub show: bool,
     pub isolation: Isolation,
+    /// People are handed over from it or to it.
+    pub hands_over: bool,
+}
+
+/// Whether a camera is moved.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Kind {
+    /// It follows.
+    #[default]
+    Ptz,
+    /// It only sees who is there.
+    Fixed,
 }
 
 /// What a camera shares with the others.
@@ -137,6 +150,18 @@ impl Codec {
     }
 }
 
+impl Read for Kind {
+    const WHAT: &'static str = "\"ptz\" or \"fixed\"";
+
+    fn read(value: &toml::de::DeValue) -> Option<Self> {
+        match value.as_str()? {
+            "ptz" => Some(Self::Ptz),
+            "fixed" => Some(Self::Fixed),
+            _ => None,
+        }
+    }
+}
+
 impl Read for Isolation {
     const WHAT: &'static str = "\"none\" or \"process\"";
 
@@ -211,11 +236,7 @@ impl CameraSettings {
 
     /// How it may be proved who we are, and whose certificates are believed: as the sink is told, for pictures too.
     pub fn security(&self) -> (Authentication, Trust) {
-        let of = |name| {
-            let is = |property: &&Property| property.element == self.protocol.sink() && property.name == name;
-            // The last one counts.
-            self.properties.iter().rfind(is).map(|property| property.value.trim_matches('"'))
-        };
+        let of = |name| self.sink_property(name);
         let authentication = match of("auth") {
             Some("basic") => Authentication::Basic,
             _ => Authentication::Auto,
@@ -228,6 +249,13 @@ impl CameraSettings {
         (authentication, trust)
     }
 
+    /// A property of its sink, where it is set.
+    pub fn sink_property(&self, name: &str) -> Option<&str> {
+        let is = |property: &&Property| property.element == self.protocol.sink() && property.name == name;
+        // The last one counts.
+        self.properties.iter().rfind(is).map(|property| property.value.trim_matches('"'))
+    }
+
     pub(super) fn read(name: String, mut table: Table) -> Option<Self> {
         if !name.chars().all(|c| c.is_ascii_alphanumeric() || c == '-' || c == '_') {
             table.wrong(format!("camera `{name}`: a name has letters, digits, `-` and `_` only"));
@@ -238,6 +266,7 @@ impl CameraSettings {
             .and_then(|address| Self::at(&name, protocol, &address).inspect_err(|err| table.wrong(err)).ok());
         // The rest is read all the same, so that every mistake is found at once.
         let mut camera = camera.unwrap_or_else(|| Self::without_address(&name));
+        camera.kind = table.get("kind").unwrap_or_default();
         let of_rtsp = |value: &toml::de::DeValue| {
             value.as_str().filter(|text| rtsp_host(text).is_some()).map(str::to_owned)
         };
@@ -281,6 +310,11 @@ impl CameraSettings {
         if camera.pipeline.is_some() && camera.recording.is_some() {
             table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
         }
+        if camera.pipeline.is_some() && camera.kind == Kind::Fixed {
+            table.wrong(
+                "`kind` belongs to the program's own pipeline: with `pipeline`, leave the sink out of that",
+            );
+        }
         table.no_more();
         Some(camera)
     }
@@ -298,6 +332,7 @@ impl CameraSettings {
     fn without_address(name: &str) -> Self {
         Self {
             name: name.to_owned(),
+            kind: Kind::default(),
             protocol: Protocol::default(),
             address: String::new(),
             rtsp: None,
@@ -311,6 +346,7 @@ impl CameraSettings {
             pipeline: None,
             show: false,
             isolation: Isolation::default(),
+            hands_over: false,
         }
     }
 }

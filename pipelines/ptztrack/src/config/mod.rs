@@ -4,6 +4,7 @@
 
 mod camera;
 mod credentials;
+mod handover;
 mod mqtt;
 mod problem;
 mod properties;
@@ -17,8 +18,9 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-pub use camera::{CameraSettings, Codec, Isolation, RTSP_PORT, Recording, size};
+pub use camera::{CameraSettings, Codec, Isolation, Kind, RTSP_PORT, Recording, size};
 pub use credentials::{Credentials, Secret};
+pub use handover::HandOver;
 pub use mqtt::Mqtt;
 pub use problem::Problems;
 pub use protocol::{Protocol, Watchdogs};
@@ -33,6 +35,7 @@ pub struct Config {
     pub cameras: Vec<CameraSettings>,
     pub http: Option<Http>,
     pub mqtt: Option<Mqtt>,
+    pub hand_over: Vec<HandOver>,
 }
 
 /// Why a file is of no use, in words.
@@ -107,10 +110,14 @@ impl Config {
         if cameras.is_empty() {
             root.wrong("there is no camera: [camera.door] begins one that is called door");
         }
-        let cameras =
+        let mut cameras: Vec<_> =
             cameras.into_iter().filter_map(|(name, table)| CameraSettings::read(name, table)).collect();
+        let hand_over = HandOver::read_all(&mut root, &cameras);
+        for camera in &mut cameras {
+            camera.hands_over = hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
+        }
         root.no_more();
-        Self { cameras, http, mqtt }
+        Self { cameras, http, mqtt, hand_over }
     }
 }
 

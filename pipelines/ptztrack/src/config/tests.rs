@@ -37,7 +37,7 @@ fn every_mistake_is_named_with_its_line_and_what_is_allowed() {
         "line 3: `user` needs one of `password-file`",
         "line 4: `codec` must be \"mjpeg\", \"mpeg4\", \"h264\" or \"h265\"",
         "line 5: `rate` must be pictures per second, a whole number from 1 to 60",
-        "line 6: `sise` is not known here; there are: address, protocol, rtsp, codec",
+        "line 6: `sise` is not known here; there are: address, protocol, kind, rtsp, codec",
         "line 8: a recording needs `keep`",
         "line 10: `segment` must be a duration",
     ] {
@@ -203,4 +203,38 @@ fn a_pipeline_of_ones_own_must_be_one() {
 #[test]
 fn the_example_is_right() {
     parse(EXAMPLE).unwrap();
+}
+
+#[test]
+fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
+    let cameras = "[camera.yard]\naddress = \"http://a\"\nkind = \"fixed\"\n[camera.door]\naddress = \"http://b\"\n[camera.hall]\naddress = \"http://c\"\n";
+    let config = parse(&format!("{cameras}[handover.yard]\ncalls = [\"door\"]\nprecedence = 3\n")).unwrap();
+    let [wish] = config.hand_over.as_slice() else { panic!("{config:?}") };
+    assert_eq!(
+        (wish.from.as_str(), wish.calls.as_slice(), wish.precedence),
+        ("yard", &["door".to_owned()][..], 3)
+    );
+    let hands_over: Vec<_> = config.cameras.iter().map(|camera| (&*camera.name, camera.hands_over)).collect();
+    assert_eq!(hands_over, [("door", true), ("hall", false), ("yard", true)]);
+    for (table, reason) in [
+        ("[handover.gate]\ncalls = [\"door\"]", "line 8: handover: there is no camera `gate`"),
+        ("[handover.door]\ncalls = [\"gate\"]", "line 8: handover: there is no camera `gate`"),
+        ("[handover.door]\ncalls = [\"yard\"]", "line 8: handover: `yard` is fixed, so it cannot be called"),
+        (
+            "[handover.door]\ncalls = [\"door\"]",
+            "line 8: handover: `door` cannot call `door` twice, nor itself",
+        ),
+        ("[handover.yard]\nzones = []", "line 8: `calls` is missing"),
+        (
+            "[handover.yard]\ncalls = [\"door\"]\nzones = [\"0,0\"]",
+            "line 10: `zones` must be a list of polygons",
+        ),
+        (
+            "[handover.yard]\ncalls = [\"door\"]\nprecedence = -1",
+            "line 10: `precedence` must be a whole number",
+        ),
+    ] {
+        let wrong = parse(&format!("{cameras}{table}\n")).unwrap_err();
+        assert!(wrong.starts_with(reason), "{wrong}");
+    }
 }

@@ -50,6 +50,7 @@ pub async fn run() -> io::Result<()> {
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut timer = interval(EVERY);
     let mut look: Option<Look> = None;
+    let mut sights = known.sight.subscribe();
     while !camera.is_over() {
         tokio::select! {
             order = next(&mut orders) => {
@@ -65,6 +66,10 @@ pub async fn run() -> io::Result<()> {
             Ok(event) = events.recv() => process.say(&Word::Event(event)).await?,
             picture = next_picture(&mut look) => {
                 process.say(&Word::Picture(BASE64_STANDARD.encode(picture))).await?;
+            }
+            Ok(()) = sights.changed() => {
+                let (at, sight) = (**sights.borrow_and_update()).clone();
+                process.say(&Word::Sight(at.elapsed(), sight)).await?;
             }
             _ = timer.tick() => process.report(&camera).await?,
             _ = terminate.recv() => break,

@@ -150,6 +150,10 @@ impl Processes {
                 Word::Event(event) => log.tell(&event),
                 Word::Report(report) if report.stuck => return Err(hangs()),
                 Word::Report(report) => remote.hear(*report, known),
+                Word::Sight(age, sight) => {
+                    let at = Instant::now().checked_sub(age).unwrap_or_else(Instant::now);
+                    known.sight.send_replace(Arc::new((at, sight)));
+                }
                 Word::Picture(picture) => {
                     if let Ok(picture) = BASE64_STANDARD.decode(picture) {
                         known.view.send_replace(picture.into());

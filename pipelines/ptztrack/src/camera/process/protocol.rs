@@ -8,8 +8,9 @@ use std::time::{Duration, Instant};
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
-use crate::camera::known::{Control, Known, State, Steering};
+use crate::camera::known::{Control, Gaze, Known, State, Steering};
 use crate::camera::servo_stats::ServoStats;
+use crate::camera::sight::Sight;
 use crate::config::CameraSettings;
 use crate::event::Event;
 
@@ -37,13 +38,16 @@ pub enum Word {
     Report(Box<Report>),
     /// For who looks, JPEG in base64.
     Picture(String),
+    /// What it sees, and how long ago that was.
+    Sight(Duration, Sight),
 }
 
 /// In whose hand a camera is; a [`Steering`] without its times.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum Hand {
     Follow,
     GoHome,
+    LookAt(Gaze),
     HandedOver,
     Operator,
 }
@@ -73,6 +77,7 @@ impl From<Steering> for Hand {
         match steering {
             Steering::Follow => Self::Follow,
             Steering::GoHome(_) => Self::GoHome,
+            Steering::LookAt(gaze, _) => Self::LookAt(gaze),
             Steering::HandedOver => Self::HandedOver,
             Steering::Operator(_) => Self::Operator,
         }
@@ -85,6 +90,7 @@ impl From<Hand> for Steering {
         match hand {
             Hand::Follow => Self::Follow,
             Hand::GoHome => Self::GoHome(Instant::now()),
+            Hand::LookAt(gaze) => Self::LookAt(gaze, Instant::now()),
             Hand::HandedOver => Self::HandedOver,
             Hand::Operator => Self::Operator(Instant::now()),
         }

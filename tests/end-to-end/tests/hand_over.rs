@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! A camera that does not turn calls one that does.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::fs;
+use std::path::Path;
+use std::time::Duration;
+
+use end_to_end::{Program, scene};
+use handover::{Direction, Map, Pair, Place};
+use virtual_camera::{Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
+
+/// Somebody walks to and fro to the right of what the camera that turns sees at first.
+fn somebody_aside(home: Pose) -> VirtualCamera {
+    let turn =
+        |(lap, pan_deg): (u64, f64)| Waypoint { time: Duration::from_secs(6 * lap), pan_deg, tilt_deg: -2.0 };
+    let path = (0..60).map(|lap| turn((lap, if lap % 2 == 0 { 6.0 } else { 26.0 }))).collect();
+    let settings = scene::nobody();
+    let world = World::Synthetic(SyntheticSettings { path, ..Default::default() });
+    VirtualCamera::start(Settings { world, home: Some(home), ..settings }).unwrap()
+}
+
+fn looking(pan_deg: f64) -> Pose {
+    Pose { pan_deg, tilt_deg: 0.0, zoom_step: 1.0 }
+}
+
+/// What would have been learned: both look out of the same place.
+fn known(fixed: &VirtualCamera, size: (u32, u32)) -> Map {
+    let mut map = Map::default();
+    for second in 3..30 {
+        let time = Duration::from_millis(1000 * second + 137 * second % 1000);
+        let Some(person) = fixed.ground_truth_from(&looking(16.0), time, size).into_iter().next() else {
+            continue;
+        };
+        // Seen from straight ahead, the place in the picture is the direction.
+        let middle = |pan_deg| fixed.ground_truth_from(&looking(pan_deg), time, size)[0].clone();
+        let half = (36f64 / 2.0).to_radians().tan();
+        let bounds = middle(0.0).bounds;
+        let angle = |part: f64, half: f64| ((2.0 * part - 1.0) * half).atan().to_degrees();
+        let (x, y) = (bounds.left + bounds.width / 2.0, bounds.top + bounds.height);
+        let direction = Direction {
+            pan_deg: angle(x / f64::from(size.0), half),
+            tilt_deg: -angle(y / f64::from(size.1), half * 0.75),
+        };
+        let bounds = person.bounds;
+        let feet = (bounds.left + bounds.width / 2.0, bounds.top + bounds.height);
+        let place = Place::in_picture(feet.0 / f64::from(size.0), feet.1 / f64::from(size.1));
+        map.learn(Pair { place, direction, height_deg: Some(9.0), person: 1 });
+    }
+    map
+}
+
+#[test]
+fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
+    let (yard, door) = (somebody_aside(looking(16.0)), somebody_aside(looking(-20.0)));
+    let map = known(&yard, yard.view_size()).to_json();
+    let state = end_to_end::scratch("hand-over-state");
+    fs::create_dir_all(&state).unwrap();
+    fs::write(state.join("map.yard.door.json"), map).unwrap();
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
+        let door = Program::entry("door", &door.url(), &password);
+        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
+    };
+    let environment = [("STATE_DIRECTORY", state.as_path())];
+    let mut program = Program::start_in("hand-over", file, &[], &environment);
+    let line = program.launch.wait_for_line("door: turns to target ");
+    assert!(line.ends_with(" of yard"), "{line}");
+    let line = program.launch.wait_for_line("door: target ");
+    program.launch.rewind();
+    program.launch.wait_for_line(" of yard");
+    let cameras = program.wait_for("/cameras", |cameras| cameras.contains("of yard)"));
+    assert!(cameras.contains("follows target"), "{line} {cameras}");
+    assert!(door.status().pan_deg > 0.0, "{:?}", door.status());
+    program.end("TERM");
+    scene::assert_left_at_rest(&door);
+    // Nobody has a word for the one that does not turn.
+    assert!(yard.commands().iter().all(|command| !command.query.contains("move=")), "{:?}", yard.commands());
+    fs::remove_dir_all(&state).unwrap();
+}
