@@ -9,6 +9,7 @@ use std::time::Duration;
 use clap::{Args, Parser, Subcommand};
 use onvif::VideoStream;
 
+use crate::ask_events::AskEvents;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol, Secret, Watchdogs};
 use crate::discovery::{Found, ask};
 use crate::log::{Format, Log};
@@ -55,6 +56,8 @@ pub enum Task {
         /// The file
         file: PathBuf,
     },
+    /// List who was followed, when and where, the latest last
+    Events(AskEvents),
     /// Print a file with everything in it, commented
     ExampleConfig,
     /// Be the process of one camera, for a `ptztrack` that is on the other side of standard input

@@ -4,6 +4,7 @@
 //!
 //! This is a program, and a library for who examines it only.
 
+mod ask_events;
 mod camera;
 mod cli;
 mod config;
@@ -17,15 +18,18 @@ mod log;
 mod mqtt;
 #[doc(hidden)]
 pub mod parsers;
+mod report;
 mod service;
 mod shard;
+mod store;
 
+use std::io::Write;
 use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{CommandFactory, Parser};
 use cli::{Options, Serving, Task};
-use config::{Config, Http, NotLoaded};
+use config::{Config, Http, NotLoaded, Store};
 use log::Log;
 use service::Origin;
 
@@ -84,7 +88,8 @@ fn run(options: Options) -> Result<(), Failure> {
         }
         Task::Follow(follow_one) => {
             let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
-            let config = Config { cameras, http: None, mqtt: None, hand_over: Vec::new() };
+            let store = Store { what: None, ..Store::default() };
+            let config = Config { cameras, http: None, mqtt: None, hand_over: Vec::new(), store };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Task::Discover { wait } => Ok(runtime(1)?.block_on(discovery::discover(wait))?),
@@ -92,6 +97,12 @@ fn run(options: Options) -> Result<(), Failure> {
             let config = Config::load(&file)?;
             config.check_machine()?;
             println!("{} is right; cameras: {}", file.display(), config.cameras.len());
+            Ok(())
+        }
+        Task::Events(ask) => {
+            let answer = ask.answer()?;
+            // Whoever reads it may have seen enough.
+            let _ = std::io::stdout().write_all(answer.as_bytes());
             Ok(())
         }
         Task::Camera { .. } => {

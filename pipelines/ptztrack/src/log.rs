@@ -2,7 +2,9 @@
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::Mutex;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
+use events::Sighting;
 use ptztrack_contract::lock::lock;
 use tokio::sync::broadcast;
 
@@ -26,19 +28,28 @@ pub struct Log {
     status: Mutex<Vec<String>>,
     /// For whoever tells it elsewhere too.
     events: broadcast::Sender<Event>,
+    /// For whoever keeps who was followed.
+    sightings: Mutex<Option<SyncSender<Sighting>>>,
 }
 
 /// So many events wait for somebody who is slow; those before are lost to them.
 const WAITING: usize = 256;
+/// So many of those who were followed wait for a disk that is slow; those after them are lost. Each may have a picture.
+const SIGHTINGS_WAITING: usize = 64;
 
 impl Log {
     pub fn new(format: Format) -> Self {
-        Self { format: Some(format), status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
+        Self { format: Some(format), ..Self::unwritten() }
     }
 
     /// One for those alone who subscribe.
     pub fn unwritten() -> Self {
-        Self { format: None, status: Mutex::default(), events: broadcast::Sender::new(WAITING) }
+        Self {
+            format: None,
+            status: Mutex::default(),
+            events: broadcast::Sender::new(WAITING),
+            sightings: Mutex::default(),
+        }
     }
 
     /// Whether there is somebody to show a status to.
@@ -63,6 +74,25 @@ impl Log {
     /// Everything that is told from now on.
     pub fn subscribe(&self) -> broadcast::Receiver<Event> {
         self.events.subscribe()
+    }
+
+    /// Has somebody who was followed kept, where anybody keeps that. Waits for nothing.
+    pub fn keep(&self, sighting: Sighting) {
+        if let Some(sightings) = &*lock(&self.sightings) {
+            // Whoever keeps them says so where there is no place for more.
+            let _ = sightings.try_send(sighting);
+        }
+    }
+
+    /// All who are followed from now on, until [`Self::keep_no_more`].
+    pub fn sightings(&self) -> Receiver<Sighting> {
+        let (sender, receiver) = sync_channel(SIGHTINGS_WAITING);
+        *lock(&self.sightings) = Some(sender);
+        receiver
+    }
+
+    pub fn keep_no_more(&self) {
+        lock(&self.sightings).take();
     }
 
     pub fn info(&self, event: &str, detail: impl Into<String>) {

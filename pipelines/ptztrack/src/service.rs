@@ -19,6 +19,7 @@ use crate::http;
 use crate::log::Log;
 use crate::mqtt::Publisher;
 use crate::shard::Shard;
+use crate::store::Keeper;
 
 /// Between two tries to have the page's address.
 const LISTEN_AGAIN: Duration = Duration::from_secs(5);
@@ -77,6 +78,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
         let tell = |err: &session::Error| log.error("mqtt-not-started", format!("no MQTT: {err}"));
         started.inspect_err(tell).ok()
     });
+    let keeper = Keeper::start(&config.store, &log);
     fleet.apply(config.cameras.clone());
     let tell = |err: &std::io::Error| log.error("not-handing-over", format!("nobody is handed over: {err}"));
     let handing_over = HandingOver::start(&config, fleet.clone(), log.clone()).inspect_err(tell).ok();
@@ -129,6 +131,9 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     });
     if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
         log.error("not-ended", "a camera's pipeline hangs: its watchdog stops the camera");
+    }
+    if let Some(keeper) = keeper {
+        let _ = tokio::task::spawn_blocking(|| keeper.end()).await;
     }
     if let Some(publisher) = publisher {
         publisher.end().await;
@@ -189,10 +194,10 @@ fn read_again(
         Ok(config) if only_changes && config.cameras == current.cameras => None,
         Ok(config) => {
             log.info("read-again", "the configuration was read again");
-            if config.http != current.http || config.mqtt != current.mqtt {
+            if config.http != current.http || config.mqtt != current.mqtt || config.store != current.store {
                 log.error(
                     "restart-needed",
-                    "what changed in [http] and [mqtt] counts from the next start on",
+                    "what changed in [http], [mqtt] and [events] counts from the next start on",
                 );
             }
             fleet.apply(config.cameras.clone());

@@ -42,6 +42,7 @@ impl Program {
         fs::write(&cameras, file(&folder)).unwrap();
         let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
         command.arg("run").arg(&cameras).args(["--http", "127.0.0.1:0"]).args(more);
+        command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
         command.envs(environment.iter().copied());
         let mut launch = GstLaunch::spawn(command);
         let line = launch.wait_for_line("/healthz at http://");

@@ -12,6 +12,7 @@ mod refusals;
 mod running;
 mod servo_stats;
 mod sight;
+mod sightings;
 mod stopwatch;
 mod video;
 
@@ -186,7 +187,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             (Some(reason), _) => Err(NotBuilt::Video(Failure::new(reason))),
             (_, Some(refused)) => Err(NotBuilt::Video(refused)),
             _ if refusals.are_waited_for() => return Ok(None),
-            _ => pipeline::build(settings, known, recorder.clone()),
+            _ => pipeline::build(settings, known, recorder.clone(), log),
         };
         match built {
             Ok(pipeline) => {

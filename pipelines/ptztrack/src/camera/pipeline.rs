@@ -19,8 +19,10 @@ use super::recording::{self, Recorder};
 use super::running::Running;
 use super::servo_stats::ServoStats;
 use super::sight;
+use super::sightings;
 use super::video;
 use crate::config::{CameraSettings, Codec, Credentials, Kind, Protocol};
+use crate::log::Log;
 
 /// Whatever the elements behind cannot keep up with is dropped here, oldest first.
 const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0 max-size-time=0";
@@ -55,6 +57,9 @@ pub fn description(camera: &CameraSettings) -> String {
         write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", camera.protocol.sink()));
     }
     write_all(&mut text, &format!("followed. ! {NEWEST} ! {VIEW} "));
+    if camera.kept.is_some() {
+        write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", sightings::SINK));
+    }
     if recording.is_some_and(|recording| recording.overlay) {
         let encoder = recording::ENCODER;
         write_all(
@@ -117,6 +122,7 @@ pub fn build(
     camera: &CameraSettings,
     known: &Arc<Known>,
     recorder: Option<Recorder>,
+    log: &Arc<Log>,
 ) -> Result<gst::Pipeline, NotBuilt> {
     let open = || video::open(camera, known.ended.clone());
     let video = camera.pipeline.is_none().then(open).transpose()?;
@@ -136,6 +142,9 @@ pub fn build(
     }
     if let Some((recorder, tap)) = recorder.zip(of_name::<gst_app::AppSink>(&pipeline, "tap")) {
         recorder.record(&tap);
+    }
+    if let Some(sink) = of_name(&pipeline, "sightings") {
+        sightings::watch(&sink, of_factory(&pipeline, "lkfeaturetrack").as_ref(), camera, log.clone());
     }
     if camera.pipeline.is_none() {
         end_in_silence(&pipeline);

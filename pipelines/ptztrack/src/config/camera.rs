@@ -12,6 +12,7 @@ use session::http::{Authentication, Trust};
 use super::credentials::{self, Credentials};
 use super::properties::{self, ELEMENTS, Property};
 use super::protocol::{Protocol, Watchdogs};
+use super::store::Kept;
 use super::table::{Read, Table, whole};
 use super::units;
 
@@ -48,6 +49,8 @@ pub struct CameraSettings {
     pub isolation: Isolation,
     /// People are handed over from it or to it.
     pub hands_over: bool,
+    /// What is kept of those who were followed.
+    pub kept: Option<Kept>,
 }
 
 /// Whether a camera is moved.
@@ -347,6 +350,7 @@ impl CameraSettings {
             show: false,
             isolation: Isolation::default(),
             hands_over: false,
+            kept: None,
         }
     }
 }

@@ -9,8 +9,9 @@ mod mqtt;
 mod problem;
 mod properties;
 mod protocol;
+mod store;
 mod table;
-mod units;
+pub mod units;
 
 use std::cell::RefCell;
 use std::net::SocketAddr;
@@ -24,6 +25,7 @@ pub use handover::HandOver;
 pub use mqtt::Mqtt;
 pub use problem::Problems;
 pub use protocol::{Protocol, Watchdogs};
+pub use store::{Kept, Store};
 use table::{Source, Table};
 
 /// An example with everything in it, commented.
@@ -36,6 +38,7 @@ pub struct Config {
     pub http: Option<Http>,
     pub mqtt: Option<Mqtt>,
     pub hand_over: Vec<HandOver>,
+    pub store: Store,
 }
 
 /// Why a file is of no use, in words.
@@ -106,18 +109,20 @@ impl Config {
     fn read(mut root: Table) -> Self {
         let http = root.table("http").and_then(Http::read);
         let mqtt = root.table("mqtt").and_then(Mqtt::read);
+        let store = root.table("events").map(Store::read).unwrap_or_default();
         let cameras = root.tables("camera");
         if cameras.is_empty() {
             root.wrong("there is no camera: [camera.door] begins one that is called door");
         }
-        let mut cameras: Vec<_> =
-            cameras.into_iter().filter_map(|(name, table)| CameraSettings::read(name, table)).collect();
+        let read =
+            |(name, table)| Some(CameraSettings { kept: store.what, ..CameraSettings::read(name, table)? });
+        let mut cameras: Vec<_> = cameras.into_iter().filter_map(read).collect();
         let hand_over = HandOver::read_all(&mut root, &cameras);
         for camera in &mut cameras {
             camera.hands_over = hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
         }
         root.no_more();
-        Self { cameras, http, mqtt, hand_over }
+        Self { cameras, http, mqtt, hand_over, store }
     }
 }
 

@@ -6,10 +6,12 @@ use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream as StdUnixStream;
 use std::sync::Arc;
+use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
+use events::Sighting;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use serde::de::DeserializeOwned;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
@@ -43,6 +45,7 @@ pub async fn run() -> io::Result<()> {
     let start: Start = next(&mut orders).await?.ok_or(io::ErrorKind::UnexpectedEof)?;
     let log = Arc::new(Log::unwritten());
     let mut events = log.subscribe();
+    let sightings = log.sightings();
     let camera = Camera::start_here(start.settings, start.control, log, None)?;
     let known = camera.known.clone();
     let mut process = Child { words, heard: 0 };
@@ -71,7 +74,10 @@ pub async fn run() -> io::Result<()> {
                 let (at, sight) = (**sights.borrow_and_update()).clone();
                 process.say(&Word::Sight(at.elapsed(), sight)).await?;
             }
-            _ = timer.tick() => process.report(&camera).await?,
+            _ = timer.tick() => {
+                process.say_all(&sightings).await?;
+                process.report(&camera).await?;
+            }
             _ = terminate.recv() => break,
             _ = interrupt.recv() => break,
         }
@@ -82,6 +88,7 @@ pub async fn run() -> io::Result<()> {
         process.report(&camera).await?;
         timer.tick().await;
     }
+    process.say_all(&sightings).await?;
     while let Ok(event) = events.try_recv() {
         process.say(&Word::Event(event)).await?;
     }
@@ -112,6 +119,13 @@ struct Child {
 impl Child {
     async fn report(&mut self, camera: &Camera) -> io::Result<()> {
         self.say(&Word::Report(Box::new(Report::of(&camera.known, self.heard)))).await
+    }
+
+    async fn say_all(&mut self, sightings: &Receiver<Sighting>) -> io::Result<()> {
+        for sighting in sightings.try_iter() {
+            self.say(&Word::Sighting(Box::new(sighting))).await?;
+        }
+        Ok(())
     }
 
     async fn say(&mut self, word: &Word) -> io::Result<()> {

@@ -154,6 +154,7 @@ impl Processes {
                     let at = Instant::now().checked_sub(age).unwrap_or_else(Instant::now);
                     known.sight.send_replace(Arc::new((at, sight)));
                 }
+                Word::Sighting(sighting) => log.keep(*sighting),
                 Word::Picture(picture) => {
                     if let Ok(picture) = BASE64_STANDARD.decode(picture) {
                         known.view.send_replace(picture.into());

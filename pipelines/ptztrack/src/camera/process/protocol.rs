@@ -5,6 +5,7 @@
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use events::Sighting;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
@@ -36,6 +37,8 @@ pub enum Order {
 pub enum Word {
     Event(Event),
     Report(Box<Report>),
+    /// Somebody was followed.
+    Sighting(Box<Sighting>),
     /// For who looks, JPEG in base64.
     Picture(String),
     /// What it sees, and how long ago that was.

@@ -6,6 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
+use events::Pointer;
 use gst::prelude::*;
 
 use crate::config::Recording;
@@ -48,6 +49,25 @@ fn is_short(folder: &Path) -> bool {
 /// Whether something was written not long ago.
 pub fn newest_grew(recording: &Recording, camera: &str, within: Duration) -> bool {
     files(&recording.folder, camera).iter().any(|file| file.bytes > 0 && file.age < within)
+}
+
+/// Where in the recording of this camera a time is, in milliseconds since 1970.
+pub fn at(recording: &Recording, camera: &str, at_ms: i64) -> Option<Pointer> {
+    let began = |file: Kept| Some((begin_ms(&file.path, camera)?, file.path));
+    let before = files(&recording.folder, camera).into_iter().filter_map(began);
+    let (began, file) = before.filter(|(began, _)| *began <= at_ms).max()?;
+    Some(Pointer { file, offset_ms: at_ms - began })
+}
+
+/// When a file begins, by its name.
+fn begin_ms(path: &Path, camera: &str) -> Option<i64> {
+    let time = path.file_stem()?.to_str()?.strip_prefix(camera)?.strip_prefix('-')?;
+    let part = |from: usize, to: usize| time.get(from..to)?.parse::<i32>().ok();
+    let (year, month, day) = (part(0, 4)?, part(4, 6)?, part(6, 8)?);
+    let began =
+        glib::DateTime::from_utc(year, month, day, part(9, 11)?, part(11, 13)?, f64::from(part(13, 15)?))
+            .ok()?;
+    Some(began.to_unix() * 1000 + i64::from(part(15, 18)?))
 }
 
 /// One file of a recording.
@@ -147,5 +167,33 @@ mod tests {
         fs::remove_dir_all(&folder).unwrap();
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].path.ends_with("door-20260101T000000000.mkv"));
+    }
+
+    #[test]
+    fn a_time_is_in_the_file_that_began_last() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-at-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        for name in
+            ["door-20260101T000000000.mkv", "door-20260101T001000250.mkv", "yard-20260101T001000500.mkv"]
+        {
+            fs::write(folder.join(name), "x").unwrap();
+        }
+        let recording = Recording {
+            folder: folder.clone(),
+            segment: Duration::ZERO,
+            keep: None,
+            keep_bytes: None,
+            overlay: false,
+        };
+        // 2026 began 1767225600 s after 1970.
+        let at = |ms: i64| at(&recording, "door", 1_767_225_600_000 + ms);
+        let place = |pointer: Pointer| (pointer.file.file_name().unwrap().to_owned(), pointer.offset_ms);
+        let found = [at(-1), at(600_249), at(601_000)].map(|pointer| pointer.map(place));
+        fs::remove_dir_all(&folder).unwrap();
+        let wanted = [("door-20260101T000000000.mkv", 600_249), ("door-20260101T001000250.mkv", 750)];
+        assert_eq!(
+            found,
+            [None, Some((wanted[0].0.into(), wanted[0].1)), Some((wanted[1].0.into(), wanted[1].1))]
+        );
     }
 }

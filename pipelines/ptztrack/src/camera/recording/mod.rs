@@ -9,6 +9,8 @@
 
 mod files;
 
+pub use files::at;
+
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;

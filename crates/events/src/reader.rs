@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::path::{Path, PathBuf};
+
+use rusqlite::types::Value;
+use rusqlite::{Connection, OptionalExtension, Row, params_from_iter};
+
+use crate::file::{self, Error};
+use crate::{Filter, Looks, Pointer, Sighting};
+
+/// Answers whoever asks; whoever writes is not held up.
+#[derive(Debug)]
+pub struct Reader {
+    connection: Connection,
+    file: PathBuf,
+}
+
+/// A sighting that is kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Entry {
+    /// Its number, which no other one ever has.
+    pub id: i64,
+    /// All of it but the picture.
+    pub sighting: Sighting,
+    /// How far they went, in degrees.
+    pub way_deg: f64,
+    /// Whether there is a picture.
+    pub has_picture: bool,
+    /// What they look like, where there is a picture.
+    pub looks: Option<Looks>,
+}
+
+/// What an [`Entry`] is read from.
+pub(crate) const COLUMNS: &str = "id, camera, run_ms, track, from_ms, to_ms, way_deg, path, file, offset_ms, looks, \
+     EXISTS (SELECT 1 FROM picture WHERE picture.sighting = sighting.id)";
+
+impl Reader {
+    /// Of the events in this folder.
+    ///
+    /// # Errors
+    /// Where there are none, or they cannot be read.
+    pub fn open(folder: &Path) -> Result<Self, Error> {
+        Ok(Self { connection: file::open_to_read(folder)?, file: folder.join(file::FILE) })
+    }
+
+    /// Those that are asked for, the latest first.
+    ///
+    /// # Errors
+    /// Where they cannot be read.
+    pub fn sightings(&self, filter: &Filter) -> Result<Vec<Entry>, Error> {
+        self.select(filter).map_err(Error::file(&self.file))
+    }
+
+    /// One of them.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub fn sighting(&self, id: i64) -> Result<Option<Entry>, Error> {
+        let sql = format!("SELECT {COLUMNS} FROM sighting WHERE id = ?1");
+        self.connection.query_row(&sql, [id], entry).optional().map_err(Error::file(&self.file))
+    }
+
+    /// The picture of one, JPEG.
+    ///
+    /// # Errors
+    /// Where it cannot be read.
+    pub fn picture(&self, id: i64) -> Result<Option<Vec<u8>>, Error> {
+        self.connection
+            .query_row("SELECT jpeg FROM picture WHERE sighting = ?1", [id], |row| row.get(0))
+            .optional()
+            .map_err(Error::file(&self.file))
+    }
+
+    /// The cameras that there are sightings of.
+    ///
+    /// # Errors
+    /// Where they cannot be read.
+    pub fn cameras(&self) -> Result<Vec<String>, Error> {
+        let all = || -> rusqlite::Result<Vec<String>> {
+            let mut select =
+                self.connection.prepare("SELECT DISTINCT camera FROM sighting ORDER BY camera")?;
+            select.query_map([], |row| row.get(0))?.collect()
+        };
+        all().map_err(Error::file(&self.file))
+    }
+
+    fn select(&self, filter: &Filter) -> rusqlite::Result<Vec<Entry>> {
+        let mut conditions = Vec::new();
+        let mut values: Vec<Value> = Vec::new();
+        let mut add = |condition: &'static str, value: Option<Value>| {
+            if let Some(value) = value {
+                conditions.push(condition);
+                values.push(value);
+            }
+        };
+        add("to_ms >= ?", filter.since_ms.map(Value::from));
+        add("from_ms <= ?", filter.until_ms.map(Value::from));
+        add("camera = ?", filter.camera.clone().map(Value::from));
+        let conditions = if conditions.is_empty() { "TRUE".to_owned() } else { conditions.join(" AND ") };
+        let sql = format!("SELECT {COLUMNS} FROM sighting WHERE {conditions} ORDER BY from_ms DESC, id DESC");
+        let mut select = self.connection.prepare(&sql)?;
+        let entries = select.query_map(params_from_iter(values), entry)?;
+        let wanted = |entry: &rusqlite::Result<Entry>| match (entry, &filter.area) {
+            (Ok(entry), Some(area)) => area.saw(&entry.sighting),
+            _ => true,
+        };
+        entries.filter(wanted).take(filter.most.unwrap_or(usize::MAX)).collect()
+    }
+}
+
+pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
+    let file: Option<String> = row.get("file")?;
+    let path: String = row.get("path")?;
+    let path = serde_json::from_str(&path).map_err(|err| {
+        rusqlite::Error::FromSqlConversionFailure(7, rusqlite::types::Type::Text, err.into())
+    })?;
+    let recording = match file {
+        Some(file) => Some(Pointer { file: file.into(), offset_ms: row.get("offset_ms")? }),
+        None => None,
+    };
+    let sighting = Sighting {
+        camera: row.get("camera")?,
+        run_ms: row.get("run_ms")?,
+        track: row.get::<_, i64>("track")?.unsigned_abs(),
+        from_ms: row.get("from_ms")?,
+        to_ms: row.get("to_ms")?,
+        path,
+        picture: None,
+        recording,
+    };
+    let looks = row.get::<_, Option<Vec<u8>>>("looks")?.map(Looks::from);
+    Ok(Entry { id: row.get("id")?, sighting, way_deg: row.get("way_deg")?, has_picture: row.get(11)?, looks })
+}

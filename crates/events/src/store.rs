@@ -1,0 +1,167 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, SystemTime};
+
+use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
+
+use crate::file::{self, Error};
+use crate::reader::{COLUMNS, entry};
+use crate::{Picture, Sighting};
+
+/// How much is kept.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Retention {
+    /// Whatever ended longer ago goes.
+    pub age: Duration,
+    /// The oldest go where the file has more.
+    pub bytes: u64,
+}
+
+/// Keeps sightings, in one file of a folder.
+#[derive(Debug)]
+pub struct Store {
+    connection: Connection,
+    file: PathBuf,
+}
+
+/// So many of the oldest go at a time where there is too much.
+const BATCH: i64 = 16;
+
+impl Store {
+    /// Opens the file, or makes one. Where there is a broken one, or one of another version, it is moved aside, and its new
+    /// place is returned too.
+    ///
+    /// # Errors
+    /// Where the folder or the file cannot be written.
+    pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), Error> {
+        let (connection, aside) = file::open(folder)?;
+        Ok((Self { connection, file: folder.join(file::FILE) }, aside))
+    }
+
+    /// Keeps one; where the same track was kept before, both become one. Its number.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn keep(&mut self, sighting: Sighting) -> Result<i64, Error> {
+        let said = Error::file(&self.file);
+        let keep = |connection: &mut Connection| {
+            let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
+            let id = write(&transaction, sighting)?;
+            transaction.commit()?;
+            Ok(id)
+        };
+        keep(&mut self.connection).map_err(said)
+    }
+
+    /// Deletes what is more than is kept, at this time.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn retain(&mut self, retention: &Retention, now: SystemTime) -> Result<(), Error> {
+        let oldest =
+            now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().saturating_sub(retention.age);
+        let oldest_ms = i64::try_from(oldest.as_millis()).unwrap_or(i64::MAX);
+        self.delete_where("to_ms < ?1", oldest_ms)?;
+        while self.bytes()? > retention.bytes {
+            let the_oldest = "id IN (SELECT id FROM sighting ORDER BY from_ms LIMIT ?1)";
+            if self.delete_where(the_oldest, BATCH)? == 0 {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Deletes all that is known of somebody: of one track. Whether there was something.
+    ///
+    /// # Errors
+    /// Where it cannot be written.
+    pub fn delete(&mut self, id: i64) -> Result<bool, Error> {
+        let found = self.delete_where("id = ?1", id)? > 0;
+        // It is not in the log either.
+        let shorten = |row: &rusqlite::Row| row.get::<_, i64>(0);
+        let shortened = self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], shorten);
+        shortened.map_err(Error::file(&self.file))?;
+        Ok(found)
+    }
+
+    /// What the file takes, but for what is free in it.
+    fn bytes(&self) -> Result<u64, Error> {
+        let sql = "SELECT (page_count - freelist_count) * page_size \
+                   FROM pragma_page_count, pragma_freelist_count, pragma_page_size";
+        let bytes = self.connection.query_row(sql, [], |row| row.get::<_, i64>(0));
+        Ok(bytes.map_err(Error::file(&self.file))?.unsigned_abs())
+    }
+
+    fn delete_where(&mut self, condition: &'static str, value: i64) -> Result<usize, Error> {
+        let delete = || {
+            let gone =
+                self.connection.execute(&format!("DELETE FROM sighting WHERE {condition}"), [value])?;
+            // It gives back a page with each of its rows.
+            let mut vacuum = self.connection.prepare("PRAGMA incremental_vacuum")?;
+            let mut pages = vacuum.query([])?;
+            while pages.next()?.is_some() {}
+            Ok(gone)
+        };
+        delete().map_err(Error::file(&self.file))
+    }
+}
+
+impl Error {
+    /// Whether the file has to be opened anew, which moves a broken one aside.
+    pub fn needs_another_file(&self) -> bool {
+        self.is_corrupt()
+    }
+}
+
+fn write(transaction: &Transaction, new: Sighting) -> rusqlite::Result<i64> {
+    let track = new.track.cast_signed();
+    let known = format!("SELECT {COLUMNS} FROM sighting WHERE camera = ?1 AND run_ms = ?2 AND track = ?3");
+    let known = transaction.query_row(&known, params![new.camera, new.run_ms, track], entry).optional()?;
+    let (id, sighting) = match known {
+        Some(known) => {
+            let mut sighting = Sighting { picture: picture(transaction, known.id)?, ..known.sighting };
+            sighting.join(new);
+            (Some(known.id), sighting)
+        }
+        None => (None, new),
+    };
+    let path = serde_json::to_string(&sighting.path)
+        .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
+    let recording = sighting.recording.as_ref();
+    transaction.execute(
+        "INSERT INTO sighting (id, camera, run_ms, track, from_ms, to_ms, way_deg, path, quality, looks, file, offset_ms)
+         VALUES (?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8, ?9, ?10, ?11, ?12)
+         ON CONFLICT (id) DO UPDATE SET from_ms = ?5, to_ms = ?6, way_deg = ?7, path = ?8, quality = ?9, looks = ?10,
+             file = ?11, offset_ms = ?12",
+        params![
+            id,
+            sighting.camera,
+            sighting.run_ms,
+            track,
+            sighting.from_ms,
+            sighting.to_ms,
+            sighting.way_deg(),
+            path,
+            sighting.picture.as_ref().map(|picture| picture.quality),
+            sighting.picture.as_ref().map(|picture| picture.looks.bytes()),
+            recording.map(|pointer| pointer.file.to_string_lossy()),
+            recording.map(|pointer| pointer.offset_ms),
+        ],
+    )?;
+    let id = id.unwrap_or_else(|| transaction.last_insert_rowid());
+    if let Some(picture) = sighting.picture {
+        transaction
+            .execute("REPLACE INTO picture (sighting, jpeg) VALUES (?1, ?2)", params![id, picture.jpeg])?;
+    }
+    Ok(id)
+}
+
+fn picture(transaction: &Transaction, id: i64) -> rusqlite::Result<Option<Picture>> {
+    let sql = "SELECT jpeg, quality, looks FROM picture JOIN sighting ON sighting.id = picture.sighting WHERE id = ?1";
+    let read = |row: &rusqlite::Row| {
+        let looks: Vec<u8> = row.get(2)?;
+        Ok(Picture { jpeg: row.get(0)?, quality: row.get(1)?, looks: looks.into() })
+    };
+    transaction.query_row(sql, [id], read).optional()
+}

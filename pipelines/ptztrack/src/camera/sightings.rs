@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Who is followed, with the best picture: a branch of the camera's pipeline, which gets what is left for it.
+
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant, SystemTime};
+
+use events::{Collector, Crop, Ended, Sighting, Target, sharpness};
+use gst::prelude::*;
+use gst_video::prelude::*;
+use ptztrack_contract::lock::lock;
+use ptztrack_contract::{BufferMeta, CameraEvent, Rect, TargetMeta, TargetState};
+
+use super::recording;
+use crate::config::{CameraSettings, Kept};
+use crate::log::Log;
+
+/// Where a pipeline ends from which it is seen who is followed.
+pub const SINK: &str = "appsink name=sightings sync=false async=false max-buffers=1 drop=true";
+
+/// Between two looks whether a picture is better than those before.
+const LOOK: Duration = Duration::from_millis(200);
+
+/// No picture that is kept is higher, in pixels.
+const MOST_HEIGHT: u32 = 480;
+
+/// Sees to it that those are kept whom this pipeline follows.
+pub fn watch(
+    sink: &gst_app::AppSink,
+    tracker: Option<&gst::Element>,
+    camera: &CameraSettings,
+    log: Arc<Log>,
+) {
+    let Some(kept) = camera.kept else { return };
+    let looks = Arc::new(Mutex::new(CameraEvent::default()));
+    if let Some(pad) = tracker.and_then(|tracker| tracker.static_pad("src")) {
+        let looks = looks.clone();
+        pad.add_probe(gst::PadProbeType::EVENT_UPSTREAM, move |_, info| {
+            if let Some(Ok(camera)) = info.event().and_then(|event| CameraEvent::of(event)) {
+                *lock(&looks) = camera;
+            }
+            gst::PadProbeReturn::Ok
+        });
+    }
+    let mut witness = Witness::new(camera, kept, looks, log);
+    let see = move |sink: &gst_app::AppSink| {
+        let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
+        witness.see(&sample);
+        Ok(gst::FlowSuccess::Ok)
+    };
+    sink.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(see).build());
+}
+
+struct Witness {
+    camera: CameraSettings,
+    kept: Kept,
+    log: Arc<Log>,
+    began: Instant,
+    collector: Collector,
+    /// Where the camera looks.
+    looks: Arc<Mutex<CameraEvent>>,
+    looked: Option<Instant>,
+}
+
+impl Witness {
+    fn new(camera: &CameraSettings, kept: Kept, looks: Arc<Mutex<CameraEvent>>, log: Arc<Log>) -> Self {
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        let run_ms = i64::try_from(now.as_millis()).unwrap_or(i64::MAX);
+        let collector = Collector::new(&camera.name, run_ms);
+        Self { camera: camera.clone(), kept, log, began: Instant::now(), collector, looks, looked: None }
+    }
+
+    fn see(&mut self, sample: &gst::Sample) {
+        let Some(meta) = sample.buffer().and_then(TargetMeta::of).and_then(Result::ok) else { return };
+        let followed = matches!(meta.state, TargetState::Tracking | TargetState::Occluded);
+        let target = followed.then(|| self.target(&meta));
+        let ended = self.collector.see(self.began.elapsed(), target.as_ref());
+        ended.into_iter().for_each(|ended| self.keep(ended));
+        if let Some(target) = target.filter(|_| meta.state == TargetState::Tracking && self.is_to_look()) {
+            self.look(sample, &target, meta.bounds);
+        }
+    }
+
+    fn target(&self, meta: &TargetMeta) -> Target {
+        let camera = lock(&self.looks).clone();
+        // While it turns it is where it was a moment ago.
+        let view = CameraEvent { moving: false, ..camera }.view();
+        let ego = meta.ego_velocity.unwrap_or_default();
+        let (x, y) = (meta.velocity.x - ego.x, meta.velocity.y - ego.y);
+        let speed = x.hypot(y);
+        Target {
+            track: meta.id,
+            height: meta.bounds.height,
+            // Whoever comes closer to a camera above their head goes down in its picture.
+            towards: if speed > 0.0 { y / speed } else { 0.0 },
+            direction: view.map(|view| view.angles_of(meta.bounds.centre())),
+        }
+    }
+
+    fn is_to_look(&mut self) -> bool {
+        let is_due = self.kept.pictures && self.looked.is_none_or(|looked| looked.elapsed() >= LOOK);
+        if is_due {
+            self.looked = Some(Instant::now());
+        }
+        is_due
+    }
+
+    fn look(&mut self, sample: &gst::Sample, target: &Target, bounds: Rect) {
+        let Some(info) = sample.caps().and_then(|caps| gst_video::VideoInfo::from_caps(caps).ok()) else {
+            return;
+        };
+        let Some(frame) = sample
+            .buffer()
+            .and_then(|buffer| gst_video::VideoFrameRef::from_buffer_ref_readable(buffer, &info).ok())
+        else {
+            return;
+        };
+        let (x, y, width, height) = bounds.to_pixels(info.width(), info.height());
+        let grey = convert(&frame, [x, y, width, height], (width, height), gst_video::VideoFormat::Gray8);
+        let Some(grey) = grey else { return };
+        self.collector.offer(target, sharpness(&grey, width as usize), || crop(&frame, bounds));
+    }
+
+    fn keep(&self, ended: Ended) {
+        let Ended { sighting, best } = ended;
+        let picture = best.and_then(|(quality, crop)| crop.into_picture(quality, self.kept.pixelate));
+        let recording = self.camera.recording.as_ref();
+        let recording =
+            recording.and_then(|recording| recording::at(recording, &self.camera.name, sighting.from_ms));
+        self.log.keep(Sighting { picture, recording, ..sighting });
+    }
+}
+
+/// The pipeline is over.
+impl Drop for Witness {
+    fn drop(&mut self) {
+        let ended = self.collector.end();
+        ended.into_iter().for_each(|ended| self.keep(ended));
+    }
+}
+
+type Frame<'a> = gst_video::VideoFrameRef<&'a gst::BufferRef>;
+
+/// Somebody, with half of the box around them.
+fn crop(frame: &Frame, bounds: Rect) -> Option<Crop> {
+    let around = Rect {
+        x: bounds.x - bounds.width / 2.0,
+        y: bounds.y - bounds.height / 4.0,
+        width: 2.0 * bounds.width,
+        height: 1.5 * bounds.height,
+    };
+    let (left, top, width, height) = around.to_pixels(frame.width(), frame.height());
+    let (x, y, person_width, person_height) = bounds.to_pixels(frame.width(), frame.height());
+    let scale = (f64::from(MOST_HEIGHT) / f64::from(height.max(1))).min(1.0);
+    let scaled = |length: u32| (f64::from(length) * scale).round() as u32;
+    let size = (scaled(width).max(1), scaled(height).max(1));
+    let rgb = convert(frame, [left, top, width, height], size, gst_video::VideoFormat::Rgb)?;
+    let person = [x.saturating_sub(left), y.saturating_sub(top), person_width, person_height].map(scaled);
+    Some(Crop { width: size.0, height: size.1, rgb, person })
+}
+
+/// A part of a picture in another format, scaled to a size: its pixels row by row, without a gap.
+fn convert(
+    frame: &Frame,
+    part: [u32; 4],
+    (width, height): (u32, u32),
+    format: gst_video::VideoFormat,
+) -> Option<Vec<u8>> {
+    let whole = part.map(|side| i32::try_from(side).ok());
+    let [Some(x), Some(y), Some(part_width @ 1..), Some(part_height @ 1..)] = whole else { return None };
+    let info = gst_video::VideoInfo::builder(format, width, height).build().ok()?;
+    let mut config = gst_video::VideoConverterConfig::new();
+    config.set_src_x(x);
+    config.set_src_y(y);
+    config.set_src_width(Some(part_width));
+    config.set_src_height(Some(part_height));
+    let converter = gst_video::VideoConverter::new(frame.info(), &info, Some(config)).ok()?;
+    let buffer = gst::Buffer::with_size(info.size()).ok()?;
+    let mut converted = gst_video::VideoFrame::from_buffer_writable(buffer, &info).ok()?;
+    converter.frame_ref(frame, &mut converted.as_mut_video_frame_ref());
+    let stride = usize::try_from(info.stride()[0]).ok()?;
+    let row = width as usize * info.format_info().pixel_stride()[0] as usize;
+    let plane = converted.plane_data(0).ok()?;
+    Some(
+        plane
+            .chunks(stride)
+            .take(height as usize)
+            .flat_map(|line| &line[..row.min(line.len())])
+            .copied()
+            .collect(),
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A grey picture whose pixels tell their places, at an odd width.
+    #[test]
+    fn a_crop_has_somebody_where_it_says() {
+        gst::init().unwrap();
+        let (width, height) = (81, 60);
+        let info =
+            gst_video::VideoInfo::builder(gst_video::VideoFormat::Gray8, width, height).build().unwrap();
+        let mut pixels = vec![16; info.size()];
+        let stride = info.stride()[0] as usize;
+        for row in 20..40 {
+            pixels[row * stride + 30..row * stride + 40].fill(235);
+        }
+        let buffer = gst::Buffer::from_slice(pixels);
+        let frame = gst_video::VideoFrameRef::from_buffer_ref_readable(&buffer, &info).unwrap();
+        let crop = crop(&frame, Rect::from_pixels((30, 20, 10, 20), width, height)).unwrap();
+        assert_eq!((crop.width, crop.height, crop.person), (20, 30, [5, 5, 10, 20]));
+        let bright = |x: usize, y: usize| crop.rgb[(y * 20 + x) * 3] > 200;
+        assert!(
+            bright(5, 5)
+                && bright(14, 24)
+                && !bright(4, 5)
+                && !bright(15, 5)
+                && !bright(5, 4)
+                && !bright(5, 25)
+        );
+        assert!(convert(&frame, [0, 0, 0, 10], (1, 1), gst_video::VideoFormat::Rgb).is_none());
+    }
+}

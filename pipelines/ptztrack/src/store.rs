@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Keeps who was followed, in a thread of its own: where the disk is full, slow or hangs, nobody is followed the worse for it.
+
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
+use std::thread;
+use std::time::{Duration, SystemTime};
+
+use events::{Error, Retention, Sighting};
+
+use crate::config::Store;
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// Between two tries; twice as long each time.
+const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
+
+/// What is too old goes this often where nothing happens.
+const LOOK: Duration = Duration::from_secs(3600);
+
+/// The last ones are waited for this long, as a disk may hang.
+const LONGEST_END: Duration = Duration::from_secs(5);
+
+/// Where state is kept: where systemd says, or where programs of a user have theirs (XDG Base Directory Specification).
+pub fn state_folder() -> Option<PathBuf> {
+    let of = |variable| std::env::var_os(variable).filter(|value| !value.is_empty()).map(PathBuf::from);
+    let of_user = || of("XDG_STATE_HOME").or_else(|| Some(of("HOME")?.join(".local/state")));
+    of("STATE_DIRECTORY").or_else(|| Some(of_user()?.join("ptztrack")))
+}
+
+impl Store {
+    /// Where the file is.
+    ///
+    /// # Errors
+    /// Where nobody says where.
+    pub fn place(&self) -> Result<PathBuf, String> {
+        let nowhere = "no folder for events: `folder` in [events] says which";
+        self.folder.clone().or_else(state_folder).ok_or_else(|| nowhere.to_owned())
+    }
+}
+
+/// Whoever keeps, until [`Keeper::end`].
+pub struct Keeper {
+    log: Arc<Log>,
+    ended: Receiver<()>,
+}
+
+impl Keeper {
+    /// Keeps from now on who was followed; nobody where nothing is to be kept.
+    pub fn start(settings: &Store, log: &Arc<Log>) -> Option<Self> {
+        settings.what?;
+        let keeping = settings.place().map(|folder| Keeping {
+            folder,
+            retention: settings.retention,
+            log: log.clone(),
+            open: None,
+            in_trouble: false,
+        });
+        let started = keeping.and_then(|keeping| Self::spawn(keeping, log).map_err(|err| err.to_string()));
+        let tell = |reason: &String| {
+            log.tell(&Event::new(Level::Warning, None, "events-not-kept", not_kept(reason)));
+        };
+        started.inspect_err(tell).ok()
+    }
+
+    fn spawn(mut keeping: Keeping, log: &Arc<Log>) -> io::Result<Self> {
+        let (ending, ended) = channel();
+        let sightings = log.sightings();
+        thread::Builder::new().name("events".to_owned()).spawn(move || {
+            keeping.run(&sightings);
+            drop(ending);
+        })?;
+        Ok(Self { log: log.clone(), ended })
+    }
+
+    /// Waits until all is kept; not for ever.
+    pub fn end(self) {
+        self.log.keep_no_more();
+        // Nothing is ever sent: it ends with the thread.
+        let _ = self.ended.recv_timeout(LONGEST_END);
+    }
+}
+
+fn not_kept(reason: &str) -> String {
+    format!("who is followed is not kept: {reason}")
+}
+
+struct Keeping {
+    folder: PathBuf,
+    retention: Retention,
+    log: Arc<Log>,
+    open: Option<events::Store>,
+    in_trouble: bool,
+}
+
+impl Keeping {
+    fn run(&mut self, sightings: &Receiver<Sighting>) {
+        self.persist(|keeping| keeping.retain());
+        loop {
+            match sightings.recv_timeout(LOOK) {
+                Ok(sighting) => self.persist(|keeping| keeping.keep(&sighting)),
+                Err(RecvTimeoutError::Timeout) => self.persist(|keeping| keeping.retain()),
+                Err(RecvTimeoutError::Disconnected) => return,
+            }
+        }
+    }
+
+    /// Tries until it is done. The failure is said once, and its end.
+    fn persist(&mut self, mut what: impl FnMut(&mut Self) -> Result<(), Error>) {
+        let mut pause = SHORTEST_PAUSE;
+        while let Err(err) = what(self) {
+            // Whatever was wrong may be mended in the next one.
+            self.open = None;
+            if !std::mem::replace(&mut self.in_trouble, true) {
+                let detail =
+                    format!("{}; the cameras follow, and it is tried again", not_kept(&err.to_string()));
+                self.log.tell(&Event::new(Level::Warning, None, "events-not-kept", detail));
+            }
+            thread::sleep(pause);
+            pause = (pause * 2).min(LONGEST_PAUSE);
+        }
+        if std::mem::take(&mut self.in_trouble) {
+            self.log.info("events-kept", "who is followed is kept again");
+        }
+    }
+
+    fn keep(&mut self, sighting: &Sighting) -> Result<(), Error> {
+        let id = self.store()?.keep(sighting.clone())?;
+        let seconds = (sighting.to_ms - sighting.from_ms) as f64 / 1000.0;
+        let detail = format!("event {id}: target {} was followed for {seconds:.1} s", sighting.track);
+        self.log.tell(&Event::new(Level::Info, Some(&sighting.camera), "event-kept", detail));
+        // What is too much can wait for the next one.
+        let _ = self.retain();
+        Ok(())
+    }
+
+    fn retain(&mut self) -> Result<(), Error> {
+        let retention = self.retention;
+        self.store()?.retain(&retention, SystemTime::now())
+    }
+
+    fn store(&mut self) -> Result<&mut events::Store, Error> {
+        let store = match self.open.take() {
+            Some(store) => store,
+            None => self.open_anew()?,
+        };
+        Ok(self.open.insert(store))
+    }
+
+    fn open_anew(&self) -> Result<events::Store, Error> {
+        let (store, aside) = events::Store::open(&self.folder)?;
+        if let Some(aside) = aside {
+            self.log.tell(&Event::new(Level::Warning, None, "events-moved-aside", moved(&aside)));
+        }
+        Ok(store)
+    }
+}
+
+fn moved(aside: &Path) -> String {
+    format!(
+        "the file of events is broken or of another version: it is {} now, and a new one was begun",
+        aside.display()
+    )
+}
