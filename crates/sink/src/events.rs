@@ -36,6 +36,11 @@ impl PendingStatus {
         }
     }
 
+    /// What was told last is to be told again: the picture has another shape, or has one now.
+    pub fn renew(&mut self) {
+        self.next = self.next.or(self.last.map(|(status, _)| status));
+    }
+
     /// Whether there is something to be told.
     pub fn is_due(&self) -> bool {
         self.next.is_some()
@@ -85,6 +90,19 @@ mod tests {
         };
         assert_eq!(told(true), [0, 5, 10, 15, 20, 25, 30, 35]);
         assert_eq!(told(false), [0]);
+    }
+
+    #[test]
+    fn what_was_told_before_there_was_a_picture_is_told_again() {
+        let mut pending = PendingStatus::default();
+        pending.renew();
+        assert!(!pending.is_due(), "nothing was told");
+        let status = Status { connected: true, ..Status::default() };
+        pending.changed(status);
+        assert_eq!(pending.take(Time::ZERO), Some(status));
+        pending.renew();
+        assert_eq!(pending.take(Time::ZERO), Some(status));
+        assert!(!pending.is_due());
     }
 
     #[test]

@@ -157,6 +157,8 @@ pub trait Plumbing: PtzSink {
         let picture = Picture::of(caps)
             .ok_or_else(|| gst::loggable_error!(Self::category(), "caps without a size: {caps}"))?;
         lock(&self.core().stream).picture = Some(picture);
+        // Of a field of view it can only be said now how high it is.
+        lock(&self.core().pending_status).renew();
         Ok(())
     }
 
