@@ -44,6 +44,9 @@ pub struct Options {
     /// Where the people are: hall, yard, night-yard or infrared-yard
     #[arg(long, value_name = "PLACE", value_parser = place)]
     place: Option<Place>,
+    /// Where the camera hangs in the room, as 6,3.2,0.5: metres to the right of where it does otherwise, above the floor, and ahead
+    #[arg(long, value_name = "RIGHT,UP,AHEAD", value_parser = stand, allow_hyphen_values = true)]
+    stand: Option<[f64; 3]>,
     /// How many cars drive by, in a yard
     #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
     vehicles: u8,
@@ -344,6 +347,7 @@ impl Options {
         let for_room = self.room_test.is_some()
             || self.action.is_some()
             || self.place.is_some()
+            || self.stand.is_some()
             || (self.seed.is_some() && self.photo.is_none());
         let name = self.world.unwrap_or(match (&self.footage, &self.photo) {
             (Some(_), _) => WorldName::Footage,
@@ -359,7 +363,7 @@ impl Options {
         }
         if for_room && name != WorldName::Room {
             return Err(
-                "--room-test, --place and --action are for --world room, --seed is for that or --world photo"
+                "--room-test, --place, --stand and --action are for --world room, --seed is for that or --world photo"
                     .into(),
             );
         }
@@ -401,6 +405,7 @@ impl Options {
             action: self.action.unwrap_or_default(),
             others: usize::from(self.others),
             place: self.place.unwrap_or_default(),
+            stand: self.stand,
             vehicles: usize::from(self.vehicles),
             faint: self.faint,
             events: self.events.clone(),
@@ -480,6 +485,12 @@ fn action(text: &str) -> Result<Action, String> {
 
 fn place(text: &str) -> Result<Place, String> {
     named(&Place::ALL, text)
+}
+
+fn stand(text: &str) -> Result<[f64; 3], String> {
+    let metres = |text: &str| text.trim().parse().ok().filter(|metres: &f64| metres.abs() < 1000.0);
+    let metres: Option<Vec<f64>> = text.split(',').map(metres).collect();
+    metres.and_then(|metres| metres.try_into().ok()).ok_or_else(|| "must be like 6,3.2,0.5".into())
 }
 
 fn event(text: &str) -> Result<Event, String> {
@@ -569,6 +580,8 @@ mod tests {
         assert!(!room("--world room --once").repeats);
         assert_eq!(room("--action cross-alike --seed 2").action, Action::CrossAlike);
         assert!(settings("--action fly").is_err());
+        assert_eq!(room("--stand -6,3.2,0.5").stand, Some([-6.0, 3.2, 0.5]));
+        assert!(settings("--stand 1,2").is_err());
         assert_eq!(room("--world room --faint 4").faint, Some(4.0));
         let busy = room("--world room --events door,sun --cast-shadows --reflecting-floor");
         assert_eq!(

@@ -39,11 +39,13 @@ pub enum Action {
     Drive,
     /// Stands beside the first view and holds their hands into it for a while; then walks across the room.
     Reach,
+    /// Walks to and fro for a minute and leaves; then somebody else comes in from the other side.
+    Relay,
 }
 
 impl Action {
     /// Every one, with its name for command lines and tables.
-    pub const ALL: [(Self, &'static str); 16] = [
+    pub const ALL: [(Self, &'static str); 17] = [
         (Self::Test, "test"),
         (Self::Nobody, "nobody"),
         (Self::Cross, "cross"),
@@ -60,6 +62,7 @@ impl Action {
         (Self::Far, "far"),
         (Self::Drive, "drive"),
         (Self::Reach, "reach"),
+        (Self::Relay, "relay"),
     ];
 
     /// A number for streams of chance; the way of a thesis test has those of the tests.

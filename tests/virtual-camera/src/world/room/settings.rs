@@ -84,6 +84,9 @@ pub struct RoomSettings {
     pub seed: u64,
     /// Where all that is.
     pub place: Place,
+    /// Where the camera hangs, in metres: to the right of where it does otherwise, above the floor, and ahead. Of furniture only the
+    /// sides that are seen from there otherwise are drawn.
+    pub stand: Option<[f64; 3]>,
     /// How much light there is.
     pub lighting: Lighting,
     /// What hides the person on the way.
@@ -121,6 +124,7 @@ impl Default for RoomSettings {
         Self {
             seed: 1,
             place: Place::Hall,
+            stand: None,
             lighting: Lighting::Optimal,
             occlusion: Occlusion::None,
             speed: Change::Fixed,

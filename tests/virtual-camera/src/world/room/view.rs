@@ -43,7 +43,7 @@ impl View {
     /// The same through a lens that is so many metres ahead of the axes that the camera turns about.
     pub fn ahead(self, offset_m: f64) -> Self {
         let [right, down, ahead] = self.rotation.map(|line| line[2] * offset_m);
-        Self { lens: add(CAMERA, [right, -down, ahead]), ..self }
+        Self { lens: add(self.lens, [right, -down, ahead]), ..self }
     }
 
     /// The same through a lens somewhere else.

@@ -9,7 +9,7 @@ use super::{
     light::Strength,
     scene::{Plan, Scene, Style},
     settings::{Place, RoomSettings},
-    view::{Vector, View},
+    view::{CAMERA, Vector, View, subtract},
     walker::{Mover, SkinPatch, bounds, mark, movers, obstacles},
     weather::Weather,
 };
@@ -55,6 +55,8 @@ pub(crate) struct Room {
     faint: Option<f64>,
     /// How far everything has come when the world begins.
     begins: Duration,
+    /// Where the camera hangs.
+    stand: Vector,
     /// How far the lens is ahead of the axes that the camera turns about, in metres.
     lens_offset_m: f64,
     optics: Optics,
@@ -113,6 +115,7 @@ impl Room {
             weather: Weather::new(room),
             faint: room.faint,
             begins: room.begins,
+            stand: room.stand.unwrap_or(CAMERA),
             lens_offset_m: settings.imaging.lens_offset_m,
             sensor: Sensor::new(
                 room.lighting,
@@ -136,13 +139,17 @@ impl Room {
         let body = |(id, mover): (u32, &'a dyn Mover)| Body { id, mover, place: mover.place(seconds) };
         let movers = self.movers.iter().map(|mover| mover.as_ref());
         let mut bodies: Vec<_> = (1..).zip(movers).map(body).collect();
-        let away = |body: &Body| body.place[0].hypot(body.place[2]);
+        let away = |body: &Body| {
+            let [right, _, ahead] = subtract(body.place, self.stand);
+            right.hypot(ahead)
+        };
         bodies.sort_by(|one, other| away(other).total_cmp(&away(one)));
         bodies
     }
 
     fn view(&self, pose: &Pose, size: (u32, u32)) -> View {
-        View::new(pose, self.pinhole(pose.zoom_step, size), size).ahead(self.lens_offset_m)
+        let view = View::new(pose, self.pinhole(pose.zoom_step, size), size);
+        view.with_lens(self.stand).ahead(self.lens_offset_m)
     }
 
     /// The light of an exposure on a picture through `view`, which is the camera's as the shutter opens; `seen` says what the

@@ -9,7 +9,7 @@ use super::{
         action::Action,
         settings::{RoomSettings, Subject},
     },
-    route::{Leg, Leg::*, Way},
+    route::{self, Leg, Leg::*, Way},
     walk::{ENTRY_DEG, TO_THE_EDGE},
 };
 use crate::{seeded::Seeded, truth::Kind};
@@ -21,8 +21,11 @@ const FAST: f64 = 1.9;
 const RUN: f64 = 4.0;
 /// When those who walk set off, in seconds: as in the tests.
 const DEPARTURE: f64 = 0.8;
-/// How long somebody wanders, in seconds.
+/// How long somebody wanders, in seconds, and each of those who take turns.
 const WANDERING: f64 = 180.0;
+const RELAY: f64 = 60.0;
+/// So far to the side a camera that turns no farther than it has to sees nobody any more, in metres.
+const GONE: f64 = 12.0;
 /// The part of the floor in which they walk: from side to side and ahead of the camera, in metres.
 const FLOOR: ((f64, f64), (f64, f64)) = ((-4.2, 4.2), (4.9, 6.9));
 
@@ -73,6 +76,7 @@ pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
         Action::Far => alone(stage.far(&mut chance)),
         Action::Drive => alone(stage.drive(&mut chance)),
         Action::Reach => alone(stage.reach(&mut chance)),
+        Action::Relay => stage.relay(&mut chance),
     };
     let first = if settings.action == Action::Drive { Kind::Vehicle } else { Kind::Person };
     let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
@@ -125,18 +129,19 @@ fn about((near, far): (f64, f64), chance: &mut Seeded) -> Way {
         heading: chance.range(-PI, PI),
         departure: chance.range(0.0, 2.0),
         above_deg: 0.0,
-        legs: strolling(start, chance, place),
+        legs: strolling(start, WANDERING, chance, place),
     }
 }
 
-/// From place to place for as long as somebody wanders, with stops, at changing speeds.
+/// From place to place for so many seconds, with stops, at changing speeds.
 fn strolling(
     mut place: (f64, f64),
+    lasting: f64,
     chance: &mut Seeded,
     somewhere: impl Fn(&mut Seeded) -> (f64, f64),
 ) -> Vec<Leg> {
     let (mut legs, mut seconds) = (Vec::new(), 3.0);
-    while seconds < WANDERING {
+    while seconds < lasting {
         let next = somewhere(chance);
         let (length, speed) = ((next.0 - place.0).hypot(next.1 - place.1), chance.range(0.7, 1.7));
         if length < 1.2 {
@@ -309,12 +314,26 @@ impl Stage {
     }
 
     fn wander(&self, chance: &mut Seeded) -> Way {
+        self.wander_for(WANDERING, DEPARTURE, chance)
+    }
+
+    fn wander_for(&self, seconds: f64, departure: f64, chance: &mut Seeded) -> Way {
         let first = self.at(-3.5, self.lane);
         let ((left, right), (near, far)) = FLOOR;
         let somewhere = |chance: &mut Seeded| (chance.range(left, right), chance.range(near, far));
         let mut legs = vec![Past(first, SPEED)];
-        legs.extend(strolling(first, chance, somewhere));
-        self.way(self.start(self.lane), DEPARTURE, legs)
+        legs.extend(strolling(first, seconds, chance, somewhere));
+        self.way(self.start(self.lane), departure, legs)
+    }
+
+    /// One after the other: the second comes in where the first one came in, some seconds after that one has left on the other
+    /// side.
+    fn relay(&self, chance: &mut Seeded) -> Vec<(Way, usize)> {
+        let mut first = self.wander_for(RELAY, DEPARTURE, chance);
+        first.legs.push(Past(self.at(GONE, self.lane), SPEED));
+        let (_, left) = route::follow(&first);
+        let second = self.wander_for(RELAY, left + chance.range(3.0, 6.0), chance);
+        vec![(first, 0), (second, 1)]
     }
 
     /// In rows of up to three, at about the same speed; the person is anywhere in the first row.
