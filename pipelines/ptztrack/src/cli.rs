@@ -13,6 +13,7 @@ use crate::ask_events::AskEvents;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol, Secret, Watchdogs};
 use crate::discovery::{Found, ask};
 use crate::log::{Format, Log};
+use crate::point::Point;
 use crate::shard::Shard;
 
 /// Follows people with pan-tilt-zoom network cameras by itself.
@@ -49,6 +50,8 @@ pub enum Task {
         #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = seconds)]
         wait: Duration,
     },
+    /// Tell a ptztrack that runs that the middle of a camera's picture shows this place of another one's, for it to learn
+    Point(Point),
     /// Follow with one camera, without a file
     Follow(Box<Follow>),
     /// Read a file and name every mistake in it, with its line, and what this machine has not got for a camera

@@ -19,6 +19,7 @@ mod mqtt;
 #[doc(hidden)]
 pub mod parsers;
 mod report;
+mod point;
 mod service;
 mod shard;
 mod store;
@@ -92,6 +93,7 @@ fn run(options: Options) -> Result<(), Failure> {
             let config = Config { cameras, http: None, mqtt: None, hand_over: Vec::new(), store };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
+        Task::Point(point) => Ok(runtime(1)?.block_on(point.say())?),
         Task::Discover { wait } => Ok(runtime(1)?.block_on(discovery::discover(wait))?),
         Task::Check { file } => {
             let config = Config::load(&file)?;

@@ -7,7 +7,7 @@ use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use end_to_end::{Program, scene};
+use end_to_end::{Program, plugin_folder, scene, tool};
 use handover::{Direction, Map, Pair, Place};
 use virtual_camera::{Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
@@ -79,4 +79,33 @@ fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
     // Nobody has a word for the one that does not turn.
     assert!(yard.commands().iter().all(|command| !command.query.contains("move=")), "{:?}", yard.commands());
     fs::remove_dir_all(&state).unwrap();
+}
+
+#[test]
+fn what_a_camera_looks_at_can_be_said_by_hand() {
+    let [yard, door] = [0, 1].map(|_| VirtualCamera::start(scene::nobody()).unwrap());
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
+        let door = Program::entry("door", &door.url(), &password);
+        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
+    };
+    let mut program = Program::start("point", file, &[]);
+    program.launch.wait_for_line("door: the picture is there");
+    let page = program.url().replace("http://", "").replace('/', "");
+    let point = |to: &str, from: &str, place: &str| {
+        let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
+        let output = command.args(["point", to, from, place, "--http", &page]).output().unwrap();
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    assert_eq!(point("door", "yard", "0.4,0.7"), (Some(0), String::new()));
+    program.launch.wait_for_line("door: looks at 0.40,0.70 of yard, as somebody says");
+    assert_eq!(point("yard", "door", "0.4,0.7"), (Some(0), String::new()));
+    program.launch.wait_for_line("yard: warning: door does not call it");
+    let (status, said) = point("door", "gate", "0.4,0.7");
+    assert!(status == Some(1) && said.contains("there is no camera `door`, or none `gate`"), "{said}");
+    assert_eq!(point("door", "yard", "4,7").0, Some(2));
+    program.end("TERM");
+    let (status, said) = point("door", "yard", "0.4,0.7");
+    assert!(status == Some(1) && said.contains("no ptztrack has its page at"), "{said}");
 }

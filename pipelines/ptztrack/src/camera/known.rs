@@ -49,6 +49,8 @@ pub struct Known {
     pub looking: AtomicUsize,
     /// What was seen last, and when, of a camera that people are handed over from or to.
     pub sight: watch::Sender<Arc<(Instant, Sight)>>,
+    /// What it looks at, as somebody has said: places in the pictures of others, which nobody has taken notice of yet.
+    pub points: Mutex<Vec<(String, f64, f64)>>,
     /// Whom another camera saw before this one took them up.
     pub origin: Mutex<Option<Origin>>,
     /// The last picture for who looks, as JPEG.
@@ -146,6 +148,7 @@ impl Known {
             ended: Ended::default(),
             looking: AtomicUsize::default(),
             sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
+            points: Mutex::default(),
             origin: Mutex::default(),
             view: watch::Sender::new(Bytes::new()),
             times: Stopwatch::all(),

@@ -35,7 +35,7 @@ use ptztrack_contract::lock::lock;
 use recording::Recorder;
 use refusals::Refusals;
 use running::Running;
-pub use sight::{Person, Sight};
+pub use sight::{Person, Pose, Sight};
 pub use stopwatch::Stopwatch;
 use tokio::sync::watch;
 
@@ -265,6 +265,15 @@ impl Known {
     /// Follows who is at this place of the picture, 0 to 1.
     pub fn select(&self, x: f64, y: f64) {
         self.with(|running| running.select(x, y));
+    }
+
+    /// The middle of its picture shows this place in that of another camera, 0 to 1.
+    pub fn point(&self, from: String, x: f64, y: f64) {
+        const MOST: usize = 16;
+        let mut points = lock(&self.points);
+        // Where nobody takes notice.
+        points.truncate(MOST - 1);
+        points.push((from, x, y));
     }
 
     pub fn release(&self) {

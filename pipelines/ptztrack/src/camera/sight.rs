@@ -45,6 +45,10 @@ pub struct Sight {
     pub people: Vec<Person>,
     /// The last places of a camera that turns, as it told them, the oldest first.
     pub poses: Vec<Pose>,
+    /// Where it should be by what it was told to do since.
+    pub reckoned: Option<Pose>,
+    /// How fast it should turn, degrees per second to the right and up.
+    pub rate_deg_s: [f64; 2],
     /// It may turn.
     pub moving: bool,
 }
@@ -120,6 +124,17 @@ impl Sight {
         self.people.iter().find(|person| person.is_target && person.is_whole())
     }
 
+    /// About where the camera looked so long ago: by its own word, or else by dead reckoning.
+    pub fn pose_about(&self, age: Duration) -> Option<Pose> {
+        self.pose_at(age).or_else(|| {
+            let reckoned = self.reckoned.clone()?;
+            let since = reckoned.age.as_secs_f64() - age.as_secs_f64();
+            let [pan, tilt] = self.rate_deg_s;
+            let (pan_deg, tilt_deg) = (reckoned.pan_deg + pan * since, reckoned.tilt_deg + tilt * since);
+            Some(Pose { age, pan_deg, tilt_deg, ..reckoned })
+        })
+    }
+
     /// Where the camera looked so long ago; `None` where that is not known yet, or no more.
     pub fn pose_at(&self, age: Duration) -> Option<Pose> {
         let last = self.poses.last()?;
@@ -151,6 +166,8 @@ impl Sight {
 #[derive(Debug, Default)]
 struct Told {
     poses: Vec<(Instant, Pose)>,
+    reckoned: Option<(Instant, Pose)>,
+    rate_deg_s: [f64; 2],
     moving: bool,
 }
 
@@ -158,11 +175,26 @@ impl Told {
     fn hear(&mut self, event: &CameraEvent) {
         let sets_out = event.moving && !std::mem::replace(&mut self.moving, event.moving);
         let Some(pose) = Pose::of(event) else { return };
+        let is_new = self.poses.last().is_none_or(|(_, last)| !last.is_at(&pose));
+        self.reckon(&pose, is_new);
+        self.rate_deg_s = [event.pan_rate_deg_s, event.tilt_rate_deg_s];
         // It was there until now, or is there now; an event may tell of something else.
-        if sets_out || self.poses.last().is_none_or(|(_, last)| !last.is_at(&pose)) {
+        if sets_out || is_new {
             self.poses.push((Instant::now(), pose));
             self.poses.drain(..self.poses.len().saturating_sub(POSES));
         }
+    }
+
+    /// From the last place on at the last rate, unless a new place is told.
+    fn reckon(&mut self, told: &Pose, is_new: bool) {
+        let now = Instant::now();
+        let on = |(at, pose): &(Instant, Pose)| {
+            let (seconds, [pan, tilt]) = ((now - *at).as_secs_f64(), self.rate_deg_s);
+            let (pan_deg, tilt_deg) = (pose.pan_deg + pan * seconds, pose.tilt_deg + tilt * seconds);
+            Pose { pan_deg, tilt_deg, ..told.clone() }
+        };
+        let pose = self.reckoned.as_ref().filter(|_| !is_new).map_or_else(|| told.clone(), on);
+        self.reckoned = Some((now, pose));
     }
 }
 
@@ -191,9 +223,12 @@ fn sight(tracks: &[Track], told: &Told) -> Sight {
         confidence: track.confidence,
         is_target: track.is_target,
     };
+    let aged = |(at, pose): &(Instant, Pose)| Pose { age: at.elapsed(), ..pose.clone() };
     Sight {
         people: tracks.iter().map(person).collect(),
-        poses: told.poses.iter().map(|(at, pose)| Pose { age: at.elapsed(), ..pose.clone() }).collect(),
+        poses: told.poses.iter().map(aged).collect(),
+        reckoned: told.reckoned.as_ref().map(aged),
+        rate_deg_s: told.rate_deg_s,
         moving: told.moving,
     }
 }
@@ -226,6 +261,15 @@ mod tests {
         assert_eq!((pan(1200), pan(300)), (None, None));
         let resting = Sight { moving: false, ..sight.clone() };
         assert_eq!(resting.pose_at(Duration::from_millis(300)).unwrap().pan_deg, -176.0);
+    }
+
+    #[test]
+    fn where_it_looks_is_reckoned_until_it_tells() {
+        let (poses, reckoned) = (vec![pose(900, 10.0)], Some(pose(300, 16.0)));
+        let sight = Sight { poses, reckoned, rate_deg_s: [10.0, 0.0], moving: true, ..Sight::default() };
+        assert_eq!(sight.pose_about(Duration::from_millis(100)).unwrap().pan_deg, 18.0);
+        let resting = Sight { moving: false, ..sight };
+        assert_eq!(resting.pose_about(Duration::from_millis(100)).unwrap().pan_deg, 10.0);
     }
 
     #[test]

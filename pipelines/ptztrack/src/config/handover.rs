@@ -4,7 +4,8 @@ use std::collections::BTreeSet;
 
 use toml::de::DeValue;
 
-use super::camera::{CameraSettings, Kind};
+use super::camera::CameraSettings;
+use super::choices::Kind;
 use super::table::{Read, Table, whole};
 
 /// Whom one camera calls, where it sees somebody.
@@ -69,11 +70,15 @@ impl HandOver {
 
     fn read(from: String, mut table: Table, cameras: &[CameraSettings]) -> Option<Self> {
         let of = |name: &str| cameras.iter().find(|camera| camera.name == name);
-        if of(&from).is_none() {
-            table.wrong(format!("handover: there is no camera `{from}`"));
+        match of(&from) {
+            None => table.wrong(format!("handover: there is no camera `{from}`")),
+            Some(camera) if camera.kind != Kind::Fixed => {
+                table.wrong(format!("handover: `{from}` turns; only one of `kind = \"fixed\"` calls others"));
+            }
+            Some(_) => {}
         }
         let calls: Option<Vec<String>> = table.need("calls");
-        let mut seen = BTreeSet::from([from.as_str()]);
+        let mut seen = BTreeSet::new();
         for called in calls.iter().flatten() {
             match of(called) {
                 None => table.wrong(format!("handover: there is no camera `{called}`")),
@@ -81,7 +86,7 @@ impl HandOver {
                     table.wrong(format!("handover: `{called}` is fixed, so it cannot be called"));
                 }
                 Some(_) if !seen.insert(called) => {
-                    table.wrong(format!("handover: `{from}` cannot call `{called}` twice, nor itself"));
+                    table.wrong(format!("handover: `{from}` cannot call `{called}` twice"));
                 }
                 Some(_) => {}
             }

@@ -3,6 +3,7 @@
 //! The file of cameras: what is in it, read whole before anything starts, every mistake named with its line.
 
 mod camera;
+mod choices;
 mod credentials;
 mod handover;
 mod mqtt;
@@ -19,7 +20,8 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
-pub use camera::{CameraSettings, Codec, Isolation, Kind, RTSP_PORT, Recording, size};
+pub use camera::{CameraSettings, RTSP_PORT, Recording, size};
+pub use choices::{Codec, Isolation, Kind};
 pub use credentials::{Credentials, Secret};
 pub use handover::HandOver;
 pub use mqtt::Mqtt;

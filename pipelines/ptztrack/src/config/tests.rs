@@ -218,11 +218,15 @@ fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
     assert_eq!(hands_over, [("door", true), ("hall", false), ("yard", true)]);
     for (table, reason) in [
         ("[handover.gate]\ncalls = [\"door\"]", "line 8: handover: there is no camera `gate`"),
-        ("[handover.door]\ncalls = [\"gate\"]", "line 8: handover: there is no camera `gate`"),
-        ("[handover.door]\ncalls = [\"yard\"]", "line 8: handover: `yard` is fixed, so it cannot be called"),
+        ("[handover.yard]\ncalls = [\"gate\"]", "line 8: handover: there is no camera `gate`"),
+        ("[handover.yard]\ncalls = [\"yard\"]", "line 8: handover: `yard` is fixed, so it cannot be called"),
         (
-            "[handover.door]\ncalls = [\"door\"]",
-            "line 8: handover: `door` cannot call `door` twice, nor itself",
+            "[handover.door]\ncalls = [\"hall\"]",
+            "line 8: handover: `door` turns; only one of `kind = \"fixed\"`",
+        ),
+        (
+            "[handover.yard]\ncalls = [\"door\", \"door\"]",
+            "line 8: handover: `yard` cannot call `door` twice",
         ),
         ("[handover.yard]\nzones = []", "line 8: `calls` is missing"),
         (

@@ -60,8 +60,10 @@ impl Call {
             return Progress::Overruled;
         }
         if let Some(person) = self.found(link, from, called) {
-            let middle = person.middle();
-            called.known.select(middle.x, middle.y);
+            if !person.is_target {
+                let middle = person.middle();
+                called.known.select(middle.x, middle.y);
+            }
             called.known.steer(Steering::Follow);
             let origin = Origin { target: person.id, id: self.id, camera: self.from.clone() };
             *lock(&called.known.origin) = Some(origin);
@@ -117,7 +119,7 @@ pub fn follows(link: &Link, from: &Seen, person: &Person, called: &View) -> bool
 /// Who of those whom a camera sees is where somebody has to be.
 fn nearest<'a>(aim: &Aim, called: &'a View) -> Option<&'a Person> {
     let sight = &called.seen.1;
-    let view = sight.pose_at(called.video)?.view()?;
+    let view = sight.pose_about(called.video)?.view()?;
     let off = |person: &Person| direction(&view, person.feet()).angle_to_deg(aim.feet);
     let seen = sight.people.iter().filter(|person| person.seen).map(|person| (person, off(person)));
     let (person, off) = seen.min_by(|one, other| one.1.total_cmp(&other.1))?;

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use handover::{Aim, Direction, Learned, Map, Pair, Place};
 
-use crate::camera::{Person, Sight};
+use crate::camera::{Person, Pose, Sight};
 
 /// A picture of each that come within so long show the same moment: no longer than one is under way.
 const SAME_MOMENT: Duration = Duration::from_millis(150);
@@ -76,6 +76,15 @@ impl Link {
         let Some(at) = to.0.checked_sub(video) else { return };
         self.last = Some(to.0);
         self.waiting.push_back(Moment { at, place: place(&from.1, seen), person: person.clone() });
+    }
+
+    /// The camera that is called looks at this place, as somebody says. Returns whether that can be so.
+    pub fn point(&mut self, x: f64, y: f64, pose: &Pose) -> bool {
+        let direction = Direction { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg };
+        let pair = Pair { place: Place::in_picture(x, y), direction, height_deg: None, person: 0 };
+        let learned = self.map.learn(pair) == Learned::Taken;
+        self.changed |= learned;
+        learned
     }
 
     /// Where to look for somebody whom the camera that calls sees there.

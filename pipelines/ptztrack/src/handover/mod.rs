@@ -148,6 +148,7 @@ impl Dispatcher {
                 }
             }
         }
+        self.take_points(wishes, &views);
         self.advance(&views);
         let now = Instant::now();
         self.spared.retain(|_, until| *until > now);
@@ -189,6 +190,30 @@ impl Dispatcher {
                 "{from} or {to} was moved: where {to} has to look for whom {from} sees is learned anew"
             );
             self.tell(to, Level::Warning, "map-void", detail);
+        }
+    }
+
+    /// What somebody says.
+    fn take_points(&mut self, wishes: &[HandOver], views: &BTreeMap<String, View>) {
+        for (to, called) in views {
+            for (from, x, y) in std::mem::take(&mut *lock(&called.known.points)) {
+                if !wishes.iter().any(|wish| wish.from == from && wish.calls.contains(to)) {
+                    let detail = format!("{from} does not call it: [handover.{from}] says who calls whom");
+                    self.tell(to, Level::Warning, "pointed", detail);
+                    continue;
+                }
+                let learned =
+                    called.seen.1.pose_at(called.video).map(|pose| self.link(&from, to).point(x, y, &pose));
+                let place = format!("{x:.2},{y:.2} of {from}");
+                let detail = match learned {
+                    Some(true) => format!("looks at {place}, as somebody says"),
+                    Some(false) => format!("does not look at {place}, by all that is known"),
+                    None => format!(
+                        "cannot be told that it looks at {place}: it turns, or does not say where it looks"
+                    ),
+                };
+                self.tell(to, Level::Info, "pointed", detail);
+            }
         }
     }
 

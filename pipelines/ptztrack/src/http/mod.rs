@@ -235,6 +235,8 @@ fn part(jpeg: &Bytes) -> Bytes {
 struct Place {
     x: Option<f64>,
     y: Option<f64>,
+    /// In the picture of another camera.
+    from: Option<String>,
 }
 
 /// What somebody wants of a camera.
@@ -248,6 +250,13 @@ async fn order(
     match (order.as_str(), within(place.x), within(place.y)) {
         ("select", Some(x), Some(y)) => known.select(x, y),
         ("select", ..) => return (StatusCode::BAD_REQUEST, "x and y are from 0 to 1\n").into_response(),
+        ("point", Some(x), Some(y)) => {
+            let Some(from) = place.from.filter(|from| fleet.of(from).is_some()) else {
+                return StatusCode::NOT_FOUND.into_response();
+            };
+            known.point(from, x, y);
+        }
+        ("point", ..) => return (StatusCode::BAD_REQUEST, "x and y are from 0 to 1\n").into_response(),
         ("release", ..) => known.release(),
         ("hand-over", ..) => known.steer(Steering::HandedOver),
         ("take-back", ..) => known.steer(Steering::Follow),
