@@ -18,8 +18,8 @@ mod log;
 mod mqtt;
 #[doc(hidden)]
 pub mod parsers;
-mod report;
 mod point;
+mod report;
 mod service;
 mod shard;
 mod store;

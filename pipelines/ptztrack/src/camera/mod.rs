@@ -262,6 +262,11 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
 
 /// What somebody at the page can ask for.
 impl Known {
+    /// Follows whom the tracker knows by this number.
+    pub fn select_track(&self, id: u64) {
+        self.with(|running| running.select_track(id));
+    }
+
     /// Follows who is at this place of the picture, 0 to 1.
     pub fn select(&self, x: f64, y: f64) {
         self.with(|running| running.select(x, y));

@@ -336,6 +336,12 @@ impl Running for Elements {
         }
     }
 
+    fn select_track(&self, id: u64) {
+        if let Some(tracker) = &self.tracker {
+            tracker.emit_by_name::<()>("select-track", &[&id]);
+        }
+    }
+
     fn release(&self) {
         if let Some(tracker) = &self.tracker {
             tracker.emit_by_name::<()>("release-target", &[]);

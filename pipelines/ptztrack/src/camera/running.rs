@@ -13,6 +13,9 @@ pub trait Running: Debug + Send + Sync {
     /// Follows who is at this place of the picture, 0 to 1.
     fn select(&self, x: f64, y: f64);
 
+    /// Follows whom the tracker knows by this number.
+    fn select_track(&self, id: u64);
+
     fn release(&self);
 
     /// Lets the camera follow, sends it home, or leaves it to somebody else.

@@ -70,11 +70,6 @@ impl Person {
         Point { x: x + width / 2.0, y }
     }
 
-    pub fn middle(&self) -> Point {
-        let [x, y, width, height] = self.bounds;
-        Point { x: x + width / 2.0, y: y + height / 2.0 }
-    }
-
     /// Seen by themselves, and where they stand.
     pub fn stands_in_picture(&self) -> bool {
         let feet = self.feet();

@@ -61,8 +61,7 @@ impl Call {
         }
         if let Some(person) = self.found(link, from, called) {
             if !person.is_target {
-                let middle = person.middle();
-                called.known.select(middle.x, middle.y);
+                called.known.select_track(person.id);
             }
             called.known.steer(Steering::Follow);
             let origin = Origin { target: person.id, id: self.id, camera: self.from.clone() };

@@ -61,6 +61,7 @@ pub async fn run() -> io::Result<()> {
                 process.heard += 1;
                 match order {
                     Order::Select { x, y } => known.select(x, y),
+                    Order::SelectTrack(id) => known.select_track(id),
                     Order::Release => known.release(),
                     Order::Steer(hand) => known.steer(hand.into()),
                     Order::Look(somebody) => look = somebody.then(|| known.look()),

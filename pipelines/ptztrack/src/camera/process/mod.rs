@@ -246,6 +246,10 @@ impl Running for Remote {
         self.order(&Order::Select { x, y });
     }
 
+    fn select_track(&self, id: u64) {
+        self.order(&Order::SelectTrack(id));
+    }
+
     fn release(&self) {
         self.order(&Order::Release);
     }

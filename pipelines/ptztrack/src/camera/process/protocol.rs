@@ -27,6 +27,7 @@ pub struct Start {
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Order {
     Select { x: f64, y: f64 },
+    SelectTrack(u64),
     Release,
     Steer(Hand),
     Look(bool),
