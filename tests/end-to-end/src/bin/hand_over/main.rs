@@ -4,7 +4,8 @@
 //! walks about for a minute before both and leaves; then somebody else comes in, and only the fixed camera sees that.
 //!
 //! ```sh
-//! make evaluate-handover    # RUNS=20; leaves runs.csv, and what the program said in each, in target/handover
+//! cargo build --workspace --lib --bins
+//! scripts/with-plugins debug target/debug/hand_over --runs 20    # leaves runs.csv, and what the program said, in target/handover
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
