@@ -86,19 +86,22 @@ demo: packages-demo
 	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
-## bench: measure what following costs, on recordings of the room, and leave tables and plots in target/bench: whole pipelines beside
-##       decoding and other elements, in MJPEG and MPEG-4, what they allocate, live pictures as in the thesis' table 5.4, how late
-##       commands are, 1 to 16 cameras, and each algorithm by itself from 640x480 to 3840x2160
-##       (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20)
+## bench: measure what following costs, on recordings of the room with one person and with eight, and leave tables and plots in
+##       target/bench: whole pipelines beside decoding and other elements, in MJPEG and MPEG-4, what they allocate, live pictures as in
+##       the thesis' table 5.4, how late commands are, 1 to 16 cameras, and each algorithm by itself from 640x480 to 3840x2160
+##       (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20  FOOTAGE=file, a recording to look at as well)
 bench: packages-bench
 	$(CARGO) build --release $(PRODUCT)
 	$(CARGO) build --release $(BENCHMARKS)
 	mkdir -p target/bench
-	for codec in avi mpeg4; do \
-		target/release/record target/bench/still.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 0; \
-		target/release/record target/bench/turning.$$codec $(BENCH_SIZE) $(BENCH_SECONDS) 5; \
-	done
-	scripts/with-plugins release python3 tests/benchmarks/pipelines.py target/bench/{still,turning}.{avi,mpeg4} \
+	recordings=(); for codec in avi mpeg4; do for world in 1 8 $(if $(FOOTAGE),"$(FOOTAGE)"); do \
+		case "$$world" in 1) name=;; 8) name=crowd-;; *) name=footage-;; esac; \
+		for camera in still:0 turning:5; do \
+			recordings+=("target/bench/$$name$${camera%:*}.$$codec"); \
+			target/release/record "$${recordings[-1]}" $(BENCH_SIZE) $(BENCH_SECONDS) "$${camera#*:}" "$$world"; \
+		done; \
+	done; done; \
+	scripts/with-plugins release python3 tests/benchmarks/pipelines.py "$${recordings[@]}" \
 		--size $(BENCH_SIZE) --pictures $$(( $(BENCH_SECONDS) * 25 )) --rounds $(ROUNDS) --out target/bench
 	scripts/with-plugins release python3 tests/benchmarks/allocations.py target/bench/still.{avi,mpeg4} --out target/bench
 	scripts/with-plugins release python3 tests/benchmarks/live.py --programs target/release --seconds $(LIVE_SECONDS) --out target/bench

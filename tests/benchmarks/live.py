@@ -50,7 +50,7 @@ class Bench:
         path = self.out / f"live-{size}-{rate}fps-{seconds}s.{CODECS[codec]}"
         if not path.exists():
             unfinished = path.with_name(f"unfinished-{path.name}")
-            self.run("record", unfinished, size, seconds, 0, rate)
+            self.run("record", unfinished, size, seconds, 0, 1, rate)
             unfinished.rename(path)
         return path
 

@@ -91,7 +91,8 @@ def measure(recording, pipelines, pictures, rounds):
 
 def label(recording):
     """What it is called in tables and plots."""
-    return f"{CODECS[recording.suffix]}, camera {recording.stem}"
+    *world, camera = recording.stem.split("-")
+    return ", ".join([CODECS[recording.suffix], *world, f"camera {camera}"])
 
 
 def table(recording, runs):
@@ -128,7 +129,9 @@ def plot(out, results):
         set terminal pngcairo size 1000,560 noenhanced font "DejaVu Sans,11"; set output "{out / 'pipelines.png'}"
         set style data histograms; set style histogram clustered gap 1; set style fill solid 0.85 noborder; set boxwidth 0.9
         set linetype 1 linecolor rgb "#3b6ea5"; set linetype 2 linecolor rgb "#8fb3d9"
-        set linetype 3 linecolor rgb "#c9622e"; set linetype 4 linecolor rgb "#eab38f"
+        set linetype 3 linecolor rgb "#1f4468"; set linetype 4 linecolor rgb "#5f8fc0"
+        set linetype 5 linecolor rgb "#c9622e"; set linetype 6 linecolor rgb "#eab38f"
+        set linetype 7 linecolor rgb "#8a3f18"; set linetype 8 linecolor rgb "#dd8a5a"
         set key top left; set yrange [0:*]; set ylabel "processor ms a picture"; set grid y
         set xtics nomirror rotate by -25 scale 0; set ytics nomirror; set border 3; set rmargin 12
         plot for [column=2:{len(recordings) + 1}] "{data}" using column:xtic(1) title columnheader

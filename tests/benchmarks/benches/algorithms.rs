@@ -5,8 +5,8 @@
 
 use divan::Bencher;
 use gstptztrack::vision::{
-    Background, CameraMotionEstimator, Chroma, ForegroundTest, Luma, Picture, Reduced, Samples,
-    SceneModel, TravellingBackground,
+    Background, CameraMotionEstimator, Chroma, ForegroundTest, Luma, Picture, Reduced, Samples, SceneModel,
+    TravellingBackground,
 };
 use ptztrack_benchmarks::{Camera, Footage};
 use ptztrack_contract::CameraMotion;
@@ -32,7 +32,7 @@ struct Film {
 
 impl Film {
     fn new(size: (usize, usize), camera: Camera) -> Self {
-        let footage = Footage::new(size, camera);
+        let footage = Footage::new(size, camera, 1);
         let there = (0..PICTURES).map(|number| footage.picture(number));
         let mut pictures: Vec<_> = there.collect();
         let back: Vec<_> = pictures[1..pictures.len() - 1].iter().rev().cloned().collect();

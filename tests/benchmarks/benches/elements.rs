@@ -15,7 +15,7 @@ fn main() {
 }
 
 fn measure(bencher: Bencher, stage: Stage, size: (usize, usize), camera: Camera) {
-    let stages = RefCell::new(Stages::warmed_up(size, camera));
+    let stages = RefCell::new(Stages::warmed_up(size, camera, 1));
     bencher
         .with_inputs(|| stages.borrow_mut().next_before(stage))
         .bench_local_values(|picture| stages.borrow_mut().pass(stage, picture));

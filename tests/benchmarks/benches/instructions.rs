@@ -12,20 +12,29 @@ const SIZE: (usize, usize) = (1280, 720);
 /// Pictures that are counted together: what is done every few pictures is among them.
 const PICTURES: usize = 12;
 
-/// Elements that follow somebody, and what reaches `stage` next.
-fn warmed_up(stage: Stage, camera: Camera) -> (Stages, Stage, Vec<gst::Buffer>) {
-    let mut stages = Stages::warmed_up(SIZE, camera);
+/// A crowd.
+const CROWD: u64 = 8;
+
+/// Elements that follow one of so many people, and what reaches `stage` next.
+fn warmed_up(stage: Stage, camera: Camera, people: u64) -> (Stages, Stage, Vec<gst::Buffer>) {
+    let mut stages = Stages::warmed_up(SIZE, camera, people);
     let pictures = (0..PICTURES).map(|_| stages.next_before(stage)).collect();
     (stages, stage, pictures)
 }
 
 #[library_benchmark(setup = warmed_up)]
-#[bench::detect_still(Stage::Detect, Camera::Still)]
-#[bench::detect_turning(Stage::Detect, Camera::Turning)]
-#[bench::track_still(Stage::Track, Camera::Still)]
-#[bench::track_turning(Stage::Track, Camera::Turning)]
-#[bench::overlay_still(Stage::Overlay, Camera::Still)]
-#[bench::overlay_turning(Stage::Overlay, Camera::Turning)]
+#[bench::detect_still(Stage::Detect, Camera::Still, 1)]
+#[bench::detect_turning(Stage::Detect, Camera::Turning, 1)]
+#[bench::track_still(Stage::Track, Camera::Still, 1)]
+#[bench::track_turning(Stage::Track, Camera::Turning, 1)]
+#[bench::overlay_still(Stage::Overlay, Camera::Still, 1)]
+#[bench::overlay_turning(Stage::Overlay, Camera::Turning, 1)]
+#[bench::detect_crowd_still(Stage::Detect, Camera::Still, CROWD)]
+#[bench::detect_crowd_turning(Stage::Detect, Camera::Turning, CROWD)]
+#[bench::track_crowd_still(Stage::Track, Camera::Still, CROWD)]
+#[bench::track_crowd_turning(Stage::Track, Camera::Turning, CROWD)]
+#[bench::overlay_crowd_still(Stage::Overlay, Camera::Still, CROWD)]
+#[bench::overlay_crowd_turning(Stage::Overlay, Camera::Turning, CROWD)]
 fn pass((mut stages, stage, pictures): (Stages, Stage, Vec<gst::Buffer>)) -> Stages {
     for picture in pictures {
         stages.pass(stage, picture);

@@ -8,6 +8,8 @@ const WALK: u64 = 60;
 const WALKER: (f64, f64) = (0.15, 0.45);
 /// How far the walker goes in the picture, in widths of it.
 const WAY: f64 = 0.3;
+/// How much later each walker turns than the one before, pictures.
+const LATER: u64 = 37;
 
 /// What the camera does.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,26 +20,27 @@ pub enum Camera {
     Turning,
 }
 
-/// Somebody who walks to and fro before a wall with a pattern, in I420 pictures without gaps between rows. The same number
+/// People who walk to and fro before a wall with a pattern, past each other, in I420 pictures without gaps between rows. The same number
 /// gives the same picture.
 #[derive(Debug)]
 pub struct Footage {
     size: (usize, usize),
     camera: Camera,
+    people: u64,
     /// Luma of the wall, wider than the picture.
     wall: Vec<u8>,
     margin: usize,
 }
 
 impl Footage {
-    /// Of pictures of that size (pixels, even).
-    pub fn new(size: (usize, usize), camera: Camera) -> Self {
+    /// Of pictures of that size (pixels, even), with so many people.
+    pub fn new(size: (usize, usize), camera: Camera, people: u64) -> Self {
         let margin = (MARGIN * size.0 as f64) as usize;
         let width = size.0 + margin;
         let grain = (size.1 / 60).max(2);
         let wall =
             (0..width * size.1).map(|index| pattern(1, index % width, index / width, grain, 90)).collect();
-        Self { size, camera, wall, margin }
+        Self { size, camera, people, wall, margin }
     }
 
     /// Width and height, pixels.
@@ -56,20 +59,23 @@ impl Footage {
             pixels.extend(row[first..first + width].iter().zip(noise).map(|(wall, noise)| wall + noise));
         }
         pixels.resize(width * height * 3 / 2, 128);
-        self.paint(&mut pixels, number);
+        (0..self.people).for_each(|person| self.paint(&mut pixels, number, person));
         pixels
     }
 
-    fn paint(&self, pixels: &mut [u8], number: u64) {
+    fn paint(&self, pixels: &mut [u8], number: u64, person: u64) {
         let (width, height) = self.size;
         let (across, down) = ((WALKER.0 * height as f64) as usize, (WALKER.1 * height as f64) as usize);
-        let place = 0.5 + WAY * (swing(number + WALK / 2) - 0.5);
-        let (left, top) = ((place * width as f64) as usize - across / 2, height / 4);
+        let middle = (person + 1) as f64 / (self.people + 1) as f64;
+        let place = middle + WAY * (swing(number + WALK / 2 + person * LATER) - 0.5);
+        let left = ((place * width as f64) as usize).saturating_sub(across / 2).min(width - across);
+        // Every second one is nearer to the camera.
+        let top = height / 4 + (person % 2) as usize * height / 8;
         let (luma, chroma) = pixels.split_at_mut(width * height);
         let grain = (height / 90).max(2);
         for y in 0..down {
             for x in 0..across {
-                luma[(top + y) * width + left + x] = pattern(2, x, y, grain, 20);
+                luma[(top + y) * width + left + x] = pattern(2 + person as usize, x, y, grain, 20);
             }
         }
         for (plane, value) in chroma.chunks_exact_mut(width * height / 4).zip([100, 170]) {
@@ -105,7 +111,7 @@ mod tests {
     #[test]
     fn the_walker_moves_and_the_wall_only_when_the_camera_turns() {
         for (camera, moves) in [(Camera::Still, false), (Camera::Turning, true)] {
-            let footage = Footage::new((320, 240), camera);
+            let footage = Footage::new((320, 240), camera, 1);
             let (first, second) = (footage.picture(10), footage.picture(20));
             assert_eq!(first, footage.picture(10));
             let apart = |place: usize| first[place].abs_diff(second[place]);

@@ -31,12 +31,12 @@ pub struct Stages {
 }
 
 impl Stages {
-    /// After enough pictures of that size for somebody to be followed.
+    /// After enough pictures of that size, with so many people, for one of them to be followed.
     ///
     /// # Panics
     /// Where nobody is: what is measured then is something else.
     #[allow(clippy::expect_used, clippy::unwrap_used, reason = "a measurement that cannot be made")]
-    pub fn warmed_up(size: (usize, usize), camera: Camera) -> Self {
+    pub fn warmed_up(size: (usize, usize), camera: Camera, people: u64) -> Self {
         static ONCE: Once = Once::new();
         ONCE.call_once(|| {
             gst::init().unwrap();
@@ -48,7 +48,7 @@ impl Stages {
             harness.set_caps_str(&caps, "video/x-raw");
             harness
         });
-        let mut stages = Self { footage: Footage::new(size, camera), number: 0, harnesses };
+        let mut stages = Self { footage: Footage::new(size, camera, people), number: 0, harnesses };
         let mut last = None;
         for _ in 0..WARM_UP {
             let picture = stages.next_before(Stage::Overlay);
@@ -56,7 +56,7 @@ impl Stages {
             stages.pass(Stage::Overlay, picture);
         }
         let state = last.expect("a meta").expect("a readable meta").state;
-        assert_eq!(state, TargetState::Tracking, "{size:?}, {camera:?}");
+        assert_eq!(state, TargetState::Tracking, "{size:?}, {camera:?}, {people} people");
         stages
     }
 

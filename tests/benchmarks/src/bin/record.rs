@@ -1,16 +1,21 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Writes what the camera sees of somebody in the room, as a recording to measure with:
-//! `record FILE WxH SECONDS DEGREES_PER_SECOND [PICTURES_PER_SECOND]`, the last 25 unless given.
+//! Writes what the camera sees, as a recording to measure with:
+//! `record FILE WxH SECONDS DEGREES_PER_SECOND [WORLD [PICTURES_PER_SECOND]]`.
 //!
-//! The camera turns to and fro at that speed, two seconds each way, or rests at 0. Time is the room's own: the same
-//! arguments give the same pictures. The file is AVI: MJPEG, or MPEG-4 where its name ends in `.mpeg4`.
+//! The world is the room with so many people in it, 1 unless given, or a recording, whose file is named. The camera turns to and fro
+//! at that speed, two seconds each way, or rests at 0. Time is the world's own: the same arguments give the same pictures, 25 a
+//! second unless given. The file is AVI: MJPEG, or MPEG-4 where its name ends in `.mpeg4`.
 
 use std::{error::Error, time::Duration};
 
 use gst::prelude::*;
-use virtual_camera::{Auth, Clock, Picture, RoomSettings, Settings, Video, VirtualCamera, World};
+use virtual_camera::{
+    Auth, Clock, FootageSettings, Picture, RoomSettings, Settings, Video, VirtualCamera, World,
+};
 
+/// Arguments that there are in any case.
+const NEEDED: usize = 4;
 /// How long it turns to one side.
 const SWEEP_S: u32 = 2;
 
@@ -20,25 +25,37 @@ const WAITING: u64 = 2;
 fn main() -> Result<(), Box<dyn Error>> {
     gst::init()?;
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let (file, size, seconds, speed, rate) = match arguments.as_slice() {
-        [file, size, seconds, speed] => (file, size, seconds, speed, "25"),
-        [file, size, seconds, speed, rate] => (file, size, seconds, speed, rate.as_str()),
-        _ => return Err("record FILE WxH SECONDS DEGREES_PER_SECOND [PICTURES_PER_SECOND]".into()),
-    };
+    let (needed, optional) =
+        arguments
+            .split_at_checked(NEEDED)
+            .filter(|(_, optional)| optional.len() <= 2)
+            .ok_or("record FILE WxH SECONDS DEGREES_PER_SECOND [WORLD [PICTURES_PER_SECOND]]")?;
+    let [file, size, seconds, speed] = needed else { return Ok(()) };
     let (width, height) = size.split_once('x').ok_or("the size is WIDTHxHEIGHT")?;
-    record(file, (width.parse()?, height.parse()?), seconds.parse()?, speed.parse()?, rate.parse()?)
+    let world = world(optional.first().map_or("1", String::as_str))?;
+    let rate = optional.get(1).map_or("25", String::as_str).parse()?;
+    record(file, (width.parse()?, height.parse()?), seconds.parse()?, speed.parse()?, world, rate)
 }
 
-fn record(file: &str, size: (u32, u32), seconds: u32, speed: i32, rate: u32) -> Result<(), Box<dyn Error>> {
-    let room = RoomSettings::test(1, 1).ok_or("no such test")?;
-    let video = Video { frame_rate: Some(rate.into()), ..Video::default() };
-    let settings = Settings {
-        auth: Auth::None,
-        world: World::Room(room),
-        clock: Clock::Stepped,
-        video,
-        ..Settings::default()
+/// The room with so many people in it, or the recording of that name.
+fn world(name: &str) -> Result<World, Box<dyn Error>> {
+    let Ok(people) = name.parse::<usize>() else {
+        return Ok(World::Footage(FootageSettings::new(name)));
     };
+    let room = RoomSettings::test(1, 1).ok_or("no such test")?;
+    Ok(World::Room(RoomSettings { others: people.checked_sub(1).ok_or("nobody")?, ..room }))
+}
+
+fn record(
+    file: &str,
+    size: (u32, u32),
+    seconds: u32,
+    speed: i32,
+    world: World,
+    rate: u32,
+) -> Result<(), Box<dyn Error>> {
+    let video = Video { frame_rate: Some(rate.into()), ..Video::default() };
+    let settings = Settings { auth: Auth::None, world, clock: Clock::Stepped, video, ..Settings::default() };
     let camera = VirtualCamera::start(Settings { service_time: Duration::ZERO, ..settings })?;
     let writing = Writing::to(file, size, rate)?;
     let period = camera.frame_period();
