@@ -3,6 +3,7 @@
 //! OpenCV's letters, each drawn once.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 
 use opencv::core::{Mat, Point, Scalar};
 use opencv::imgproc;
@@ -27,11 +28,10 @@ pub fn text_width(text: &str, height: f64) -> opencv::Result<f64> {
     Ok(f64::from(imgproc::get_text_size(text, FACE, scale, width, &mut 0)?.width))
 }
 
-/// Letters of one size.
+/// Letters, by their size as well: a picture has labels of several.
 #[derive(Debug, Default)]
 pub(super) struct Font {
-    height: f64,
-    glyphs: HashMap<u8, Glyph>,
+    glyphs: HashMap<(u8, u64), Glyph>,
 }
 
 /// A letter.
@@ -49,17 +49,14 @@ impl Font {
     /// Covers a line of text whose base line begins at `origin`, with capitals of `height` pixels. What is not ASCII
     /// becomes `?`.
     pub fn write(&mut self, text: &str, origin: Spot, height: f64, out: &mut Coverage) -> opencv::Result<()> {
-        if self.height != height {
-            *self = Self { height, glyphs: HashMap::new() };
-        }
         let (mut x, y) = (origin.x.round(), origin.y.round() as i32);
         for letter in text.chars() {
             let letter =
                 u8::try_from(letter).ok().filter(|letter| (b' '..=b'~').contains(letter)).unwrap_or(b'?');
-            if let std::collections::hash_map::Entry::Vacant(entry) = self.glyphs.entry(letter) {
-                entry.insert(Glyph::drawn(letter, height)?);
-            }
-            let Some(glyph) = self.glyphs.get(&letter) else { continue };
+            let glyph = match self.glyphs.entry((letter, height.to_bits())) {
+                Entry::Occupied(known) => known.into_mut(),
+                Entry::Vacant(place) => place.insert(Glyph::drawn(letter, height)?),
+            };
             let corner = (x.round() as i32 + glyph.offset.0, y + glyph.offset.1);
             out.add_mask(&glyph.mask, glyph.width, corner);
             x += glyph.advance;
@@ -122,6 +119,21 @@ mod tests {
         // No letter lies a pixel or more beside its place: half of what is white is white in both.
         let both = known.iter().zip(coverage.bytes()).filter(|(known, ours)| **known > 128 && *ours > 128);
         assert!(both.count() * 2 > known.iter().filter(|known| **known > 128).count());
+    }
+
+    #[test]
+    fn a_letter_is_drawn_once_for_each_size() {
+        let (mut font, mut coverage) = (Font::default(), Coverage::default());
+        coverage.clear(Rect::new(0, 0, 90, 40));
+        for height in [15.0, 11.0, 15.0, 11.0] {
+            font.write("123", Spot { x: 10.0, y: 30.0 }, height, &mut coverage).unwrap();
+            let masks =
+                |font: &Font| font.glyphs.values().map(|glyph| glyph.mask.as_ptr()).collect::<Vec<_>>();
+            let before = masks(&font);
+            font.write("31", Spot { x: 10.0, y: 30.0 }, height, &mut coverage).unwrap();
+            assert_eq!(before, masks(&font));
+        }
+        assert_eq!(font.glyphs.len(), 6);
     }
 
     #[test]
