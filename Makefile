@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-everybody soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-demo packages-evaluate packages-test
+.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-everybody evaluate-handover soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-demo packages-evaluate packages-test
 
 # Debian's packages, in this one place.
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
@@ -146,6 +146,13 @@ soak: DURATION := 600
 soak: packages-test
 	$(CARGO) build --workspace --lib --bins
 	scripts/with-plugins debug target/debug/soak --duration $(DURATION) --reconnects $(RECONNECTS) --seed $(SEED)
+
+## evaluate-handover: have somebody walk before a fixed camera and one that turns, and somebody else come in, in RUNS=20 rooms, and leave
+##       in target/handover/runs.csv how soon the second person is seen and how the map's error fell (ARGS="--seed 1 --others 1")
+evaluate-handover: RUNS := 20
+evaluate-handover: packages-test
+	$(CARGO) build --workspace --lib --bins
+	scripts/with-plugins debug target/debug/hand_over --runs $(RUNS) $(ARGS)
 
 ## deny: check licences and origin of every dependency, and whether any has a known vulnerability
 deny: packages-build
