@@ -140,11 +140,13 @@ pub fn build(
         let video = if video.is_none() && fed { Some(open()?) } else { video };
         connect(&source, camera, video);
     }
+    let segments = recorder.as_ref().map(Recorder::segments);
     if let Some((recorder, tap)) = recorder.zip(of_name::<gst_app::AppSink>(&pipeline, "tap")) {
         recorder.record(&tap);
     }
     if let Some(sink) = of_name(&pipeline, "sightings") {
-        sightings::watch(&sink, of_factory(&pipeline, "lkfeaturetrack").as_ref(), camera, log.clone());
+        let tracker = of_factory(&pipeline, "lkfeaturetrack");
+        sightings::watch(&sink, tracker.as_ref(), camera, segments, log.clone());
     }
     if camera.pipeline.is_none() {
         end_in_silence(&pipeline);

@@ -11,7 +11,7 @@ use gst_video::prelude::*;
 use ptztrack_contract::lock::lock;
 use ptztrack_contract::{BufferMeta, CameraEvent, Rect, TargetMeta, TargetState};
 
-use super::recording;
+use super::recording::Segments;
 use crate::config::{CameraSettings, Kept};
 use crate::log::Log;
 
@@ -29,6 +29,7 @@ pub fn watch(
     sink: &gst_app::AppSink,
     tracker: Option<&gst::Element>,
     camera: &CameraSettings,
+    segments: Option<Arc<Segments>>,
     log: Arc<Log>,
 ) {
     let Some(kept) = camera.kept else { return };
@@ -42,7 +43,7 @@ pub fn watch(
             gst::PadProbeReturn::Ok
         });
     }
-    let mut witness = Witness::new(camera, kept, looks, log);
+    let mut witness = Witness::new(&camera.name, kept, looks, segments, log);
     let see = move |sink: &gst_app::AppSink| {
         let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
         witness.see(&sample);
@@ -52,9 +53,10 @@ pub fn watch(
 }
 
 struct Witness {
-    camera: CameraSettings,
     kept: Kept,
     log: Arc<Log>,
+    /// What is recorded of the camera, where it is.
+    segments: Option<Arc<Segments>>,
     began: Instant,
     collector: Collector,
     /// Where the camera looks.
@@ -63,11 +65,17 @@ struct Witness {
 }
 
 impl Witness {
-    fn new(camera: &CameraSettings, kept: Kept, looks: Arc<Mutex<CameraEvent>>, log: Arc<Log>) -> Self {
+    fn new(
+        camera: &str,
+        kept: Kept,
+        looks: Arc<Mutex<CameraEvent>>,
+        segments: Option<Arc<Segments>>,
+        log: Arc<Log>,
+    ) -> Self {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let run_ms = i64::try_from(now.as_millis()).unwrap_or(i64::MAX);
-        let collector = Collector::new(&camera.name, run_ms);
-        Self { camera: camera.clone(), kept, log, began: Instant::now(), collector, looks, looked: None }
+        let collector = Collector::new(camera, run_ms);
+        Self { kept, log, segments, began: Instant::now(), collector, looks, looked: None }
     }
 
     fn see(&mut self, sample: &gst::Sample) {
@@ -124,9 +132,7 @@ impl Witness {
     fn keep(&self, ended: Ended) {
         let Ended { sighting, best } = ended;
         let picture = best.and_then(|(quality, crop)| crop.into_picture(quality, self.kept.pixelate));
-        let recording = self.camera.recording.as_ref();
-        let recording =
-            recording.and_then(|recording| recording::at(recording, &self.camera.name, sighting.from_ms));
+        let recording = self.segments.as_ref().and_then(|segments| segments.at(sighting.from_ms));
         self.log.keep(Sighting { picture, recording, ..sighting });
     }
 }

@@ -2,31 +2,60 @@
 
 //! What is recorded, and how long it is kept.
 
+use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, SystemTime};
 
 use events::Pointer;
 use gst::prelude::*;
+use ptztrack_contract::lock::lock;
 
 use crate::config::Recording;
 
 /// This share of a disk is left to others: one in so many.
 const FREE_SHARE: u64 = 20;
 
+/// The files of a recording that began last, and when, in milliseconds since 1970. They are not looked for: the disk may hang.
+#[derive(Debug, Default)]
+pub struct Segments(Mutex<VecDeque<(i64, PathBuf)>>);
+
+impl Segments {
+    /// More are not remembered.
+    const MOST: usize = 64;
+
+    fn begin(&self, at_ms: i64, file: PathBuf) {
+        let mut segments = lock(&self.0);
+        segments.push_back((at_ms, file));
+        let surplus = segments.len().saturating_sub(Self::MOST);
+        segments.drain(..surplus);
+    }
+
+    /// Where a time is.
+    pub fn at(&self, at_ms: i64) -> Option<Pointer> {
+        let segments = lock(&self.0);
+        let (began, file) = segments.iter().rfind(|(began, _)| *began <= at_ms)?;
+        Some(Pointer { file: file.clone(), offset_ms: at_ms - began })
+    }
+}
+
 /// Names the files by the time at which they begin, and deletes old ones whenever another begins.
-pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str) {
+pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, segments: &Arc<Segments>) {
     let Some(sink) = pipeline.by_name("recording") else { return };
     sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
-    let (recording, camera) = (recording.clone(), camera.to_owned());
+    let (recording, camera, segments) = (recording.clone(), camera.to_owned(), segments.clone());
     sink.connect("format-location", false, move |_| {
         // Where a folder cannot be written, the element says so.
         let _ = fs::create_dir_all(&recording.folder);
         delete_old(&recording, &camera);
-        let now = glib::DateTime::now_utc().and_then(|now| now.format("%Y%m%dT%H%M%S%f"));
+        let time = glib::DateTime::now_utc().and_then(|now| now.format("%Y%m%dT%H%M%S%f"));
         // To the millisecond: a pipeline that is started anew must not write over what it recorded just before.
-        let now = now.map(|now| now.chars().take(18).collect::<String>()).unwrap_or_default();
-        Some(recording.folder.join(format!("{camera}-{now}.mkv")).to_value())
+        let time = time.map(|time| time.chars().take(18).collect::<String>()).unwrap_or_default();
+        let file = recording.folder.join(format!("{camera}-{time}.mkv"));
+        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+        segments.begin(i64::try_from(now.as_millis()).unwrap_or(i64::MAX), file.clone());
+        Some(file.to_value())
     });
 }
 
@@ -49,25 +78,6 @@ fn is_short(folder: &Path) -> bool {
 /// Whether something was written not long ago.
 pub fn newest_grew(recording: &Recording, camera: &str, within: Duration) -> bool {
     files(&recording.folder, camera).iter().any(|file| file.bytes > 0 && file.age < within)
-}
-
-/// Where in the recording of this camera a time is, in milliseconds since 1970.
-pub fn at(recording: &Recording, camera: &str, at_ms: i64) -> Option<Pointer> {
-    let began = |file: Kept| Some((begin_ms(&file.path, camera)?, file.path));
-    let before = files(&recording.folder, camera).into_iter().filter_map(began);
-    let (began, file) = before.filter(|(began, _)| *began <= at_ms).max()?;
-    Some(Pointer { file, offset_ms: at_ms - began })
-}
-
-/// When a file begins, by its name.
-fn begin_ms(path: &Path, camera: &str) -> Option<i64> {
-    let time = path.file_stem()?.to_str()?.strip_prefix(camera)?.strip_prefix('-')?;
-    let part = |from: usize, to: usize| time.get(from..to)?.parse::<i32>().ok();
-    let (year, month, day) = (part(0, 4)?, part(4, 6)?, part(6, 8)?);
-    let began =
-        glib::DateTime::from_utc(year, month, day, part(9, 11)?, part(11, 13)?, f64::from(part(13, 15)?))
-            .ok()?;
-    Some(began.to_unix() * 1000 + i64::from(part(15, 18)?))
 }
 
 /// One file of a recording.
@@ -171,29 +181,16 @@ mod tests {
 
     #[test]
     fn a_time_is_in_the_file_that_began_last() {
-        let folder = std::env::temp_dir().join(format!("ptztrack-at-{}", std::process::id()));
-        fs::create_dir_all(&folder).unwrap();
-        for name in
-            ["door-20260101T000000000.mkv", "door-20260101T001000250.mkv", "yard-20260101T001000500.mkv"]
-        {
-            fs::write(folder.join(name), "x").unwrap();
+        let segments = Segments::default();
+        assert_eq!(segments.at(5000), None);
+        for (at_ms, file) in [(1000, "a.mkv"), (3000, "b.mkv")] {
+            segments.begin(at_ms, file.into());
         }
-        let recording = Recording {
-            folder: folder.clone(),
-            segment: Duration::ZERO,
-            keep: None,
-            keep_bytes: None,
-            overlay: false,
-        };
-        // 2026 began 1767225600 s after 1970.
-        let at = |ms: i64| at(&recording, "door", 1_767_225_600_000 + ms);
-        let place = |pointer: Pointer| (pointer.file.file_name().unwrap().to_owned(), pointer.offset_ms);
-        let found = [at(-1), at(600_249), at(601_000)].map(|pointer| pointer.map(place));
-        fs::remove_dir_all(&folder).unwrap();
-        let wanted = [("door-20260101T000000000.mkv", 600_249), ("door-20260101T001000250.mkv", 750)];
-        assert_eq!(
-            found,
-            [None, Some((wanted[0].0.into(), wanted[0].1)), Some((wanted[1].0.into(), wanted[1].1))]
-        );
+        let in_file = |file: &str, offset_ms| Some(Pointer { file: file.into(), offset_ms });
+        assert_eq!(segments.at(999), None);
+        assert_eq!(segments.at(2999), in_file("a.mkv", 1999));
+        assert_eq!(segments.at(3000), in_file("b.mkv", 0));
+        (4..100).for_each(|second| segments.begin(1000 * second, "c.mkv".into()));
+        assert_eq!((segments.at(3500), segments.at(99_500)), (None, in_file("c.mkv", 500)));
     }
 }

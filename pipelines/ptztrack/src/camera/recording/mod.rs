@@ -9,7 +9,7 @@
 
 mod files;
 
-pub use files::at;
+pub use files::Segments;
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -49,6 +49,7 @@ pub struct Recorder {
     /// Held by everybody who still writes.
     _writing: Sender<()>,
     trouble: Arc<Mutex<bool>>,
+    segments: Arc<Segments>,
 }
 
 /// Hears when nobody writes any more.
@@ -74,9 +75,22 @@ impl Recorder {
         let codec = if settings.overlay { Codec::H264 } else { codec };
         let (settings, camera) = (settings.clone(), camera.to_owned());
         (
-            Self { settings, codec, camera, log, _writing: writing, trouble: Arc::default() },
+            Self {
+                settings,
+                codec,
+                camera,
+                log,
+                _writing: writing,
+                trouble: Arc::default(),
+                segments: Arc::default(),
+            },
             Recordings(written),
         )
+    }
+
+    /// The files that it has begun.
+    pub fn segments(&self) -> Arc<Segments> {
+        self.segments.clone()
     }
 
     /// Records what comes to this sink, until its stream ends or it is no more.
@@ -129,7 +143,7 @@ impl Recorder {
         let said = |err: glib::Error| err.message().to_owned();
         let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
-        files::configure(&pipeline, &self.settings, &self.camera);
+        files::configure(&pipeline, &self.settings, &self.camera, &self.segments);
         let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
         let bus = pipeline.bus().ok_or("a pipeline without a bus")?;
         // Where it fails, a message has the reason.
