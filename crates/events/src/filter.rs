@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use crate::Sighting;
+use crate::Step;
 
 /// Which sightings are asked for; by default all.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -27,9 +27,9 @@ pub struct Area {
 }
 
 impl Area {
-    /// Whether somebody was in it.
-    pub fn saw(&self, sighting: &Sighting) -> bool {
-        sighting.path.iter().any(|step| self.has(step.pan_deg, step.tilt_deg))
+    /// Whether somebody who went that way was in it.
+    pub fn saw(&self, path: &[Step]) -> bool {
+        path.iter().any(|step| self.has(step.pan_deg, step.tilt_deg))
     }
 
     fn has(&self, pan_deg: f64, tilt_deg: f64) -> bool {

@@ -6,7 +6,7 @@ use rusqlite::types::Value;
 use rusqlite::{Connection, OptionalExtension, Row, params_from_iter};
 
 use crate::file::{self, Error};
-use crate::{Filter, Looks, Pointer, Sighting};
+use crate::{Filter, Looks, Pointer, Sighting, Step};
 
 /// Answers whoever asks; whoever writes is not held up.
 #[derive(Debug)]
@@ -48,7 +48,15 @@ impl Reader {
     /// # Errors
     /// Where they cannot be read.
     pub fn sightings(&self, filter: &Filter) -> Result<Vec<Entry>, Error> {
-        self.select(filter).map_err(Error::file(&self.file))
+        self.select(filter, entry).map_err(Error::file(&self.file))
+    }
+
+    /// The same without their paths, which take longer to read than all the rest.
+    ///
+    /// # Errors
+    /// Where they cannot be read.
+    pub fn without_paths(&self, filter: &Filter) -> Result<Vec<Entry>, Error> {
+        self.select(filter, pathless).map_err(Error::file(&self.file))
     }
 
     /// One of them.
@@ -84,7 +92,11 @@ impl Reader {
         all().map_err(Error::file(&self.file))
     }
 
-    fn select(&self, filter: &Filter) -> rusqlite::Result<Vec<Entry>> {
+    fn select(
+        &self,
+        filter: &Filter,
+        read: fn(&Row) -> rusqlite::Result<Entry>,
+    ) -> rusqlite::Result<Vec<Entry>> {
         let mut conditions = Vec::new();
         let mut values: Vec<Value> = Vec::new();
         let mut add = |condition: &'static str, value: Option<Value>| {
@@ -99,21 +111,30 @@ impl Reader {
         let conditions = if conditions.is_empty() { "TRUE".to_owned() } else { conditions.join(" AND ") };
         let sql = format!("SELECT {COLUMNS} FROM sighting WHERE {conditions} ORDER BY from_ms DESC, id DESC");
         let mut select = self.connection.prepare(&sql)?;
-        let entries = select.query_map(params_from_iter(values), entry)?;
-        let wanted = |entry: &rusqlite::Result<Entry>| match (entry, &filter.area) {
-            (Ok(entry), Some(area)) => area.saw(&entry.sighting),
-            _ => true,
+        let wanted = |row: &Row| -> rusqlite::Result<bool> {
+            filter.area.map_or(Ok(true), |area| Ok(area.saw(&path(row)?)))
         };
-        entries.filter(wanted).take(filter.most.unwrap_or(usize::MAX)).collect()
+        let entries = select.query_and_then(params_from_iter(values), |row| {
+            if wanted(row)? { read(row).map(Some) } else { Ok(None) }
+        })?;
+        entries.filter_map(Result::transpose).take(filter.most.unwrap_or(usize::MAX)).collect()
     }
 }
 
 pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
-    let file: Option<String> = row.get("file")?;
+    let mut entry = pathless(row)?;
+    entry.sighting.path = path(row)?;
+    Ok(entry)
+}
+
+fn path(row: &Row) -> rusqlite::Result<Vec<Step>> {
     let path: String = row.get("path")?;
-    let path = serde_json::from_str(&path).map_err(|err| {
-        rusqlite::Error::FromSqlConversionFailure(7, rusqlite::types::Type::Text, err.into())
-    })?;
+    serde_json::from_str(&path)
+        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(7, rusqlite::types::Type::Text, err.into()))
+}
+
+fn pathless(row: &Row) -> rusqlite::Result<Entry> {
+    let file: Option<String> = row.get("file")?;
     let recording = match file {
         Some(file) => Some(Pointer { file: file.into(), offset_ms: row.get("offset_ms")? }),
         None => None,
@@ -124,7 +145,7 @@ pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
         track: row.get::<_, i64>("track")?.unsigned_abs(),
         from_ms: row.get("from_ms")?,
         to_ms: row.get("to_ms")?,
-        path,
+        path: Vec::new(),
         picture: None,
         recording,
     };

@@ -71,7 +71,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 
     let fleet = Arc::new(Fleet::new(log.clone()));
     if let Some(http) = config.http.clone() {
-        tokio::spawn(serve(http, fleet.clone(), log.clone()));
+        tokio::spawn(serve(http, fleet.clone(), config.store.kept_in(), log.clone()));
     }
     let publisher = config.mqtt.as_ref().and_then(|mqtt| {
         let started = Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone());
@@ -142,7 +142,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 }
 
 /// Nobody is followed the worse for a page that is not there: it is tried again.
-async fn serve(http: Http, fleet: Arc<Fleet>, log: Arc<Log>) {
+async fn serve(http: Http, fleet: Arc<Fleet>, events: Option<PathBuf>, log: Arc<Log>) {
     let mut told = false;
     let listener = loop {
         match http::listen(&http).await {
@@ -160,7 +160,7 @@ async fn serve(http: Http, fleet: Arc<Fleet>, log: Arc<Log>) {
     if let Ok(address) = listener.local_addr() {
         log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
     }
-    http::serve(listener, &http, fleet).await;
+    http::serve(listener, &http, fleet, events).await;
 }
 
 /// Where a disk hangs, it waits for itself and for nobody else.

@@ -41,6 +41,11 @@ impl Store {
         let nowhere = "no folder for events: `folder` in [events] says which";
         self.folder.clone().or_else(state_folder).ok_or_else(|| nowhere.to_owned())
     }
+
+    /// The same, where anything is kept.
+    pub fn kept_in(&self) -> Option<PathBuf> {
+        self.what.and_then(|_| self.place().ok())
+    }
 }
 
 /// Whoever keeps, until [`Keeper::end`].

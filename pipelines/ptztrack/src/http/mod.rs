@@ -3,11 +3,13 @@
 //! The page, what it asks for, `/metrics` and `/healthz`.
 
 mod access;
+mod events;
 mod metrics;
 
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::net::IpAddr;
+use std::path::PathBuf;
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -77,8 +79,8 @@ pub async fn listen(http: &Http) -> std::io::Result<TcpListener> {
 /// Serves until the process ends. Whoever connects before they have said who they are costs a little for a short time: no more
 /// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor. Where there
 /// are too many, the first of them makes room.
-pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>) {
-    let router = router(http, fleet);
+pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events: Option<PathBuf>) {
+    let router = router(http, fleet, events);
     let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     let mut visits: Vec<(Visit, JoinHandle<()>)> = Vec::new();
     loop {
@@ -126,7 +128,7 @@ const LONGEST_ANSWER: usize = 1024 * 1024;
 /// All that is answered to somebody who says this and no more, on a page without cameras or password.
 pub fn answer_to(said: &[u8]) -> Vec<u8> {
     let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
-    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))));
+    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), None);
     let visit = Visit { local: http.listen.ip(), welcome: Arc::default() };
     let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
     let talk = async {
@@ -149,24 +151,25 @@ pub fn answer_to(said: &[u8]) -> Vec<u8> {
     }
 }
 
-fn router(http: &Http, fleet: Arc<Fleet>) -> Router {
+fn router(http: &Http, fleet: Arc<Fleet>, events: Option<PathBuf>) -> Router {
     let access = Arc::new(Access::new(http));
     Router::new()
-        .route("/", get(page))
+        .route("/", get(async || html(include_str!("page.html"))))
         .route("/metrics", get(metrics::answer))
         .route("/cameras", get(cameras))
         .route("/cameras/{name}/picture", get(picture))
         .route("/cameras/{name}/video", get(video))
         .route("/cameras/{name}/{order}", post(order))
+        .merge(events::routes(events))
         .layer(axum::middleware::from_fn_with_state(access, access::check))
         // Asked for by whoever starts programs anew, under any name; it tells nothing of the cameras' pictures.
         .route("/healthz", get(healthz))
         .with_state(fleet)
 }
 
-/// In no page of somebody else, who could have a click mean what it does not seem to.
-async fn page() -> impl IntoResponse {
-    ([(header::CONTENT_SECURITY_POLICY, "frame-ancestors 'none'")], Html(include_str!("page.html")))
+/// A page that is in none of somebody else, who could have a click mean what it does not seem to.
+fn html(page: &'static str) -> impl IntoResponse {
+    ([(header::CONTENT_SECURITY_POLICY, "frame-ancestors 'none'")], Html(page))
 }
 
 /// Well while every camera's thread does its work: whether the cameras are there is another matter, and no new start of this
@@ -276,9 +279,11 @@ mod tests {
     }
 
     #[test]
-    fn the_page_is_in_no_frame_of_somebody_else() {
-        let answer = answer("GET /");
-        assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
-        assert!(answer.contains("\r\ncontent-security-policy: frame-ancestors 'none'\r\n"), "{answer}");
+    fn no_page_is_in_a_frame_of_somebody_else() {
+        for page in ["GET /", "GET /events"] {
+            let answer = answer(page);
+            assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
+            assert!(answer.contains("\r\ncontent-security-policy: frame-ancestors 'none'\r\n"), "{answer}");
+        }
     }
 }

@@ -1,0 +1,159 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Who was followed: the timeline, and what it asks for.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use axum::Router;
+use axum::body::Body;
+use axum::extract::{Path, Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use axum::routing::{get, post};
+use events::{Area, Entry, Error, Filter, Reader, Store};
+use serde::Deserialize;
+use serde_json::{Value, json};
+
+use super::html;
+use crate::report;
+
+/// No answer has more events.
+const MOST: usize = 10_000;
+/// So many who look most like somebody are shown.
+const ALIKE: usize = 30;
+
+/// The folder that events are kept in; `None` where they are not.
+type Folder = State<Arc<Option<PathBuf>>>;
+
+pub fn routes<S>(folder: Option<PathBuf>) -> Router<S> {
+    Router::new()
+        .route("/events", get(async || html(include_str!("events.html"))))
+        .route("/events/list", get(list))
+        .route("/events/events.csv", get(csv))
+        .route("/events/{id}/picture", get(picture))
+        .route("/events/{id}/delete", post(delete))
+        .with_state(Arc::new(folder))
+}
+
+/// Which events somebody wants to see.
+#[derive(Debug, Deserialize)]
+struct Wanted {
+    /// Milliseconds since 1970.
+    since: Option<i64>,
+    until: Option<i64>,
+    camera: Option<String>,
+    /// Degrees; all four, or none.
+    left: Option<f64>,
+    right: Option<f64>,
+    bottom: Option<f64>,
+    top: Option<f64>,
+    /// Those who look like that one.
+    like: Option<i64>,
+}
+
+impl Wanted {
+    fn filter(&self) -> Filter {
+        let area = || Some(Area { pan_deg: (self.left?, self.right?), tilt_deg: (self.bottom?, self.top?) });
+        Filter {
+            since_ms: self.since,
+            until_ms: self.until,
+            camera: self.camera.clone(),
+            area: area(),
+            most: Some(MOST),
+        }
+    }
+
+    /// With how much each looks like the one that was named; without one the latest are the first.
+    fn find(&self, reader: &Reader) -> Result<Vec<(Entry, Option<f64>)>, Error> {
+        let entries = reader.without_paths(&self.filter())?;
+        let Some(id) = self.like else { return Ok(entries.into_iter().map(|entry| (entry, None)).collect()) };
+        let looks = reader.sighting(id)?.and_then(|entry| entry.looks).unwrap_or_default();
+        let likeness = |entry: Entry| {
+            let likeness = entry.looks.as_ref()?.likeness(&looks);
+            Some((entry, Some(likeness)))
+        };
+        let mut alike: Vec<_> = entries.into_iter().filter_map(likeness).collect();
+        alike.sort_by(|(_, a), (_, b)| f64::total_cmp(&b.unwrap_or_default(), &a.unwrap_or_default()));
+        alike.truncate(ALIKE);
+        Ok(alike)
+    }
+}
+
+async fn list(folder: Folder, Query(wanted): Query<Wanted>) -> Response {
+    let list = move |reader: &Reader| {
+        let found = wanted.find(reader)?;
+        let events: Vec<_> = found.iter().map(|(entry, likeness)| describe(entry, *likeness)).collect();
+        Ok(json!({ "cameras": reader.cameras()?, "events": events }).to_string())
+    };
+    read(folder, list).await.map_or_else(|refusal| refusal, |text| answer("application/json", text))
+}
+
+fn describe(entry: &Entry, likeness: Option<f64>) -> Value {
+    json!({
+        "id": entry.id,
+        "camera": entry.sighting.camera,
+        "from": entry.sighting.from_ms,
+        "to": entry.sighting.to_ms,
+        "way": entry.way_deg,
+        "picture": entry.has_picture,
+        "likeness": likeness,
+    })
+}
+
+async fn csv(folder: Folder, Query(wanted): Query<Wanted>) -> Response {
+    let csv = move |reader: &Reader| {
+        let entries: Vec<_> = wanted.find(reader)?.into_iter().map(|(entry, _)| entry).collect();
+        Ok(report::csv(&entries))
+    };
+    let name = [(header::CONTENT_DISPOSITION, "attachment; filename=\"events.csv\"")];
+    match read(folder, csv).await {
+        Ok(text) => (name, answer("text/csv; charset=utf-8", text)).into_response(),
+        Err(refusal) => refusal,
+    }
+}
+
+async fn picture(folder: Folder, Path(id): Path<i64>) -> Response {
+    match read(folder, move |reader| reader.picture(id)).await {
+        Ok(Some(jpeg)) => answer("image/jpeg", jpeg),
+        Ok(None) => StatusCode::NOT_FOUND.into_response(),
+        Err(refusal) => refusal,
+    }
+}
+
+async fn delete(folder: Folder, Path(id): Path<i64>) -> Response {
+    let delete = move |folder: PathBuf| Store::open(&folder)?.0.delete(id);
+    match with(folder, delete).await {
+        Ok(true) => StatusCode::NO_CONTENT.into_response(),
+        Ok(false) => StatusCode::NOT_FOUND.into_response(),
+        Err(refusal) => refusal,
+    }
+}
+
+/// Nobody keeps what is told of people.
+fn answer(kind: &'static str, body: impl Into<Body>) -> Response {
+    ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-store")], body.into()).into_response()
+}
+
+async fn read<T: Send + 'static>(
+    folder: Folder,
+    what: impl FnOnce(&Reader) -> Result<T, Error> + Send + 'static,
+) -> Result<T, Response> {
+    with(folder, move |folder| what(&Reader::open(&folder)?)).await
+}
+
+/// In a thread of its own, as a disk may be slow.
+async fn with<T: Send + 'static>(
+    State(folder): Folder,
+    what: impl FnOnce(PathBuf) -> Result<T, Error> + Send + 'static,
+) -> Result<T, Response> {
+    let Some(folder) = (*folder).clone() else {
+        let reason = "No events are kept: `store` in [events] is \"off\".\n";
+        return Err((StatusCode::NOT_FOUND, reason).into_response());
+    };
+    match tokio::task::spawn_blocking(move || what(folder)).await {
+        Ok(Ok(found)) => Ok(found),
+        Ok(Err(err)) => Err((StatusCode::SERVICE_UNAVAILABLE, format!("{err}\n")).into_response()),
+        Err(_) => Err(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
+    }
+}
