@@ -13,7 +13,7 @@ RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugin
 EVALUATE_PACKAGES := $(RUN_PACKAGES) gstreamer1.0-opencv gnuplot-nox fonts-dejavu-core
 BENCH_PACKAGES := $(EVALUATE_PACKAGES) valgrind python3
 DEMO_PACKAGES := $(RUN_PACKAGES) python3 gnuplot-nox opencv-doc
-TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium mosquitto mosquitto-clients nodejs python3 python3-gi python3-venv \
+TEST_PACKAGES := $(EVALUATE_PACKAGES) ffmpeg chromium mosquitto mosquitto-clients glib-networking nodejs python3 python3-gi python3-venv \
 	gir1.2-gst-plugins-base-1.0 e2fsprogs fuse2fs
 
 # rustup puts Rust there; a cargo that is recent enough elsewhere in PATH does as well.

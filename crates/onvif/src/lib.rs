@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! ONVIF, the interface of network cameras of most makes, as far as following a target needs it: PTZ of Profile S.
+//! ONVIF, the interface of network cameras of most makes, as far as following a target needs it: PTZ of Profile S. And what is
+//! seen, in its words: [`metadata`].
 //!
 //! [`Client`] puts what the [`session`] wants to say or ask into SOAP messages, and reads the answers. Nothing here knows
 //! GStreamer.
@@ -14,6 +15,7 @@ mod answers;
 mod client;
 mod clock;
 mod messages;
+pub mod metadata;
 mod moves;
 mod soap;
 mod streams;

@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 use ptztrack_contract::lock::lock;
 
 use crate::camera::{Camera, Control, Known};
-use crate::config::CameraSettings;
+use crate::config::{CameraSettings, Codec};
 use crate::control_file::ControlFile;
 use crate::log::Log;
 
@@ -84,6 +84,13 @@ impl Fleet {
     /// What is known of one.
     pub fn of(&self, name: &str) -> Option<Arc<Known>> {
         lock(&self.cameras).get(name).map(|camera| camera.known.clone())
+    }
+
+    /// The same, where its stream comes in this form.
+    pub fn of_codec(&self, name: &str, codec: Codec) -> Option<Arc<Known>> {
+        let cameras = lock(&self.cameras);
+        let camera = cameras.get(name).filter(|camera| camera.settings.codec == codec)?;
+        Some(camera.known.clone())
     }
 
     /// At which height in its picture a camera keeps whom it follows, where it zooms.

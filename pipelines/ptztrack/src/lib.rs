@@ -20,6 +20,7 @@ mod mqtt;
 pub mod parsers;
 mod point;
 mod report;
+mod restream;
 mod service;
 mod shard;
 mod store;
@@ -90,7 +91,8 @@ fn run(options: Options) -> Result<(), Failure> {
         Task::Follow(follow_one) => {
             let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
             let store = Store { what: None, ..Store::default() };
-            let config = Config { cameras, http: None, mqtt: None, hand_over: Vec::new(), store };
+            let config =
+                Config { cameras, http: None, mqtt: None, hand_over: Vec::new(), store, restream: None };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Task::Point(point) => Ok(runtime(1)?.block_on(point.say())?),

@@ -13,11 +13,13 @@ use tokio::task::JoinHandle;
 use tokio::time::{Interval, interval};
 
 use crate::config::{Config, Http, NotLoaded, Watchdogs};
+use crate::event::{Event, Level};
 use crate::fleet::Fleet;
 use crate::handover::HandingOver;
 use crate::http;
 use crate::log::Log;
 use crate::mqtt::Publisher;
+use crate::restream::Restreaming;
 use crate::shard::Shard;
 use crate::store::Keeper;
 
@@ -82,6 +84,14 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     fleet.apply(config.cameras.clone());
     let tell = |err: &std::io::Error| log.error("not-handing-over", format!("nobody is handed over: {err}"));
     let handing_over = HandingOver::start(&config, fleet.clone(), log.clone()).inspect_err(tell).ok();
+    let restreaming = config.restream.as_ref().and_then(|restream| {
+        let started = Restreaming::start(restream, &config.cameras, fleet.clone(), log.clone());
+        let tell = |reason: &String| {
+            let detail = format!("nothing is passed on by RTSP: {reason}");
+            log.tell(&Event::new(Level::Warning, None, "not-restreaming", detail));
+        };
+        started.inspect_err(tell).ok()
+    });
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
     let mut second = interval(Duration::from_secs(1));
@@ -99,6 +109,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
             () = end(&mut terminate, &mut interrupt) => break,
             config = finished(&mut reading) => if let Some(config) = config {
                 handing_over.iter().for_each(|handing_over| handing_over.change(&config));
+                restreaming.iter().for_each(|restreaming| restreaming.change(&config.cameras));
                 current = config;
             },
             _ = hangup.recv(), if reading.is_none() => reading = read(&current, false),
@@ -124,6 +135,9 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     notify(&[NotifyState::Stopping]);
     log.show_status(Vec::new());
     log.info("ending", "ends: every camera is brought to rest");
+    if let Some(restreaming) = restreaming {
+        let _ = tokio::task::spawn_blocking(|| restreaming.end()).await;
+    }
     let ending = fleet.clone();
     let ended = tokio::task::spawn_blocking(move || {
         ending.end();
@@ -194,10 +208,13 @@ fn read_again(
         Ok(config) if only_changes && config.cameras == current.cameras => None,
         Ok(config) => {
             log.info("read-again", "the configuration was read again");
-            if config.http != current.http || config.mqtt != current.mqtt || config.store != current.store {
+            let of_start = |config: &Config| {
+                (config.http.clone(), config.mqtt.clone(), config.store.clone(), config.restream.clone())
+            };
+            if of_start(&config) != of_start(current) {
                 log.error(
                     "restart-needed",
-                    "what changed in [http], [mqtt] and [events] counts from the next start on",
+                    "what changed in [http], [mqtt], [events] and [restream] counts from the next start on",
                 );
             }
             fleet.apply(config.cameras.clone());

@@ -16,6 +16,7 @@ mod pipeline;
 mod program;
 mod recording;
 pub mod scene;
+mod viewer;
 mod watchdog;
 
 pub use broker::Broker;
@@ -28,6 +29,7 @@ pub use launch::{GstLaunch, children_of, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::Program;
 pub use recording::pictures_in;
+pub use viewer::{Times, Viewer};
 pub use watchdog::Watchdog;
 
 use std::time::Duration;

@@ -9,8 +9,9 @@ use axum::body::Bytes;
 use pipeline_supervisor::video::Ended;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
-use tokio::sync::watch;
+use tokio::sync::{broadcast, watch};
 
+use super::packets::{self, Packet};
 use super::running::Running;
 use super::servo_stats::ServoStats;
 use super::sight::Sight;
@@ -55,6 +56,8 @@ pub struct Known {
     pub origin: Mutex<Option<Origin>>,
     /// The last picture for who looks, as JPEG.
     pub view: watch::Sender<Bytes>,
+    /// Its stream and what is seen in it, for who passes them on.
+    pub packets: broadcast::Sender<Packet>,
     pub times: Vec<Stopwatch>,
 }
 
@@ -151,6 +154,7 @@ impl Known {
             points: Mutex::default(),
             origin: Mutex::default(),
             view: watch::Sender::new(Bytes::new()),
+            packets: packets::channel(),
             times: Stopwatch::all(),
         }
     }

@@ -5,6 +5,7 @@
 mod bounds;
 mod known;
 mod messages;
+mod packets;
 mod pipeline;
 pub mod process;
 mod recording;
@@ -27,6 +28,7 @@ use axum::body::Bytes;
 pub use bounds::picture_size;
 pub use known::{Control, Gaze, Known, Origin, Steering};
 use messages::Listener;
+pub use packets::{Content, Packet, next as next_packet};
 use pipeline::NotBuilt;
 use pipeline_supervisor::Supervisor;
 use pipeline_supervisor::video::Failure;

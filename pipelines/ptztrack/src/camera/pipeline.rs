@@ -15,6 +15,7 @@ use ptztrack_contract::lock::lock;
 
 use super::bounds;
 use super::known::{Known, Steering};
+use super::packets::{self, DECODER};
 use super::recording::{self, Recorder};
 use super::running::Running;
 use super::servo_stats::ServoStats;
@@ -81,12 +82,14 @@ fn source(codec: Codec, tapped: bool) -> String {
     let tap =
         if tapped { format!(" ! tee name=encoded encoded. ! {TAP} encoded. ! queue") } else { String::new() };
     let rtsp = |depay: &str, decoder: &str| {
-        format!("rtspsrc name=source latency=0 protocols=tcp ! {depay} name=received{tap} ! {decoder}")
+        format!(
+            "rtspsrc name=source latency=0 protocols=tcp ! {depay} name=received{tap} ! {decoder} name={DECODER}"
+        )
     };
     match codec {
         Codec::Mjpeg => {
             format!(
-                "appsrc name=source is-live=true do-timestamp=true format=time ! multipartdemux{tap} ! jpegdec"
+                "appsrc name=source is-live=true do-timestamp=true format=time ! multipartdemux{tap} ! jpegdec name={DECODER}"
             )
         }
         Codec::Mpeg4 => rtsp("rtpmp4vdepay", "avdec_mpeg4"),
@@ -155,6 +158,7 @@ pub fn build(
     if let Some(tracker) = of_factory(&pipeline, "lkfeaturetrack").filter(|_| camera.hands_over) {
         sight::watch(&tracker, known);
     }
+    packets::tap(&pipeline, of_factory(&pipeline, "lkfeaturetrack").as_ref(), known);
     let elements = Elements::of(&pipeline);
     elements.show_to(known);
     elements.look(known.looking.load(Ordering::Relaxed) > 0);

@@ -56,6 +56,19 @@ pub struct Sight {
 /// So many places are remembered: those before and after any picture of the last seconds.
 const POSES: usize = 4;
 
+impl From<&Track> for Person {
+    fn from(track: &Track) -> Self {
+        Self {
+            id: track.id,
+            bounds: [track.bounds.x, track.bounds.y, track.bounds.width, track.bounds.height],
+            velocity: [track.velocity.x, track.velocity.y],
+            seen: track.state == TrackState::Seen,
+            confidence: track.confidence,
+            is_target: track.is_target,
+        }
+    }
+}
+
 impl Person {
     /// Boxes that come so near to the picture's edge may be cut off by it.
     const EDGE: f64 = 0.01;
@@ -210,17 +223,9 @@ pub fn watch(tracker: &gst::Element, known: &Arc<Known>) {
 }
 
 fn sight(tracks: &[Track], told: &Told) -> Sight {
-    let person = |track: &Track| Person {
-        id: track.id,
-        bounds: [track.bounds.x, track.bounds.y, track.bounds.width, track.bounds.height],
-        velocity: [track.velocity.x, track.velocity.y],
-        seen: track.state == TrackState::Seen,
-        confidence: track.confidence,
-        is_target: track.is_target,
-    };
     let aged = |(at, pose): &(Instant, Pose)| Pose { age: at.elapsed(), ..pose.clone() };
     Sight {
-        people: tracks.iter().map(person).collect(),
+        people: tracks.iter().map(Person::from).collect(),
         poses: told.poses.iter().map(aged).collect(),
         reckoned: told.reckoned.as_ref().map(aged),
         rate_deg_s: told.rate_deg_s,

@@ -10,6 +10,7 @@ mod mqtt;
 mod problem;
 mod properties;
 mod protocol;
+mod restream;
 mod store;
 mod table;
 pub mod units;
@@ -27,6 +28,7 @@ pub use handover::HandOver;
 pub use mqtt::Mqtt;
 pub use problem::Problems;
 pub use protocol::{Protocol, Watchdogs};
+pub use restream::Restream;
 pub use store::{Kept, Store};
 use table::{Source, Table};
 
@@ -41,6 +43,7 @@ pub struct Config {
     pub mqtt: Option<Mqtt>,
     pub hand_over: Vec<HandOver>,
     pub store: Store,
+    pub restream: Option<Restream>,
 }
 
 /// Why a file is of no use, in words.
@@ -95,7 +98,7 @@ impl Config {
         config.filter(|_| problems.is_empty()).ok_or(problems)
     }
 
-    /// What this machine has not got, a line for each camera that cannot start without.
+    /// What this machine has not got, a line for each camera that cannot start without, and for a certificate that is of no use.
     ///
     /// # Errors
     /// Those lines.
@@ -104,7 +107,10 @@ impl Config {
             let reason = camera.no_password.clone().or_else(|| camera.lacks())?;
             Some(format!("camera `{}`: {reason}", camera.name))
         };
-        let lacks: Vec<String> = self.cameras.iter().filter_map(lack).collect();
+        let certificate = self.restream.as_ref().and_then(|restream| restream.tls.as_ref());
+        let useless = certificate.and_then(|certificate| certificate.load().err());
+        let useless = useless.map(|reason| format!("[restream]: {reason}"));
+        let lacks: Vec<String> = self.cameras.iter().filter_map(lack).chain(useless).collect();
         if lacks.is_empty() { Ok(()) } else { Err(lacks.join("\n")) }
     }
 
@@ -112,6 +118,7 @@ impl Config {
         let http = root.table("http").and_then(Http::read);
         let mqtt = root.table("mqtt").and_then(Mqtt::read);
         let store = root.table("events").map(Store::read).unwrap_or_default();
+        let restream = root.table("restream").map(Restream::read);
         let cameras = root.tables("camera");
         if cameras.is_empty() {
             root.wrong("there is no camera: [camera.door] begins one that is called door");
@@ -124,7 +131,7 @@ impl Config {
             camera.hands_over = hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
         }
         root.no_more();
-        Self { cameras, http, mqtt, hand_over, store }
+        Self { cameras, http, mqtt, hand_over, store, restream }
     }
 }
 

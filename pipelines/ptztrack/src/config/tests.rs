@@ -126,6 +126,29 @@ fn a_broker_has_a_host_and_topics_without_wildcards() {
 }
 
 #[test]
+fn streams_are_passed_on_within_this_machine_unless_there_is_a_password() {
+    let camera = "[camera.a]\naddress = \"http://a\"\n";
+    let restream = parse(&format!("[restream]\n{camera}")).unwrap().restream.unwrap();
+    assert_eq!((restream.listen.to_string().as_str(), restream.tls), ("127.0.0.1:8554", None));
+    let wrong = "[restream]\nlisten = \"[::]:8554\"\ncertificate-file = \"/etc/a.pem\"\n";
+    let wrong = parse(&format!("{wrong}{camera}")).unwrap_err();
+    for expected in [
+        "line 1: TLS needs both `certificate-file` and `key-file`",
+        "line 1: to listen on [::]:8554, beyond this machine, it needs `user` and `password-file` in [restream]",
+    ] {
+        assert!(wrong.contains(expected), "{expected} is not in:\n{wrong}");
+    }
+}
+
+#[test]
+fn a_certificate_that_is_of_no_use_is_named_beforehand() {
+    let tls = "certificate-file = \"/dev/null\"\nkey-file = \"/dev/null\"\n";
+    let config = parse(&format!("[restream]\n{tls}[camera.a]\naddress = \"http://a\"\n")).unwrap();
+    let wrong = config.check_machine().unwrap_err();
+    assert!(wrong.starts_with("[restream]: no TLS by /dev/null and /dev/null: "), "{wrong}");
+}
+
+#[test]
 fn a_recording_is_kept_for_so_long_or_so_much() {
     let recording =
         "[camera.a]\naddress = \"http://a\"\n[camera.a.recording]\nfolder = \"/r\"\nkeep-bytes = \"2GB\"\n";

@@ -46,6 +46,12 @@ pub fn picture_size(codec: u8, stream: &[u8]) -> Option<(u32, u32)> {
     Some((size.width, size.height))
 }
 
+/// The size that a picture announces, which comes to this pad.
+pub fn size_of(pad: &gst::Pad, picture: &gst::BufferRef) -> Option<(u32, u32)> {
+    let size = of_buffers(pad, [picture]).ok().flatten()?;
+    Some((size.width, size.height))
+}
+
 /// What comes is counted until a decoder gets a picture.
 fn count(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
     pad.add_probe(gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST, move |pad, info| {

@@ -18,11 +18,12 @@ use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
 use tokio::net::UnixStream;
 use tokio::net::unix::{OwnedReadHalf, OwnedWriteHalf};
 use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::broadcast;
 use tokio::time::interval;
 
 use super::line;
 use super::protocol::{Order, Report, Start, Word};
-use crate::camera::{Camera, Look};
+use crate::camera::{self, Camera, Look, Packet};
 use crate::log::Log;
 
 /// Between two reports.
@@ -53,6 +54,7 @@ pub async fn run() -> io::Result<()> {
     let mut interrupt = signal(SignalKind::interrupt())?;
     let mut timer = interval(EVERY);
     let mut look: Option<Look> = None;
+    let mut packets: Option<broadcast::Receiver<Packet>> = None;
     let mut sights = known.sight.subscribe();
     while !camera.is_over() {
         tokio::select! {
@@ -65,12 +67,14 @@ pub async fn run() -> io::Result<()> {
                     Order::Release => known.release(),
                     Order::Steer(hand) => known.steer(hand.into()),
                     Order::Look(somebody) => look = somebody.then(|| known.look()),
+                    Order::Stream(taken) => packets = taken.then(|| known.packets.subscribe()),
                 }
             }
             Ok(event) = events.recv() => process.say(&Word::Event(event)).await?,
             picture = next_picture(&mut look) => {
                 process.say(&Word::Picture(BASE64_STANDARD.encode(picture))).await?;
             }
+            packet = next_packet(&mut packets) => process.say(&Word::Packet(Box::new(packet))).await?,
             Ok(()) = sights.changed() => {
                 let (at, sight) = (**sights.borrow_and_update()).clone();
                 process.say(&Word::Sight(at.elapsed(), sight)).await?;
@@ -107,6 +111,16 @@ async fn next_picture(look: &mut Option<Look>) -> axum::body::Bytes {
         && let Some(picture) = look.next().await
     {
         return picture;
+    }
+    std::future::pending().await
+}
+
+/// Never where nobody takes them.
+async fn next_packet(packets: &mut Option<broadcast::Receiver<Packet>>) -> Packet {
+    if let Some(packets) = packets
+        && let Some(packet) = camera::next_packet(packets).await
+    {
+        return packet;
     }
     std::future::pending().await
 }

@@ -8,6 +8,7 @@
 //! this process: Known, Remote ─ socket pair, lines of JSON ─▶ child: the camera, as a thread has it elsewhere
 //! ```
 
+pub mod bytes;
 pub mod child;
 mod protocol;
 
@@ -154,6 +155,7 @@ impl Processes {
                     let at = Instant::now().checked_sub(age).unwrap_or_else(Instant::now);
                     known.sight.send_replace(Arc::new((at, sight)));
                 }
+                Word::Packet(packet) => drop(known.packets.send(*packet)),
                 Word::Sighting(sighting) => log.keep(*sighting),
                 Word::Picture(picture) => {
                     if let Ok(picture) = BASE64_STANDARD.decode(picture) {
@@ -206,6 +208,7 @@ struct Remote {
     /// Orders so far.
     given: AtomicU64,
     somebody_looks: AtomicBool,
+    somebody_takes_packets: AtomicBool,
     last: Mutex<Option<Report>>,
 }
 
@@ -215,6 +218,7 @@ impl Remote {
             socket,
             given: AtomicU64::new(0),
             somebody_looks: AtomicBool::new(false),
+            somebody_takes_packets: AtomicBool::new(false),
             last: Mutex::default(),
         }
     }
@@ -232,6 +236,10 @@ impl Remote {
         report.tell(known, self.given.load(Ordering::SeqCst));
         *lock(&self.last) = Some(report);
         self.look(known.looking.load(Ordering::Relaxed) > 0);
+        let taken = known.packets.receiver_count() > 0;
+        if self.somebody_takes_packets.swap(taken, Ordering::SeqCst) != taken {
+            self.order(&Order::Stream(taken));
+        }
     }
 }
 

@@ -9,6 +9,7 @@ use events::Sighting;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
+use crate::camera::Packet;
 use crate::camera::known::{Control, Gaze, Known, State, Steering};
 use crate::camera::servo_stats::ServoStats;
 use crate::camera::sight::Sight;
@@ -26,11 +27,16 @@ pub struct Start {
 /// All further ones.
 #[derive(Debug, Serialize, Deserialize)]
 pub enum Order {
-    Select { x: f64, y: f64 },
+    Select {
+        x: f64,
+        y: f64,
+    },
     SelectTrack(u64),
     Release,
     Steer(Hand),
     Look(bool),
+    /// Somebody takes the packets of its stream.
+    Stream(bool),
 }
 
 /// What the process of a camera says.
@@ -42,6 +48,8 @@ pub enum Word {
     Sighting(Box<Sighting>),
     /// For who looks, JPEG in base64.
     Picture(String),
+    /// Of its stream, for who passes it on.
+    Packet(Box<Packet>),
     /// What it sees, and how long ago that was.
     Sight(Duration, Sight),
 }

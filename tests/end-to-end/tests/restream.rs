@@ -1,0 +1,242 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Cameras are passed on by RTSP, with what is seen in them as ONVIF's metadata; nobody is followed the worse for it.
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::fs;
+use std::net::TcpListener;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Duration;
+
+use chrono::DateTime;
+use end_to_end::{GstLaunch, PATIENCE, Program, Viewer, scene, scratch};
+use gst_rtsp_server::gio::TlsFileDatabase;
+use gst_rtsp_server::prelude::*;
+use serde_json::Value;
+use virtual_camera::VirtualCamera;
+
+/// Between two pictures of the camera.
+const INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / 15);
+
+/// A camera that is passed on, with more in its entry and in the server's.
+#[track_caller]
+fn start(test: &str, camera: &VirtualCamera, entry: &str, restream: &str) -> Program {
+    let file = |folder: &Path| {
+        let door = Program::entry("door", &camera.url(), &folder.join("password"));
+        let rtsp = camera.rtsp_url();
+        format!("{door}rtsp = \"{rtsp}\"\n{entry}\n[restream]\nlisten = \"127.0.0.1:0\"\n{restream}\n")
+    };
+    Program::start(test, file, &[])
+}
+
+/// Where it is, once there are pictures.
+#[track_caller]
+fn address(program: &mut Program) -> String {
+    let line = program.launch.wait_for_line("passes the cameras on at ");
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"door\"} 1"));
+    line.rsplit(' ').next().unwrap().replace("NAME", "door")
+}
+
+/// Whether it can be read, and what was said.
+fn ffprobe(url: &str) -> (bool, String) {
+    let mut command = Command::new("timeout");
+    command.args(["60", "ffprobe", "-v", "error", "-rtsp_transport", "tcp", "-show_entries"]);
+    let output =
+        command.args(["stream=codec_type,codec_name,width", "-of", "csv=p=0", url]).output().unwrap();
+    let said = String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned();
+    (output.status.success(), said)
+}
+
+#[track_caller]
+fn is_steered(camera: &VirtualCamera) {
+    let before = camera.status().commands;
+    assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 20), "not steered");
+}
+
+#[test]
+fn others_play_the_picture_and_list_the_metadata_in_whatever_form_it_comes() {
+    for (codec, name, depayloader) in [
+        ("h264", "h264", "rtph264depay ! avdec_h264"),
+        ("h265", "hevc", "rtph265depay ! avdec_h265"),
+        ("mpeg4", "mpeg4", "rtpmp4vdepay ! avdec_mpeg4"),
+        ("mjpeg", "mjpeg", "rtpjpegdepay ! jpegdec"),
+    ] {
+        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+        let mut program = start(&format!("plays-{codec}"), &camera, &format!("codec = \"{codec}\""), "");
+        let url = address(&mut program);
+        let (read, said) = ffprobe(&url);
+        let lists = |stream: &str| said.lines().any(|line| line.contains(stream));
+        assert!(read && lists(&format!("{name},video,320")) && lists("data"), "{codec}: {said}");
+        let player = GstLaunch::start(
+            &["-q"],
+            &format!(
+                "rtspsrc location={url} protocols=tcp ! {depayloader} ! video/x-raw,width=320,height=240 \
+                 ! fakesink num-buffers=30"
+            ),
+        );
+        let (status, said) = player.finish();
+        assert!(status.success() && !said.contains("ERROR"), "{codec}: {said}");
+        program.end("TERM");
+    }
+}
+
+/// Both streams have the same clock, and by the sender's reports, which are as exact as the machine is idle, the same calendar.
+#[test]
+fn a_document_tells_of_the_picture_of_its_time() {
+    for isolation in ["none", "process"] {
+        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+        let entry = format!("codec = \"h264\"\nisolation = \"{isolation}\"");
+        let mut program = start(&format!("times-{isolation}"), &camera, &entry, "");
+        let viewer = Viewer::start(&address(&mut program), |_| {});
+        let mut picture =
+            std::iter::repeat_with(|| viewer.picture()).find(|times| times.taken.is_some()).unwrap();
+        let mut apart = None;
+        for _ in 0..60 {
+            let (text, times) = viewer.document();
+            let told = told(&text);
+            while picture.taken.unwrap() + INTERVAL / 2 < told {
+                picture = viewer.picture();
+            }
+            // Those before the first report are not compared.
+            let Some(taken) = times.taken.filter(|_| told + INTERVAL / 2 > picture.taken.unwrap()) else {
+                continue;
+            };
+            assert!(told.abs_diff(taken) < INTERVAL / 2, "{isolation}: {told:?}, by its reports {taken:?}");
+            let ticks = times.rtp.wrapping_sub(picture.rtp);
+            let off = ticks.wrapping_sub(*apart.get_or_insert(ticks)).cast_signed();
+            assert!(off.abs() <= 1, "{isolation}: {told:?} is {off} ticks off the picture {picture:?}");
+        }
+        assert!(apart.is_some(), "{isolation}: no document is of a picture");
+        program.end("TERM");
+    }
+}
+
+/// When the picture was taken that a document tells of, since 1970.
+fn told(document: &str) -> Duration {
+    let time = document.split("UtcTime=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+    let time = DateTime::parse_from_rfc3339(time).unwrap();
+    Duration::from_micros(time.timestamp_micros().try_into().unwrap())
+}
+
+/// By ONVIF's own schema.
+#[test]
+fn a_library_from_pypi_reads_who_is_where() {
+    let clients = Path::new(env!("CARGO_MANIFEST_DIR")).join("clients");
+    let environment = Path::new(env!("CARGO_TARGET_TMPDIR")).join("onvif-metadata");
+    let created = Command::new("python3").args(["-m", "venv"]).arg(&environment).status().unwrap();
+    assert!(created.success(), "python3-venv is not installed: `make test` installs it");
+    let python = environment.join("bin/python");
+    if !has_libraries(&python, &clients.join("requirements.txt")) {
+        return;
+    }
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("schema", &camera, "codec = \"h264\"", "");
+    let viewer = Viewer::start(&address(&mut program), |_| {});
+    let shows_somebody = |text: &String| text.contains("ObjectId=\"1\"");
+    let text = std::iter::repeat_with(|| viewer.document().0).find(shows_somebody).unwrap();
+    let file = scratch("document.xml");
+    fs::write(&file, &text).unwrap();
+    let output = Command::new(python).arg(clients.join("read_metadata.py")).arg(&file).output().unwrap();
+    assert!(output.status.success(), "{text}\n{output:?}");
+    let read: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let seen = &read["tt:VideoAnalytics"][0]["tt:Frame"][0]["tt:Object"][0]["tt:Appearance"];
+    let side = |name: &str| seen["tt:Shape"]["tt:BoundingBox"][name].as_f64().unwrap();
+    assert!(side("@left") < side("@right") && side("@bottom") < side("@top"), "{read}");
+    let class = &seen["tt:Class"]["tt:Type"][0];
+    let likelihood = class["@Likelihood"].as_f64().unwrap();
+    assert!(class["$"] == "Human" && (0.0..=1.0).contains(&likelihood), "{read}");
+    fs::remove_file(file).unwrap();
+    program.end("TERM");
+}
+
+fn has_libraries(python: &Path, requirements: &Path) -> bool {
+    let output = Command::new("timeout")
+        .arg("120")
+        .arg(python)
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries", "2"])
+        .args(["--timeout", "15", "--requirement"])
+        .arg(requirements)
+        .output()
+        .unwrap();
+    let said = String::from_utf8_lossy(&output.stderr);
+    let unreachable = ["connection broken by", "Max retries exceeded", "timed out"];
+    let is_reached = output.status.code() != Some(124) && !unreachable.iter().any(|sign| said.contains(sign));
+    assert!(output.status.success() || !is_reached, "{said}");
+    if !is_reached {
+        eprintln!("SKIPPED: the package index cannot be reached:\n{said}");
+    }
+    is_reached
+}
+
+#[test]
+fn who_does_not_know_the_password_sees_nothing() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let password = scratch("restream-password");
+    fs::write(&password, "sesame-17").unwrap();
+    let restream = format!("user = \"guard\"\npassword-file = {password:?}");
+    let mut program = start("refuses", &camera, "codec = \"h264\"", &restream);
+    let url = address(&mut program);
+    let as_guard = |password: &str| ffprobe(&url.replace("rtsp://", &format!("rtsp://guard:{password}@")));
+    for (read, said) in [ffprobe(&url), as_guard("wrong")] {
+        assert!(!read && said.contains("401"), "{said}");
+    }
+    let (read, said) = as_guard("sesame-17");
+    assert!(read && said.contains("h264"), "{said}");
+    fs::remove_file(password).unwrap();
+    let said = program.end("TERM");
+    assert!(!said.contains("sesame"), "{said}");
+}
+
+#[test]
+fn who_believes_its_certificate_sees_and_nobody_else_does() {
+    let certificates =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
+    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let (certificate, key): (PathBuf, PathBuf) = (of("camera.pem"), of("camera.key.pem"));
+    let restream = format!("certificate-file = {certificate:?}\nkey-file = {key:?}");
+    let mut program = start("tls", &camera, "codec = \"h264\"", &restream);
+    let url = address(&mut program);
+    assert!(url.starts_with("rtsps://127.0.0.1:"), "{url}");
+    let believing = |authority: &str| {
+        let database = TlsFileDatabase::new(of(authority)).unwrap();
+        Viewer::start(&url, |source| source.set_property("tls-database", &database))
+    };
+    let (text, _) = believing("authority.pem").document();
+    assert!(text.contains("tt:MetadataStream"), "{text}");
+    assert!(believing("self-signed.pem").error().contains("Failed\\ to\\ connect"));
+    let (read, said) = ffprobe(&url.replace("rtsps://", "rtsp://"));
+    assert!(!read, "in clear: {said}");
+    program.end("TERM");
+}
+
+/// It is tried again until the port is free.
+#[test]
+fn a_port_that_is_taken_is_said_once_and_nobody_is_followed_the_worse_for_it() {
+    let taken = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap();
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let file = |folder: &Path| {
+        let door = Program::entry("door", &camera.url(), &folder.join("password"));
+        format!("{door}[restream]\nlisten = \"{address}\"\n")
+    };
+    let mut program = Program::start("port-taken", file, &[]);
+    program.launch.wait_for_line(&format!("nothing is passed on at {address}: "));
+    is_steered(&camera);
+    drop(taken);
+    program.launch.wait_for_line(&format!("passes the cameras on at rtsp://{address}/NAME"));
+    let said = program.end("TERM");
+    assert_eq!(said.matches("nothing is passed on").count(), 1, "{said}");
+}
+
+#[test]
+fn a_certificate_that_is_none_is_said_once_and_nobody_is_followed_the_worse_for_it() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let nothing = "certificate-file = \"/dev/null\"\nkey-file = \"/dev/null\"";
+    let mut program = start("no-certificate", &camera, "", nothing);
+    program.launch.wait_for_line("nothing is passed on by RTSP: no TLS by /dev/null and /dev/null: ");
+    is_steered(&camera);
+    let said = program.end("TERM");
+    assert_eq!(said.matches("nothing is passed on").count(), 1, "{said}");
+}
