@@ -174,7 +174,10 @@ fn convert(
 ) -> Option<Vec<u8>> {
     let whole = part.map(|side| i32::try_from(side).ok());
     let [Some(x), Some(y), Some(part_width @ 1..), Some(part_height @ 1..)] = whole else { return None };
-    let info = gst_video::VideoInfo::builder(format, width, height).build().ok()?;
+    // Neither is converted.
+    let (rate, interlacing) = (frame.info().fps(), frame.info().interlace_mode());
+    let info = gst_video::VideoInfo::builder(format, width, height).fps(rate).interlace_mode(interlacing);
+    let info = info.build().ok()?;
     let mut config = gst_video::VideoConverterConfig::new();
     config.set_src_x(x);
     config.set_src_y(y);
@@ -201,13 +204,14 @@ fn convert(
 mod tests {
     use super::*;
 
-    /// A grey picture whose pixels tell their places, at an odd width.
+    /// A grey picture whose pixels tell their places, at an odd width, of a stream that says its rate, as those by RTSP do.
     #[test]
     fn a_crop_has_somebody_where_it_says() {
         gst::init().unwrap();
         let (width, height) = (81, 60);
-        let info =
-            gst_video::VideoInfo::builder(gst_video::VideoFormat::Gray8, width, height).build().unwrap();
+        let info = gst_video::VideoInfo::builder(gst_video::VideoFormat::Gray8, width, height)
+            .fps(gst::Fraction::new(25, 1));
+        let info = info.build().unwrap();
         let mut pixels = vec![16; info.size()];
         let stride = info.stride()[0] as usize;
         for row in 20..40 {
