@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 use ::events::{Crop, Sighting, Step, Store};
 use browser::Browser;
-use end_to_end::{PATIENCE, Program, scratch};
+use end_to_end::{PATIENCE, Program, scene, scratch};
 use serde_json::{Value, json};
+use virtual_camera::VirtualCamera;
 
 /// 10 January 2026, 20:00 UTC, in milliseconds.
 const EVENING_MS: i64 = 1_768_075_200_000;
@@ -143,6 +144,52 @@ fn the_timeline_shows_who_was_there_and_finds_and_deletes_them() {
     fs::remove_dir_all(&folder).unwrap();
 }
 
+/// Whom a camera followed that is recorded, in files of two seconds, one of which is still written.
+#[test]
+fn whoever_was_recorded_is_played_and_kept_as_a_clip() {
+    let mut browser = Browser::start("chromium-timeline-clip");
+    let element = |codec: &str| if codec == "h264" { "video" } else { "img[alt=Recording]" };
+    for (codec, plays, kind) in
+        [("h264", "currentTime > 0.2", "video/mp4"), ("mjpeg", "naturalWidth == 320", "video/x-matroska")]
+    {
+        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+        let file = |own: &Path| {
+            let (recordings, rtsp) = (own.join("recordings"), camera.rtsp_url());
+            Program::entry("door", &camera.url(), &own.join("password"))
+                + &format!("codec = \"{codec}\"\nrtsp = \"{rtsp}\"\n[camera.door.recording]\n")
+                + &format!("folder = {recordings:?}\nsegment = \"2s\"\nkeep = \"1h\"\n")
+        };
+        let mut program = Program::start(&format!("timeline-{codec}"), file, &[]);
+        scene::wait_until_following(&camera);
+        let before = camera.status().commands;
+        assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 30), "not steered");
+        assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+        program.launch.wait_for_line(": event 1: target ");
+        browser.open(&format!("{}events", program.url()));
+        browser.wait_for("document.querySelector('form')?.day.value");
+        // It may be past midnight by now.
+        let list: Value = serde_json::from_str(&program.ask("GET", "/events/list").1).unwrap();
+        let event = list["events"].as_array().unwrap().iter().find(|event| event["id"] == 1).unwrap();
+        let from = &event["from"];
+        browser.value(&format!("form.day.value = dayOf(new Date({from})); refresh()"));
+        browser.wait_for("document.querySelector('#event-1 .play')?.checkVisibility()");
+        browser.wait_for("document.querySelector('#event-1 img').naturalWidth > 0");
+        browser.value("document.querySelector('#event-1 .play').click()");
+        browser.wait_for(&format!("document.querySelector('#event-1 {}')?.{plays}", element(codec)));
+        browser.save_picture(&format!("ptztrack-events-{codec}.png"));
+        let clip = browser.value(
+            "fetch(document.querySelector('#event-1 .clip').href).then(async answer => \
+             [answer.headers.get('content-type'), (await answer.blob()).size])",
+        );
+        assert!(clip[0] == kind && clip[1].as_u64().unwrap() > 10_000, "{clip}");
+        // Where the recording is gone, that is said.
+        fs::remove_dir_all(program.folder().join("recordings")).unwrap();
+        assert_eq!(program.ask("GET", "/events/1/clip"), (404, "The recording is no more.\n".to_owned()));
+        program.end("TERM");
+        scene::assert_left_at_rest(&camera);
+    }
+}
+
 /// Dark, and on a phone.
 #[test]
 fn the_timeline_fits_a_phone() {
@@ -179,6 +226,9 @@ fn events_are_told_and_deleted_by_the_rules_of_the_page() {
         ("GET", "/events/..%2f..%2fetc%2fpasswd/picture", 400),
         ("GET", "/events/1/delete", 405),
         ("POST", "/events/7/delete", 404),
+        // Of whom there is no recording.
+        ("GET", "/events/1/video", 404),
+        ("GET", "/events/1/clip", 404),
     ] {
         assert_eq!(program.ask(method, path).0, status, "{method} {path}");
     }

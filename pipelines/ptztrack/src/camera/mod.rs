@@ -8,7 +8,7 @@ mod messages;
 mod packets;
 mod pipeline;
 pub mod process;
-mod recording;
+pub mod recording;
 mod refusals;
 mod running;
 mod servo_stats;

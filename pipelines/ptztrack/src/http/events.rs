@@ -2,6 +2,7 @@
 
 //! Who was followed: the timeline, and what it asks for.
 
+use std::convert::Infallible;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -11,11 +12,13 @@ use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
-use events::{Area, Entry, Error, Filter, Reader, Store};
+use events::{Area, Entry, Error, Filter, Reader, Sighting, Store};
+use futures_util::{StreamExt, stream};
 use serde::Deserialize;
 use serde_json::{Value, json};
 
 use super::html;
+use crate::camera::recording::{self, Clip, Form, NoClip, Purpose};
 use crate::report;
 
 /// No answer has more events.
@@ -32,6 +35,8 @@ pub fn routes<S>(folder: Option<PathBuf>) -> Router<S> {
         .route("/events/list", get(list))
         .route("/events/events.csv", get(csv))
         .route("/events/{id}/picture", get(picture))
+        .route("/events/{id}/video", get(async |folder, id| recorded(folder, id, Purpose::Play).await))
+        .route("/events/{id}/clip", get(async |folder, id| recorded(folder, id, Purpose::Keep).await))
         .route("/events/{id}/delete", post(delete))
         .with_state(Arc::new(folder))
 }
@@ -97,6 +102,7 @@ fn describe(entry: &Entry, likeness: Option<f64>) -> Value {
         "to": entry.sighting.to_ms,
         "way": entry.way_deg,
         "picture": entry.has_picture,
+        "recorded": entry.sighting.recording.is_some(),
         "likeness": likeness,
     })
 }
@@ -119,6 +125,48 @@ async fn picture(folder: Folder, Path(id): Path<i64>) -> Response {
         Ok(None) => StatusCode::NOT_FOUND.into_response(),
         Err(refusal) => refusal,
     }
+}
+
+/// What the recording shows of somebody.
+async fn recorded(folder: Folder, Path(id): Path<i64>, purpose: Purpose) -> Response {
+    let find = move |reader: &Reader| {
+        let sighting = reader.sighting(id)?.map(|entry| entry.sighting);
+        let pieces = |sighting: &Sighting| {
+            let from = sighting.recording.as_ref()?;
+            Some(recording::pieces(from, sighting.to_ms - sighting.from_ms))
+        };
+        Ok(sighting.and_then(|sighting| Some((pieces(&sighting)?, sighting.camera))))
+    };
+    let (pieces, camera) = match read(folder, find).await {
+        Ok(Some(found)) => found,
+        Ok(None) => return (StatusCode::NOT_FOUND, "It was not recorded.\n").into_response(),
+        Err(refusal) => return refusal,
+    };
+    let clip = match recording::cut(pieces, purpose).await {
+        Ok(clip) => clip,
+        Err(NoClip::Gone) => return (StatusCode::NOT_FOUND, "The recording is no more.\n").into_response(),
+        Err(NoClip::Busy) => {
+            return (StatusCode::SERVICE_UNAVAILABLE, "Others are taken from the recordings: try again.\n")
+                .into_response();
+        }
+    };
+    let (kind, extension) = match clip.form {
+        Form::Pictures => (super::multipart(), "mjpeg"),
+        Form::Mp4 => ("video/mp4".to_owned(), "mp4"),
+        Form::Matroska => ("video/x-matroska".to_owned(), "mkv"),
+    };
+    let place = match purpose {
+        Purpose::Play => "inline".to_owned(),
+        Purpose::Keep => format!("attachment; filename=\"{camera}-{id}.{extension}\""),
+    };
+    let head = [(header::CONTENT_TYPE, kind), (header::CONTENT_DISPOSITION, place)];
+    (head, [(header::CACHE_CONTROL, "no-store")], body(clip)).into_response()
+}
+
+fn body(clip: Clip) -> Body {
+    let whole = move |part| if clip.form == Form::Pictures { super::part(&part) } else { part };
+    let parts = stream::unfold(clip.parts, async |mut parts| Some((parts.recv().await?, parts)));
+    Body::from_stream(parts.map(move |part| Ok::<_, Infallible>(whole(part))))
 }
 
 async fn delete(folder: Folder, Path(id): Path<i64>) -> Response {

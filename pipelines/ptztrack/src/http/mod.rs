@@ -224,8 +224,12 @@ async fn video(State(fleet): State<Arc<Fleet>>, Path(name): Path<String>) -> Res
         let jpeg = look.next().await?;
         Some((Ok::<_, Infallible>(part(&jpeg)), look))
     });
-    let kind = format!("multipart/x-mixed-replace; boundary={BOUNDARY}");
-    ([(header::CONTENT_TYPE, kind)], Body::from_stream(parts)).into_response()
+    ([(header::CONTENT_TYPE, multipart())], Body::from_stream(parts)).into_response()
+}
+
+/// Of a stream of pictures.
+fn multipart() -> String {
+    format!("multipart/x-mixed-replace; boundary={BOUNDARY}")
 }
 
 fn part(jpeg: &Bytes) -> Bytes {

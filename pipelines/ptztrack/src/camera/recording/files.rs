@@ -40,6 +40,45 @@ impl Segments {
     }
 }
 
+/// A part of a file of a recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Piece {
+    pub file: PathBuf,
+    pub from: gst::ClockTime,
+    pub lasts: gst::ClockTime,
+    /// Where it is among all pieces.
+    pub at: gst::ClockTime,
+}
+
+/// From there on for so long, in all files that the recording went on in.
+pub fn pieces(from: &Pointer, lasts_ms: i64) -> Vec<Piece> {
+    let piece = |file: PathBuf, from_ms: i64, at_ms: i64| {
+        let time = |ms: i64| gst::ClockTime::from_mseconds(ms.max(0).unsigned_abs());
+        Piece { file, from: time(from_ms), lasts: time(lasts_ms - at_ms), at: time(at_ms) }
+    };
+    let mut pieces = vec![piece(from.file.clone(), from.offset_ms, 0)];
+    let Some((camera, began_ms)) = name_of(&from.file) else { return pieces };
+    let later = fs::read_dir(from.file.parent().unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let mut later: Vec<(i64, PathBuf)> = later
+        .filter_map(|entry| {
+            let file = entry.path();
+            let at_ms = name_of(&file).filter(|(of, _)| *of == camera)?.1 - began_ms - from.offset_ms;
+            (file > from.file && at_ms < lasts_ms).then_some((at_ms, file))
+        })
+        .collect();
+    later.sort();
+    pieces.extend(later.into_iter().map(|(at_ms, file)| piece(file, 0, at_ms)));
+    pieces
+}
+
+/// Whose recording a file is of, and when it began, in milliseconds since 1970.
+fn name_of(file: &Path) -> Option<(&str, i64)> {
+    let (camera, time) = file.file_stem()?.to_str()?.rsplit_once('-')?;
+    let (seconds, thousandths) = time.split_at_checked(15)?;
+    let time = glib::DateTime::from_iso8601(&format!("{seconds}Z"), None).ok()?;
+    Some((camera, time.to_unix() * 1000 + thousandths.parse::<i64>().ok()?))
+}
+
 /// Names the files by the time at which they begin, and deletes old ones whenever another begins.
 pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, segments: &Arc<Segments>) {
     let Some(sink) = pipeline.by_name("recording") else { return };
@@ -177,6 +216,28 @@ mod tests {
         fs::remove_dir_all(&folder).unwrap();
         assert_eq!(found.len(), 1, "{found:?}");
         assert!(found[0].path.ends_with("door-20260101T000000000.mkv"));
+    }
+
+    #[test]
+    fn a_clip_goes_on_in_the_files_that_began_before_its_end() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-pieces-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let file = |name: &str| folder.join(format!("{name}.mkv"));
+        let [first, second] = ["door-20260101T000000000", "door-20260101T001000250"].map(file);
+        let others = ["door-20260101T002000000", "door-20251231T235000000", "yard-20260101T001000000"];
+        for file in others.map(file).iter().chain([&first, &second]) {
+            fs::write(file, "").unwrap();
+        }
+        let of = |offset_ms, lasts_ms| {
+            let pieces = pieces(&Pointer { file: first.clone(), offset_ms }, lasts_ms);
+            let time = |time: gst::ClockTime| time.mseconds();
+            let parts = pieces.into_iter().map(|p| (p.file, time(p.from), time(p.lasts), time(p.at)));
+            parts.collect::<Vec<_>>()
+        };
+        let found = [of(1000, 5000), of(590_250, 30_000)];
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(found[0], [(first.clone(), 1000, 5000, 0)]);
+        assert_eq!(found[1], [(first.clone(), 590_250, 30_000, 0), (second, 0, 20_000, 10_000)]);
     }
 
     #[test]

@@ -7,9 +7,11 @@
 //! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ parser ─ splitmuxsink
 //! ```
 
+mod clip;
 mod files;
 
-pub use files::Segments;
+pub use clip::{Clip, Form, NoClip, Purpose, cut};
+pub use files::{Segments, pieces};
 
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
