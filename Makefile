@@ -2,12 +2,14 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test lint check-format demo bench bench-check evaluate evaluate-everybody evaluate-handover soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-demo packages-evaluate packages-test
+.PHONY: help build test test-analytics lint check-format demo bench bench-check evaluate evaluate-everybody evaluate-handover soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-demo packages-evaluate packages-test
 
-# Debian's packages, in this one place.
+# Debian's packages, in this one place. GStreamer's analytics are in those called bad, from Debian 13 on; in Debian 12 there are none,
+# and these would bring 68 others along.
+ANALYTICS_PACKAGES := $(shell . /etc/os-release; [ "$${VERSION_ID:-0}" -lt 13 ] || echo libgstreamer-plugins-bad1.0-dev)
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
 	libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstrtspserver-1.0-dev \
-	libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev
+	libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev $(ANALYTICS_PACKAGES)
 RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good \
 	gstreamer1.0-plugins-bad gstreamer1.0-plugins-ugly gstreamer1.0-libav
 EVALUATE_PACKAGES := $(RUN_PACKAGES) gstreamer1.0-opencv gnuplot-nox fonts-dejavu-core
@@ -23,6 +25,9 @@ CARGO ?= cargo
 # The plugins; the watchdogs, programs of the crates `ptztrack-vapix` and `ptztrack-onvif`; what `pipelines/` are run with; and the program `ptztrack`.
 PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package gst-plugin-onvifptz --package ptztrack-vapix \
 	--package ptztrack-onvif --package pipeline-supervisor --package ptztrack
+
+# Seen when something is built, as it may have been installed just before.
+FEATURES = $$(pkg-config --exists gstreamer-analytics-1.0 && echo "--features gst-plugin-ptztrack/analytics")
 
 CODEC ?= mjpeg
 DURATION ?= 60
@@ -54,20 +59,24 @@ help:
 
 ## build: build the plugins, the watchdog and the program that runs `pipelines/` (release) into target/release
 build: packages-build
-	$(CARGO) build --release $(PRODUCT)
+	$(CARGO) build --release $(PRODUCT) $(FEATURES)
 
 ## test: check formatting, lint, build, run all tests
 test: packages-test check-format
 	@# Clippy's own compiler builds what is tested, so that nothing is compiled twice; it denies warnings as in `make lint`.
 	export RUSTC_WORKSPACE_WRAPPER="$$(command -v clippy-driver)" CLIPPY_ARGS="-Dwarnings__CLIPPY_HACKERY__"; \
-	$(CARGO) build --workspace --all-targets; \
+	$(CARGO) build --workspace --all-targets $(FEATURES); \
 	: With cameras on this machine the tests speak plain HTTP, no proxy has a way to these. A critical of GLib ends its test.; \
 	env -u http_proxy -u HTTP_PROXY G_DEBUG=fatal-criticals RUST_TEST_THREADS=$${RUST_TEST_THREADS:-4} scripts/with-plugins debug \
-		scripts/run-tests
+		scripts/run-tests $(FEATURES)
+
+## test-analytics: have elements of others read and make GStreamer's analytics metas; needs GStreamer 1.24
+test-analytics: packages-test
+	$(CARGO) test --manifest-path tests/analytics/Cargo.toml --target-dir target
 
 ## lint: check formatting, run clippy and shell syntax checks, warnings denied
 lint: packages-build check-format
-	$(CARGO) clippy --workspace --all-targets -- -D warnings
+	$(CARGO) clippy --workspace --all-targets $(FEATURES) -- -D warnings
 
 check-format: packages-build
 	$(CARGO) fmt --all --check
@@ -77,7 +86,7 @@ check-format: packages-build
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
 ##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
 demo: packages-demo
-	$(CARGO) build --release $(PRODUCT) --package virtual-camera
+	$(CARGO) build --release $(PRODUCT) $(FEATURES) --package virtual-camera
 	@case "$(WORLD)" in \
 	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
 	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \
@@ -91,7 +100,7 @@ demo: packages-demo
 ##       the thesis' table 5.4, how late commands are, 1 to 16 cameras, and each algorithm by itself from 640x480 to 3840x2160
 ##       (ROUNDS=5  BENCH_SIZE=1280x720  LIVE_SECONDS=20  FOOTAGE=file, a recording to look at as well)
 bench: packages-bench
-	$(CARGO) build --release $(PRODUCT)
+	$(CARGO) build --release $(PRODUCT) $(FEATURES)
 	$(CARGO) build --release $(BENCHMARKS)
 	mkdir -p target/bench
 	recordings=(); for codec in avi mpeg4; do for world in 1 8 $(if $(FOOTAGE),"$(FOOTAGE)"); do \
@@ -190,7 +199,7 @@ deb:
 else
 deb: packages-build packages-deb
 	@# The date is the package's: crates in C would be compiled anew with each commit.
-	env -u SOURCE_DATE_EPOCH $(CARGO) build --release $(PRODUCT)
+	env -u SOURCE_DATE_EPOCH $(CARGO) build --release $(PRODUCT) $(FEATURES)
 	scripts/make-deb target/release target/deb
 endif
 
@@ -198,7 +207,7 @@ endif
 reproduce: packages-build packages-deb
 	for time in 1 2; do \
 		rm -rf target/reproduced; \
-		CARGO_TARGET_DIR="$(CURDIR)/target/reproduced" $(CARGO) build --release $(PRODUCT); \
+		CARGO_TARGET_DIR="$(CURDIR)/target/reproduced" $(CARGO) build --release $(PRODUCT) $(FEATURES); \
 		scripts/make-deb target/reproduced/release "target/deb-$$time"; \
 	done
 	sha256sum target/deb-1/*.deb target/deb-2/*.deb
@@ -218,7 +227,7 @@ test-fleet: packages-build
 	@scripts/install-packages $(RUN_PACKAGES) python3 python3-venv
 	@# Not installed: that of Debian 12 does not know what deploy/kubernetes asks of it.
 	if command -v kubectl >/dev/null; then scripts/test-kubernetes; else echo "Without kubectl, deploy/kubernetes is not checked."; fi
-	$(CARGO) build --release $(PRODUCT) --package virtual-camera
+	$(CARGO) build --release $(PRODUCT) $(FEATURES) --package virtual-camera
 	scripts/test-fleet target/release
 
 ## test-container: build the container of deploy/Containerfile with podman, and follow in it, not as root and on a read-only root;

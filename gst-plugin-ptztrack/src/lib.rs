@@ -9,6 +9,8 @@
 //! The algorithms live in [`vision`], without a GStreamer type in sight.
 
 mod allocation;
+#[cfg(feature = "analytics")]
+mod analytics;
 pub mod bgavgdetect;
 mod duration;
 pub mod lkfeaturetrack;

@@ -38,6 +38,12 @@ impl Detections {
                     bounds: Rect::from_pixels(bounds, info.width(), info.height()),
                     ..Detection::default()
                 }));
+                #[cfg(feature = "analytics")]
+                self.list.extend(
+                    crate::analytics::boxes(buffer, info, roi_type)
+                        .into_iter()
+                        .map(|bounds| Detection { bounds, ..Detection::default() }),
+                );
             }
             Err(error) => {
                 self.list.clear();

@@ -17,6 +17,8 @@ use ptztrack_contract::{
 use super::scene_source::SceneSource;
 use super::{Profile, TargetSelection, buffer};
 use crate::allocation::refuse_crop;
+#[cfg(feature = "analytics")]
+use crate::analytics::Analytics;
 use crate::duration;
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
@@ -115,6 +117,8 @@ struct Stream {
     scene: SceneSource,
     detections: buffer::Detections,
     tracker: vision::Tracker,
+    #[cfg(feature = "analytics")]
+    analytics: Analytics,
     state: TargetState,
     /// Running time of the last frame.
     last_time: Option<gst::ClockTime>,
@@ -131,6 +135,8 @@ impl Stream {
             scene: SceneSource::default(),
             detections: buffer::Detections::default(),
             tracker: vision::Tracker::new(config),
+            #[cfg(feature = "analytics")]
+            analytics: Analytics::default(),
             state: TargetState::Searching,
             last_time: None,
             since_message: gst::ClockTime::ZERO,
@@ -172,7 +178,7 @@ pub struct LkFeatureTrack {
     )]
     #[property(
         name = "roi-type", type = String, default = Some(MOTION_ROI), mutable_playing,
-        blurb = "Name of the region-of-interest metas that count as detections (motion: those of bgavgdetect); another detector need not see every frame, once a second will do",
+        blurb = "Name of the region-of-interest metas, or class of the object detections (GStreamer 1.24), that count as detections (motion: those of bgavgdetect); another detector need not see every frame, once a second will do",
         get = |imp: &Self| lock(&imp.settings).roi_type.to_string(),
         set = |imp: &Self, name: Option<String>| lock(&imp.settings).roi_type = name.unwrap_or_default().into()
     )]
@@ -391,6 +397,16 @@ impl LkFeatureTrack {
         };
         self.announce(stream, settings, &tracked, times, step);
         self.count(settings, &tracked, times);
+        #[cfg(feature = "analytics")]
+        if let Err(err) = stream.analytics.attach(
+            buffer,
+            &stream.info,
+            &settings.roi_type,
+            &tracked.tracks,
+            times.running_time,
+        ) {
+            self.warn_once(stream, &format!("no object can be attached: {err}"));
+        }
         match buffer::attach(buffer, &stream.info, tracked, times.running_time) {
             Ok((features, tracks)) => stream.tracker.recycle(features, tracks),
             Err(err) => self.warn_once(stream, &format!("no meta can be attached: {err}")),

@@ -15,6 +15,11 @@
 //! else. With `post-tracks` everybody who comes or goes is told of by an element message named `ptztrack-track` (`change`: `new`,
 //! `back`, `merged` with the number `into` which it went, `gone`).
 //!
+//! Where the plugin is built with GStreamer 1.24 or later, its analytics library (`GstAnalyticsRelationMeta`) is spoken, too: object
+//! detections whose class is `roi-type` count as detections, whichever element has made them, and every track is attached as an
+//! object detection of that class (`person` where it is `bgavgdetect` who detects) with the track's confidence, related to a
+//! tracking of its number.
+//!
 //! ## Groups
 //! With `selection=group` everybody who goes somewhere is followed, in one box that holds all of them: together with `auto-zoom` of a sink
 //! the camera keeps them all in the picture. The number is that of one of them. The box takes in who joins, and lets go of who has left or
