@@ -4,10 +4,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs;
-use std::net::TcpListener;
+use std::io::Read;
+use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use chrono::DateTime;
 use end_to_end::{GstLaunch, PATIENCE, Program, Viewer, scene, scratch};
@@ -208,6 +209,27 @@ fn who_believes_its_certificate_sees_and_nobody_else_does() {
     assert!(believing("self-signed.pem").error().contains("Failed\\ to\\ connect"));
     let (read, said) = ffprobe(&url.replace("rtsps://", "rtsp://"));
     assert!(!read, "in clear: {said}");
+    program.end("TERM");
+}
+
+/// Once they are gone there is room again.
+#[test]
+fn those_who_are_too_many_are_sent_away_and_nobody_is_followed_the_worse_for_it() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("crowd", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let server = url.trim_start_matches("rtsp://").trim_end_matches("/door");
+    let mut crowd: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(server).unwrap()).collect();
+    // The last of them is told nothing but that.
+    let last = crowd.last_mut().unwrap();
+    last.set_read_timeout(Some(PATIENCE)).unwrap();
+    assert_eq!(last.read(&mut [0]).unwrap(), 0);
+    is_steered(&camera);
+    drop(crowd);
+    let begin = Instant::now();
+    while !ffprobe(&url).0 {
+        assert!(begin.elapsed() < PATIENCE, "there is no room any more");
+    }
     program.end("TERM");
 }
 

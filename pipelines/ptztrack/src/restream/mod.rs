@@ -78,12 +78,17 @@ impl Restreaming {
             // One for each client: who waits for a camera's first picture keeps nobody else waiting.
             pool.set_max_threads(-1);
         }
-        server.connect_client_connected(|server, client| {
-            if server.client_filter(None).len() > MOST_CLIENTS {
-                client.close();
+        let context = glib::MainContext::new();
+        server.connect_client_connected({
+            let context = context.clone();
+            move |server, client| {
+                if server.client_filter(None).len() > MOST_CLIENTS {
+                    let client = client.clone();
+                    // Not before the server has taken it on: it would never let it go.
+                    context.spawn(async move { client.close() });
+                }
             }
         });
-        let context = glib::MainContext::new();
         let main_loop = glib::MainLoop::new(Some(&context), false);
         let scheme = if settings.tls.is_some() { "rtsps" } else { "rtsp" };
         context.spawn(listen(server.clone(), context.clone(), scheme, log));
