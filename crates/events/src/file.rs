@@ -84,7 +84,7 @@ impl Error {
     }
 
     /// Whether the file is broken, so that it will be no better later.
-    pub(crate) fn is_corrupt(&self) -> bool {
+    pub fn is_corrupt(&self) -> bool {
         let Self::File { cause, .. } = self else { return false };
         matches!(cause.sqlite_error_code(), Some(ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase))
     }
@@ -105,6 +105,13 @@ pub(crate) fn open(folder: &Path) -> Result<(Connection, Option<PathBuf>), Error
         }
         Err(err) => Err(err),
     }
+}
+
+/// Moves a broken file aside, as another process does not do at the same time; its new place.
+pub(crate) fn put_aside(folder: &Path) -> Result<PathBuf, Error> {
+    let said = Error::folder(folder);
+    let _alone = alone(folder).map_err(&said)?;
+    move_aside(&folder.join(FILE)).map_err(&said)
 }
 
 /// To read only.

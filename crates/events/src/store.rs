@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -39,11 +40,20 @@ impl Store {
         Ok((Self { connection, file: folder.join(file::FILE) }, aside))
     }
 
+    /// Moves a file aside that has turned out to be broken ([`Error::is_corrupt`]), so that another one is made the next time; its
+    /// new place.
+    ///
+    /// # Errors
+    /// Where it is not there, or the folder cannot be written.
+    pub fn put_aside(folder: &Path) -> Result<PathBuf, Error> {
+        file::put_aside(folder)
+    }
+
     /// Keeps one; where the same track was kept before, both become one. Its number.
     ///
     /// # Errors
     /// Where it cannot be written.
-    pub fn keep(&mut self, sighting: Sighting) -> Result<i64, Error> {
+    pub fn keep(&mut self, sighting: &Sighting) -> Result<i64, Error> {
         let said = Error::file(&self.file);
         let keep = |connection: &mut Connection| {
             let transaction = connection.transaction_with_behavior(TransactionBehavior::Immediate)?;
@@ -107,24 +117,17 @@ impl Store {
     }
 }
 
-impl Error {
-    /// Whether the file has to be opened anew, which moves a broken one aside.
-    pub fn needs_another_file(&self) -> bool {
-        self.is_corrupt()
-    }
-}
-
-fn write(transaction: &Transaction, new: Sighting) -> rusqlite::Result<i64> {
+fn write(transaction: &Transaction, new: &Sighting) -> rusqlite::Result<i64> {
     let track = new.track.cast_signed();
     let known = format!("SELECT {COLUMNS} FROM sighting WHERE camera = ?1 AND run_ms = ?2 AND track = ?3");
     let known = transaction.query_row(&known, params![new.camera, new.run_ms, track], entry).optional()?;
     let (id, sighting) = match known {
         Some(known) => {
             let mut sighting = Sighting { picture: picture(transaction, known.id)?, ..known.sighting };
-            sighting.join(new);
-            (Some(known.id), sighting)
+            sighting.join(new.clone());
+            (Some(known.id), Cow::Owned(sighting))
         }
-        None => (None, new),
+        None => (None, Cow::Borrowed(new)),
     };
     let path = serde_json::to_string(&sighting.path)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
@@ -150,7 +153,7 @@ fn write(transaction: &Transaction, new: Sighting) -> rusqlite::Result<i64> {
         ],
     )?;
     let id = id.unwrap_or_else(|| transaction.last_insert_rowid());
-    if let Some(picture) = sighting.picture {
+    if let Some(picture) = &sighting.picture {
         transaction
             .execute("REPLACE INTO picture (sighting, jpeg) VALUES (?1, ?2)", params![id, picture.jpeg])?;
     }

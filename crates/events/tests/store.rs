@@ -71,7 +71,7 @@ fn sighting(n: i64) -> Sighting {
 #[test]
 fn what_is_kept_is_read_back() {
     let folder = Folder::new("read-back");
-    let id = folder.store().keep(sighting(4)).unwrap();
+    let id = folder.store().keep(&sighting(4)).unwrap();
     let reader = Reader::open(&folder.0).unwrap();
     let entry = reader.sighting(id).unwrap().unwrap();
     assert_eq!(entry.sighting, Sighting { picture: None, ..sighting(4) });
@@ -86,7 +86,7 @@ fn what_is_kept_is_read_back() {
 fn those_are_found_that_are_asked_for_the_latest_first() {
     let folder = Folder::new("asked-for");
     let mut store = folder.store();
-    let ids: Vec<i64> = (0..6).map(|n| store.keep(sighting(n)).unwrap()).collect();
+    let ids: Vec<i64> = (0..6).map(|n| store.keep(&sighting(n)).unwrap()).collect();
     let from_ms = |n: i64| sighting(n).from_ms;
     let filter = Filter::default();
     assert_eq!(folder.all(), ids.iter().rev().copied().collect::<Vec<_>>());
@@ -109,17 +109,17 @@ fn those_are_found_that_are_asked_for_the_latest_first() {
 fn a_track_that_is_taken_up_again_is_one_sighting() {
     let folder = Folder::new("again");
     let mut store = folder.store();
-    let id = store.keep(sighting(1)).unwrap();
+    let id = store.keep(&sighting(1)).unwrap();
     let later =
         Sighting { from_ms: sighting(1).from_ms + 20_000, to_ms: sighting(1).to_ms + 20_000, ..sighting(1) };
     let better = Picture { jpeg: vec![9; 10], quality: 2.0, looks: Looks::default() };
-    assert_eq!(store.keep(Sighting { picture: Some(better), ..later }).unwrap(), id);
+    assert_eq!(store.keep(&Sighting { picture: Some(better), ..later }).unwrap(), id);
     let reader = Reader::open(&folder.0).unwrap();
     let entry = reader.sighting(id).unwrap().unwrap();
     assert_eq!(entry.sighting.to_ms - entry.sighting.from_ms, 30_000);
     assert_eq!((entry.sighting.path.len(), reader.picture(id).unwrap()), (20, Some(vec![9; 10])));
     // Another run of the tracker counts anew.
-    let other = store.keep(Sighting { run_ms: 8, ..sighting(1) }).unwrap();
+    let other = store.keep(&Sighting { run_ms: 8, ..sighting(1) }).unwrap();
     assert_eq!(folder.all().len(), 2);
     assert_ne!(other, id);
 }
@@ -128,7 +128,7 @@ fn a_track_that_is_taken_up_again_is_one_sighting() {
 fn what_is_too_old_or_too_much_goes_the_oldest_first() {
     let folder = Folder::new("retention");
     let mut store = folder.store();
-    let ids: Vec<i64> = (0..100).map(|n| store.keep(sighting(n)).unwrap()).collect();
+    let ids: Vec<i64> = (0..100).map(|n| store.keep(&sighting(n)).unwrap()).collect();
     let now = SystemTime::UNIX_EPOCH + Duration::from_millis(sighting(100).from_ms.unsigned_abs());
     let retention = Retention { age: Duration::from_secs(50 * 60), bytes: u64::MAX };
     store.retain(&retention, now).unwrap();
@@ -153,7 +153,7 @@ fn of_whom_was_deleted_nothing_is_left_in_the_files() {
         picture: Some(Picture { jpeg: jpeg.to_vec(), quality: 1.0, looks: Looks::default() }),
         ..sighting(n)
     };
-    let (stays, goes) = (store.keep(with(1, b"other")).unwrap(), store.keep(with(2, word)).unwrap());
+    let (stays, goes) = (store.keep(&with(1, b"other")).unwrap(), store.keep(&with(2, word)).unwrap());
     let is_there = || {
         let files = fs::read_dir(&folder.0).unwrap().map(|file| fs::read(file.unwrap().path()).unwrap());
         files.into_iter().any(|bytes| bytes.windows(word.len()).any(|window| window == word))
@@ -164,13 +164,13 @@ fn of_whom_was_deleted_nothing_is_left_in_the_files() {
     assert_eq!(folder.all(), [stays]);
     // Its number is nobody else's.
     drop(store);
-    assert!(folder.store().keep(sighting(3)).unwrap() > goes);
+    assert!(folder.store().keep(&sighting(3)).unwrap() > goes);
 }
 
 #[test]
 fn a_file_of_another_version_is_moved_aside_and_not_changed() {
     let folder = Folder::new("version");
-    folder.store().keep(sighting(1)).unwrap();
+    folder.store().keep(&sighting(1)).unwrap();
     let file = folder.0.join(FILE);
     // Where SQLite's file format has the version of its user.
     let mut bytes = fs::read(&file).unwrap();
@@ -179,31 +179,39 @@ fn a_file_of_another_version_is_moved_aside_and_not_changed() {
     assert!(Reader::open(&folder.0).unwrap_err().to_string().contains("another version"));
     let (mut store, aside) = Store::open(&folder.0).unwrap();
     assert_eq!(fs::read(aside.unwrap()).unwrap(), bytes);
-    store.keep(sighting(2)).unwrap();
+    store.keep(&sighting(2)).unwrap();
     assert_eq!((folder.all().len(), folder.aside().len()), (1, 1));
 }
 
 #[test]
-fn a_broken_file_is_moved_aside_before_or_while_it_is_written() {
-    let folder = Folder::new("broken");
-    fs::write(
-        folder.0.join(FILE),
-        "no database at all, and longer than a header of one would be, so that it is none",
-    )
-    .unwrap();
+fn a_file_that_is_no_database_is_moved_aside() {
+    let folder = Folder::new("no-database");
+    let nonsense = "no database at all, and longer than a header of one would be, so that it is none";
+    fs::write(folder.0.join(FILE), nonsense).unwrap();
     let (mut store, aside) = Store::open(&folder.0).unwrap();
-    assert!(aside.is_some());
+    assert_eq!(fs::read_to_string(aside.unwrap()).unwrap(), nonsense);
+    store.keep(&sighting(1)).unwrap();
+    assert_eq!(folder.all().len(), 1);
+}
+
+/// Its beginning is whole, so that it is noticed by whoever writes.
+#[test]
+fn a_file_that_turns_out_to_be_broken_is_put_aside_and_another_one_made() {
+    let folder = Folder::new("broken");
+    let mut store = folder.store();
     for n in 0..50 {
-        store.keep(sighting(n)).unwrap();
+        store.keep(&sighting(n)).unwrap();
     }
     drop(store);
     let mut bytes = fs::read(folder.0.join(FILE)).unwrap();
-    let len = bytes.len();
-    bytes[4096..len].fill(0xa5);
+    bytes[4096..].fill(0xa5);
     fs::write(folder.0.join(FILE), &bytes).unwrap();
-    let (mut store, aside) = Store::open(&folder.0).unwrap();
-    let err = if aside.is_none() { Some(store.keep(sighting(99)).unwrap_err()) } else { None };
-    assert!(err.as_ref().is_none_or(|err| err.needs_another_file()), "{err:?}");
+    let err = folder.store().keep(&sighting(99)).unwrap_err();
+    assert!(err.is_corrupt(), "{err}");
+    let aside = Store::put_aside(&folder.0).unwrap();
+    assert_eq!(fs::read(aside).unwrap(), bytes);
+    folder.store().keep(&sighting(99)).unwrap();
+    assert_eq!((folder.all().len(), folder.aside().len()), (1, 1));
 }
 
 #[test]
@@ -212,7 +220,7 @@ fn a_folder_that_cannot_be_written_is_said() {
     fs::write(folder.0.join("file"), "").unwrap();
     let err = Store::open(&folder.0.join("file")).unwrap_err();
     assert!(err.to_string().contains("file: "), "{err}");
-    assert!(!err.needs_another_file());
+    assert!(!err.is_corrupt());
     assert!(Reader::open(&folder.0).is_err());
 }
 
@@ -224,7 +232,7 @@ fn keeps_until_it_is_killed() {
     let (mut store, _) = Store::open(Path::new(&folder)).unwrap();
     let begin = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap().as_nanos() as i64;
     for n in 1.. {
-        let id = store.keep(Sighting { run_ms: begin, ..sighting(n) }).unwrap();
+        let id = store.keep(&Sighting { run_ms: begin, ..sighting(n) }).unwrap();
         writeln!(std::io::stdout().lock(), "kept {id}").unwrap();
     }
 }
@@ -251,5 +259,5 @@ fn no_sighting_that_was_kept_is_lost_where_the_process_is_killed() {
     assert!(kept.len() >= 210 && kept.iter().all(|id| all.contains(id)), "{kept:?}\n{all:?}");
     let (mut store, aside) = Store::open(&folder.0).unwrap();
     assert_eq!(aside, None, "the file is broken");
-    store.keep(sighting(0)).unwrap();
+    store.keep(&sighting(0)).unwrap();
 }

@@ -120,7 +120,8 @@ impl Keeping {
         while let Err(err) = what(self) {
             // Whatever was wrong may be mended in the next one.
             self.open = None;
-            if !std::mem::replace(&mut self.in_trouble, true) {
+            let is_mended = err.is_corrupt() && self.put_aside();
+            if !is_mended && !std::mem::replace(&mut self.in_trouble, true) {
                 let detail =
                     format!("{}; the cameras follow, and it is tried again", not_kept(&err.to_string()));
                 self.log.tell(&Event::new(Level::Warning, None, "events-not-kept", detail));
@@ -134,7 +135,7 @@ impl Keeping {
     }
 
     fn keep(&mut self, sighting: &Sighting) -> Result<(), Error> {
-        let id = self.store()?.keep(sighting.clone())?;
+        let id = self.store()?.keep(sighting)?;
         let seconds = (sighting.to_ms - sighting.from_ms) as f64 / 1000.0;
         let detail = format!("event {id}: target {} was followed for {seconds:.1} s", sighting.track);
         self.log.tell(&Event::new(Level::Info, Some(&sighting.camera), "event-kept", detail));
@@ -158,10 +159,19 @@ impl Keeping {
 
     fn open_anew(&self) -> Result<events::Store, Error> {
         let (store, aside) = events::Store::open(&self.folder)?;
-        if let Some(aside) = aside {
-            self.log.tell(&Event::new(Level::Warning, None, "events-moved-aside", moved(&aside)));
-        }
+        aside.iter().for_each(|aside| self.tell_moved(aside));
         Ok(store)
+    }
+
+    /// A file that has turned out to be broken while it was written.
+    fn put_aside(&self) -> bool {
+        let aside = events::Store::put_aside(&self.folder);
+        aside.iter().for_each(|aside| self.tell_moved(aside));
+        aside.is_ok()
+    }
+
+    fn tell_moved(&self, aside: &Path) {
+        self.log.tell(&Event::new(Level::Warning, None, "events-moved-aside", moved(aside)));
     }
 }
 
@@ -170,4 +180,41 @@ fn moved(aside: &Path) -> String {
         "the file of events is broken or of another version: it is {} now, and a new one was begun",
         aside.display()
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// As on a disk that loses what was written; the next one is kept in a file of its own.
+    #[test]
+    fn a_file_that_breaks_while_it_is_written_is_moved_aside() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-breaks-{}", std::process::id()));
+        let log = Arc::new(Log::unwritten());
+        let mut told = log.subscribe();
+        let retention = Retention { age: Duration::MAX, bytes: u64::MAX };
+        let mut keeping = Keeping { folder: folder.clone(), retention, log, open: None, in_trouble: false };
+        let sighting = |track| Sighting {
+            camera: "door".to_owned(),
+            run_ms: 0,
+            track,
+            from_ms: 0,
+            to_ms: 1000,
+            path: Vec::new(),
+            picture: None,
+            recording: None,
+        };
+        keeping.persist(|keeping| keeping.keep(&sighting(1)));
+        keeping.open = None;
+        let mut bytes = std::fs::read(folder.join(events::FILE)).unwrap();
+        bytes[4096..].fill(0xa5);
+        std::fs::write(folder.join(events::FILE), bytes).unwrap();
+        keeping.persist(|keeping| keeping.keep(&sighting(2)));
+        let kept = events::Reader::open(&folder).unwrap().sightings(&events::Filter::default()).unwrap();
+        assert_eq!(kept.iter().map(|entry| entry.sighting.track).collect::<Vec<_>>(), [2]);
+        let said: Vec<String> =
+            std::iter::from_fn(|| told.try_recv().ok()).map(|event| event.event).collect();
+        assert_eq!(said, ["event-kept", "events-moved-aside", "event-kept"]);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
 }

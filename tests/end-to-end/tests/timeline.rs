@@ -53,7 +53,7 @@ fn sighting(camera: &str, minutes: i64, coat: [u8; 3], pan_deg: f64) -> Sighting
 fn program(test: &str, sightings: Vec<Sighting>) -> (Program, PathBuf) {
     let folder = scratch(&format!("timeline-{test}"));
     let (mut store, _) = Store::open(&folder).unwrap();
-    for sighting in sightings {
+    for sighting in &sightings {
         store.keep(sighting).unwrap();
     }
     let kept = folder.clone();
