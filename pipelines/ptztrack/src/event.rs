@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use axum::body::Bytes;
 use serde::{Deserialize, Serialize};
 
 /// How much somebody should care.
@@ -26,6 +27,12 @@ pub struct Event {
     pub event: String,
     /// In words, for a person.
     pub detail: String,
+    /// Where the page has a picture of it, below its own address.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub picture: Option<String>,
+    /// The same picture.
+    #[serde(skip)]
+    pub jpeg: Option<Bytes>,
 }
 
 impl Event {
@@ -43,7 +50,15 @@ impl Event {
             camera: camera.map(str::to_owned),
             event: event.into(),
             detail: detail.into(),
+            picture: None,
+            jpeg: None,
         }
+    }
+
+    /// The same with the picture of an event that was kept.
+    pub fn with_picture(self, id: i64, jpeg: &[u8]) -> Self {
+        let (picture, jpeg) = (format!("events/{id}/picture"), Bytes::copy_from_slice(jpeg));
+        Self { picture: Some(picture), jpeg: Some(jpeg), ..self }
     }
 }
 

@@ -76,7 +76,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
         tokio::spawn(serve(http, fleet.clone(), config.store.kept_in(), log.clone()));
     }
     let publisher = config.mqtt.as_ref().and_then(|mqtt| {
-        let started = Publisher::start(mqtt, origin.shard(), fleet.clone(), log.clone());
+        let pictures = config.store.what.is_some_and(|kept| kept.pictures);
+        let started = Publisher::start(mqtt, origin.shard(), pictures, fleet.clone(), log.clone());
         let tell = |err: &session::Error| log.error("mqtt-not-started", format!("no MQTT: {err}"));
         started.inspect_err(tell).ok()
     });

@@ -138,7 +138,11 @@ impl Keeping {
         let id = self.store()?.keep(sighting)?;
         let seconds = (sighting.to_ms - sighting.from_ms) as f64 / 1000.0;
         let detail = format!("event {id}: target {} was followed for {seconds:.1} s", sighting.track);
-        self.log.tell(&Event::new(Level::Info, Some(&sighting.camera), "event-kept", detail));
+        let event = Event::new(Level::Info, Some(&sighting.camera), "event-kept", detail);
+        self.log.tell(&match &sighting.picture {
+            Some(picture) => event.with_picture(id, &picture.jpeg),
+            None => event,
+        });
         // What is too much can wait for the next one.
         let _ = self.retain();
         Ok(())

@@ -50,8 +50,17 @@ impl Broker {
 
     /// A line for each message, topic and payload: what is kept there, then what comes.
     pub fn listen(&self, topic: &str) -> GstLaunch {
+        self.listen_with(topic, &["-v"])
+    }
+
+    /// The same with the length of the payload in its place.
+    pub fn listen_to_sizes(&self, topic: &str) -> GstLaunch {
+        self.listen_with(topic, &["-F", "%t %l"])
+    }
+
+    fn listen_with(&self, topic: &str, more: &[&str]) -> GstLaunch {
         let mut command = Command::new("mosquitto_sub");
-        command.args(["-h", "127.0.0.1", "-p", &self.port.to_string(), "-t", topic, "-v"]);
+        command.args(["-h", "127.0.0.1", "-p", &self.port.to_string(), "-t", topic]).args(more);
         GstLaunch::spawn(command)
     }
 }

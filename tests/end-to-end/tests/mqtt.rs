@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use end_to_end::{Broker, Program, scene, signal};
+use end_to_end::{Broker, PATIENCE, Program, scene, signal};
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
 
@@ -47,6 +47,31 @@ fn events_states_and_discovery_reach_a_broker() {
     availability.wait_for_line("ptztrack/availability offline");
     assert!(!said.contains("no connection to the MQTT broker"), "{said}");
     assert!(!said.contains(scene::PASSWORD), "{said}");
+}
+
+/// The broker keeps none of them.
+#[test]
+fn the_picture_of_who_was_followed_reaches_a_broker_and_does_not_stay() {
+    let broker = Broker::start();
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut events = broker.listen("ptztrack/camera/door/event");
+    let mut pictures = broker.listen_to_sizes("ptztrack/camera/door/picture");
+    let program = program(&broker, "mqtt-picture", &camera);
+    scene::wait_until_following(&camera);
+    let before = camera.status().commands;
+    assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 20), "not steered");
+    assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+    let event = payload(&events.wait_for_line("event-kept"));
+    assert_eq!(event["picture"], "events/1/picture", "{event}");
+    let size = pictures.wait_for_line("door/picture ");
+    assert!(size.rsplit(' ').next().unwrap().parse::<u64>().unwrap() > 1000, "{size}");
+    let mut config = broker.listen("homeassistant/image/#");
+    assert_eq!(payload(&config.wait_for_line("last/config"))["image_topic"], "ptztrack/camera/door/picture");
+    program.end("TERM");
+    // What is kept comes first.
+    let mut kept = broker.listen("ptztrack/#");
+    kept.wait_for_line("ptztrack/availability offline");
+    assert!(!kept.seen().iter().any(|line| line.contains("/picture")), "{:?}", kept.seen());
 }
 
 #[test]

@@ -30,6 +30,9 @@ const EVERY: Duration = Duration::from_secs(1);
 const KEEP_ALIVE: Duration = Duration::from_secs(20);
 /// So many messages wait for a broker that is away.
 const WAITING: usize = 256;
+/// A broker has little to say, and no picture is longer than that, in bytes.
+const LONGEST_HEARD: usize = 10 * 1024;
+const LONGEST_SAID: usize = 1024 * 1024;
 /// For the last words.
 const LONGEST_END: Duration = Duration::from_secs(1);
 
@@ -42,20 +45,22 @@ pub struct Publisher {
 }
 
 impl Publisher {
-    /// Connects, and tells from now on what happens.
+    /// Connects, and tells from now on what happens; pictures where they are kept.
     ///
     /// # Errors
     /// Where the certificates that are to be believed cannot be read.
     pub fn start(
         settings: &Mqtt,
         shard: Option<Shard>,
+        pictures: bool,
         fleet: Arc<Fleet>,
         log: Arc<Log>,
     ) -> Result<Self, session::Error> {
-        let topics = Topics::new(settings, shard);
+        let topics = Topics::new(settings, shard, pictures);
         let id = format!("ptztrack-{}-{}", glib::host_name(), std::process::id());
         let mut options = MqttOptions::new(id, &settings.host, settings.port);
         options.set_keep_alive(KEEP_ALIVE);
+        options.set_max_packet_size(LONGEST_HEARD, LONGEST_SAID);
         options.set_last_will(LastWill::new(topics.availability(), OFFLINE, QoS::AtLeastOnce, true));
         if let Some(credentials) = &settings.credentials {
             options.set_credentials(&credentials.user, credentials.password.reveal());
@@ -149,6 +154,12 @@ async fn publish(
 fn publish_event(client: &AsyncClient, topics: &Topics, event: &Event) {
     if let Ok(payload) = serde_json::to_string(event) {
         let _ = client.try_publish(topics.event(event.camera.as_deref()), QoS::AtMostOnce, false, payload);
+    }
+    // The broker keeps none, so that who is deleted here is not there either.
+    if let (Some(camera), Some(jpeg)) = (&event.camera, &event.jpeg)
+        && jpeg.len() < LONGEST_SAID / 2
+    {
+        let _ = client.try_publish(topics.picture(camera), QoS::AtMostOnce, false, jpeg.to_vec());
     }
 }
 

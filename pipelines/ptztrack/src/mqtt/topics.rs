@@ -18,6 +18,8 @@ pub struct Topics {
     /// Where Home Assistant looks for what there is.
     discovery: Option<String>,
     shard: Option<Shard>,
+    /// There are pictures of who was followed.
+    pictures: bool,
 }
 
 /// What Home Assistant is to show of a camera: component, field of the state, name, device class.
@@ -28,8 +30,8 @@ const ENTITIES: [(&str, &str, &str, Option<&str>); 3] = [
 ];
 
 impl Topics {
-    pub fn new(settings: &Mqtt, shard: Option<Shard>) -> Self {
-        Self { own: settings.topic.clone(), discovery: settings.discovery.clone(), shard }
+    pub fn new(settings: &Mqtt, shard: Option<Shard>, pictures: bool) -> Self {
+        Self { own: settings.topic.clone(), discovery: settings.discovery.clone(), shard, pictures }
     }
 
     /// Whether the program runs; each process that shares the cameras has its own.
@@ -47,6 +49,11 @@ impl Topics {
         }
     }
 
+    /// Of who was followed last.
+    pub fn picture(&self, camera: &str) -> String {
+        format!("{}/camera/{camera}/picture", self.own)
+    }
+
     fn state(&self, camera: &str) -> String {
         format!("{}/camera/{camera}/state", self.own)
     }
@@ -60,24 +67,39 @@ impl Topics {
                 let topic = format!("{prefix}/{component}/ptztrack_{camera}/{field}/config");
                 (topic, self.entity(camera, field, name, class).to_string())
             }));
+            if self.pictures {
+                let topic = format!("{prefix}/image/ptztrack_{camera}/last/config");
+                kept.push((topic, self.image(camera).to_string()));
+            }
         }
         kept
     }
 
     /// One entity of Home Assistant (its documentation of MQTT discovery).
     fn entity(&self, camera: &str, field: &str, name: &str, class: Option<&str>) -> Value {
-        let mut entity = json!({
-            "name": name,
-            "unique_id": format!("ptztrack_{camera}_{field}"),
-            "state_topic": self.state(camera),
-            "value_template": format!("{{{{ value_json.{field} }}}}"),
-            "availability_topic": self.availability(),
-            "device": { "identifiers": [format!("ptztrack_{camera}")], "name": camera, "manufacturer": "ptztrack" },
-        });
+        let mut entity = self.of_camera(camera, field, name);
+        entity["state_topic"] = self.state(camera).into();
+        entity["value_template"] = format!("{{{{ value_json.{field} }}}}").into();
         if let Some(class) = class {
             entity["device_class"] = class.into();
         }
         entity
+    }
+
+    fn image(&self, camera: &str) -> Value {
+        let mut entity = self.of_camera(camera, "last", "Last followed");
+        entity["image_topic"] = self.picture(camera).into();
+        entity["content_type"] = "image/jpeg".into();
+        entity
+    }
+
+    fn of_camera(&self, camera: &str, field: &str, name: &str) -> Value {
+        json!({
+            "name": name,
+            "unique_id": format!("ptztrack_{camera}_{field}"),
+            "availability_topic": self.availability(),
+            "device": { "identifiers": [format!("ptztrack_{camera}")], "name": camera, "manufacturer": "ptztrack" },
+        })
     }
 }
 
@@ -99,7 +121,8 @@ mod tests {
 
     fn topics(shard: Option<&str>) -> Topics {
         let discovery = Some("homeassistant".to_owned());
-        Topics { own: "ptztrack".to_owned(), discovery, shard: shard.map(|shard| shard.parse().unwrap()) }
+        let shard = shard.map(|shard| shard.parse().unwrap());
+        Topics { own: "ptztrack".to_owned(), discovery, shard, pictures: true }
     }
 
     #[test]
@@ -113,8 +136,13 @@ mod tests {
                 "homeassistant/binary_sensor/ptztrack_door/following/config",
                 "homeassistant/binary_sensor/ptztrack_door/picture/config",
                 "homeassistant/sensor/ptztrack_door/words/config",
+                "homeassistant/image/ptztrack_door/last/config",
             ]
         );
+        let image: Value = serde_json::from_str(&kept[4].1).unwrap();
+        assert_eq!(image["image_topic"], "ptztrack/camera/door/picture");
+        let none = Topics { pictures: false, ..topics(None) }.kept(&Known::new("door"));
+        assert_eq!(none.len(), 4, "{none:?}");
         let state: Value = serde_json::from_str(&kept[0].1).unwrap();
         assert_eq!((&state["picture"], &state["target"]), (&json!("OFF"), &Value::Null));
         let entity: Value = serde_json::from_str(&kept[1].1).unwrap();
