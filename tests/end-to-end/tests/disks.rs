@@ -82,6 +82,57 @@ fn a_full_disk_is_said_once_and_recorded_on_when_there_is_room() {
     assert_eq!(said.matches("nothing is recorded").count(), 1, "{said}");
 }
 
+/// A camera that is followed, with its events there.
+fn with_events_on(disk: &Disk, test: &str) -> (VirtualCamera, Program) {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let file = |folder: &Path| {
+        let events = disk.folder();
+        Program::entry("door", &camera.url(), &folder.join("password"))
+            + &format!("[events]\nfolder = {events:?}\n")
+    };
+    let program = Program::start(test, file, &[]);
+    scene::wait_until_following(&camera);
+    (camera, program)
+}
+
+#[track_caller]
+fn is_steered(camera: &VirtualCamera) {
+    let before = camera.status().commands;
+    assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 20), "not steered");
+}
+
+#[test]
+fn a_full_disk_of_events_is_said_once_and_they_are_kept_when_there_is_room() {
+    let disk = Disk::new("events-full", MEBIBYTES);
+    let other = disk.folder().join("other");
+    let _ = fs::write(&other, vec![0; (MEBIBYTES as usize) << 20]);
+    let (camera, mut program) = with_events_on(&disk, "events-full");
+    program.launch.wait_for_line("warning: who is followed is not kept: ");
+    is_steered(&camera);
+    assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+    is_steered(&camera);
+    fs::remove_file(other).unwrap();
+    program.launch.wait_for_line("who is followed is kept again");
+    program.launch.wait_for_line(": event 1: target ");
+    let said = program.end("TERM");
+    assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+    scene::assert_left_at_rest(&camera);
+}
+
+/// Whoever keeps events waits, and so does whoever asks for them; nobody else does.
+#[test]
+fn a_disk_of_events_that_hangs_holds_nobody() {
+    let disk = Disk::new("events-hang", MEBIBYTES);
+    let (camera, program) = with_events_on(&disk, "events-hang");
+    wait_until("no file of events", || disk.folder().join("events.db").exists());
+    disk.hang();
+    assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+    is_steered(&camera);
+    assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
+    program.end("TERM");
+    scene::assert_left_at_rest(&camera);
+}
+
 /// Before it is full: a share of it is left free for others.
 #[test]
 fn the_oldest_recordings_make_room_for_the_newest() {

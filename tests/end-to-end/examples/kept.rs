@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Kills `ptztrack` a hundred times while it keeps who was followed, fills a store with ten thousand events and asks its page for them,
+//! and prints a table in Markdown of what is lost, and how long the page takes:
+//!
+//! ```sh
+//! cargo build --release --workspace --lib --bins && cargo run --release -p end-to-end --example kept
+//! ```
+#![allow(clippy::unwrap_used, clippy::expect_used)]
+
+use std::fs;
+use std::path::Path;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use end_to_end::{Chance, Program, scene, scratch};
+use events::{Crop, Filter, Reader, Sighting, Step, Store};
+use virtual_camera::VirtualCamera;
+
+const KILLS: usize = 100;
+const EVENTS: i64 = 10_000;
+const CAMERAS: i64 = 20;
+const QUESTIONS: usize = 20;
+
+fn main() {
+    println!("| what | how often | figure |\n|---|---|---|");
+    println!("| SIGKILL | {KILLS} | {} |", killed());
+    let (slowest, bytes) = asked();
+    println!(
+        "| the page's list of {EVENTS} events of {CAMERAS} cameras, {bytes} bytes | {QUESTIONS} | {slowest} ms at most |"
+    );
+}
+
+/// At another moment each time after an event was said to be kept.
+fn killed() -> String {
+    let camera = VirtualCamera::start(scene::walking_person_for(Duration::from_secs(7200))).unwrap();
+    let folder = scratch("kept-killed");
+    let mut chance = Chance::new(1);
+    let mut said = 0;
+    for _ in 0..KILLS {
+        let mut program = program("killed", &camera.url(), &folder);
+        program.launch.wait_for_line("acquired");
+        assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+        let line = program.launch.wait_for_line(": target ");
+        assert!(line.contains(": event "), "{line}");
+        said += 1;
+        thread::sleep(Duration::from_millis(chance.within((0, 200))));
+        let (_, all) = program.end_somehow("KILL");
+        // It may have kept another one since.
+        said += all.matches(": event ").count() - 1;
+        let (_, aside) = Store::open(&folder).unwrap();
+        assert_eq!(aside, None, "the file is broken");
+    }
+    let kept = Reader::open(&folder).unwrap().sightings(&Filter::default()).unwrap().len();
+    let pictures = Reader::open(&folder).unwrap();
+    let whole = pictures
+        .sightings(&Filter::default())
+        .unwrap()
+        .iter()
+        .all(|entry| pictures.picture(entry.id).is_ok());
+    fs::remove_dir_all(&folder).unwrap();
+    assert!(whole);
+    format!("{said} events were said to be kept, {} of them lost, no file broken", said.saturating_sub(kept))
+}
+
+/// The longest that the page took, in milliseconds, and how long its answer is.
+fn asked() -> (u128, usize) {
+    let folder = scratch("kept-asked");
+    fill(&folder);
+    let program = program("asked", "http://127.0.0.1:1", &folder);
+    let ask = |_| {
+        let begin = Instant::now();
+        let (status, list) = program.ask("GET", "/events/list");
+        assert_eq!((status, list.matches("\"id\":").count()), (200, EVENTS as usize));
+        (begin.elapsed().as_millis(), list.len())
+    };
+    let slowest = (0..QUESTIONS).map(ask).max().unwrap();
+    program.end("TERM");
+    fs::remove_dir_all(&folder).unwrap();
+    slowest
+}
+
+fn program(test: &str, address: &str, events: &Path) -> Program {
+    let file = |own: &Path| {
+        Program::entry("door", address, &own.join("password"))
+            + &format!("[events]\nfolder = {events:?}\nkeep = \"10000d\"\n")
+    };
+    Program::start(&format!("kept-{test}"), file, &[])
+}
+
+/// Each of a minute, with a picture.
+fn fill(folder: &Path) {
+    let (mut store, _) = Store::open(folder).unwrap();
+    let picture = |n: i64| {
+        let (width, height) = (160, 240);
+        let rgb = (0..width * height * 3).map(|at| (i64::from(at) * (n + 7) / 97 % 251) as u8).collect();
+        Crop { width, height, rgb, person: [40, 40, 80, 160] }.into_picture(1.0, false)
+    };
+    let pictures: Vec<_> = (0..50).map(picture).collect();
+    for n in 0..EVENTS {
+        let from_ms = 1_768_000_000_000 + n * 30_000;
+        let step = |second: i64| Step {
+            at_ms: from_ms + second * 1000,
+            pan_deg: (second % 90) as f64,
+            tilt_deg: -5.0,
+        };
+        let sighting = Sighting {
+            camera: format!("camera-{}", n % CAMERAS),
+            run_ms: 0,
+            track: n.unsigned_abs(),
+            from_ms,
+            to_ms: from_ms + 60_000,
+            path: (0..60).map(step).collect(),
+            picture: pictures[n as usize % pictures.len()].clone(),
+            recording: None,
+        };
+        store.keep(&sighting).unwrap();
+    }
+}
