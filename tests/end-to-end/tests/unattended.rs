@@ -314,6 +314,52 @@ fn the_page_shows_every_camera_and_steers_it() {
     scene::assert_left_at_rest(&door);
 }
 
+/// By touch; who turns it is an operator, for as long as the camera is left to one.
+#[test]
+fn a_camera_is_turned_by_hand_on_the_page() {
+    let mut browser = Browser::start("chromium-by-hand");
+    for isolation in ["none", "process"] {
+        let camera = VirtualCamera::start(scene::nobody()).unwrap();
+        let file = |folder: &Path| {
+            let more = format!(
+                "isolation = \"{isolation}\"\n[camera.door.vapixptzsink]\noverride-timeout = \"3s\"\n"
+            );
+            Program::entry("door", &camera.url(), &folder.join("password")) + &more
+        };
+        let program = Program::start(&format!("by-hand-{isolation}"), file, &[]);
+        browser.open(&program.url());
+        browser.wait_for("document.querySelector('.turn')?.checkVisibility()");
+        let before = camera.status();
+        browser.call("Emulation.setTouchEmulationEnabled", json!({"enabled": true}));
+        let right = "document.querySelector('[data-turn=\"x=0.2\"]').getBoundingClientRect()";
+        let place = browser.value(&format!(
+            "(() => {{ document.querySelector('.turn').scrollIntoView(); const r = {right}; return {{ x: r.x + r.width / 2, y: r.y + r.height / 2 }}; }})()"
+        ));
+        browser.call("Input.dispatchTouchEvent", json!({"type": "touchStart", "touchPoints": [place]}));
+        browser.call("Input.dispatchTouchEvent", json!({"type": "touchEnd", "touchPoints": []}));
+        browser
+            .wait_for("document.querySelector('article').innerText.includes('an operator has the camera')");
+        let turned = |status: &virtual_camera::Status| status.pan_deg > before.pan_deg + 3.0;
+        assert!(camera.wait_for(PATIENCE, turned), "{:?}", camera.status());
+        browser.save_picture("ptztrack-page-by-hand.png");
+        browser
+            .wait_for("!document.querySelector('article').innerText.includes('an operator has the camera')");
+        assert_eq!(program.ask("POST", "/cameras/door/turn?x=7").0, 400);
+        assert_eq!(program.ask("POST", "/cameras/door/turn?zoom=0.5").0, 204);
+        assert!(
+            camera.wait_for(PATIENCE, |status| status.magnification > 1.1 * before.magnification),
+            "{:?}",
+            camera.status()
+        );
+        program.end("TERM");
+        assert!(
+            scene::rests(&camera, camera.now()).is_some(),
+            "left turning: {:?}",
+            camera.commands().last()
+        );
+    }
+}
+
 #[test]
 fn the_cameras_own_stream_is_recorded_as_it_comes() {
     let camera = camera();

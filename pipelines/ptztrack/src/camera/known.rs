@@ -5,7 +5,6 @@ use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use axum::body::Bytes;
 use pipeline_supervisor::video::Ended;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
@@ -16,6 +15,7 @@ use super::running::Running;
 use super::servo_stats::ServoStats;
 use super::sight::Sight;
 use super::stopwatch::Stopwatch;
+use super::view::Shown;
 
 /// A camera's thread waits for 10 s at most, for the end of a stream, and for as long as its elements take to stop.
 const LONGEST_PAUSE: Duration = Duration::from_secs(60);
@@ -54,8 +54,8 @@ pub struct Known {
     pub points: Mutex<Vec<(String, f64, f64)>>,
     /// Whom another camera saw before this one took them up.
     pub origin: Mutex<Option<Origin>>,
-    /// The last picture for who looks, as JPEG.
-    pub view: watch::Sender<Bytes>,
+    /// The last picture for who looks.
+    pub view: watch::Sender<Shown>,
     /// Its stream and what is seen in it, for who passes them on.
     pub packets: broadcast::Sender<Packet>,
     pub times: Vec<Stopwatch>,
@@ -99,6 +99,8 @@ pub enum Steering {
     LookAt(Gaze, Instant),
     /// It is somebody else's, who asked for it.
     HandedOver,
+    /// Somebody at the page has it look there; until then it is left alone.
+    Turned(Gaze, Instant),
     /// Somebody else was moving it when the last pipeline ended; until then it is left alone.
     Operator(Instant),
 }
@@ -153,7 +155,7 @@ impl Known {
             sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
             points: Mutex::default(),
             origin: Mutex::default(),
-            view: watch::Sender::new(Bytes::new()),
+            view: watch::Sender::new(Shown::default()),
             packets: packets::channel(),
             times: Stopwatch::all(),
         }
@@ -163,7 +165,7 @@ impl Known {
     pub fn control(&self) -> Control {
         match *lock(&self.steering) {
             Steering::HandedOver => Control::HandedOver,
-            Steering::Operator(_) => Control::Operator,
+            Steering::Operator(_) | Steering::Turned(..) => Control::Operator,
             _ if self.operator.load(Ordering::Relaxed) => Control::Operator,
             _ => Control::Ours,
         }
@@ -248,6 +250,13 @@ impl Known {
         running?.servo_stats()
     }
 
+    /// From when a picture is taken until it is here. Of the whole delay of commands and pictures, half is taken to be that of
+    /// pictures, as everywhere.
+    pub fn video_delay(&self) -> Duration {
+        let latency = self.servo().and_then(|servo| servo.numbers.get("latency").copied()).unwrap_or(0);
+        Duration::from_nanos(latency / 2)
+    }
+
     /// Whether the camera rests.
     pub fn is_at_rest(&self) -> bool {
         self.servo().and_then(|servo| servo.state).as_deref() == Some("at-rest")
@@ -262,7 +271,19 @@ impl Known {
 
     /// Its state in words.
     pub fn in_words(&self) -> String {
-        let state = lock(&self.state).clone();
+        self.words(lock(&self.state).clone())
+    }
+
+    /// The same, with whom a picture shows.
+    pub fn words_of(&self, shown: &Shown) -> String {
+        let mut state = lock(&self.state).clone();
+        if let Some(target) = &shown.target {
+            (state.target, state.target_id) = (target.state.clone(), target.id);
+        }
+        self.words(state)
+    }
+
+    fn words(&self, state: State) -> String {
         if state.given_up {
             return format!("given up: {}", state.trouble.unwrap_or_default());
         }
@@ -279,7 +300,7 @@ impl Known {
             (Steering::HandedOver, _) => "the camera is handed over",
             (Steering::GoHome(_), _) => "the camera goes home",
             (Steering::LookAt(..), _) => "the camera turns to whom another one sees",
-            (Steering::Operator(_), _) => "an operator has the camera",
+            (Steering::Operator(_) | Steering::Turned(..), _) => "an operator has the camera",
             (_, Some("at-rest")) => "the camera rests",
             (_, Some("moving")) => "the camera turns",
             (_, Some("taken-over")) => "an operator has the camera",

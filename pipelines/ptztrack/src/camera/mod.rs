@@ -3,6 +3,7 @@
 //! One camera: a thread in which its pipeline runs, is watched, and comes back, in this process or in one of its own.
 
 mod bounds;
+mod by_hand;
 mod known;
 mod messages;
 mod packets;
@@ -16,6 +17,7 @@ mod sight;
 mod sightings;
 mod stopwatch;
 mod video;
+mod view;
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -24,8 +26,8 @@ use std::sync::atomic::Ordering;
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use axum::body::Bytes;
 pub use bounds::picture_size;
+pub use by_hand::Turn;
 pub use known::{Control, Gaze, Known, Origin, Steering};
 use messages::Listener;
 pub use packets::{Content, Packet, next as next_packet};
@@ -36,10 +38,11 @@ use process::Processes;
 use ptztrack_contract::lock::lock;
 use recording::Recorder;
 use refusals::Refusals;
+pub use running::Abilities;
 use running::Running;
 pub use sight::{Person, Pose, Sight};
 pub use stopwatch::Stopwatch;
-use tokio::sync::watch;
+pub use view::{Look, Shown};
 
 use crate::config::{CameraSettings, Isolation};
 use crate::event::{Event, Level};
@@ -248,7 +251,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
             there || since.elapsed() > LONGEST_WAY_HOME
         }
         Steering::LookAt(_, since) => since.elapsed() > LONGEST_WAY_HOME,
-        Steering::Operator(until) => until <= Instant::now(),
+        Steering::Operator(until) | Steering::Turned(_, until) => until <= Instant::now(),
         Steering::Follow | Steering::HandedOver => false,
     };
     if over {
@@ -299,17 +302,15 @@ impl Known {
         self.steer(Steering::GoHome(Instant::now()));
     }
 
-    /// Whether the camera can be sent home, and whether it can be handed over.
-    pub fn abilities(&self) -> (bool, bool) {
-        let running = lock(&self.running).clone();
-        running.map(|running| running.abilities()).unwrap_or_default()
+    /// Turns it by hand.
+    pub fn turn(&self, turn: Turn) {
+        self.with(|running| running.turn(self, turn));
     }
 
-    /// Pictures are made while this is held.
-    pub fn look(self: &Arc<Self>) -> Look {
-        self.looking.fetch_add(1, Ordering::Relaxed);
-        self.with(|running| running.look(true));
-        Look { pictures: self.view.subscribe(), known: self.clone() }
+    /// What can be done with the camera.
+    pub fn abilities(&self) -> Abilities {
+        let running = lock(&self.running).clone();
+        running.map(|running| running.abilities(self)).unwrap_or_default()
     }
 
     fn with(&self, what: impl FnOnce(&dyn Running)) {
@@ -317,26 +318,5 @@ impl Known {
         if let Some(running) = running {
             what(&*running);
         }
-    }
-}
-
-/// Somebody looks; where nobody does any more, the camera's own timer ends it, as the next may come soon.
-#[derive(Debug)]
-pub struct Look {
-    known: Arc<Known>,
-    pictures: watch::Receiver<Bytes>,
-}
-
-impl Look {
-    /// The next picture, JPEG; `None` where the camera is no more.
-    pub async fn next(&mut self) -> Option<Bytes> {
-        self.pictures.changed().await.ok()?;
-        Some(self.pictures.borrow_and_update().clone())
-    }
-}
-
-impl Drop for Look {
-    fn drop(&mut self) {
-        self.known.looking.fetch_sub(1, Ordering::Relaxed);
     }
 }

@@ -8,7 +8,6 @@ use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use axum::body::Bytes;
 use gst::prelude::*;
 use pipeline_supervisor::video::{Failure, Video};
 use ptztrack_contract::lock::lock;
@@ -22,6 +21,8 @@ use super::servo_stats::ServoStats;
 use super::sight;
 use super::sightings;
 use super::video;
+use super::view::{self, VIEW};
+use super::{Abilities, Turn};
 use crate::config::{CameraSettings, Codec, Credentials, Kind, Protocol};
 use crate::log::Log;
 
@@ -31,17 +32,10 @@ const NEWEST: &str = "queue leaky=downstream max-size-buffers=1 max-size-bytes=0
 /// Nobody is there to notice that it follows somebody asleep, or has taken the wall for somebody.
 const TRACKER: &str = "lkfeaturetrack stationary-timeout=120000000000";
 
-/// A few pictures a second for who looks, and none while nobody does.
-const VIEW: &str = "valve name=view drop=true drop-mode=forward-sticky-events ! ptzoverlay ! videoconvert \
-    ! jpegenc quality=75 ! appsink name=picture sync=false async=false max-buffers=1 drop=true";
-
 /// Without a packet for so long, RTSP has to begin anew; HTTP's source has a limit of its own.
 const LONGEST_SILENCE: Duration = Duration::from_millis(1200);
 /// On top of that before the first packet: to log in over a long way, and for the camera to start an encoder.
 const LONGEST_START: Duration = Duration::from_secs(4);
-
-/// Between two pictures for who looks.
-const VIEW_EVERY: Duration = Duration::from_millis(200);
 
 /// Copies of what is recorded, for a pipeline of its own: whatever becomes of that, nobody is followed the worse for it.
 const TAP: &str = "appsink name=tap sync=false async=false enable-last-sample=false";
@@ -147,20 +141,19 @@ pub fn build(
     if let Some((recorder, tap)) = recorder.zip(of_name::<gst_app::AppSink>(&pipeline, "tap")) {
         recorder.record(&tap);
     }
+    if let Some(tracker) = of_factory(&pipeline, "lkfeaturetrack") {
+        sight::watch(&tracker, known);
+    }
     if let Some(sink) = of_name(&pipeline, "sightings") {
-        let tracker = of_factory(&pipeline, "lkfeaturetrack");
-        sightings::watch(&sink, tracker.as_ref(), camera, segments, log.clone());
+        sightings::watch(&sink, known, camera, segments, log.clone());
     }
     if camera.pipeline.is_none() {
         end_in_silence(&pipeline);
     }
     count(&pipeline, known);
-    if let Some(tracker) = of_factory(&pipeline, "lkfeaturetrack").filter(|_| camera.hands_over) {
-        sight::watch(&tracker, known);
-    }
     packets::tap(&pipeline, of_factory(&pipeline, "lkfeaturetrack").as_ref(), known);
     let elements = Elements::of(&pipeline);
-    elements.show_to(known);
+    view::show(elements.view.as_ref(), elements.picture.as_ref(), known);
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
     elements.steer(known.steering_at_start(elements.override_timeout()));
     *lock(&known.running) = Some(Arc::new(elements));
@@ -296,32 +289,6 @@ impl Elements {
         }
     }
 
-    /// Hands a few pictures a second to who looks. Not by `videorate`: it ends the process where a picture has no duration.
-    fn show_to(&self, known: &Arc<Known>) {
-        let last = Mutex::new(None::<Instant>);
-        let few = move |_: &gst::Pad, _: &mut gst::PadProbeInfo| {
-            let mut last = lock(&last);
-            if last.is_some_and(|last| last.elapsed() < VIEW_EVERY) {
-                return gst::PadProbeReturn::Drop;
-            }
-            *last = Some(Instant::now());
-            gst::PadProbeReturn::Ok
-        };
-        if let Some(pad) = self.view.as_ref().and_then(|view| view.static_pad("src")) {
-            pad.add_probe(gst::PadProbeType::BUFFER, few);
-        }
-        let Some(picture) = &self.picture else { return };
-        let known = known.clone();
-        let show = move |sink: &gst_app::AppSink| {
-            let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
-            if let Some(map) = sample.buffer().and_then(|buffer| buffer.map_readable().ok()) {
-                known.view.send_replace(Bytes::copy_from_slice(&map));
-            }
-            Ok(gst::FlowSuccess::Ok)
-        };
-        picture.set_callbacks(gst_app::AppSinkCallbacks::builder().new_sample(show).build());
-    }
-
     /// How long a camera is left to who has moved it.
     fn override_timeout(&self) -> Duration {
         let of = |servo: &gst::Element| servo.property::<u64>("override-timeout");
@@ -354,9 +321,18 @@ impl Running for Elements {
         }
     }
 
-    fn abilities(&self) -> (bool, bool) {
+    fn turn(&self, known: &Known, turn: Turn) {
+        known.turn_here(turn, self.override_timeout());
+    }
+
+    fn abilities(&self, known: &Known) -> Abilities {
         let has_home = |servo: &gst::Element| servo.property::<Option<String>>("home").is_some();
-        (self.servo.as_ref().is_some_and(has_home), self.servo.is_some())
+        let turns = self.servo.is_some();
+        Abilities {
+            home: self.servo.as_ref().is_some_and(has_home),
+            hand_over: turns,
+            turn: turns && known.says_where_it_looks(),
+        }
     }
 
     fn steer(&self, steering: Steering) {
@@ -364,7 +340,7 @@ impl Running for Elements {
         let to = match steering {
             Steering::Follow => "follow",
             Steering::GoHome(_) => "home",
-            Steering::LookAt(gaze, _) => {
+            Steering::LookAt(gaze, _) | Steering::Turned(gaze, _) => {
                 servo.set_property("look-at", gaze.to_string());
                 "look-at"
             }

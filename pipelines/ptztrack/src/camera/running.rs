@@ -2,8 +2,20 @@
 
 use std::fmt::Debug;
 
-use super::Steering;
+use serde::{Deserialize, Serialize};
+
 use super::servo_stats::ServoStats;
+use super::{Known, Steering, Turn};
+
+/// What can be done with a camera.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Abilities {
+    /// There is a home to go to.
+    pub home: bool,
+    pub hand_over: bool,
+    /// By hand.
+    pub turn: bool,
+}
 
 /// What runs a camera, a pipeline of this process or another process: what can be told to it, and asked.
 pub trait Running: Debug + Send + Sync {
@@ -21,8 +33,11 @@ pub trait Running: Debug + Send + Sync {
     /// Lets the camera follow, sends it home, or leaves it to somebody else.
     fn steer(&self, steering: Steering);
 
-    /// Whether there is a home to go to, and whether the camera can be handed over.
-    fn abilities(&self) -> (bool, bool);
+    /// Turns the camera by hand, which is left alone for a while after that.
+    fn turn(&self, known: &Known, turn: Turn);
+
+    /// What can be done with the camera.
+    fn abilities(&self, known: &Known) -> Abilities;
 
     /// What the sink says of itself.
     fn servo_stats(&self) -> Option<ServoStats>;

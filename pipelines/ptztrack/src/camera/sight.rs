@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What a camera sees and where it looks, for who hands people over.
+//! What a camera sees and where it looks.
 
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -76,6 +76,11 @@ impl Person {
     pub fn feet(&self) -> Point {
         let [x, y, width, height] = self.bounds;
         Point { x: x + width / 2.0, y: y + height }
+    }
+
+    pub fn centre(&self) -> Point {
+        let [x, y, width, height] = self.bounds;
+        Point { x: x + width / 2.0, y: y + height / 2.0 }
     }
 
     pub fn head(&self) -> Point {

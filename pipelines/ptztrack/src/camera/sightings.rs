@@ -2,16 +2,16 @@
 
 //! Who is followed, with the best picture: a branch of the camera's pipeline, which gets what is left for it.
 
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime};
 
 use events::{Collector, Crop, Ended, Sighting, Target, sharpness};
-use gst::prelude::*;
 use gst_video::prelude::*;
-use ptztrack_contract::lock::lock;
-use ptztrack_contract::{BufferMeta, CameraEvent, Rect, TargetMeta, TargetState};
+use ptztrack_contract::{BufferMeta, Rect, TargetMeta, TargetState};
 
+use super::known::Known;
 use super::recording::Segments;
+use super::sight::Person;
 use crate::config::{CameraSettings, Kept};
 use crate::log::Log;
 
@@ -27,23 +27,13 @@ const MOST_HEIGHT: u32 = 480;
 /// Sees to it that those are kept whom this pipeline follows.
 pub fn watch(
     sink: &gst_app::AppSink,
-    tracker: Option<&gst::Element>,
+    known: &Arc<Known>,
     camera: &CameraSettings,
     segments: Option<Arc<Segments>>,
     log: Arc<Log>,
 ) {
     let Some(kept) = camera.kept else { return };
-    let looks = Arc::new(Mutex::new(CameraEvent::default()));
-    if let Some(pad) = tracker.and_then(|tracker| tracker.static_pad("src")) {
-        let looks = looks.clone();
-        pad.add_probe(gst::PadProbeType::EVENT_UPSTREAM, move |_, info| {
-            if let Some(Ok(camera)) = info.event().and_then(|event| CameraEvent::of(event)) {
-                *lock(&looks) = camera;
-            }
-            gst::PadProbeReturn::Ok
-        });
-    }
-    let mut witness = Witness::new(&camera.name, kept, looks, segments, log);
+    let mut witness = Witness::new(known.clone(), kept, segments, log);
     let see = move |sink: &gst_app::AppSink| {
         let sample = sink.pull_sample().map_err(|_| gst::FlowError::Eos)?;
         witness.see(&sample);
@@ -59,23 +49,16 @@ struct Witness {
     segments: Option<Arc<Segments>>,
     began: Instant,
     collector: Collector,
-    /// Where the camera looks.
-    looks: Arc<Mutex<CameraEvent>>,
+    known: Arc<Known>,
     looked: Option<Instant>,
 }
 
 impl Witness {
-    fn new(
-        camera: &str,
-        kept: Kept,
-        looks: Arc<Mutex<CameraEvent>>,
-        segments: Option<Arc<Segments>>,
-        log: Arc<Log>,
-    ) -> Self {
+    fn new(known: Arc<Known>, kept: Kept, segments: Option<Arc<Segments>>, log: Arc<Log>) -> Self {
         let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
         let run_ms = i64::try_from(now.as_millis()).unwrap_or(i64::MAX);
-        let collector = Collector::new(camera, run_ms);
-        Self { kept, log, segments, began: Instant::now(), collector, looks, looked: None }
+        let collector = Collector::new(&known.name, run_ms);
+        Self { kept, log, segments, began: Instant::now(), collector, known, looked: None }
     }
 
     fn see(&mut self, sample: &gst::Sample) {
@@ -90,9 +73,6 @@ impl Witness {
     }
 
     fn target(&self, meta: &TargetMeta) -> Target {
-        let camera = lock(&self.looks).clone();
-        // While it turns it is where it was a moment ago.
-        let view = CameraEvent { moving: false, ..camera }.view();
         let ego = meta.ego_velocity.unwrap_or_default();
         let (x, y) = (meta.velocity.x - ego.x, meta.velocity.y - ego.y);
         let speed = x.hypot(y);
@@ -101,8 +81,18 @@ impl Witness {
             height: meta.bounds.height,
             // Whoever comes closer to a camera above their head goes down in its picture.
             towards: if speed > 0.0 { y / speed } else { 0.0 },
-            direction: view.map(|view| view.angles_of(meta.bounds.centre())),
+            direction: self.direction(meta),
         }
+    }
+
+    /// Pan and tilt, of the place of the target in the last picture that the tracker has seen, and where the camera looked when that
+    /// was taken. This one may have waited.
+    fn direction(&self, meta: &TargetMeta) -> Option<(f64, f64)> {
+        let seen = self.known.sight.borrow().clone();
+        let (_, sight) = &*seen;
+        let place = sight.people.iter().find(|person| person.id == meta.id).map(Person::centre);
+        let view = sight.pose_about(self.known.video_delay())?.view()?;
+        Some(view.angles_of(place.unwrap_or_else(|| meta.bounds.centre())))
     }
 
     fn is_to_look(&mut self) -> bool {
@@ -202,7 +192,78 @@ fn convert(
 
 #[cfg(test)]
 mod tests {
+    use ptztrack_contract::lock::lock;
+    use ptztrack_contract::{Point, Vector};
+
     use super::*;
+    use crate::camera::running::Running;
+    use crate::camera::servo_stats::ServoStats;
+    use crate::camera::{Abilities, Pose, Sight, Steering, Turn};
+
+    /// The camera has turned on by the time at which the picture is here.
+    #[test]
+    fn a_late_picture_tells_where_they_were() {
+        let known = Arc::new(Known::new("door"));
+        let pose = |ms: u64, pan_deg: f64| Pose {
+            age: Duration::from_millis(ms),
+            pan_deg,
+            tilt_deg: 0.0,
+            horizontal_fov_deg: 60.0,
+            vertical_fov_deg: 40.0,
+        };
+        let person = Person {
+            id: 7,
+            bounds: [0.45, 0.3, 0.1, 0.4],
+            velocity: [0.0; 2],
+            seen: true,
+            confidence: 1.0,
+            is_target: true,
+        };
+        let poses = vec![pose(1000, 0.0), pose(0, 20.0)];
+        let sight = Sight { people: vec![person], poses, moving: true, ..Sight::default() };
+        known.sight.send_replace(Arc::new((Instant::now(), sight)));
+        *lock(&known.running) = Some(Arc::new(Late(400)));
+        let kept = Kept { pictures: false, pixelate: false };
+        let witness = Witness::new(known, kept, None, Arc::new(Log::unwritten()));
+        // Of a picture before, in which they were further to the right.
+        let meta = TargetMeta {
+            state: TargetState::Tracking,
+            id: 7,
+            bounds: Rect { x: 0.6, y: 0.3, width: 0.1, height: 0.4 },
+            centroid: Point { x: 0.65, y: 0.5 },
+            velocity: Vector::default(),
+            ego_velocity: None,
+            unchanged_for: None,
+            confidence: 1.0,
+            features: Vec::new(),
+            aspect: None,
+            capture_time: None,
+        };
+        let (pan_deg, tilt_deg) = witness.target(&meta).direction.unwrap();
+        assert!((pan_deg - 16.0).abs() < 1e-6 && tilt_deg.abs() < 1e-6, "{pan_deg}, {tilt_deg}");
+    }
+
+    /// What runs with so many milliseconds between a command and a picture that shows it.
+    #[derive(Debug)]
+    struct Late(u64);
+
+    impl Running for Late {
+        fn look(&self, _: bool) {}
+        fn select(&self, _: f64, _: f64) {}
+        fn select_track(&self, _: u64) {}
+        fn release(&self) {}
+        fn steer(&self, _: Steering) {}
+        fn turn(&self, _: &Known, _: Turn) {}
+        fn abilities(&self, _: &Known) -> Abilities {
+            Abilities::default()
+        }
+        fn servo_stats(&self) -> Option<ServoStats> {
+            Some(ServoStats {
+                numbers: [("latency".to_owned(), self.0 * 1_000_000)].into(),
+                ..ServoStats::default()
+            })
+        }
+    }
 
     /// A grey picture whose pixels tell their places, at an odd width, of a stream that says its rate, as those by RTSP do.
     #[test]

@@ -159,14 +159,12 @@ impl Dispatcher {
 
     fn view(&mut self, known: Arc<Known>) -> View {
         let seen = known.sight.borrow().clone();
-        // Of the whole delay of commands and pictures, half is taken to be that of pictures, as everywhere.
-        let latency = known.servo().and_then(|servo| servo.numbers.get("latency").copied()).unwrap_or(0);
         for pose in &seen.1.poses {
             let widest = self.widest.entry(known.name.clone()).or_default();
             *widest = widest.max(pose.horizontal_fov_deg);
         }
         View {
-            video: Duration::from_nanos(latency / 2),
+            video: known.video_delay(),
             widest_fov_deg: self.widest.get(&known.name).copied(),
             target_height: self.fleet.target_height(&known.name),
             known,

@@ -36,7 +36,7 @@ use tokio::net::TcpListener;
 use tokio::sync::Semaphore;
 use tokio::task::JoinHandle;
 
-use crate::camera::{Known, Look, Steering};
+use crate::camera::{Known, Look, Steering, Turn};
 use crate::config::Http;
 use crate::fleet::Fleet;
 use crate::log::Log;
@@ -54,7 +54,7 @@ const LONGEST_STALL: Duration = Duration::from_secs(30);
 /// After no connection could be taken.
 const ACCEPT_AGAIN: Duration = Duration::from_millis(200);
 
-/// A camera's state in words, sent along with its picture: asked for by itself it may be that of another picture.
+/// What a picture shows in words, sent along with it: asked for by itself it may be what another one shows.
 const STATE_HEADER: &str = "ptztrack-state";
 /// Between two pictures of a stream.
 const BOUNDARY: &str = "ptztrack-picture";
@@ -191,7 +191,7 @@ async fn cameras(State(fleet): State<Arc<Fleet>>) -> Response {
 }
 
 fn describe(known: &Known) -> serde_json::Value {
-    let (home, hand_over) = known.abilities();
+    let abilities = known.abilities();
     let state = lock(&known.state).clone();
     json!({
         "name": known.name,
@@ -199,19 +199,20 @@ fn describe(known: &Known) -> serde_json::Value {
         "well": state.picture && !state.given_up,
         "target": state.target_id,
         "handed_over": *lock(&known.steering) == Steering::HandedOver,
-        "can_go_home": home,
-        "can_hand_over": hand_over,
+        "can_go_home": abilities.home,
+        "can_hand_over": abilities.hand_over,
+        "can_turn": abilities.turn && *lock(&known.steering) != Steering::HandedOver,
     })
 }
 
-/// The next picture, and the camera's state in words as it was then.
+/// The next picture, and what it shows in words.
 async fn picture(State(fleet): State<Arc<Fleet>>, Path(name): Path<String>) -> Response {
     let Some(known) = fleet.of(&name) else { return StatusCode::NOT_FOUND.into_response() };
     let mut look = known.look();
     match tokio::time::timeout(LONGEST_WAIT, look.next()).await {
-        Ok(Some(jpeg)) => {
+        Ok(Some(shown)) => {
             let head = [(header::CONTENT_TYPE, "image/jpeg"), (header::CACHE_CONTROL, "no-store")];
-            (head, [(STATE_HEADER, known.in_words())], jpeg).into_response()
+            (head, [(STATE_HEADER, known.words_of(&shown))], shown.jpeg).into_response()
         }
         _ => (StatusCode::SERVICE_UNAVAILABLE, "no picture\n").into_response(),
     }
@@ -221,8 +222,8 @@ async fn picture(State(fleet): State<Arc<Fleet>>, Path(name): Path<String>) -> R
 async fn video(State(fleet): State<Arc<Fleet>>, Path(name): Path<String>) -> Response {
     let Some(known) = fleet.of(&name) else { return StatusCode::NOT_FOUND.into_response() };
     let parts = stream::unfold(known.look(), |mut look: Look| async {
-        let jpeg = look.next().await?;
-        Some((Ok::<_, Infallible>(part(&jpeg)), look))
+        let shown = look.next().await?;
+        Some((Ok::<_, Infallible>(part(&shown.jpeg)), look))
     });
     ([(header::CONTENT_TYPE, multipart())], Body::from_stream(parts)).into_response()
 }
@@ -237,13 +238,15 @@ fn part(jpeg: &Bytes) -> Bytes {
     [head.as_bytes(), jpeg, b"\r\n"].concat().into()
 }
 
-/// A place in the picture, 0 to 1.
+/// A place in the picture, 0 to 1; of a turn, parts of the picture to the right and up, -1 to 1.
 #[derive(Debug, Deserialize)]
 struct Place {
     x: Option<f64>,
     y: Option<f64>,
     /// In the picture of another camera.
     from: Option<String>,
+    /// Nearer, or further away: -1 to 1.
+    zoom: Option<f64>,
 }
 
 /// What somebody wants of a camera.
@@ -264,6 +267,15 @@ async fn order(
             known.point(from, x, y);
         }
         ("point", ..) => return (StatusCode::BAD_REQUEST, "x and y are from 0 to 1\n").into_response(),
+        ("turn", ..) => match [place.x, place.y, place.zoom].map(Option::unwrap_or_default) {
+            turn if !turn.iter().all(|part| (-1.0..=1.0).contains(part)) => {
+                return (StatusCode::BAD_REQUEST, "x, y and zoom are from -1 to 1\n").into_response();
+            }
+            _ if !known.abilities().turn => {
+                return (StatusCode::CONFLICT, "it does not say where it looks\n").into_response();
+            }
+            [right, up, zoom] => known.turn(Turn { right, up, zoom }),
+        },
         ("release", ..) => known.release(),
         ("hand-over", ..) => known.steer(Steering::HandedOver),
         ("take-back", ..) => known.steer(Steering::Follow),

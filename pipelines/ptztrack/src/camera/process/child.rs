@@ -23,7 +23,7 @@ use tokio::time::interval;
 
 use super::line;
 use super::protocol::{Order, Report, Start, Word};
-use crate::camera::{self, Camera, Look, Packet};
+use crate::camera::{self, Camera, Look, Packet, Shown};
 use crate::log::Log;
 
 /// Between two reports.
@@ -47,6 +47,7 @@ pub async fn run() -> io::Result<()> {
     let log = Arc::new(Log::unwritten());
     let mut events = log.subscribe();
     let sightings = log.sightings();
+    let hands_over = start.settings.hands_over;
     let camera = Camera::start_here(start.settings, start.control, log, None)?;
     let known = camera.known.clone();
     let mut process = Child { words, heard: 0 };
@@ -66,16 +67,18 @@ pub async fn run() -> io::Result<()> {
                     Order::SelectTrack(id) => known.select_track(id),
                     Order::Release => known.release(),
                     Order::Steer(hand) => known.steer(hand.into()),
+                    Order::Turn(turn) => known.turn(turn),
                     Order::Look(somebody) => look = somebody.then(|| known.look()),
                     Order::Stream(taken) => packets = taken.then(|| known.packets.subscribe()),
                 }
             }
             Ok(event) = events.recv() => process.say(&Word::Event(event)).await?,
             picture = next_picture(&mut look) => {
-                process.say(&Word::Picture(BASE64_STANDARD.encode(picture))).await?;
+                let Shown { jpeg, target } = picture;
+                process.say(&Word::Picture(BASE64_STANDARD.encode(jpeg), target)).await?;
             }
             packet = next_packet(&mut packets) => process.say(&Word::Packet(Box::new(packet))).await?,
-            Ok(()) = sights.changed() => {
+            Ok(()) = sights.changed(), if hands_over => {
                 let (at, sight) = (**sights.borrow_and_update()).clone();
                 process.say(&Word::Sight(at.elapsed(), sight)).await?;
             }
@@ -106,7 +109,7 @@ async fn next<T: DeserializeOwned>(lines: &mut Lines<BufReader<OwnedReadHalf>>) 
 }
 
 /// Never where nobody looks.
-async fn next_picture(look: &mut Option<Look>) -> axum::body::Bytes {
+async fn next_picture(look: &mut Option<Look>) -> Shown {
     if let Some(look) = look
         && let Some(picture) = look.next().await
     {

@@ -34,6 +34,8 @@ use socket2::SockRef;
 use super::known::{Known, SEARCHING, Steering};
 use super::running::Running;
 use super::servo_stats::ServoStats;
+use super::view::Shown;
+use super::{Abilities, Turn};
 use crate::config::CameraSettings;
 use crate::event::{Event, Level};
 use crate::log::Log;
@@ -157,9 +159,9 @@ impl Processes {
                 }
                 Word::Packet(packet) => drop(known.packets.send(*packet)),
                 Word::Sighting(sighting) => log.keep(*sighting),
-                Word::Picture(picture) => {
+                Word::Picture(picture, target) => {
                     if let Ok(picture) = BASE64_STANDARD.decode(picture) {
-                        known.view.send_replace(picture.into());
+                        known.view.send_replace(Shown { jpeg: picture.into(), target });
                     }
                 }
             }
@@ -266,7 +268,11 @@ impl Running for Remote {
         self.order(&Order::Steer(steering.into()));
     }
 
-    fn abilities(&self) -> (bool, bool) {
+    fn turn(&self, _: &Known, turn: Turn) {
+        self.order(&Order::Turn(turn));
+    }
+
+    fn abilities(&self, _: &Known) -> Abilities {
         lock(&self.last).as_ref().map(|report| report.abilities).unwrap_or_default()
     }
 

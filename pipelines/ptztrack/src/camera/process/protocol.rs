@@ -13,6 +13,8 @@ use crate::camera::Packet;
 use crate::camera::known::{Control, Gaze, Known, State, Steering};
 use crate::camera::servo_stats::ServoStats;
 use crate::camera::sight::Sight;
+use crate::camera::view::Seen;
+use crate::camera::{Abilities, Turn};
 use crate::config::CameraSettings;
 use crate::event::Event;
 
@@ -34,6 +36,7 @@ pub enum Order {
     SelectTrack(u64),
     Release,
     Steer(Hand),
+    Turn(Turn),
     Look(bool),
     /// Somebody takes the packets of its stream.
     Stream(bool),
@@ -46,8 +49,8 @@ pub enum Word {
     Report(Box<Report>),
     /// Somebody was followed.
     Sighting(Box<Sighting>),
-    /// For who looks, JPEG in base64.
-    Picture(String),
+    /// For who looks: JPEG in base64, and what the tracker says of it.
+    Picture(String, Option<Seen>),
     /// Of its stream, for who passes it on.
     Packet(Box<Packet>),
     /// What it sees, and how long ago that was.
@@ -61,6 +64,7 @@ pub enum Hand {
     GoHome,
     LookAt(Gaze),
     HandedOver,
+    Turned(Gaze),
     Operator,
 }
 
@@ -78,7 +82,7 @@ pub struct Report {
     times: Vec<(u64, f64)>,
     /// What the sink says of itself.
     pub servo: Option<ServoStats>,
-    pub abilities: (bool, bool),
+    pub abilities: Abilities,
     /// How many orders had been heard.
     orders: u64,
     pub stuck: bool,
@@ -91,6 +95,7 @@ impl From<Steering> for Hand {
             Steering::GoHome(_) => Self::GoHome,
             Steering::LookAt(gaze, _) => Self::LookAt(gaze),
             Steering::HandedOver => Self::HandedOver,
+            Steering::Turned(gaze, _) => Self::Turned(gaze),
             Steering::Operator(_) => Self::Operator,
         }
     }
@@ -104,6 +109,7 @@ impl From<Hand> for Steering {
             Hand::GoHome => Self::GoHome(Instant::now()),
             Hand::LookAt(gaze) => Self::LookAt(gaze, Instant::now()),
             Hand::HandedOver => Self::HandedOver,
+            Hand::Turned(gaze) => Self::Turned(gaze, Instant::now()),
             Hand::Operator => Self::Operator(Instant::now()),
         }
     }
