@@ -120,6 +120,35 @@ fn told(document: &str) -> Duration {
     Duration::from_micros(time.timestamp_micros().try_into().unwrap())
 }
 
+/// Whoever watches goes on watching while that of the camera changes which does not concern its stream.
+#[test]
+fn cameras_come_and_go_with_the_file() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("sighup", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let viewer = Viewer::start(&url, |_| {});
+    viewer.document();
+    let file = program.folder().join("cameras.toml");
+    let text = fs::read_to_string(&file).unwrap();
+    let yard = text.split("[restream]").next().unwrap().replace("[camera.door]", "[camera.yard]");
+    let calmer = text.replace("codec =", "exclude-zones = [\"0,0 0.1,0 0.1,0.1\"]\ncodec =");
+    fs::write(&file, format!("{calmer}{yard}")).unwrap();
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("the configuration was read again");
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"yard\"} 1"));
+    assert!(ffprobe(&url.replace("/door", "/yard")).0);
+    let before = told(&viewer.document().0);
+    let since = Duration::from_secs(1);
+    assert!(std::iter::repeat_with(|| viewer.document().0).any(|text| told(&text) > before + since));
+    fs::write(&file, text.replace("[camera.door]", "[camera.gate]")).unwrap();
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("the configuration was read again");
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"gate\"} 1"));
+    let (read, said) = ffprobe(&url);
+    assert!(!read && said.contains("404"), "{said}");
+    program.end("TERM");
+}
+
 /// By ONVIF's own schema.
 #[test]
 fn a_library_from_pypi_reads_who_is_where() {
