@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use gst_analytics::prelude::*;
 use gst_analytics::{AnalyticsODMtd, AnalyticsRelationMeta, RelTypes};
 use gst_video::VideoInfo;
-use ptztrack_contract::{MOTION_ROI, Rect, Track};
+use ptztrack_contract::{MOTION_ROI, Rect, Track, TrackState};
 
 /// The class of those whom our own detector finds. It tells people from others no more than by how they move.
 const PERSON: &str = "person";
@@ -40,7 +40,7 @@ pub struct Analytics {
 }
 
 impl Analytics {
-    /// Attaches a box for each track, of the class that the detector's boxes have, and its number.
+    /// Attaches a box for each track that is seen, of the class that the detector's boxes have, and its number.
     ///
     /// # Errors
     /// Where GStreamer has no room for them.
@@ -53,7 +53,8 @@ impl Analytics {
         now: Option<gst::ClockTime>,
     ) -> Result<(), glib::BoolError> {
         self.first_seen.retain(|id, _| tracks.iter().any(|track| track.id == *id));
-        if tracks.is_empty() {
+        let mut seen = tracks.iter().filter(|track| track.state != TrackState::Hidden).peekable();
+        if seen.peek().is_none() {
             return Ok(());
         }
         let class = glib::Quark::from_str(if roi_type == MOTION_ROI { PERSON } else { roi_type });
@@ -63,7 +64,7 @@ impl Analytics {
         } else {
             AnalyticsRelationMeta::add(buffer)
         };
-        for track in tracks {
+        for track in seen {
             let first = *self.first_seen.entry(track.id).or_insert(now.unwrap_or_default());
             let [x, y, width, height] = pixels(&track.bounds, info);
             let object = meta.add_od_mtd(class, x, y, width, height, track.confidence as f32)?.id();

@@ -8,7 +8,7 @@ use gst::buffer::BufferMetaForeachAction::{Keep, Remove};
 use gst::prelude::*;
 use gst_analytics::prelude::*;
 use gst_analytics::{AnalyticsODMtd, AnalyticsRelationMeta, AnalyticsTrackingMtd, RelTypes};
-use ptztrack_contract::{BufferMeta, TargetMeta, TargetState, Track, TracksMeta};
+use ptztrack_contract::{BufferMeta, TargetMeta, TargetState, Track, TrackState, TracksMeta};
 
 const SIZE: (u32, u32) = (320, 240);
 
@@ -33,8 +33,10 @@ fn run(description: &str, set_up: impl FnOnce(&gst::Pipeline)) -> Vec<gst::Buffe
     buffers
 }
 
+/// Those who are seen.
 fn tracks(buffer: &gst::BufferRef) -> Vec<Track> {
-    TracksMeta::of(buffer).unwrap().unwrap().tracks
+    let all = TracksMeta::of(buffer).unwrap().unwrap().tracks;
+    all.into_iter().filter(|track| track.state != TrackState::Hidden).collect()
 }
 
 /// Left, top, width and height.

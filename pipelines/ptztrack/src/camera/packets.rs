@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use axum::body::Bytes;
 use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, TracksMeta};
+use ptztrack_contract::{BufferMeta, TrackState, TracksMeta};
 use serde::{Deserialize, Serialize};
 use tokio::sync::broadcast::{Receiver, Sender, error::RecvError};
 
@@ -20,7 +20,7 @@ pub const DECODER: &str = "decoder";
 /// So many wait for who takes them; of the oldest ones a slow taker misses some.
 const MOST: usize = 64;
 
-/// A picture as it is encoded, or what was seen in one.
+/// A picture as it is encoded, or who was seen in one.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Packet {
     /// When the picture came, in nanoseconds of the machine's monotonic clock, which its processes have in common.
@@ -71,7 +71,8 @@ pub fn tap(pipeline: &gst::Pipeline, tracker: Option<&gst::Element>, known: &Arc
     if let Some(pad) = tracker.and_then(|tracker| tracker.static_pad("src")) {
         watch(&pad, known, |_, buffer| {
             let meta = TracksMeta::of(buffer)?.ok()?;
-            Some(Content::People(meta.tracks.iter().map(Person::from).collect()))
+            let seen = meta.tracks.iter().filter(|track| track.state != TrackState::Hidden);
+            Some(Content::People(seen.map(Person::from).collect()))
         });
     }
 }
