@@ -30,9 +30,14 @@ pub struct Entry {
     pub looks: Option<Looks>,
 }
 
-/// What an [`Entry`] is read from.
-pub(crate) const COLUMNS: &str = "id, camera, run_ms, track, from_ms, to_ms, way_deg, path, file, offset_ms, looks, \
-     EXISTS (SELECT 1 FROM picture WHERE picture.sighting = sighting.id)";
+/// What an [`Entry`] is read from, but for its path, which is longer than all the rest.
+const BRIEF: &str = "id, camera, run_ms, track, from_ms, to_ms, way_deg, file, offset_ms, looks, \
+     EXISTS (SELECT 1 FROM picture WHERE picture.sighting = sighting.id) AS has_picture";
+
+/// All that an [`Entry`] is read from.
+pub(crate) fn columns() -> String {
+    format!("{BRIEF}, path")
+}
 
 impl Reader {
     /// Of the events in this folder.
@@ -48,7 +53,7 @@ impl Reader {
     /// # Errors
     /// Where they cannot be read.
     pub fn sightings(&self, filter: &Filter) -> Result<Vec<Entry>, Error> {
-        self.select(filter, entry).map_err(Error::file(&self.file))
+        self.select(filter, &columns(), entry).map_err(Error::file(&self.file))
     }
 
     /// The same without their paths, which take longer to read than all the rest.
@@ -56,7 +61,9 @@ impl Reader {
     /// # Errors
     /// Where they cannot be read.
     pub fn without_paths(&self, filter: &Filter) -> Result<Vec<Entry>, Error> {
-        self.select(filter, pathless).map_err(Error::file(&self.file))
+        // To know who went through an area takes their paths.
+        let columns = if filter.area.is_some() { columns() } else { BRIEF.to_owned() };
+        self.select(filter, &columns, pathless).map_err(Error::file(&self.file))
     }
 
     /// One of them.
@@ -64,7 +71,7 @@ impl Reader {
     /// # Errors
     /// Where it cannot be read.
     pub fn sighting(&self, id: i64) -> Result<Option<Entry>, Error> {
-        let sql = format!("SELECT {COLUMNS} FROM sighting WHERE id = ?1");
+        let sql = format!("SELECT {} FROM sighting WHERE id = ?1", columns());
         self.connection.query_row(&sql, [id], entry).optional().map_err(Error::file(&self.file))
     }
 
@@ -95,6 +102,7 @@ impl Reader {
     fn select(
         &self,
         filter: &Filter,
+        columns: &str,
         read: fn(&Row) -> rusqlite::Result<Entry>,
     ) -> rusqlite::Result<Vec<Entry>> {
         let mut conditions = Vec::new();
@@ -109,7 +117,7 @@ impl Reader {
         add("from_ms <= ?", filter.until_ms.map(Value::from));
         add("camera = ?", filter.camera.clone().map(Value::from));
         let conditions = if conditions.is_empty() { "TRUE".to_owned() } else { conditions.join(" AND ") };
-        let sql = format!("SELECT {COLUMNS} FROM sighting WHERE {conditions} ORDER BY from_ms DESC, id DESC");
+        let sql = format!("SELECT {columns} FROM sighting WHERE {conditions} ORDER BY from_ms DESC, id DESC");
         let mut select = self.connection.prepare(&sql)?;
         let wanted = |row: &Row| -> rusqlite::Result<bool> {
             filter.area.map_or(Ok(true), |area| Ok(area.saw(&path(row)?)))
@@ -130,7 +138,7 @@ pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
 fn path(row: &Row) -> rusqlite::Result<Vec<Step>> {
     let path: String = row.get("path")?;
     serde_json::from_str(&path)
-        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(7, rusqlite::types::Type::Text, err.into()))
+        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(11, rusqlite::types::Type::Text, err.into()))
 }
 
 fn pathless(row: &Row) -> rusqlite::Result<Entry> {
@@ -150,5 +158,11 @@ fn pathless(row: &Row) -> rusqlite::Result<Entry> {
         recording,
     };
     let looks = row.get::<_, Option<Vec<u8>>>("looks")?.map(Looks::from);
-    Ok(Entry { id: row.get("id")?, sighting, way_deg: row.get("way_deg")?, has_picture: row.get(11)?, looks })
+    Ok(Entry {
+        id: row.get("id")?,
+        sighting,
+        way_deg: row.get("way_deg")?,
+        has_picture: row.get("has_picture")?,
+        looks,
+    })
 }

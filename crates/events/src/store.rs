@@ -7,7 +7,7 @@ use std::time::{Duration, SystemTime};
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 
 use crate::file::{self, Error};
-use crate::reader::{COLUMNS, entry};
+use crate::reader::{columns, entry};
 use crate::{Picture, Sighting};
 
 /// How much is kept.
@@ -119,7 +119,8 @@ impl Store {
 
 fn write(transaction: &Transaction, new: &Sighting) -> rusqlite::Result<i64> {
     let track = new.track.cast_signed();
-    let known = format!("SELECT {COLUMNS} FROM sighting WHERE camera = ?1 AND run_ms = ?2 AND track = ?3");
+    let known =
+        format!("SELECT {} FROM sighting WHERE camera = ?1 AND run_ms = ?2 AND track = ?3", columns());
     let known = transaction.query_row(&known, params![new.camera, new.run_ms, track], entry).optional()?;
     let (id, sighting) = match known {
         Some(known) => {
