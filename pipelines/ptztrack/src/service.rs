@@ -136,9 +136,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     notify(&[NotifyState::Stopping]);
     log.show_status(Vec::new());
     log.info("ending", "ends: every camera is brought to rest");
-    if let Some(restreaming) = restreaming {
-        let _ = tokio::task::spawn_blocking(|| restreaming.end()).await;
-    }
+    // No camera waits for those who watch.
+    let passing_on = restreaming.map(|restreaming| tokio::task::spawn_blocking(|| restreaming.end()));
     let ending = fleet.clone();
     let ended = tokio::task::spawn_blocking(move || {
         ending.end();
@@ -146,6 +145,9 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     });
     if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
         log.error("not-ended", "a camera's pipeline hangs: its watchdog stops the camera");
+    }
+    if let Some(passing_on) = passing_on {
+        let _ = passing_on.await;
     }
     if let Some(keeper) = keeper {
         let _ = tokio::task::spawn_blocking(|| keeper.end()).await;
