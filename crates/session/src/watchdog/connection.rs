@@ -119,9 +119,10 @@ impl Heard {
 
     /// Why there is no connection, where there is none any more.
     pub fn end(receiver: &HeardReceiver) -> Option<Unavailable> {
-        let ended = || Unavailable::Broken("it ended".to_owned());
+        // First whether it is over: what is said after that is not missed.
+        let is_over = receiver.has_changed().is_err();
         let said = receiver.borrow().end.clone();
-        said.or_else(|| receiver.has_changed().is_err().then(ended))
+        said.or_else(|| is_over.then(|| Unavailable::Broken("it ended".to_owned())))
     }
 }
 
