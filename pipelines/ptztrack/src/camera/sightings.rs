@@ -192,8 +192,8 @@ fn convert(
 
 #[cfg(test)]
 mod tests {
+    use ptztrack_contract::Point;
     use ptztrack_contract::lock::lock;
-    use ptztrack_contract::{Point, Vector};
 
     use super::*;
     use crate::camera::running::Running;
@@ -231,13 +231,8 @@ mod tests {
             id: 7,
             bounds: Rect { x: 0.6, y: 0.3, width: 0.1, height: 0.4 },
             centroid: Point { x: 0.65, y: 0.5 },
-            velocity: Vector::default(),
-            ego_velocity: None,
-            unchanged_for: None,
             confidence: 1.0,
-            features: Vec::new(),
-            aspect: None,
-            capture_time: None,
+            ..TargetMeta::default()
         };
         let (pan_deg, tilt_deg) = witness.target(&meta).direction.unwrap();
         assert!((pan_deg - 16.0).abs() < 1e-6 && tilt_deg.abs() < 1e-6, "{pan_deg}, {tilt_deg}");

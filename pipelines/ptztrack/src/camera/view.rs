@@ -108,7 +108,7 @@ impl Drop for Look {
 
 #[cfg(test)]
 mod tests {
-    use ptztrack_contract::{Point, Rect, Vector};
+    use ptztrack_contract::{Point, Rect};
 
     use super::*;
 
@@ -130,13 +130,8 @@ mod tests {
             id: 7,
             bounds: Rect { x: 0.1, y: 0.1, width: 0.2, height: 0.4 },
             centroid: Point { x: 0.2, y: 0.3 },
-            velocity: Vector::default(),
-            ego_velocity: None,
-            unchanged_for: None,
             confidence: 1.0,
-            features: Vec::new(),
-            aspect: None,
-            capture_time: None,
+            ..TargetMeta::default()
         };
         meta.attach(buffer.make_mut()).unwrap();
         let mut pictures = known.view.subscribe();

@@ -9,8 +9,6 @@ use std::sync::Arc;
 use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use events::Sighting;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use serde::de::DeserializeOwned;
@@ -75,7 +73,7 @@ pub async fn run() -> io::Result<()> {
             Ok(event) = events.recv() => process.say(&Word::Event(event)).await?,
             picture = next_picture(&mut look) => {
                 let Shown { jpeg, target } = picture;
-                process.say(&Word::Picture(BASE64_STANDARD.encode(jpeg), target)).await?;
+                process.say(&Word::Picture(jpeg, target)).await?;
             }
             packet = next_packet(&mut packets) => process.say(&Word::Packet(Box::new(packet))).await?,
             Ok(()) = sights.changed(), if hands_over => {

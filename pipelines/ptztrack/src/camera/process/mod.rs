@@ -23,8 +23,6 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use base64::Engine;
-use base64::prelude::BASE64_STANDARD;
 use pipeline_supervisor::Backoff;
 use protocol::{Order, Report, Start, Word};
 use ptztrack_contract::lock::lock;
@@ -159,11 +157,7 @@ impl Processes {
                 }
                 Word::Packet(packet) => drop(known.packets.send(*packet)),
                 Word::Sighting(sighting) => log.keep(*sighting),
-                Word::Picture(picture, target) => {
-                    if let Ok(picture) = BASE64_STANDARD.decode(picture) {
-                        known.view.send_replace(Shown { jpeg: picture.into(), target });
-                    }
-                }
+                Word::Picture(jpeg, target) => drop(known.view.send_replace(Shown { jpeg, target })),
             }
         }
     }

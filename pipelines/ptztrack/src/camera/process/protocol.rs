@@ -5,6 +5,7 @@
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
+use axum::body::Bytes;
 use events::Sighting;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
@@ -50,7 +51,7 @@ pub enum Word {
     /// Somebody was followed.
     Sighting(Box<Sighting>),
     /// For who looks: JPEG in base64, and what the tracker says of it.
-    Picture(String, Option<Seen>),
+    Picture(#[serde(with = "super::bytes")] Bytes, Option<Seen>),
     /// Of its stream, for who passes it on.
     Packet(Box<Packet>),
     /// What it sees, and how long ago that was.
