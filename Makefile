@@ -26,6 +26,9 @@ CARGO ?= cargo
 PRODUCT := --package gst-plugin-ptztrack --package gst-plugin-vapix --package gst-plugin-onvifptz --package ptztrack-vapix \
 	--package ptztrack-onvif --package pipeline-supervisor --package ptztrack
 
+# What `make demo` shows, and no more: somebody waits for it.
+SHOWN := --package gst-plugin-ptztrack --package gst-plugin-vapix --package ptztrack-vapix --package virtual-camera
+
 # Seen when something is built, as it may have been installed just before.
 FEATURES = $$(pkg-config --exists gstreamer-analytics-1.0 && echo "--features gst-plugin-ptztrack/analytics")
 
@@ -86,7 +89,7 @@ check-format: packages-build
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
 ##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
 demo: packages-demo
-	$(CARGO) build --release $(PRODUCT) $(FEATURES) --package virtual-camera
+	$(CARGO) build --release $(SHOWN)
 	@case "$(WORLD)" in \
 	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
 	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \

@@ -30,7 +30,8 @@ const MIN_CELLS: f32 = 20.0;
 /// Where so many cells of those that hang together are foreground by themselves, as a share, the pixels know better what is: what is
 /// faint beside them is a shadow.
 const PLAIN: f32 = 0.3;
-/// Deviations beyond which a cell is somebody sooner than noise.
+/// Deviations that a cell counts for at most where the noise is learned (Huber's winsorised scale, 1981): it may be somebody. Were it
+/// left out, noise of long tails would be believed to be ever less.
 const NOISE_REACH: f32 = 3.0;
 
 /// What one cell of the canvas shows.
@@ -59,9 +60,9 @@ impl Default for CellNoise {
 impl CellNoise {
     fn learn(&mut self, cells: &[Cell]) {
         let mut sums = [(0.0_f32, 0.0_f32); BINS];
-        for cell in cells.iter().filter(|cell| !cell.off.is_nan() && cell.z.abs() < NOISE_REACH) {
+        for cell in cells.iter().filter(|cell| !cell.off.is_nan()) {
             let (sum, count) = &mut sums[cell.bin];
-            (*sum, *count) = (*sum + cell.z.abs() * self.0[cell.bin], *count + 1.0);
+            (*sum, *count) = (*sum + cell.z.abs().min(NOISE_REACH) * self.0[cell.bin], *count + 1.0);
         }
         for (believed, (sum, count)) in self.0.iter_mut().zip(sums) {
             if count >= MIN_CELLS {
