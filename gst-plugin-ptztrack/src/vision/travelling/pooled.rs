@@ -325,3 +325,33 @@ fn median(values: &mut [f32]) -> Option<f32> {
     let middle = values.len() / 2;
     Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is believed of cells without texture that differ by these grey levels in every picture.
+    fn learned(offs: &[f32]) -> f32 {
+        let mut noise = CellNoise::default();
+        for _ in 0..1000 {
+            let cell = |&off: &f32| Cell { off, z: off / noise.0[0], ..Cell::default() };
+            let cells: Vec<Cell> = offs.iter().map(cell).collect();
+            noise.learn(&cells);
+        }
+        noise.0[0]
+    }
+
+    #[test]
+    fn noise_of_long_tails_is_not_believed_to_be_its_core_alone() {
+        let offs: Vec<f32> = (0..100).map(|cell| if cell % 5 == 0 { 2.0 } else { 0.1 }).collect();
+        // Where 1.25 (0.8 * 0.1 + 0.2 * 3 s) = s.
+        assert!((learned(&offs) - 0.4).abs() < 0.01, "{}", learned(&offs));
+    }
+
+    #[test]
+    fn somebody_in_the_picture_makes_the_noise_hardly_larger() {
+        let offs: Vec<f32> = (0..100).map(|cell| if cell % 20 == 0 { 40.0 } else { 1.0 }).collect();
+        let believed = learned(&offs);
+        assert!((1.1..1.6).contains(&believed), "{believed}");
+    }
+}
