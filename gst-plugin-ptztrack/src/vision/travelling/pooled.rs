@@ -30,8 +30,8 @@ const MIN_CELLS: f32 = 20.0;
 /// Where so many cells of those that hang together are foreground by themselves, as a share, the pixels know better what is: what is
 /// faint beside them is a shadow.
 const PLAIN: f32 = 0.3;
-/// Deviations that a cell counts for at most where the noise is learned (Huber's winsorised scale, 1981): it may be somebody. Were it
-/// left out, noise of long tails would be believed to be ever less.
+/// Deviations that a cell counts for at most where the noise is learned (Huber's winsorised scale, 1981): it may be somebody. If
+/// such cells were left out, noise of long tails would be believed to be ever less.
 const NOISE_REACH: f32 = 3.0;
 
 /// What one cell of the canvas shows.
