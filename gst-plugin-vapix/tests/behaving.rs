@@ -414,22 +414,41 @@ fn a_stop_outlives_what_the_element_turns_to_next() {
     }
 }
 
-/// And not only where it is found to move by its positions: not every camera tells them.
+/// And not only where it is found to move by its positions: not every camera tells them. Nor need it be the same element.
 #[test]
 fn a_stop_is_handed_over_to_who_comes_next() {
-    let camera = common::camera(virtual_camera::Auth::None);
-    let mut rig = Rig::playing(&camera.url());
+    for is_another in [false, true] {
+        let camera = common::camera(virtual_camera::Auth::None);
+        let mut rig = Rig::playing(&camera.url());
+        rig.set_going(&camera);
+        camera.set_fault(Fault::Refuse);
+        rig.sink.set_state(gst::State::Null).unwrap();
+        let before = camera.commands().len() as u64;
+        let next = if is_another { Rig::ready(&camera.url()) } else { rig };
+        next.sink.set_state(gst::State::Playing).unwrap();
+        assert!(camera.status().moving);
+        camera.set_fault(Fault::None);
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving));
+        let told = camera.commands_after(before);
+        let queries = told.iter().take_while(|command| command.query.contains("query=")).count();
+        assert!(queries < 2, "{told:?}");
+    }
+}
+
+/// Even where that one is ended before the camera could tell it that it moves.
+#[test]
+fn a_camera_that_refused_everybody_is_stopped_by_who_comes_next_and_leaves_at_once() {
+    let camera = common::camera(virtual_camera::Auth::Digest { qop: true });
+    let with_account = || Rig::ready(&camera.url()).with("user", "root").with("password", "pass");
+    let mut rig = with_account().play();
     rig.set_going(&camera);
-    camera.set_fault(Fault::Refuse);
+    camera.set_fault(Fault::Locked);
     rig.sink.set_state(gst::State::Null).unwrap();
-    let before = camera.commands().len() as u64;
-    rig.sink.set_state(gst::State::Playing).unwrap();
     assert!(camera.status().moving);
     camera.set_fault(Fault::None);
-    assert!(camera.wait_for(PATIENCE, |status| !status.moving));
-    let told = camera.commands_after(before);
-    let queries = told.iter().take_while(|command| command.query.contains("query=")).count();
-    assert!(queries < 2, "{told:?}");
+    let next = with_account().play();
+    next.sink.set_state(gst::State::Null).unwrap();
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.commands().last());
 }
 
 /// Whoever stands there meanwhile.

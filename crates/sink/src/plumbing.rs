@@ -11,7 +11,7 @@ use gst_base::subclass::prelude::*;
 use ptztrack_contract::RefusedValues;
 
 use ptztrack_contract::lock::lock;
-use session::task::{CameraTask, Clock, Event, Outbox, Predecessor, wait_for};
+use session::task::{CameraTask, Clock, Event, Outbox, wait_for};
 use session::{Client, Status};
 
 use crate::Particulars;
@@ -46,8 +46,6 @@ enum Waiting {
 pub struct Core {
     pub(crate) settings: Mutex<Settings>,
     pub(crate) task: Mutex<Option<CameraTask>>,
-    /// Of the camera tasks so far, that may still be about to stop their cameras.
-    predecessors: Mutex<Vec<Predecessor>>,
     pub(crate) stream: Mutex<Stream>,
     waiting: Mutex<Waiting>,
     /// What upstream was not told yet; never pushed by the camera task, which would wait for whoever hears it.
@@ -63,7 +61,6 @@ impl Core {
         Self {
             settings: Mutex::new(settings),
             task: Mutex::default(),
-            predecessors: Mutex::default(),
             stream: Mutex::default(),
             waiting: Mutex::default(),
             pending_status: Mutex::default(),
@@ -262,11 +259,6 @@ pub trait Plumbing: PtzSink {
                 gst::element_imp_error!(self, gst::ResourceError::Settings, ("{reason}"));
                 gst::StateChangeError
             })?;
-        {
-            let mut predecessors = lock(&self.core().predecessors);
-            predecessors.retain(|predecessor| !predecessor.is_void() && !task.succeed(predecessor));
-            predecessors.push(task.predecessor());
-        }
         self.install(task, &settings);
         Ok(())
     }

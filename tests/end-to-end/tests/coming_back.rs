@@ -3,6 +3,8 @@
 //! Video and PTZ are lost together, and both come back when the camera does.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::time::{Duration, Instant};
+
 use end_to_end::following::{Following, MJPEG, RTSP, Video, python, rust, script};
 use end_to_end::{GstLaunch, PATIENCE, Way, scene, scratch};
 use virtual_camera::VirtualCamera;
@@ -82,10 +84,16 @@ fn a_recording_goes_on_in_another_file() {
         command
     });
     following.starts_anew(MJPEG, |following| following.network.http.reset());
+    let is_filled = |file: &str| folder.join(file).metadata().is_ok_and(|file| file.len() > 1000);
+    let begin = Instant::now();
+    while !is_filled("a-2.mkv") {
+        assert!(begin.elapsed() < PATIENCE, "the second part stays empty");
+        std::thread::sleep(Duration::from_millis(50));
+    }
     following.launch.signal("TERM");
     following.launch.finish();
     for file in ["a.mkv", "a-2.mkv"] {
-        assert!(folder.join(file).metadata().unwrap().len() > 1000, "{file}");
+        assert!(is_filled(file), "{file}");
     }
     std::fs::remove_dir_all(folder).unwrap();
 }

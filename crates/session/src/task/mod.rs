@@ -6,13 +6,14 @@ mod clock;
 mod dead_man;
 mod mailbox;
 mod outbox;
+mod predecessor;
 mod state;
 mod statistics;
 
 use std::cell::Cell;
 use std::pin::pin;
 use std::sync::mpsc::{Receiver, SyncSender};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use once_cell::sync::OnceCell;
@@ -25,13 +26,14 @@ pub use self::outbox::Outbox;
 pub use self::statistics::Statistics;
 
 use self::dead_man::DeadMan;
+use self::predecessor::{Address, Predecessor};
 use self::state::TaskState;
 
 use servo::Time;
 
-use crate::http::{ClientSettings, Credentials, Location};
+use crate::http::{ClientSettings, Credentials};
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
-use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status, Stop};
+use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
 use ptztrack_contract::lock::lock;
 
 /// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
@@ -88,29 +90,19 @@ pub fn wait_for(answer: &Receiver<()>, longest: Duration) -> bool {
 /// Threads that talk to cameras.
 const WORKERS: usize = 2;
 
-/// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
-const LAST_RETRIES_PAUSE: Duration = Duration::from_secs(1);
-
 /// A running camera task; dropping it stops the camera and ends the camera task, and waits for that within bounds.
 #[derive(Debug)]
 pub struct CameraTask {
-    camera: (Location, String),
+    camera: Address,
     mailbox: Arc<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
     /// When the camera was last asked to rest, while it is to.
     paused_at: Mutex<Option<Instant>>,
 }
 
-/// What is left of a camera task that was dropped: it may outlive its time in order to stop the camera.
-#[derive(Debug)]
-pub struct Predecessor {
-    camera: (Location, String),
-    mailbox: Weak<Mailbox>,
-    statistics: Arc<Mutex<Statistics>>,
-}
-
 impl CameraTask {
-    /// Starts; connecting happens in the background. `observer` is called from the camera task's thread.
+    /// Starts, and sees to the camera in place of those who were dropped before they had stopped it; connecting happens
+    /// in the background. `observer` is called from the camera task's thread.
     ///
     /// # Errors
     /// What keeps the client or the runtime from being made, in words.
@@ -126,6 +118,9 @@ impl CameraTask {
         let client = C::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let mailbox = Arc::new(Mailbox::new(clock));
+        if let Some(stop) = Predecessor::succeed(&camera) {
+            mailbox.inherit(stop);
+        }
         let control = ControlLoop::new(settings, &C::PROTOCOL);
         let (status, estimates, stop) =
             (control.status(Time::ZERO), Some(control.estimates()), Some(control.stop()));
@@ -175,26 +170,8 @@ impl CameraTask {
     }
 
     /// What will be left of it.
-    pub fn predecessor(&self) -> Predecessor {
-        Predecessor {
-            camera: self.camera.clone(),
-            mailbox: Arc::downgrade(&self.mailbox),
-            statistics: self.statistics.clone(),
-        }
-    }
-
-    /// Sees to the camera in place of one that was dropped, if it is the same camera; returns whether it is.
-    pub fn succeed(&self, predecessor: &Predecessor) -> bool {
-        if predecessor.camera != self.camera {
-            return false;
-        }
-        if let Some(mailbox) = predecessor.mailbox.upgrade() {
-            mailbox.quit();
-        }
-        if let Some(stop) = predecessor.unconfirmed_stop() {
-            self.mailbox.inherit(stop);
-        }
-        true
+    fn predecessor(&self) -> Predecessor {
+        Predecessor::new(self.camera.clone(), &self.mailbox, self.statistics.clone())
     }
 
     /// The numbers so far.
@@ -203,50 +180,15 @@ impl CameraTask {
     }
 }
 
-impl Predecessor {
-    /// Whether there is nothing left to do.
-    pub fn is_void(&self) -> bool {
-        self.unconfirmed_stop().is_none() && self.mailbox.strong_count() == 0
-    }
-
-    fn unconfirmed_stop(&self) -> Option<Stop> {
-        let statistics = lock(&self.statistics);
-        statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
-    }
-
-    /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
-    async fn stop<C: Client>(&self, settings: ClientSettings, mailbox: &Mailbox) {
-        let Ok(mut client) = C::new(settings) else { return };
-        let stop = {
-            let mut statistics = lock(&self.statistics);
-            // For whoever comes next, until it is known better.
-            statistics.status.moving = true;
-            Command::Stop(statistics.stop.unwrap_or(Stop::Position))
-        };
-        let tries = async {
-            while !mailbox.take().quit {
-                match client.exchange(&Request::Command(stop)).await {
-                    Ok(_) => {
-                        lock(&self.statistics).status.moving = false;
-                        break;
-                    }
-                    Err(err) if err.is_final() => break,
-                    Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
-                }
-            }
-        };
-        // Whoever cannot be stopped by then is not to be by us.
-        let _ = tokio::time::timeout(LAST_RETRIES, tries).await;
-    }
-}
-
 impl Drop for CameraTask {
     fn drop(&mut self) {
+        self.predecessor().leave();
         // Of many that were paused together each has waited while the first one was waited for.
         let waited = lock(&self.paused_at).map_or(Duration::ZERO, |since| since.elapsed());
         let left = FINISH_BUDGET.saturating_sub(waited);
         // Whether the camera came to rest the camera task itself reports, and when that time is over.
         wait_for(&self.mailbox.finish(left), left + STOP_GRACE);
+        Predecessor::forget_void();
     }
 }
 
@@ -414,22 +356,4 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
 
 fn is_move(request: &Request) -> bool {
     matches!(request, Request::Command(command) if !command.is_stop())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Whoever comes next stops the camera again.
-    #[test]
-    fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
-        let camera = (Location::parse("http://192.168.0.90").unwrap().0, String::new());
-        for may_yet_move in [true, false] {
-            let stop = Some(Stop::PanTilt);
-            let statistics = Arc::new(Mutex::new(Statistics { stop, may_yet_move, ..Statistics::default() }));
-            let predecessor = Predecessor { camera: camera.clone(), mailbox: Weak::new(), statistics };
-            assert_eq!(predecessor.unconfirmed_stop().is_some(), may_yet_move);
-            assert_eq!(predecessor.is_void(), !may_yet_move);
-        }
-    }
 }

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: MPL-2.0
+
+use std::sync::{Arc, Mutex, Weak};
+use std::time::Duration;
+
+use super::{LAST_RETRIES, Mailbox, Statistics};
+use crate::http::{ClientSettings, Location};
+use crate::{Client, Command, Request, Stop};
+use ptztrack_contract::lock::lock;
+
+/// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
+const LAST_RETRIES_PAUSE: Duration = Duration::from_secs(1);
+
+/// Those whose cameras may still move, of the whole process: the next to steer one of them need not be the same element.
+static LEFT: Mutex<Vec<Predecessor>> = Mutex::new(Vec::new());
+
+/// Where a camera is, and which of its channels.
+pub type Address = (Location, String);
+
+/// What is left of a camera task that was dropped: it may outlive its time in order to stop the camera.
+#[derive(Debug)]
+pub struct Predecessor {
+    camera: Address,
+    mailbox: Weak<Mailbox>,
+    statistics: Arc<Mutex<Statistics>>,
+}
+
+impl Predecessor {
+    /// Of the task that steers this camera, with this mailbox.
+    pub fn new(camera: Address, mailbox: &Arc<Mailbox>, statistics: Arc<Mutex<Statistics>>) -> Self {
+        Self { camera, mailbox: Arc::downgrade(mailbox), statistics }
+    }
+
+    /// Leaves it to whoever steers the camera next.
+    pub fn leave(self) {
+        lock(&LEFT).push(self);
+    }
+
+    /// Forgets those who have nothing left to do.
+    pub fn forget_void() {
+        lock(&LEFT).retain(|left| !left.is_void());
+    }
+
+    /// Ends those who were left at this camera; returns the stop that it has not confirmed.
+    pub fn succeed(camera: &Address) -> Option<Stop> {
+        let mut left = lock(&LEFT);
+        let ours: Vec<_> = left.extract_if(.., |left| left.camera == *camera).collect();
+        drop(left);
+        for mailbox in ours.iter().filter_map(|left| left.mailbox.upgrade()) {
+            mailbox.quit();
+        }
+        ours.iter().rev().find_map(Self::unconfirmed_stop)
+    }
+
+    /// Whether there is nothing left to do.
+    fn is_void(&self) -> bool {
+        self.unconfirmed_stop().is_none() && self.mailbox.strong_count() == 0
+    }
+
+    fn unconfirmed_stop(&self) -> Option<Stop> {
+        let statistics = lock(&self.statistics);
+        statistics.stop.filter(|_| statistics.status.moving || statistics.may_yet_move)
+    }
+
+    /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
+    pub async fn stop<C: Client>(&self, settings: ClientSettings, mailbox: &Mailbox) {
+        let Ok(mut client) = C::new(settings) else { return };
+        let stop = {
+            let mut statistics = lock(&self.statistics);
+            // For whoever comes next, until it is known better.
+            statistics.status.moving = true;
+            Command::Stop(statistics.stop.unwrap_or(Stop::Position))
+        };
+        let tries = async {
+            while !mailbox.take().quit {
+                match client.exchange(&Request::Command(stop)).await {
+                    Ok(_) => {
+                        lock(&self.statistics).status.moving = false;
+                        break;
+                    }
+                    Err(err) if err.is_final() => break,
+                    Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
+                }
+            }
+        };
+        // Whoever cannot be stopped by then is not to be by us.
+        let _ = tokio::time::timeout(LAST_RETRIES, tries).await;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn camera(name: &str) -> Address {
+        (Location::parse(&format!("http://{name}")).unwrap().0, String::new())
+    }
+
+    fn left(name: &str, may_yet_move: bool) -> Predecessor {
+        let statistics = Statistics { stop: Some(Stop::PanTilt), may_yet_move, ..Statistics::default() };
+        Predecessor {
+            camera: camera(name),
+            mailbox: Weak::new(),
+            statistics: Arc::new(Mutex::new(statistics)),
+        }
+    }
+
+    /// Whoever comes next stops the camera again.
+    #[test]
+    fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
+        for may_yet_move in [true, false] {
+            let predecessor = left("192.168.0.90", may_yet_move);
+            assert_eq!(predecessor.unconfirmed_stop().is_some(), may_yet_move);
+            assert_eq!(predecessor.is_void(), !may_yet_move);
+        }
+    }
+
+    #[test]
+    fn a_stop_is_left_to_the_next_at_the_same_camera_once() {
+        left("192.168.0.91", true).leave();
+        left("192.168.0.92", false).leave();
+        assert_eq!(Predecessor::succeed(&camera("192.168.0.93")), None);
+        assert_eq!(Predecessor::succeed(&camera("192.168.0.92")), None, "that one rests");
+        Predecessor::forget_void();
+        assert_eq!(Predecessor::succeed(&camera("192.168.0.91")), Some(Stop::PanTilt));
+        assert_eq!(Predecessor::succeed(&camera("192.168.0.91")), None, "it is seen to");
+    }
+}
