@@ -4,6 +4,7 @@
 
 use std::fs::{File, OpenOptions};
 use std::io;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 
@@ -90,28 +91,55 @@ impl Error {
     }
 }
 
+/// Which file it is, whatever its name is by now.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) struct Identity {
+    device: u64,
+    inode: u64,
+}
+
+impl Identity {
+    fn of(path: &Path) -> io::Result<Self> {
+        let metadata = std::fs::metadata(path)?;
+        Ok(Self { device: metadata.dev(), inode: metadata.ino() })
+    }
+
+    /// Whether it is what lies there.
+    pub(crate) fn is_at(self, path: &Path) -> bool {
+        Self::of(path).is_ok_and(|there| there == self)
+    }
+}
+
 /// To write; where the file is broken or of another version it is moved aside, and its new place is returned too.
-pub(crate) fn open(folder: &Path) -> Result<(Connection, Option<PathBuf>), Error> {
+pub(crate) fn open(folder: &Path) -> Result<(Connection, Identity, Option<PathBuf>), Error> {
     let said = Error::folder(folder);
     std::fs::create_dir_all(folder).map_err(&said)?;
     // Of several processes one moves it aside.
     let _alone = alone(folder).map_err(&said)?;
     let path = folder.join(FILE);
-    match prepare(&path) {
-        Ok(connection) => Ok((connection, None)),
+    let (connection, aside) = match prepare(&path) {
         Err(err) if err.is_corrupt() || matches!(err, Error::OtherVersion { .. }) => {
             let aside = move_aside(&path).map_err(&said)?;
-            Ok((prepare(&path)?, Some(aside)))
+            (prepare(&path)?, Some(aside))
         }
-        Err(err) => Err(err),
-    }
+        prepared => (prepared?, None),
+    };
+    Ok((connection, Identity::of(&path).map_err(&said)?, aside))
 }
 
-/// Moves a broken file aside, as another process does not do at the same time; its new place.
-pub(crate) fn put_aside(folder: &Path) -> Result<PathBuf, Error> {
+/// Closes a broken file and moves it aside; its new place, unless another process has moved it already.
+pub(crate) fn put_aside(
+    folder: &Path,
+    identity: Identity,
+    connection: Connection,
+) -> Result<Option<PathBuf>, Error> {
     let said = Error::folder(folder);
     let _alone = alone(folder).map_err(&said)?;
-    move_aside(&folder.join(FILE)).map_err(&said)
+    let path = folder.join(FILE);
+    // Asked while it is open: until then no other file can have its inode.
+    let is_there = identity.is_at(&path);
+    drop(connection);
+    is_there.then(|| move_aside(&path).map_err(&said)).transpose()
 }
 
 /// To read only.

@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime};
 
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 
-use crate::file::{self, Error};
+use crate::file::{self, Error, Identity};
 use crate::reader::{columns, entry};
 use crate::{Picture, Sighting};
 
@@ -23,6 +23,8 @@ pub struct Retention {
 #[derive(Debug)]
 pub struct Store {
     connection: Connection,
+    identity: Identity,
+    folder: PathBuf,
     file: PathBuf,
 }
 
@@ -36,17 +38,23 @@ impl Store {
     /// # Errors
     /// Where the folder or the file cannot be written.
     pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), Error> {
-        let (connection, aside) = file::open(folder)?;
-        Ok((Self { connection, file: folder.join(file::FILE) }, aside))
+        let (connection, identity, aside) = file::open(folder)?;
+        let folder = folder.to_owned();
+        Ok((Self { connection, identity, file: folder.join(file::FILE), folder }, aside))
     }
 
-    /// Moves a file aside that has turned out to be broken ([`Error::is_corrupt`]), so that another one is made the next time; its
-    /// new place.
+    /// Whether its file still has its name. What is written to one that was moved or deleted is found by nobody.
+    pub fn is_in_place(&self) -> bool {
+        self.identity.is_at(&self.file)
+    }
+
+    /// Moves its file aside, which has turned out to be broken ([`Error::is_corrupt`]), so that another one is made the next time;
+    /// its new place. Nothing is moved where another process has done so.
     ///
     /// # Errors
-    /// Where it is not there, or the folder cannot be written.
-    pub fn put_aside(folder: &Path) -> Result<PathBuf, Error> {
-        file::put_aside(folder)
+    /// Where the folder cannot be written.
+    pub fn put_aside(self) -> Result<Option<PathBuf>, Error> {
+        file::put_aside(&self.folder, self.identity, self.connection)
     }
 
     /// Keeps one; where the same track was kept before, both become one. Its number.

@@ -38,7 +38,19 @@ impl Folder {
 
     fn aside(&self) -> Vec<PathBuf> {
         let files = fs::read_dir(&self.0).unwrap().map(|entry| entry.unwrap().path());
-        files.filter(|file| file.to_string_lossy().contains("events-")).collect()
+        let is_aside = |file: &PathBuf| {
+            let name = file.file_name().unwrap().to_str().unwrap();
+            name.starts_with("events-") && name.ends_with(".db")
+        };
+        files.filter(is_aside).collect()
+    }
+
+    /// Its beginning stays whole, so that only who writes notices; what it is then.
+    fn break_file(&self) -> Vec<u8> {
+        let mut bytes = fs::read(self.0.join(FILE)).unwrap();
+        bytes[4096..].fill(0xa5);
+        fs::write(self.0.join(FILE), &bytes).unwrap();
+        bytes
     }
 }
 
@@ -194,7 +206,6 @@ fn a_file_that_is_no_database_is_moved_aside() {
     assert_eq!(folder.all().len(), 1);
 }
 
-/// Its beginning is whole, so that it is noticed by whoever writes.
 #[test]
 fn a_file_that_turns_out_to_be_broken_is_put_aside_and_another_one_made() {
     let folder = Folder::new("broken");
@@ -203,15 +214,32 @@ fn a_file_that_turns_out_to_be_broken_is_put_aside_and_another_one_made() {
         store.keep(&sighting(n)).unwrap();
     }
     drop(store);
-    let mut bytes = fs::read(folder.0.join(FILE)).unwrap();
-    bytes[4096..].fill(0xa5);
-    fs::write(folder.0.join(FILE), &bytes).unwrap();
-    let err = folder.store().keep(&sighting(99)).unwrap_err();
+    let bytes = folder.break_file();
+    let mut store = folder.store();
+    let err = store.keep(&sighting(99)).unwrap_err();
     assert!(err.is_corrupt(), "{err}");
-    let aside = Store::put_aside(&folder.0).unwrap();
+    let aside = store.put_aside().unwrap().unwrap();
     assert_eq!(fs::read(aside).unwrap(), bytes);
     folder.store().keep(&sighting(99)).unwrap();
     assert_eq!((folder.all().len(), folder.aside().len()), (1, 1));
+}
+
+#[test]
+fn of_two_that_have_a_broken_file_one_puts_it_aside_and_none_the_one_made_after_it() {
+    let folder = Folder::new("broken-for-two");
+    folder.store().keep(&sighting(1)).unwrap();
+    folder.break_file();
+    let [mut first, mut second] = [folder.store(), folder.store()];
+    assert!(first.keep(&sighting(2)).unwrap_err().is_corrupt());
+    assert!(second.keep(&sighting(3)).unwrap_err().is_corrupt());
+    assert!(first.put_aside().unwrap().is_some());
+    let mut next = folder.store();
+    next.keep(&sighting(2)).unwrap();
+    assert!(next.is_in_place() && !second.is_in_place());
+    assert_eq!(second.put_aside().unwrap(), None);
+    assert!(next.is_in_place());
+    next.keep(&sighting(3)).unwrap();
+    assert_eq!((folder.all().len(), folder.aside().len()), (2, 1));
 }
 
 #[test]

@@ -119,8 +119,8 @@ impl Keeping {
         let mut pause = SHORTEST_PAUSE;
         while let Err(err) = what(self) {
             // Whatever was wrong may be mended in the next one.
-            self.open = None;
-            let is_mended = err.is_corrupt() && self.put_aside();
+            let broken = self.open.take().filter(|_| err.is_corrupt());
+            let is_mended = broken.is_some_and(|store| self.put_aside(store));
             if !is_mended && !std::mem::replace(&mut self.in_trouble, true) {
                 let detail =
                     format!("{}; the cameras follow, and it is tried again", not_kept(&err.to_string()));
@@ -154,7 +154,8 @@ impl Keeping {
     }
 
     fn store(&mut self) -> Result<&mut events::Store, Error> {
-        let store = match self.open.take() {
+        // Another process may have moved it aside.
+        let store = match self.open.take().filter(events::Store::is_in_place) {
             Some(store) => store,
             None => self.open_anew()?,
         };
@@ -168,9 +169,9 @@ impl Keeping {
     }
 
     /// A file that has turned out to be broken while it was written.
-    fn put_aside(&self) -> bool {
-        let aside = events::Store::put_aside(&self.folder);
-        aside.iter().for_each(|aside| self.tell_moved(aside));
+    fn put_aside(&self, store: events::Store) -> bool {
+        let aside = store.put_aside();
+        aside.iter().flatten().for_each(|aside| self.tell_moved(aside));
         aside.is_ok()
     }
 
@@ -190,14 +191,20 @@ fn moved(aside: &Path) -> String {
 mod tests {
     use super::*;
 
-    /// As on a disk that loses what was written; the next one is kept in a file of its own.
+    /// As on a disk that loses what was written, for two programs. Both keep the next ones in one file.
     #[test]
-    fn a_file_that_breaks_while_it_is_written_is_moved_aside() {
+    fn a_file_that_breaks_while_it_is_written_is_moved_aside_once() {
         let folder = std::env::temp_dir().join(format!("ptztrack-breaks-{}", std::process::id()));
         let log = Arc::new(Log::unwritten());
         let mut told = log.subscribe();
         let retention = Retention { age: Duration::MAX, bytes: u64::MAX };
-        let mut keeping = Keeping { folder: folder.clone(), retention, log, open: None, in_trouble: false };
+        let [mut first, mut second] = [log.clone(), log].map(|log| Keeping {
+            folder: folder.clone(),
+            retention,
+            log,
+            open: None,
+            in_trouble: false,
+        });
         let sighting = |track| Sighting {
             camera: "door".to_owned(),
             run_ms: 0,
@@ -208,17 +215,21 @@ mod tests {
             picture: None,
             recording: None,
         };
-        keeping.persist(|keeping| keeping.keep(&sighting(1)));
-        keeping.open = None;
+        first.persist(|keeping| keeping.keep(&sighting(1)));
+        first.open = None;
         let mut bytes = std::fs::read(folder.join(events::FILE)).unwrap();
         bytes[4096..].fill(0xa5);
         std::fs::write(folder.join(events::FILE), bytes).unwrap();
-        keeping.persist(|keeping| keeping.keep(&sighting(2)));
+        second.store().unwrap();
+        first.persist(|keeping| keeping.keep(&sighting(2)));
+        second.persist(|keeping| keeping.keep(&sighting(3)));
         let kept = events::Reader::open(&folder).unwrap().sightings(&events::Filter::default()).unwrap();
-        assert_eq!(kept.iter().map(|entry| entry.sighting.track).collect::<Vec<_>>(), [2]);
+        let mut tracks: Vec<u64> = kept.iter().map(|entry| entry.sighting.track).collect();
+        tracks.sort_unstable();
+        assert_eq!(tracks, [2, 3]);
         let said: Vec<String> =
             std::iter::from_fn(|| told.try_recv().ok()).map(|event| event.event).collect();
-        assert_eq!(said, ["event-kept", "events-moved-aside", "event-kept"]);
+        assert_eq!(said, ["event-kept", "events-moved-aside", "event-kept", "event-kept"]);
         std::fs::remove_dir_all(folder).unwrap();
     }
 }
