@@ -6,8 +6,9 @@
 use std::fs;
 use std::path::Path;
 
-use ::events::Reader;
+use ::events::{FILE, Reader, Store};
 use end_to_end::{PATIENCE, Program, plugin_folder, scene, scratch, tool};
+use rusqlite::Connection;
 use serde_json::Value;
 use virtual_camera::VirtualCamera;
 
@@ -104,6 +105,30 @@ fn a_folder_that_cannot_be_written_is_said_once_and_nobody_is_followed_the_worse
     let said = program.end("TERM");
     fs::remove_dir_all(&there).unwrap();
     assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+}
+
+/// As by somebody who copies it, or cleans it up.
+#[test]
+fn a_store_that_another_writer_has_locked_is_said_once_and_written_once_it_is_free() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let there = scratch("events-locked");
+    drop(Store::open(&there).unwrap());
+    let writer = Connection::open(there.join(FILE)).unwrap();
+    writer.execute_batch("BEGIN IMMEDIATE").unwrap();
+    let mut program =
+        Program::start("events-locked", file(&camera, &format!("[events]\nfolder = {there:?}\n")), &[]);
+    let line = program.launch.wait_for_line("warning: who is followed is not kept: ");
+    assert!(line.contains("database is locked"), "{line}");
+    scene::wait_until_following(&camera);
+    is_steered(&camera);
+    assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
+    writer.execute_batch("COMMIT").unwrap();
+    program.launch.wait_for_line("who is followed is kept again");
+    program.launch.wait_for_line(": event 1: target 1 was followed");
+    let said = program.end("TERM");
+    assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+    assert!(Reader::open(&there).unwrap().sighting(1).unwrap().is_some());
+    fs::remove_dir_all(&there).unwrap();
 }
 
 #[test]
