@@ -2,12 +2,14 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
 
 use ptztrack_contract::lock::lock;
 
 use crate::camera::{Camera, Control, Known};
 use crate::config::{CameraSettings, Codec};
 use crate::control_file::ControlFile;
+use crate::event::{Event, Level};
 use crate::log::Log;
 
 /// That of the sinks.
@@ -18,7 +20,7 @@ const TARGET_HEIGHT: f64 = 0.4;
 pub struct Fleet {
     cameras: Mutex<BTreeMap<String, Camera>>,
     /// Those that were told to end and have no successor.
-    ending: Mutex<Vec<Camera>>,
+    ending: Mutex<Vec<JoinHandle<()>>>,
     had: ControlFile,
     log: Arc<Log>,
 }
@@ -46,14 +48,30 @@ impl Fleet {
             }
             let name = settings.name.clone();
             let control = had.get(&name).copied().unwrap_or_default();
-            match Camera::start(settings, control, self.log.clone(), go.remove(&name)) {
-                Ok(camera) => drop(cameras.insert(name, camera)),
-                Err(err) => self.log.error("not-started", format!("{name} cannot be started: {err}")),
-            }
+            let camera = Camera::new(settings, control, self.log.clone(), go.remove(&name));
+            cameras.insert(name, camera);
         }
+        drop(cameras);
+        self.start_all();
         let mut ending = lock(&self.ending);
-        ending.retain(|camera| !camera.is_over());
-        ending.extend(go.into_values());
+        ending.retain(|thread| !thread.is_finished());
+        ending.extend(go.into_values().filter_map(Camera::into_thread));
+    }
+
+    /// Starts those that have not been started. Where the system has no thread for one, that is said once, and it is not forgotten:
+    /// the next call starts it.
+    pub fn start_all(&self) {
+        for camera in lock(&self.cameras).values_mut().filter(|camera| !camera.is_started()) {
+            camera.known.beat();
+            let before = lock(&camera.known.state).trouble.take();
+            let Err(err) = camera.start() else { continue };
+            let trouble = format!("cannot be started: {err}; it is tried again");
+            if before.as_ref() != Some(&trouble) {
+                let name = Some(camera.settings.name.as_str());
+                self.log.tell(&Event::new(Level::Error, name, "not-started", trouble.clone()));
+            }
+            lock(&camera.known.state).trouble = Some(trouble);
+        }
     }
 
     fn control(&self) -> BTreeMap<String, Control> {
@@ -72,8 +90,11 @@ impl Fleet {
         let cameras = std::mem::take(&mut *lock(&self.cameras));
         let ending = std::mem::take(&mut *lock(&self.ending));
         // All at once: each may take seconds.
-        let all: Vec<Camera> = cameras.into_values().chain(ending).inspect(Camera::end).collect();
-        all.into_iter().for_each(Camera::join);
+        cameras.values().for_each(Camera::end);
+        for thread in cameras.into_values().filter_map(Camera::into_thread).chain(ending) {
+            // One that panicked has said so.
+            let _ = thread.join();
+        }
     }
 
     /// What is known of each.
@@ -111,5 +132,83 @@ impl Fleet {
     /// All were given up, so that there is nothing left to do.
     pub fn is_over(&self) -> bool {
         lock(&self.cameras).values().all(Camera::is_over)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::process::Command;
+
+    use rustix::process::{Resource, Rlimit, Uid, getrlimit, getuid, setrlimit};
+    use rustix::thread::set_thread_res_uid;
+    use tokio::sync::broadcast::Receiver;
+
+    use super::*;
+    use crate::camera::Steering;
+    use crate::config::Config;
+
+    /// Does this while the system has no thread left for us.
+    fn without_threads(what: impl FnOnce()) {
+        let limit = getrlimit(Resource::Nproc);
+        setrlimit(Resource::Nproc, Rlimit { current: Some(0), ..limit }).unwrap();
+        // The limit is not for root, so this thread is somebody else meanwhile.
+        let is_root = getuid().is_root();
+        let be = |uid| set_thread_res_uid(uid, uid, Uid::ROOT).unwrap();
+        if is_root {
+            be(Uid::from_raw(65534));
+        }
+        what();
+        if is_root {
+            be(Uid::ROOT);
+        }
+        setrlimit(Resource::Nproc, limit).unwrap();
+    }
+
+    /// The camera without a password, which has no pipeline.
+    fn door(address: &str) -> Vec<CameraSettings> {
+        let text =
+            format!("[camera.door]\naddress = \"{address}\"\nuser = \"u\"\npassword-file = \"/nowhere\"\n");
+        Config::parse(&text).unwrap().cameras
+    }
+
+    fn wait_for(event: &str, told: &mut Receiver<Event>) -> Vec<String> {
+        let mut all = Vec::new();
+        while all.last().is_none_or(|last| last != event) {
+            all.push(told.blocking_recv().unwrap().event);
+        }
+        all
+    }
+
+    #[test]
+    #[ignore = "has a process to itself, by the test below"]
+    fn without_a_thread() {
+        gst::init().unwrap();
+        let log = Arc::new(Log::unwritten());
+        let mut told = log.subscribe();
+        let fleet = Fleet::new(log);
+        fleet.apply(door("http://127.0.0.1:1"));
+        wait_for("started", &mut told);
+        fleet.of("door").unwrap().steer(Steering::HandedOver);
+        without_threads(|| {
+            fleet.apply(door("http://127.0.0.1:2"));
+            fleet.start_all();
+        });
+        assert!(!fleet.is_over() && fleet.stuck().is_empty());
+        let known = fleet.of("door").unwrap();
+        assert_eq!(known.control(), Control::HandedOver);
+        assert!(known.in_words().contains("cannot be started: "), "{}", known.in_words());
+        fleet.start_all();
+        let said = wait_for("started", &mut told);
+        let of_start = |event: &&String| ["not-started", "stopped", "started"].contains(&event.as_str());
+        assert_eq!(said.iter().filter(of_start).collect::<Vec<_>>(), ["not-started", "stopped", "started"]);
+        fleet.end();
+    }
+
+    #[test]
+    fn a_camera_for_which_there_is_no_thread_is_started_once_there_is_one() {
+        let mut test = Command::new(std::env::current_exe().unwrap());
+        let output = test.args(["--exact", "fleet::tests::without_a_thread", "--ignored"]).output().unwrap();
+        let said = String::from_utf8_lossy(&output.stdout);
+        assert!(said.contains("1 passed"), "{said}");
     }
 }

@@ -123,6 +123,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
                 notify(&[NotifyState::Watchdog]);
             },
             _ = second.tick() => {
+                fleet.start_all();
                 keep_control(&fleet, &mut keeping);
                 if log.has_terminal() {
                     log.show_status(fleet.known().iter().map(|known| format!("{}: {}", known.name, known.in_words())).collect());

@@ -20,9 +20,10 @@ mod video;
 mod view;
 
 use std::cell::RefCell;
+use std::io;
 use std::rc::Rc;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -62,98 +63,114 @@ pub struct Camera {
     pub settings: CameraSettings,
     pub known: Arc<Known>,
     runner: Runner,
-    thread: JoinHandle<()>,
+    log: Arc<Log>,
+    thread: Option<JoinHandle<()>>,
+    /// Has the camera until it ends; the thread waits for that.
+    predecessor: Arc<Mutex<Option<JoinHandle<()>>>>,
 }
 
 /// Who runs it, in the camera's thread.
 #[derive(Debug, Clone)]
 enum Runner {
-    Pipelines(Supervisor),
+    Pipelines(glib::MainContext, Supervisor),
     Processes(Arc<Processes>),
 }
 
-impl Camera {
-    /// Starts it, with who had it before, once its predecessor has ended. Waits for nothing.
-    ///
-    /// # Errors
-    /// Where the system has no thread left.
-    pub fn start(
-        settings: CameraSettings,
-        control: Control,
-        log: Arc<Log>,
-        predecessor: Option<Self>,
-    ) -> std::io::Result<Self> {
-        if settings.isolation == Isolation::None {
-            return Self::start_here(settings, control, log, predecessor);
-        }
-        let processes = Arc::new(Processes::default());
-        let runner = Runner::Processes(processes.clone());
-        let run = move |settings: &CameraSettings, known: &Arc<Known>| processes.run(settings, known, &log);
-        Self::spawn(settings, control, runner, predecessor, run)
-    }
-
-    /// The same, in this process in any case.
-    ///
-    /// # Errors
-    /// Those of [`Self::start`].
-    pub fn start_here(
-        settings: CameraSettings,
-        control: Control,
-        log: Arc<Log>,
-        predecessor: Option<Self>,
-    ) -> std::io::Result<Self> {
+impl Runner {
+    /// Pipelines of this process.
+    fn here() -> Self {
         let context = glib::MainContext::new();
         let supervisor = Supervisor::new(&context);
-        let runner = Runner::Pipelines(supervisor.clone());
-        let run = move |settings: &CameraSettings, known: &Arc<Known>| {
-            // The context is new, so nobody else has it.
-            let _ = context.with_thread_default(|| run(settings, known, &supervisor, &log));
-        };
-        Self::spawn(settings, control, runner, predecessor, run)
+        Self::Pipelines(context, supervisor)
     }
 
-    fn spawn(
+    fn of(isolation: Isolation) -> Self {
+        match isolation {
+            Isolation::None => Self::here(),
+            Isolation::Process => Self::Processes(Arc::default()),
+        }
+    }
+
+    /// Until it is told to end, or the camera is given up.
+    fn run(&self, settings: &CameraSettings, known: &Arc<Known>, log: &Arc<Log>) {
+        match self {
+            Self::Pipelines(context, supervisor) => {
+                // The context is the thread's own, so nobody else has it.
+                let _ = context.with_thread_default(|| run(settings, known, supervisor, log));
+            }
+            Self::Processes(processes) => processes.run(settings, known, log),
+        }
+    }
+}
+
+impl Camera {
+    /// One that can be started, with who had it before.
+    pub fn new(settings: CameraSettings, control: Control, log: Arc<Log>, predecessor: Option<Self>) -> Self {
+        let runner = Runner::of(settings.isolation);
+        Self::with(runner, settings, control, log, predecessor)
+    }
+
+    /// The same, in this process in any case, and nobody's successor.
+    pub fn here(settings: CameraSettings, control: Control, log: Arc<Log>) -> Self {
+        Self::with(Runner::here(), settings, control, log, None)
+    }
+
+    fn with(
+        runner: Runner,
         settings: CameraSettings,
         control: Control,
-        runner: Runner,
+        log: Arc<Log>,
         predecessor: Option<Self>,
-        run: impl FnOnce(&CameraSettings, &Arc<Known>) + Send + 'static,
-    ) -> std::io::Result<Self> {
+    ) -> Self {
         let known = Arc::new(Known::new(&settings.name));
         known.take_control(control);
-        let in_thread = {
-            let (settings, known) = (settings.clone(), known.clone());
-            move || {
-                if let Some(predecessor) = predecessor {
-                    predecessor.join();
-                }
-                run(&settings, &known);
+        let predecessor = Arc::new(Mutex::new(predecessor.and_then(Self::into_thread)));
+        Self { settings, known, runner, log, thread: None, predecessor }
+    }
+
+    /// Starts it, once its predecessor has ended. Waits for nothing.
+    ///
+    /// # Errors
+    /// Where the system has no thread left. It can be tried again.
+    pub fn start(&mut self) -> io::Result<()> {
+        let (settings, known, log) = (self.settings.clone(), self.known.clone(), self.log.clone());
+        let (runner, predecessor) = (self.runner.clone(), self.predecessor.clone());
+        let in_thread = move || {
+            let predecessor = lock(&predecessor).take();
+            if let Some(predecessor) = predecessor {
+                // One that panicked has said so.
+                let _ = predecessor.join();
             }
+            runner.run(&settings, &known, &log);
         };
-        let thread = std::thread::Builder::new().name(settings.name.clone()).spawn(in_thread)?;
-        Ok(Self { settings, known, runner, thread })
+        let builder = std::thread::Builder::new().name(self.settings.name.clone());
+        self.thread = Some(builder.spawn(in_thread)?);
+        Ok(())
+    }
+
+    pub fn is_started(&self) -> bool {
+        self.thread.is_some()
     }
 
     /// Ends it, without waiting.
     pub fn end(&self) {
         match &self.runner {
-            Runner::Pipelines(supervisor) => supervisor.end(),
+            Runner::Pipelines(_, supervisor) => supervisor.end(),
             Runner::Processes(processes) => {
                 processes.end();
-                self.thread.thread().unpark();
+                self.thread.iter().for_each(|thread| thread.thread().unpark());
             }
         }
     }
 
-    /// Waits until it has ended; the camera rests then.
-    pub fn join(self) {
-        // One that panicked has said so.
-        let _ = self.thread.join();
+    /// What ends once the camera rests, after [`Self::end`].
+    pub fn into_thread(self) -> Option<JoinHandle<()>> {
+        self.thread.or_else(|| lock(&self.predecessor).take())
     }
 
     /// It was given up, or has ended.
     pub fn is_over(&self) -> bool {
-        self.thread.is_finished()
+        self.thread.as_ref().is_some_and(JoinHandle::is_finished)
     }
 }
 

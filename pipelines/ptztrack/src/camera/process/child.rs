@@ -46,7 +46,8 @@ pub async fn run() -> io::Result<()> {
     let mut events = log.subscribe();
     let sightings = log.sightings();
     let hands_over = start.settings.hands_over;
-    let camera = Camera::start_here(start.settings, start.control, log, None)?;
+    let mut camera = Camera::here(start.settings, start.control, log);
+    camera.start()?;
     let known = camera.known.clone();
     let mut process = Child { words, heard: 0 };
     let mut terminate = signal(SignalKind::terminate())?;
