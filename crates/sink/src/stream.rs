@@ -2,6 +2,7 @@
 
 //! What is kept of the stream from buffer to buffer.
 
+use std::cmp::Ordering;
 use std::mem;
 use std::time::Duration;
 
@@ -80,8 +81,19 @@ impl Stream {
 pub struct PictureAge {
     /// The least that a picture's timestamp was behind the clock so far, in nanoseconds.
     least: i64,
-    /// By how much the last one was, and when it came; `None` before the first.
-    last: Option<(i64, Time)>,
+    /// `None` before the first.
+    last: Option<Arrival>,
+}
+
+/// A picture that came.
+#[derive(Debug)]
+struct Arrival {
+    captured: i64,
+    /// The one before it had the same timestamp.
+    repeats: bool,
+    /// By so much its timestamp was behind the clock.
+    behind: i64,
+    at: Time,
 }
 
 impl PictureAge {
@@ -93,18 +105,25 @@ impl PictureAge {
     /// time of a clock that nobody sets.
     pub fn of(&mut self, captured: i64, now: i64, arrived: Time) -> Duration {
         let behind = now.saturating_sub(captured);
-        self.least = match self.last {
-            Some((last, at)) => {
-                let elapsed = (arrived - at).as_nanos() as i64;
-                // Nothing grows older by more than the time that has passed: the rest is a clock that was set.
-                let set = behind.saturating_sub(last).saturating_sub(elapsed).max(0);
+        self.least = match &self.last {
+            Some(last) => {
+                let elapsed = (arrived - last.at).as_nanos() as i64;
+                // Nothing grows older by more than the time that has passed, and no picture is taken before the one before it,
+                // though it may come twice: the rest is a clock that was set.
+                let older = match captured.cmp(&last.captured) {
+                    Ordering::Greater => elapsed,
+                    Ordering::Equal if !last.repeats => elapsed,
+                    Ordering::Equal | Ordering::Less => 0,
+                };
+                let set = behind.saturating_sub(last.behind).saturating_sub(older).max(0);
                 // Saturates.
                 let drift = (elapsed as f64 * Self::DRIFT) as i64;
                 behind.min(self.least.saturating_add(drift).saturating_add(set))
             }
             None => behind,
         };
-        self.last = Some((behind, arrived));
+        let repeats = self.last.as_ref().is_some_and(|last| last.captured == captured);
+        self.last = Some(Arrival { captured, repeats, behind, at: arrived });
         Duration::from_nanos(u64::try_from(behind.saturating_sub(self.least)).unwrap_or(0))
     }
 }
@@ -154,6 +173,21 @@ mod tests {
                 at += 40;
                 let late = age(&mut pictures, [at, at + clock, at - 50 + source]);
                 assert!(late < 50, "{clock}, {source}: {late}");
+            }
+        }
+    }
+
+    #[test]
+    fn timestamps_that_do_not_go_on_make_no_picture_old() {
+        let stamps: [fn(i64) -> i64; 3] =
+            [|_| 0, |picture| 3_600_000 - 66 * picture, |picture| 66 * picture + picture * 7919 % 5000];
+        for (n, stamp) in stamps.into_iter().enumerate() {
+            let mut pictures = PictureAge::default();
+            for picture in 0..500 {
+                let at = 66 * picture;
+                let late = age(&mut pictures, [at, at, stamp(picture)]);
+                // One picture may be the last one again.
+                assert!(late <= 66, "{n}, {picture}: {late}");
             }
         }
     }
