@@ -13,6 +13,7 @@ mod noise;
 mod pooled;
 mod rows;
 mod samples;
+mod smear;
 mod warp;
 
 use std::time::Duration;
@@ -26,6 +27,7 @@ use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
 use self::pooled::Pooled;
 use self::samples::Sample;
+use self::smear::Smear;
 use self::warp::Warp;
 use super::Luma;
 use super::camera_motion::{displacement, to_pixels};
@@ -62,6 +64,7 @@ pub struct TravellingBackground {
     /// From the canvas to the last picture, pixels.
     to_picture: Homography,
     rested: Duration,
+    smear: Smear,
     /// Where nothing is learned: in the last picture, normalised.
     held: Option<Rect>,
     size: (usize, usize),
@@ -103,7 +106,7 @@ impl TravellingBackground {
         if self.size.0 == 0 || self.size.1 == 0 {
             return;
         }
-        if self.model.size == (0, 0) {
+        if self.model.size == (0, 0) || self.smear.is_there() {
             self.start();
         }
         let travel = motion.map_or(0.0, |motion| self.move_by(&motion.homography, elapsed));
@@ -112,8 +115,10 @@ impl TravellingBackground {
         self.lay(picture);
         self.heed_light();
         self.compare(how);
-        let stale = self.changed() > NEW_PICTURE || motion.is_none() && self.shows_another_view();
-        if stale {
+        let another_view = motion.is_none() && self.shows_another_view();
+        let gone = motion.map(|_| travel / self.size.0 as f64);
+        self.smear.update(gone, another_view, elapsed);
+        if self.changed() > NEW_PICTURE || another_view {
             self.start();
             self.lay(picture);
             self.compare(how);
