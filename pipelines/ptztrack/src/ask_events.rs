@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand};
 use events::{Filter, Reader};
 
-use crate::config::{Config, Store, units};
+use crate::config::{Config, Store, Zone, units};
 use crate::report;
 
 #[derive(Debug, Args)]
@@ -24,6 +24,9 @@ pub struct AskEvents {
     /// Of this camera only
     #[arg(long, value_name = "NAME")]
     camera: Option<String>,
+    /// Who went through this [zone] of the file of cameras only
+    #[arg(long, value_name = "NAME", requires = "config", conflicts_with = "camera")]
+    zone: Option<String>,
     /// An object of JSON on each line
     #[arg(long, conflicts_with = "csv")]
     json: bool,
@@ -57,12 +60,16 @@ struct Place {
 }
 
 impl Place {
-    fn folder(self) -> Result<PathBuf, String> {
-        let store = match self.config {
-            Some(file) => Config::load(&file).map_err(|failure| failure.reason())?.store,
-            None => Store { folder: self.folder, ..Store::default() },
+    /// What the file says that holds here.
+    fn read(self) -> Result<(PathBuf, Vec<Zone>), String> {
+        let (store, zones) = match self.config {
+            Some(file) => {
+                let config = Config::load(&file).map_err(|failure| failure.reason())?;
+                (config.store, config.zones)
+            }
+            None => (Store { folder: self.folder, ..Store::default() }, Vec::new()),
         };
-        store.place()
+        Ok((store.place()?, zones))
     }
 }
 
@@ -74,16 +81,21 @@ impl AskEvents {
     pub fn answer(self) -> Result<String, String> {
         let said = |err: events::Error| format!("{err}; --folder says where events are");
         if let Some(Change::Delete { id, place }) = self.change {
-            let (mut store, _) = events::Store::open(&place.folder()?).map_err(said)?;
+            let (mut store, _) = events::Store::open(&place.read()?.0).map_err(said)?;
             return match store.delete(id).map_err(said)? {
                 true => Ok(format!("Event {id} is deleted.\n")),
                 false => Err(format!("There is no event {id}.")),
             };
         }
+        let (folder, zones) = self.place.read()?;
         let filter =
             Filter { since_ms: self.since, until_ms: self.until, camera: self.camera, ..Filter::default() };
-        let mut entries =
-            Reader::open(&self.place.folder()?).and_then(|reader| reader.sightings(&filter)).map_err(said)?;
+        let filter = match &self.zone {
+            Some(name) => zones.iter().find(|zone| zone.name == *name).map(|zone| zone.narrow(filter)),
+            None => Some(filter),
+        };
+        let filter = filter.ok_or("the file of cameras has no [zone] of that name")?;
+        let mut entries = Reader::open(&folder).and_then(|reader| reader.sightings(&filter)).map_err(said)?;
         // As they came, as in a log.
         entries.reverse();
         if self.csv {

@@ -91,8 +91,15 @@ fn run(options: Options) -> Result<(), Failure> {
         Task::Follow(follow_one) => {
             let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
             let store = Store { what: None, ..Store::default() };
-            let config =
-                Config { cameras, http: None, mqtt: None, hand_over: Vec::new(), store, restream: None };
+            let config = Config {
+                cameras,
+                http: None,
+                mqtt: None,
+                hand_over: Vec::new(),
+                store,
+                zones: Vec::new(),
+                restream: None,
+            };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
         Task::Point(point) => Ok(runtime(1)?.block_on(point.say())?),

@@ -16,7 +16,7 @@ use crate::config::{Config, Http, NotLoaded, Watchdogs};
 use crate::event::{Event, Level};
 use crate::fleet::Fleet;
 use crate::handover::HandingOver;
-use crate::http;
+use crate::http::{self, Events};
 use crate::log::Log;
 use crate::mqtt::Publisher;
 use crate::restream::Restreaming;
@@ -73,7 +73,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 
     let fleet = Arc::new(Fleet::new(log.clone()));
     if let Some(http) = config.http.clone() {
-        tokio::spawn(serve(http, fleet.clone(), config.store.kept_in(), log.clone()));
+        tokio::spawn(serve(http, fleet.clone(), Events::of(&config), log.clone()));
     }
     let publisher = config.mqtt.as_ref().and_then(|mqtt| {
         let pictures = config.store.what.is_some_and(|kept| kept.pictures);
@@ -160,7 +160,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 }
 
 /// Nobody is followed the worse for a page that is not there: it is tried again.
-async fn serve(http: Http, fleet: Arc<Fleet>, events: Option<PathBuf>, log: Arc<Log>) {
+async fn serve(http: Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
     let mut told = false;
     let listener = loop {
         match http::listen(&http).await {
@@ -213,12 +213,13 @@ fn read_again(
         Ok(config) => {
             log.info("read-again", "the configuration was read again");
             let of_start = |config: &Config| {
-                (config.http.clone(), config.mqtt.clone(), config.store.clone(), config.restream.clone())
+                let Config { http, mqtt, store, zones, restream, .. } = config.clone();
+                (http, mqtt, store, zones, restream)
             };
             if of_start(&config) != of_start(current) {
                 log.error(
                     "restart-needed",
-                    "what changed in [http], [mqtt], [events] and [restream] counts from the next start on",
+                    "what changed in [http], [mqtt], [events], [zone] and [restream] counts from the next start on",
                 );
             }
             fleet.apply(config.cameras.clone());

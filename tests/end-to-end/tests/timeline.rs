@@ -60,6 +60,7 @@ fn program(test: &str, sightings: Vec<Sighting>) -> (Program, PathBuf) {
     let file = |own: &Path| {
         Program::entry("door", "http://127.0.0.1:1", &own.join("password"))
             + &format!("[events]\nfolder = {kept:?}\nkeep = \"10000d\"\n")
+            + "[zone.gate]\ncamera = \"door\"\npan = [35, 50]\ntilt = [-10, 0]\n"
     };
     (Program::start(&format!("timeline-{test}"), file, &[]), folder)
 }
@@ -121,6 +122,18 @@ fn the_timeline_shows_who_was_there_and_finds_and_deletes_them() {
     shows(&mut browser, &[4, 3, 1]);
     set(&mut browser, "bottom", "-4");
     browser.wait_for("document.querySelector('main').innerText == 'Nobody was followed then.'");
+    browser.value("document.querySelector('[type=reset]').click()");
+
+    // By the zone's name.
+    shows(&mut browser, &[4, 3, 2, 1]);
+    set(&mut browser, "zone", "gate");
+    shows(&mut browser, &[2]);
+    let csv = browser.value("document.querySelector('#csv').href");
+    assert!(csv.as_str().is_some_and(|address| address.contains("zone=gate")), "{csv}");
+    assert_eq!(
+        program.ask("GET", "/events/list?zone=fence"),
+        (404, "There is no zone of that name.\n".into())
+    );
     browser.value("document.querySelector('[type=reset]').click()");
 
     // Who looks the same, wherever they were; themselves first.

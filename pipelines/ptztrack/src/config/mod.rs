@@ -14,6 +14,7 @@ mod restream;
 mod store;
 mod table;
 pub mod units;
+mod zone;
 
 use std::cell::RefCell;
 use std::net::SocketAddr;
@@ -31,6 +32,7 @@ pub use protocol::{Protocol, Watchdogs};
 pub use restream::Restream;
 pub use store::{Kept, Store};
 use table::{Source, Table};
+pub use zone::Zone;
 
 /// An example with everything in it, commented.
 pub const EXAMPLE: &str = include_str!("example.toml");
@@ -43,6 +45,8 @@ pub struct Config {
     pub mqtt: Option<Mqtt>,
     pub hand_over: Vec<HandOver>,
     pub store: Store,
+    /// By whose names events are asked for.
+    pub zones: Vec<Zone>,
     pub restream: Option<Restream>,
 }
 
@@ -130,8 +134,9 @@ impl Config {
         for camera in &mut cameras {
             camera.hands_over = hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
         }
+        let zones = Zone::read_all(&mut root, &cameras);
         root.no_more();
-        Self { cameras, http, mqtt, hand_over, store, restream }
+        Self { cameras, http, mqtt, hand_over, store, zones, restream }
     }
 }
 

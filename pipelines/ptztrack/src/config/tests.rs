@@ -229,6 +229,29 @@ fn the_example_is_right() {
 }
 
 #[test]
+fn a_zone_is_a_part_of_what_a_camera_sees() {
+    let camera = "[camera.door]\naddress = \"http://a\"\n";
+    let zone = |more: &str| parse(&format!("{camera}[zone.steps]\n{more}\n"));
+    let config = zone("camera = \"door\"\npan = [170, -170.5]\ntilt = [-30, -5]").unwrap();
+    let [steps] = config.zones.as_slice() else { panic!("{config:?}") };
+    assert_eq!((steps.name.as_str(), steps.camera.as_str()), ("steps", "door"));
+    assert_eq!((steps.area.pan_deg, steps.area.tilt_deg), ((170.0, -170.5), (-30.0, -5.0)));
+    for (more, reason) in [
+        ("camera = \"gate\"\npan = [0, 1]\ntilt = [0, 1]", "line 3: zone `steps`: there is no camera `gate`"),
+        ("camera = \"door\"\ntilt = [0, 1]", "line 3: `pan` is missing: two angles in degrees"),
+        ("camera = \"door\"\npan = [0, 1, 2]\ntilt = [0, 1]", "line 5: `pan` must be two angles in degrees"),
+        ("camera = \"door\"\npan = [0, nan]\ntilt = [0, 1]", "line 5: `pan` must be two angles in degrees"),
+        (
+            "camera = \"door\"\npan = [0, 1]\ntilt = [1, 0]",
+            "line 3: zone `steps`: `tilt` goes from the bottom",
+        ),
+    ] {
+        let wrong = zone(more).unwrap_err();
+        assert!(wrong.starts_with(reason), "{wrong}");
+    }
+}
+
+#[test]
 fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
     let cameras = "[camera.yard]\naddress = \"http://a\"\nkind = \"fixed\"\n[camera.door]\naddress = \"http://b\"\n[camera.hall]\naddress = \"http://c\"\n";
     let config = parse(&format!("{cameras}[handover.yard]\ncalls = [\"door\"]\nprecedence = 3\n")).unwrap();

@@ -19,6 +19,7 @@ use serde_json::{Value, json};
 
 use super::html;
 use crate::camera::recording::{self, Clip, Form, NoClip, Purpose};
+use crate::config::{Config, Zone};
 use crate::report;
 
 /// No answer has more events.
@@ -26,20 +27,36 @@ const MOST: usize = 10_000;
 /// So many who look most like somebody are shown.
 const ALIKE: usize = 30;
 
-/// The folder that events are kept in; `None` where they are not.
-type Folder = State<Arc<Option<PathBuf>>>;
+/// What can be asked for.
+#[derive(Debug, Default)]
+pub struct Events {
+    /// The folder that events are kept in; `None` where they are not.
+    folder: Option<PathBuf>,
+    zones: Vec<Zone>,
+}
 
-pub fn routes<S>(folder: Option<PathBuf>) -> Router<S> {
+type Asked = State<Arc<Events>>;
+
+impl Events {
+    pub fn of(config: &Config) -> Self {
+        Self { folder: config.store.kept_in(), zones: config.zones.clone() }
+    }
+}
+
+pub fn routes<S>(events: Events) -> Router<S> {
     Router::new()
         .route("/events", get(async || html(include_str!("events.html"))))
         .route("/events/list", get(list))
         .route("/events/events.csv", get(csv))
         .route("/events/{id}/picture", get(picture))
-        .route("/events/{id}/video", get(async |folder, id| recorded(folder, id, Purpose::Play).await))
-        .route("/events/{id}/clip", get(async |folder, id| recorded(folder, id, Purpose::Keep).await))
+        .route("/events/{id}/video", get(async |asked, id| recorded(asked, id, Purpose::Play).await))
+        .route("/events/{id}/clip", get(async |asked, id| recorded(asked, id, Purpose::Keep).await))
         .route("/events/{id}/delete", post(delete))
-        .with_state(Arc::new(folder))
+        .with_state(Arc::new(events))
 }
+
+/// Those that were found, and how much each looks like the one that was named.
+type Found = Vec<(Entry, Option<f64>)>;
 
 /// Which events somebody wants to see.
 #[derive(Debug, Deserialize)]
@@ -48,6 +65,8 @@ struct Wanted {
     since: Option<i64>,
     until: Option<i64>,
     camera: Option<String>,
+    /// By its name; else as follows.
+    zone: Option<String>,
     /// Degrees; all four, or none.
     left: Option<f64>,
     right: Option<f64>,
@@ -58,20 +77,25 @@ struct Wanted {
 }
 
 impl Wanted {
-    fn filter(&self) -> Filter {
+    /// `None` where there is no such zone.
+    fn filter(&self, zones: &[Zone]) -> Option<Filter> {
         let area = || Some(Area { pan_deg: (self.left?, self.right?), tilt_deg: (self.bottom?, self.top?) });
-        Filter {
+        let filter = Filter {
             since_ms: self.since,
             until_ms: self.until,
             camera: self.camera.clone(),
             area: area(),
             most: Some(MOST),
+        };
+        match &self.zone {
+            Some(name) => Some(zones.iter().find(|zone| zone.name == *name)?.narrow(filter)),
+            None => Some(filter),
         }
     }
 
     /// With how much each looks like the one that was named; without one the latest are the first.
-    fn find(&self, reader: &Reader) -> Result<Vec<(Entry, Option<f64>)>, Error> {
-        let entries = reader.without_paths(&self.filter())?;
+    fn find(&self, filter: &Filter, reader: &Reader) -> Result<Found, Error> {
+        let entries = reader.without_paths(filter)?;
         let Some(id) = self.like else { return Ok(entries.into_iter().map(|entry| (entry, None)).collect()) };
         let looks = reader.sighting(id)?.and_then(|entry| entry.looks).unwrap_or_default();
         let likeness = |entry: Entry| {
@@ -85,13 +109,13 @@ impl Wanted {
     }
 }
 
-async fn list(folder: Folder, Query(wanted): Query<Wanted>) -> Response {
-    let list = move |reader: &Reader| {
-        let found = wanted.find(reader)?;
+async fn list(asked: Asked, Query(wanted): Query<Wanted>) -> Response {
+    let zones: Vec<_> = asked.zones.iter().map(|zone| zone.name.clone()).collect();
+    let list = move |found: Found, reader: &Reader| {
         let events: Vec<_> = found.iter().map(|(entry, likeness)| describe(entry, *likeness)).collect();
-        Ok(json!({ "cameras": reader.cameras()?, "events": events }).to_string())
+        Ok(json!({ "cameras": reader.cameras()?, "zones": zones, "events": events }).to_string())
     };
-    read(folder, list).await.map_or_else(|refusal| refusal, |text| answer("application/json", text))
+    find(asked, wanted, list).await.map_or_else(|refusal| refusal, |text| answer("application/json", text))
 }
 
 fn describe(entry: &Entry, likeness: Option<f64>) -> Value {
@@ -107,20 +131,20 @@ fn describe(entry: &Entry, likeness: Option<f64>) -> Value {
     })
 }
 
-async fn csv(folder: Folder, Query(wanted): Query<Wanted>) -> Response {
-    let csv = move |reader: &Reader| {
-        let entries: Vec<_> = wanted.find(reader)?.into_iter().map(|(entry, _)| entry).collect();
+async fn csv(asked: Asked, Query(wanted): Query<Wanted>) -> Response {
+    let csv = |found: Found, _: &Reader| {
+        let entries: Vec<_> = found.into_iter().map(|(entry, _)| entry).collect();
         Ok(report::csv(&entries))
     };
     let name = [(header::CONTENT_DISPOSITION, "attachment; filename=\"events.csv\"")];
-    match read(folder, csv).await {
+    match find(asked, wanted, csv).await {
         Ok(text) => (name, answer("text/csv; charset=utf-8", text)).into_response(),
         Err(refusal) => refusal,
     }
 }
 
-async fn picture(folder: Folder, Path(id): Path<i64>) -> Response {
-    match read(folder, move |reader| reader.picture(id)).await {
+async fn picture(asked: Asked, Path(id): Path<i64>) -> Response {
+    match read(asked, move |reader| reader.picture(id)).await {
         Ok(Some(jpeg)) => answer("image/jpeg", jpeg),
         Ok(None) => StatusCode::NOT_FOUND.into_response(),
         Err(refusal) => refusal,
@@ -128,7 +152,7 @@ async fn picture(folder: Folder, Path(id): Path<i64>) -> Response {
 }
 
 /// What the recording shows of somebody.
-async fn recorded(folder: Folder, Path(id): Path<i64>, purpose: Purpose) -> Response {
+async fn recorded(asked: Asked, Path(id): Path<i64>, purpose: Purpose) -> Response {
     let find = move |reader: &Reader| {
         let sighting = reader.sighting(id)?.map(|entry| entry.sighting);
         let pieces = |sighting: &Sighting| {
@@ -137,7 +161,7 @@ async fn recorded(folder: Folder, Path(id): Path<i64>, purpose: Purpose) -> Resp
         };
         Ok(sighting.and_then(|sighting| Some((pieces(&sighting)?, sighting.camera))))
     };
-    let (pieces, camera) = match read(folder, find).await {
+    let (pieces, camera) = match read(asked, find).await {
         Ok(Some(found)) => found,
         Ok(None) => return (StatusCode::NOT_FOUND, "It was not recorded.\n").into_response(),
         Err(refusal) => return refusal,
@@ -169,9 +193,9 @@ fn body(clip: Clip) -> Body {
     Body::from_stream(parts.map(move |part| Ok::<_, Infallible>(whole(part))))
 }
 
-async fn delete(folder: Folder, Path(id): Path<i64>) -> Response {
+async fn delete(asked: Asked, Path(id): Path<i64>) -> Response {
     let delete = move |folder: PathBuf| Store::open(&folder)?.0.delete(id);
-    match with(folder, delete).await {
+    match with(asked, delete).await {
         Ok(true) => StatusCode::NO_CONTENT.into_response(),
         Ok(false) => StatusCode::NOT_FOUND.into_response(),
         Err(refusal) => refusal,
@@ -183,19 +207,31 @@ fn answer(kind: &'static str, body: impl Into<Body>) -> Response {
     ([(header::CONTENT_TYPE, kind), (header::CACHE_CONTROL, "no-store")], body.into()).into_response()
 }
 
+/// What was found of what somebody wants to see.
+async fn find(
+    asked: Asked,
+    wanted: Wanted,
+    say: impl FnOnce(Found, &Reader) -> Result<String, Error> + Send + 'static,
+) -> Result<String, Response> {
+    let Some(filter) = wanted.filter(&asked.zones) else {
+        return Err((StatusCode::NOT_FOUND, "There is no zone of that name.\n").into_response());
+    };
+    read(asked, move |reader| say(wanted.find(&filter, reader)?, reader)).await
+}
+
 async fn read<T: Send + 'static>(
-    folder: Folder,
+    asked: Asked,
     what: impl FnOnce(&Reader) -> Result<T, Error> + Send + 'static,
 ) -> Result<T, Response> {
-    with(folder, move |folder| what(&Reader::open(&folder)?)).await
+    with(asked, move |folder| what(&Reader::open(&folder)?)).await
 }
 
 /// In a thread of its own, as a disk may be slow.
 async fn with<T: Send + 'static>(
-    State(folder): Folder,
+    asked: Asked,
     what: impl FnOnce(PathBuf) -> Result<T, Error> + Send + 'static,
 ) -> Result<T, Response> {
-    let Some(folder) = (*folder).clone() else {
+    let Some(folder) = asked.folder.clone() else {
         let reason = "No events are kept: `store` in [events] is \"off\".\n";
         return Err((StatusCode::NOT_FOUND, reason).into_response());
     };

@@ -9,7 +9,6 @@ mod metrics;
 use std::convert::Infallible;
 use std::future::poll_fn;
 use std::net::IpAddr;
-use std::path::PathBuf;
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,6 +23,7 @@ use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
 use axum::{Extension, Router};
+pub use events::Events;
 use futures_util::stream;
 use hyper::server::conn::http1;
 use hyper_util::rt::{TokioIo, TokioTimer};
@@ -79,7 +79,7 @@ pub async fn listen(http: &Http) -> std::io::Result<TcpListener> {
 /// Serves until the process ends. Whoever connects before they have said who they are costs a little for a short time: no more
 /// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor. Where there
 /// are too many, the first of them makes room.
-pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events: Option<PathBuf>) {
+pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events: Events) {
     let router = router(http, fleet, events);
     let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     let mut visits: Vec<(Visit, JoinHandle<()>)> = Vec::new();
@@ -128,7 +128,7 @@ const LONGEST_ANSWER: usize = 1024 * 1024;
 /// All that is answered to somebody who says this and no more, on a page without cameras or password.
 pub fn answer_to(said: &[u8]) -> Vec<u8> {
     let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
-    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), None);
+    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), Events::default());
     let visit = Visit { local: http.listen.ip(), welcome: Arc::default() };
     let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
     let talk = async {
@@ -151,7 +151,7 @@ pub fn answer_to(said: &[u8]) -> Vec<u8> {
     }
 }
 
-fn router(http: &Http, fleet: Arc<Fleet>, events: Option<PathBuf>) -> Router {
+fn router(http: &Http, fleet: Arc<Fleet>, events: Events) -> Router {
     let access = Arc::new(Access::new(http));
     Router::new()
         .route("/", get(async || html(include_str!("page.html"))))
