@@ -40,6 +40,7 @@ struct Settings {
     selection: TargetSelection,
     /// Shared with each picture's copy of the settings.
     roi_type: Arc<str>,
+    ignored_tracks: Arc<[u64]>,
     confirm_frames: u32,
     coast_time_ns: u64,
     memory_time_ns: u64,
@@ -56,6 +57,7 @@ impl Default for Settings {
             profile: Profile::default(),
             selection: TargetSelection::default(),
             roi_type: MOTION_ROI.into(),
+            ignored_tracks: Arc::default(),
             confirm_frames: 3,
             coast_time_ns: 3_000_000_000,
             memory_time_ns: 60_000_000_000,
@@ -205,6 +207,12 @@ pub struct LkFeatureTrack {
         blurb = "How long somebody who is gone is remembered, in nanoseconds: whoever comes back within it has their old number (0: not at all)"
     )]
     #[property(
+        name = "ignored-tracks", type = String, mutable_playing,
+        blurb = "Numbers of tracks that become the target only where they are selected, as 3,7",
+        get = |imp: &Self| operator::in_words(&lock(&imp.settings).ignored_tracks),
+        set = |imp: &Self, numbers: Option<String>| imp.ignore(&numbers.unwrap_or_default())
+    )]
+    #[property(
         name = "post-tracks", get, set, type = bool, member = post_tracks, default = Settings::default().post_tracks, mutable_playing,
         blurb = "Post an element message ptztrack-track for everybody who comes or goes, target or not"
     )]
@@ -344,6 +352,7 @@ impl BaseTransformImpl for LkFeatureTrack {
         let request = lock(&self.request).take();
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
+        stream.tracker.ignore(settings.ignored_tracks.clone());
         stream.tracker.set_camera_rests(!lock(&self.camera).is_moving());
         if let Some(request) = request {
             stream.tracker.request(request);

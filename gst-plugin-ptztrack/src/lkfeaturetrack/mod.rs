@@ -39,7 +39,7 @@
 //! around it; a right click releases the target. The key `n` selects the track of the next number, a digit the track of that number.
 //! Applications emit `select-target` (x and y in frame sizes, 0 to 1), `select-track` (a number), `next-target` and
 //! `release-target` instead. A number that nobody has is a warning, and the target stays. What was released is not chosen again for
-//! three seconds.
+//! three seconds. The tracks in `ignored-tracks` are not chosen at all: they become the target where they are selected.
 //!
 //! ## Giving up
 //! Both limits are off by default: whoever guards a door wants to see who waits there. A message `released` says

@@ -44,6 +44,7 @@ fn every_property_changes_something() {
     let changes = [
         ("coast-time", "0"),
         ("confirm-frames", "9"),
+        ("ignored-tracks", "1"),
         ("manual-size", "0.9"),
         ("max-tracking-time", "500000000"),
         ("memory-time", "0"),

@@ -72,6 +72,11 @@ pub(super) fn signals() -> &'static [glib::subclass::Signal] {
     &SIGNALS
 }
 
+/// As the property has them.
+pub(super) fn in_words(ids: &[u64]) -> String {
+    ids.iter().map(u64::to_string).collect::<Vec<_>>().join(",")
+}
+
 impl LkFeatureTrack {
     fn select(&self, place: Point) {
         let inside = |coordinate| (0.0..=1.0).contains(&coordinate);
@@ -92,6 +97,17 @@ impl LkFeatureTrack {
                 gst::ResourceError::NotFound,
                 ("There is no track {id} to select; the target stays. There are {numbers:?}.")
             );
+        }
+    }
+
+    pub(super) fn ignore(&self, numbers: &str) {
+        let ids = numbers.split(',').map(str::trim).filter(|id| !id.is_empty()).map(str::parse);
+        match ids.collect::<Result<Vec<u64>, _>>() {
+            Ok(ids) => lock(&self.settings).ignored_tracks = ids.into(),
+            Err(_) => self.refused.add(
+                &*self.obj(),
+                format!("`{numbers}` are no numbers of tracks, as 3,7. `ignored-tracks` stays as it was"),
+            ),
         }
     }
 

@@ -2,6 +2,8 @@
 
 //! Which track is the target.
 
+use std::sync::Arc;
+
 use opencv::core::{Point2f, Rect2f};
 
 use super::ego_motion::EgoMotion;
@@ -44,12 +46,19 @@ pub(super) struct Policy {
     /// Who stood, and where, in the newest picture: the place goes with the background.
     parked: Vec<(u64, Rect2f)>,
     released: Option<(u64, f64)>,
+    /// Who is chosen by nobody but an operator.
+    ignored: Arc<[u64]>,
 }
 
 impl Policy {
-    /// Forgets everything: another stream begins.
+    /// Forgets everything but who is to be ignored: another stream begins.
     pub fn restart(&mut self) {
-        *self = Self::default();
+        *self = Self { ignored: std::mem::take(&mut self.ignored), ..Self::default() };
+    }
+
+    /// The tracks of these numbers are not chosen, from now on.
+    pub fn ignore(&mut self, ids: Arc<[u64]>) {
+        self.ignored = ids;
     }
 
     /// The track of that number is followed from now on.
@@ -96,6 +105,7 @@ impl Policy {
                     .is_some_and(|region| !region.outside && (!must_travel || region.restless <= RESTLESS))
                 && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
                 && self.released.is_none_or(|(released, _)| released != track.id)
+                && !self.ignored.contains(&track.id)
                 && !self.is_parked(track)
                 && (!must_travel || track.travels())
         })
@@ -319,6 +329,19 @@ mod tests {
             chain.see(&one, STILL);
         }
         assert_eq!(chain.chosen(), Some(one[0]));
+    }
+
+    #[test]
+    fn who_is_ignored_is_not_chosen_and_somebody_else_is() {
+        let both = [at(300.0, 200.0, 60.0, 120.0), at(100.0, 200.0, 30.0, 60.0)];
+        let mut chain = seen(4, &both);
+        let id = chain.choose(Choice::Largest, false).expect("confirmed").id;
+        chain.policy.ignore([id].into());
+        assert_eq!(chain.chosen(), Some(both[1]));
+        chain.policy.restart();
+        assert_eq!(chain.chosen(), Some(both[1]), "for as long as they are to be ignored");
+        chain.policy.ignore([].into());
+        assert_eq!(chain.chosen(), Some(both[0]));
     }
 
     #[test]

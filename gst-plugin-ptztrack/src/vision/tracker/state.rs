@@ -2,6 +2,8 @@
 
 //! The state machine around one target.
 
+use std::sync::Arc;
+
 use opencv::core::Rect2f;
 use ptztrack_contract::{Feature, ReleaseReason, TargetChange, TargetState};
 
@@ -108,6 +110,11 @@ impl Tracker {
     /// What is known of the camera where the background cannot be seen; without any news it rests.
     pub fn set_camera_rests(&mut self, rests: bool) {
         self.camera_rests = rests;
+    }
+
+    /// The tracks of these numbers become the target where they are asked for, and not by themselves.
+    pub fn ignore(&mut self, ids: Arc<[u64]>) {
+        self.policy.ignore(ids);
     }
 
     /// With the next frame, carries this out.
