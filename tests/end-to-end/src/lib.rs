@@ -27,7 +27,7 @@ pub use front::{Front, Way};
 pub use in_view::InView;
 pub use launch::{GstLaunch, children_of, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
-pub use program::Program;
+pub use program::{Program, ask_page};
 pub use recording::pictures_in;
 pub use viewer::{Times, Viewer};
 pub use watchdog::Watchdog;

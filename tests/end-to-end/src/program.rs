@@ -77,18 +77,8 @@ impl Program {
 
     /// The same by another name.
     pub fn ask_as(&self, host: &str, method: &str, path: &str) -> (u16, String) {
-        let mut stream = TcpStream::connect(&self.page).unwrap();
-        stream.set_read_timeout(Some(PATIENCE)).unwrap();
-        write!(
-            stream,
-            "{method} {path} HTTP/1.1\r\nHost: {host}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
-        )
-        .unwrap();
-        let mut answer = Vec::new();
-        stream.read_to_end(&mut answer).unwrap();
-        let answer = String::from_utf8_lossy(&answer);
-        let (head, body) = answer.split_once("\r\n\r\n").unwrap();
-        (head.split(' ').nth(1).unwrap().parse().unwrap(), body.to_owned())
+        let (status, body) = ask_page(&self.page, host, method, path);
+        (status, String::from_utf8_lossy(&body).into_owned())
     }
 
     /// Asks again and again until this is so of the answer.
@@ -143,4 +133,20 @@ impl Program {
         fs::remove_dir_all(&self.folder).unwrap();
         ended
     }
+}
+
+/// Status and body of what is asked of a page, host and port, by a name of it.
+pub fn ask_page(page: &str, name: &str, method: &str, path: &str) -> (u16, Vec<u8>) {
+    let mut stream = TcpStream::connect(page).unwrap();
+    stream.set_read_timeout(Some(PATIENCE)).unwrap();
+    write!(
+        stream,
+        "{method} {path} HTTP/1.1\r\nHost: {name}\r\nConnection: close\r\nContent-Length: 0\r\n\r\n"
+    )
+    .unwrap();
+    let mut answer = Vec::new();
+    stream.read_to_end(&mut answer).unwrap();
+    let end = answer.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
+    let head = String::from_utf8_lossy(&answer[..end]);
+    (head.split(' ').nth(1).unwrap().parse().unwrap(), answer[end + 4..].to_vec())
 }

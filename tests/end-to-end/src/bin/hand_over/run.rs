@@ -10,7 +10,7 @@ use end_to_end::{Program, scene, scratch};
 use handover::Map;
 use virtual_camera::{Action, Auth, GroundTruth, Pose, RoomSettings, Settings, Video, VirtualCamera, World};
 
-use crate::errors;
+use crate::{Options, errors, film};
 
 /// To the right of the other one, seven metres from it, and turned left towards the floor that people walk on.
 const STAND: [f64; 3] = [6.2, 3.2, 0.4];
@@ -18,7 +18,7 @@ const LOOKS: Pose = Pose { pan_deg: -38.0, tilt_deg: -20.0, zoom_step: 1.0 };
 const SIZE: (u32, u32) = (640, 480);
 const RATE: f64 = 12.5;
 /// Between two looks at what is true.
-const LOOK: Duration = Duration::from_millis(40);
+pub const LOOK: Duration = Duration::from_millis(40);
 /// So long after somebody came in it is seen whom the camera follows.
 const JUDGED_AFTER: Duration = Duration::from_secs(10);
 /// Seconds for which the map is looked at.
@@ -53,8 +53,10 @@ impl fmt::Display for Outcome {
     }
 }
 
-fn camera(seed: u64, others: usize, stand: Option<[f64; 3]>) -> VirtualCamera {
-    let room = RoomSettings { seed, action: Action::Relay, others, stand, ..RoomSettings::default() };
+/// The camera beside the other one, or that one.
+pub fn camera(seed: u64, action: Action, others: usize, aside: bool) -> VirtualCamera {
+    let stand = aside.then_some(STAND);
+    let room = RoomSettings { seed, action, others, stand, ..RoomSettings::default() };
     let settings = Settings {
         user: scene::USER.into(),
         password: scene::PASSWORD.into(),
@@ -67,11 +69,11 @@ fn camera(seed: u64, others: usize, stand: Option<[f64; 3]>) -> VirtualCamera {
     VirtualCamera::start(settings).unwrap()
 }
 
-/// Plays one room; what the program says goes into `out`.
-pub fn run(seed: u64, others: usize, out: &Path) -> Outcome {
+/// Plays one room; what the program says goes where the runs go.
+pub fn run(seed: u64, Options { others, film, out, .. }: &Options) -> Outcome {
     let state = scratch(&format!("handover-{seed}"));
     fs::create_dir_all(&state).unwrap();
-    let (yard, door) = (camera(seed, others, Some(STAND)), camera(seed, others, None));
+    let [yard, door] = [true, false].map(|aside| camera(seed, Action::Relay, *others, aside));
     let file = |folder: &Path| {
         let password = folder.join("password");
         let entry = |name: &str, camera: &VirtualCamera| {
@@ -88,14 +90,15 @@ pub fn run(seed: u64, others: usize, out: &Path) -> Outcome {
         let map = fs::read_to_string(state.join("map.yard.door.json")).ok();
         map.and_then(|map| errors::median_deg(&Map::from_json(&map).ok()?, STAND, &LOOKS))
     });
-    let (seconds, right) = watch(&yard, &door);
+    let pictures = film.then(|| out.join(seed.to_string()));
+    let (seconds, right) = film::shoot(&program, &door, pictures, || watch(&yard, &door));
     let (_, said) = program.end_somehow("TERM");
     fs::write(out.join(format!("{seed}.log")), said).unwrap();
     fs::remove_dir_all(&state).unwrap();
     Outcome { seed, errors: errors.to_vec(), seconds, right }
 }
 
-fn wait_until(camera: &VirtualCamera, time: Duration) {
+pub fn wait_until(camera: &VirtualCamera, time: Duration) {
     thread::sleep(time.saturating_sub(camera.now()));
 }
 
@@ -118,15 +121,18 @@ fn watch(yard: &VirtualCamera, door: &VirtualCamera) -> (Option<f64>, bool) {
     (seconds, middle)
 }
 
-/// The second person as the camera sees them now.
 fn second(camera: &VirtualCamera) -> Option<GroundTruth> {
-    let pose = camera.status();
-    let pose = Pose { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, zoom_step: pose.zoom_step };
-    let people = camera.ground_truth_from(&pose, camera.now(), SIZE);
-    people.into_iter().find(|person| person.id == SECOND)
+    people(camera).into_iter().find(|person| person.id == SECOND)
 }
 
-fn is_in_middle_half(person: &GroundTruth) -> bool {
+/// Everybody as the camera sees them now.
+pub fn people(camera: &VirtualCamera) -> Vec<GroundTruth> {
+    let pose = camera.status();
+    let pose = Pose { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, zoom_step: pose.zoom_step };
+    camera.ground_truth_from(&pose, camera.now(), SIZE)
+}
+
+pub fn is_in_middle_half(person: &GroundTruth) -> bool {
     let (x, y) = person.centroid;
     let middle = |place: f64, size: u32| (0.25..=0.75).contains(&(place / f64::from(size)));
     middle(x, SIZE.0) && middle(y, SIZE.1)

@@ -41,11 +41,13 @@ pub enum Action {
     Reach,
     /// Walks to and fro for a minute and leaves; then somebody else comes in from the other side.
     Relay,
+    /// Walks to and fro for three minutes; after the first of them somebody else comes in and does the same for a minute.
+    Join,
 }
 
 impl Action {
     /// Every one, with its name for command lines and tables.
-    pub const ALL: [(Self, &'static str); 17] = [
+    pub const ALL: [(Self, &'static str); 18] = [
         (Self::Test, "test"),
         (Self::Nobody, "nobody"),
         (Self::Cross, "cross"),
@@ -63,6 +65,7 @@ impl Action {
         (Self::Drive, "drive"),
         (Self::Reach, "reach"),
         (Self::Relay, "relay"),
+        (Self::Join, "join"),
     ];
 
     /// A number for streams of chance; the way of a thesis test has those of the tests.

@@ -77,6 +77,7 @@ pub(super) fn cast(settings: &RoomSettings) -> Vec<Role> {
         Action::Drive => alone(stage.drive(&mut chance)),
         Action::Reach => alone(stage.reach(&mut chance)),
         Action::Relay => stage.relay(&mut chance),
+        Action::Join => stage.join(&mut chance),
     };
     let first = if settings.action == Action::Drive { Kind::Vehicle } else { Kind::Person };
     let others = [Subject::A, Subject::B, Subject::C].into_iter().filter(|other| *other != settings.subject);
@@ -333,6 +334,13 @@ impl Stage {
         first.legs.push(Past(self.at(GONE, self.lane), SPEED));
         let (_, left) = route::follow(&first);
         let second = self.wander_for(RELAY, left + chance.range(3.0, 6.0), chance);
+        vec![(first, 0), (second, 1)]
+    }
+
+    /// The second comes in where the first one came in, a minute and some seconds later.
+    fn join(&self, chance: &mut Seeded) -> Vec<(Way, usize)> {
+        let first = self.wander(chance);
+        let second = self.wander_for(RELAY, RELAY + chance.range(3.0, 6.0), chance);
         vec![(first, 0), (second, 1)]
     }
 
