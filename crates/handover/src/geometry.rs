@@ -48,6 +48,12 @@ impl Place {
         Self((*direction.ray()).into())
     }
 
+    /// Degrees between this place and another, for a camera that turns. In a picture they are the same for all only about: a lens
+    /// is not known.
+    pub fn angle_to_deg(self, other: Self) -> f64 {
+        angle(&self.ray(), &other.ray()).to_degrees()
+    }
+
     pub(crate) fn ray(self) -> Ray {
         Unit::new_normalize(Vector3::from(self.0))
     }

@@ -7,7 +7,7 @@ use std::thread::JoinHandle;
 use ptztrack_contract::lock::lock;
 
 use crate::camera::{Camera, Control, Known};
-use crate::config::{CameraSettings, Codec};
+use crate::config::{CameraSettings, Codec, Kind};
 use crate::control_file::ControlFile;
 use crate::event::{Event, Level};
 use crate::log::Log;
@@ -112,6 +112,11 @@ impl Fleet {
         let cameras = lock(&self.cameras);
         let camera = cameras.get(name).filter(|camera| camera.settings.codec == codec)?;
         Some(camera.known.clone())
+    }
+
+    /// Whether a camera is one that turns.
+    pub fn turns(&self, name: &str) -> bool {
+        lock(&self.cameras).get(name).is_some_and(|camera| camera.settings.kind != Kind::Fixed)
     }
 
     /// At which height in its picture a camera keeps whom it follows, where it zooms.

@@ -102,7 +102,10 @@ fn run(options: Options) -> Result<(), Failure> {
             };
             follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
         }
-        Task::Point(point) => Ok(runtime(1)?.block_on(point.say())?),
+        Task::Point(point) => {
+            print!("{}", runtime(1)?.block_on(point.say())?);
+            Ok(())
+        }
         Task::Discover { wait } => Ok(runtime(1)?.block_on(discovery::discover(wait))?),
         Task::Check { file } => {
             let config = Config::load(&file)?;

@@ -6,10 +6,11 @@ use std::net::SocketAddr;
 use std::path::PathBuf;
 
 use axum::body::Body;
-use axum::http::{Request, StatusCode, header};
+use axum::http::{Request, Response, StatusCode, header};
 use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use clap::Args;
+use hyper::body::Incoming;
 use hyper::client::conn::http1;
 use hyper_util::rt::TokioIo;
 use tokio::net::TcpStream;
@@ -18,13 +19,16 @@ use crate::config::{Http, Secret};
 
 #[derive(Debug, Args)]
 pub struct Point {
-    /// The camera that turns; the middle of its picture shows the place
+    /// The camera that is called; the middle of its picture shows the place
     camera: String,
-    /// The camera that does not turn
+    /// The camera that calls it
     from: String,
     /// The place in the picture of that: parts of it from the left and from the top, as 0.4,0.7
     #[arg(value_parser = place)]
     place: Place,
+    /// The place in the picture of the camera that is called, where that is not its middle
+    #[arg(long, value_parser = place, default_value = "0.5,0.5")]
+    here: Place,
     /// Where the program that runs has its page
     #[arg(long, value_name = "ADDRESS:PORT", default_value_t = Http::LISTEN)]
     http: SocketAddr,
@@ -44,11 +48,11 @@ struct Place {
 }
 
 impl Point {
-    /// Says so.
+    /// Says so, and what is answered.
     ///
     /// # Errors
-    /// Why it was not heard, in words.
-    pub async fn say(&self) -> Result<(), String> {
+    /// Why it was not heard, or cannot be, in words.
+    pub async fn say(&self) -> Result<String, String> {
         let nobody = |err: &dyn std::fmt::Display| {
             format!("no ptztrack has its page at {}: {err}. Start it, or say where by --http", self.http)
         };
@@ -59,7 +63,8 @@ impl Point {
         let request = self.request().map_err(|err| err.to_string())?;
         let answer = sender.send_request(request).await.map_err(|err| nobody(&err))?;
         match answer.status() {
-            StatusCode::NO_CONTENT => Ok(()),
+            StatusCode::OK => Ok(text(answer).await),
+            StatusCode::CONFLICT => Err(text(answer).await.trim_end().to_owned()),
             StatusCode::UNAUTHORIZED => {
                 Err("the page wants a password: give --user and --password-file".to_owned())
             }
@@ -72,7 +77,11 @@ impl Point {
 
     fn request(&self) -> Result<Request<Body>, Box<dyn std::error::Error>> {
         let Place { x, y } = self.place;
-        let path = format!("/cameras/{}/point?from={}&x={x}&y={y}", self.camera, self.from);
+        let here = self.here;
+        let path = format!(
+            "/cameras/{}/point?from={}&x={x}&y={y}&here_x={}&here_y={}",
+            self.camera, self.from, here.x, here.y
+        );
         let request = Request::post(path).header(header::HOST, self.http.to_string());
         let request = match (&self.user, &self.password_file) {
             (Some(user), Some(file)) => {
@@ -84,6 +93,13 @@ impl Point {
         };
         Ok(request.body(Body::empty())?)
     }
+}
+
+/// What the page says.
+async fn text(answer: Response<Incoming>) -> String {
+    const LONGEST: usize = 4096;
+    let body = axum::body::to_bytes(Body::new(answer.into_body()), LONGEST).await.unwrap_or_default();
+    String::from_utf8_lossy(&body).into_owned()
 }
 
 fn place(text: &str) -> Result<Place, &'static str> {

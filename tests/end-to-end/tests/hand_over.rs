@@ -3,11 +3,15 @@
 //! A camera that does not turn calls one that does.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+#[path = "../../virtual-camera/tests/common/browser.rs"]
+mod browser;
+
 use std::fs;
 use std::path::Path;
 use std::time::Duration;
 
-use end_to_end::{Program, plugin_folder, scene, tool};
+use browser::Browser;
+use end_to_end::{PATIENCE, Program, plugin_folder, scene, tool};
 use handover::{Direction, Map, Pair, Place};
 use virtual_camera::{Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
@@ -97,11 +101,13 @@ fn what_a_camera_looks_at_can_be_said_by_hand() {
     let point = |to: &str, from: &str, place: &str| {
         let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
         let output = command.args(["point", to, from, place, "--http", &page]).output().unwrap();
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+        (output.status.code(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
     };
-    assert_eq!(point("door", "yard", "0.4,0.7"), (Some(0), String::new()));
-    program.launch.wait_for_line("door: looks at 0.40,0.70 of yard, as somebody says");
-    assert_eq!(point("yard", "door", "0.4,0.7"), (Some(0), String::new()));
+    let (status, said) = point("door", "yard", "0.4,0.7");
+    assert!(status == Some(0) && said == "sees 0.40,0.70 of yard at 0.50,0.50, as somebody says\n", "{said}");
+    program.launch.wait_for_line("door: sees 0.40,0.70 of yard at 0.50,0.50, as somebody says");
+    let (status, said) = point("yard", "door", "0.4,0.7");
+    assert!(status == Some(1) && said.contains("door does not call it: [handover.door] says"), "{said}");
     program.launch.wait_for_line("yard: warning: door does not call it");
     let (status, said) = point("door", "gate", "0.4,0.7");
     assert!(status == Some(1) && said.contains("there is no camera `door`, or none `gate`"), "{said}");
@@ -109,4 +115,45 @@ fn what_a_camera_looks_at_can_be_said_by_hand() {
     program.end("TERM");
     let (status, said) = point("door", "yard", "0.4,0.7");
     assert!(status == Some(1) && said.contains("no ptztrack has its page at"), "{said}");
+}
+
+/// A click in the picture of the one that calls, then one in that of the other.
+#[test]
+fn a_place_is_clicked_in_both_pictures() {
+    let [yard, door] = [0, 1].map(|_| VirtualCamera::start(scene::nobody()).unwrap());
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
+        let door = Program::entry("door", &door.url(), &password);
+        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
+    };
+    let mut program = Program::start("point-page", file, &[]);
+    let mut browser = Browser::start("chromium-point");
+    browser.open(&program.url());
+    let of = |name: &str, part: &str| {
+        format!("document.querySelector('[data-name={name}]')?.querySelector('{part}')")
+    };
+    for name in ["door", "yard"] {
+        browser.wait_for(&format!("{}?.naturalWidth == 320", of(name, "img")));
+    }
+    let click = |browser: &mut Browser, name: &str, x: f64, y: f64| {
+        let image = of(name, "img");
+        browser.value(&format!(
+            "{{ const r = {image}.getBoundingClientRect(); {image}.dispatchEvent(new MouseEvent('click', \
+             {{ clientX: r.x + r.width * {x}, clientY: r.y + r.height * {y}, bubbles: true }})); }}"
+        ));
+    };
+    browser.wait_for(&format!("{}.checkVisibility()", of("yard", ".pair")));
+    let offered = browser.value(&format!("{}.checkVisibility()", of("door", ".pair")));
+    assert_eq!(offered, false, "it calls nobody");
+    browser.value(&format!("{}.click()", of("yard", ".pair")));
+    click(&mut browser, "yard", 0.25, 0.75);
+    browser.wait_for("pairing.innerText == 'Click the same place in the picture of door.'");
+    browser.save_picture("ptztrack-page-pair.png");
+    click(&mut browser, "door", 0.75, 0.5);
+    browser.wait_for(
+        "/^door sees 0.2\\d,0.7\\d of yard at 0.7\\d,0.\\d+, as somebody says/.test(pairing.innerText)",
+    );
+    program.launch.wait_for_line("as somebody says");
+    program.end("TERM");
 }

@@ -6,9 +6,10 @@ use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use pipeline_supervisor::video::Ended;
+use ptztrack_contract::Point;
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
-use tokio::sync::{broadcast, watch};
+use tokio::sync::{broadcast, oneshot, watch};
 
 use super::packets::{self, Packet};
 use super::running::Running;
@@ -50,8 +51,10 @@ pub struct Known {
     pub looking: AtomicUsize,
     /// What was seen last, and when, of a camera that people are handed over from or to.
     pub sight: watch::Sender<Arc<(Instant, Sight)>>,
-    /// What it looks at, as somebody has said: places in the pictures of others, which nobody has taken notice of yet.
-    pub points: Mutex<Vec<(String, f64, f64)>>,
+    /// What somebody has said that it sees, which nobody has taken notice of yet.
+    pub points: Mutex<Vec<Pointed>>,
+    /// Whom it calls, where people are handed over.
+    pub calls: Mutex<Vec<String>>,
     /// Whom another camera saw before this one took them up.
     pub origin: Mutex<Option<Origin>>,
     /// The last picture for who looks.
@@ -70,6 +73,17 @@ pub struct Origin {
     pub id: u64,
     /// Who called.
     pub camera: String,
+}
+
+/// One place in the pictures of two cameras, as somebody says: 0 to 1 from the left and from the top.
+#[derive(Debug)]
+pub struct Pointed {
+    /// The other camera.
+    pub from: String,
+    pub there: Point,
+    pub here: Point,
+    /// Whether that can be, in words.
+    pub answer: oneshot::Sender<Result<String, String>>,
 }
 
 /// What its messages told.
@@ -154,6 +168,7 @@ impl Known {
             looking: AtomicUsize::default(),
             sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
             points: Mutex::default(),
+            calls: Mutex::default(),
             origin: Mutex::default(),
             view: watch::Sender::new(Shown::default()),
             packets: packets::channel(),

@@ -29,13 +29,14 @@ use std::time::{Duration, Instant};
 
 pub use bounds::picture_size;
 pub use by_hand::Turn;
-pub use known::{Control, Gaze, Known, Origin, Steering};
+pub use known::{Control, Gaze, Known, Origin, Pointed, Steering};
 use messages::Listener;
 pub use packets::{Content, Packet, next as next_packet};
 use pipeline::NotBuilt;
 use pipeline_supervisor::Supervisor;
 use pipeline_supervisor::video::Failure;
 use process::Processes;
+use ptztrack_contract::Point;
 use ptztrack_contract::lock::lock;
 use recording::Recorder;
 use refusals::Refusals;
@@ -43,6 +44,7 @@ pub use running::Abilities;
 use running::Running;
 pub use sight::{Person, Pose, Sight};
 pub use stopwatch::Stopwatch;
+use tokio::sync::oneshot;
 pub use view::{Look, Shown};
 
 use crate::config::{CameraSettings, Isolation};
@@ -291,19 +293,28 @@ impl Known {
 
     /// Follows who is at this place of the picture, 0 to 1.
     pub fn select(&self, x: f64, y: f64) {
+        lock(&self.origin).take();
         self.with(|running| running.select(x, y));
     }
 
-    /// The middle of its picture shows this place in that of another camera, 0 to 1.
-    pub fn point(&self, from: String, x: f64, y: f64) {
+    /// Its picture shows here what that of another camera shows there. Whether that can be is answered by who hands people over.
+    pub fn point(
+        &self,
+        from: String,
+        there: Point,
+        here: Point,
+    ) -> oneshot::Receiver<Result<String, String>> {
         const MOST: usize = 16;
+        let (answer, answered) = oneshot::channel();
         let mut points = lock(&self.points);
         // Where nobody takes notice.
         points.truncate(MOST - 1);
-        points.push((from, x, y));
+        points.push(Pointed { from, there, here, answer });
+        answered
     }
 
     pub fn release(&self) {
+        lock(&self.origin).take();
         self.with(|running| running.release());
     }
 

@@ -73,6 +73,12 @@ impl Person {
     /// Boxes that come so near to the picture's edge may be cut off by it.
     const EDGE: f64 = 0.01;
 
+    /// Where they are so many seconds later, if they go on as they do.
+    pub fn ahead(&self, seconds: f64) -> Self {
+        let ([x, y, width, height], [right, down]) = (self.bounds, self.velocity);
+        Self { bounds: [x + right * seconds, y + down * seconds, width, height], ..self.clone() }
+    }
+
     pub fn feet(&self) -> Point {
         let [x, y, width, height] = self.bounds;
         Point { x: x + width / 2.0, y: y + height }
@@ -86,6 +92,13 @@ impl Person {
     pub fn head(&self) -> Point {
         let [x, y, width, _] = self.bounds;
         Point { x: x + width / 2.0, y }
+    }
+
+    /// Out of the picture in a second, if they go on as they do and the camera does not turn.
+    pub fn is_leaving(&self) -> bool {
+        let inside = 0.0..=1.0;
+        let then = self.ahead(1.0).centre();
+        !inside.contains(&then.x) || !inside.contains(&then.y)
     }
 
     /// Seen by themselves, and where they stand.

@@ -1,13 +1,15 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! A camera on its way to somebody whom another one sees.
+//! A camera that was called for somebody: it turns to where they have to be, takes them up, and follows them for as long as the
+//! one that called says that it is they.
 
 use std::time::{Duration, Instant};
 
 use handover::{Aim, Direction};
 
-use super::View;
-use super::link::{Link, Seen, direction};
+use super::link::Link;
+use super::motion::Expected;
+use super::view::View;
 use crate::camera::{Gaze, Origin, Person, Steering};
 use crate::config::HandOver;
 use ptztrack_contract::lock::lock;
@@ -15,13 +17,17 @@ use ptztrack_contract::lock::lock;
 /// It is given up after this: as long as a slow camera turns half round, and then sees nobody.
 const LONGEST: Duration = Duration::from_secs(10);
 /// Somebody is expected to go on as they do for so long: while a command, the camera and a picture are under way.
-const LEAD: Duration = Duration::from_millis(500);
+const LEAD_S: f64 = 0.5;
 /// Between two orders to the camera.
 const ORDER_EVERY: Duration = Duration::from_millis(400);
-/// A place within so many standard deviations may be theirs.
-const GATE: f64 = 3.0;
-/// So many of them are to fit into the picture that the camera turns to: three to either side.
+/// So many standard deviations of doubt are to fit into the picture that the camera turns to: three to either side.
 const IN_PICTURE: f64 = 6.0;
+/// Who is nearest to where they have to be in so many pictures is they.
+const PICTURES: u32 = 3;
+/// Somebody else is nearer than who is followed by so many standard deviations: two are rarely as near by chance.
+const AHEAD: f64 = 1.0;
+/// Who is followed elsewhere for so long is somebody else.
+const ASTRAY: Duration = Duration::from_secs(1);
 
 /// Somebody to turn to.
 #[derive(Debug)]
@@ -33,7 +39,16 @@ pub struct Call {
     pub precedence: u32,
     begun: Instant,
     ordered: Option<(Instant, Gaze)>,
+    likely: Likely,
+    /// Their number here, once they are followed.
+    followed: Option<u64>,
+    /// Nobody is followed where they have to be, since then.
+    astray: Option<Instant>,
 }
+
+/// Who it may be: their number here, in how many pictures they were nearest, and when the last of these came.
+#[derive(Debug, Default)]
+struct Likely(Option<(u64, u32, Instant)>);
 
 /// What becomes of it.
 #[derive(Debug, PartialEq, Eq)]
@@ -41,56 +56,121 @@ pub enum Progress {
     Going,
     /// They are followed, under this number.
     TakenUp(u64),
-    /// Somebody else wants something else of the camera.
-    Overruled,
+    /// It was somebody else, or they were lost: they are looked for again.
+    Again,
+    /// Somebody else wants something else of the camera, or the other one sees them no more.
+    Over,
     /// They were not found.
     Failed,
 }
 
 impl Call {
     pub fn new(wish: &HandOver, id: u64) -> Self {
-        let from = wish.from.clone();
-        Self { from, id, precedence: wish.precedence, begun: Instant::now(), ordered: None }
+        Self {
+            from: wish.from.clone(),
+            id,
+            precedence: wish.precedence,
+            begun: Instant::now(),
+            ordered: None,
+            likely: Likely::default(),
+            followed: None,
+            astray: None,
+        }
     }
 
     /// Goes on with it.
-    pub fn advance(&mut self, link: &Link, from: &Seen, called: &View) -> Progress {
-        let steering = *lock(&called.known.steering);
-        if self.ordered.is_some() && !matches!(steering, Steering::LookAt(..)) {
-            return Progress::Overruled;
+    pub fn advance(&mut self, link: &Link, from: &View, called: &View) -> Progress {
+        let person = from.person(self.id).filter(|_| from.is_fresh());
+        if self.is_overruled(called) || (self.followed.is_some() && person.is_none()) {
+            return Progress::Over;
         }
-        if let Some(person) = self.found(link, from, called) {
-            if !person.is_target {
-                called.known.select_track(person.id);
+        let seen = person.filter(|person| person.stands_in_picture());
+        let expected = seen.and_then(|person| link.expect(from, person, called));
+        let nearest = expected.as_ref().and_then(|expected| nearest(expected, called, self.followed));
+        if self.likely.is_sure(nearest, called.seen.0) && (self.followed.is_some() || self.ordered.is_some())
+        {
+            return nearest.map_or(Progress::Going, |person| self.take_up(person, called));
+        }
+        match (self.followed, expected) {
+            (Some(_), Some(expected)) if self.is_astray(&expected, called) => self.look_again(),
+            (Some(_), _) => Progress::Going,
+            (None, _) if self.begun.elapsed() > LONGEST => {
+                called.known.steer(Steering::Follow);
+                Progress::Failed
             }
-            called.known.steer(Steering::Follow);
-            let origin = Origin { target: person.id, id: self.id, camera: self.from.clone() };
-            *lock(&called.known.origin) = Some(origin);
-            return Progress::TakenUp(person.id);
+            (None, _) => {
+                self.turn(link, from, called);
+                Progress::Going
+            }
         }
-        if self.begun.elapsed() > LONGEST {
-            called.known.steer(Steering::Follow);
-            return Progress::Failed;
+    }
+
+    /// Whether somebody else has the camera, or has chosen whom it follows.
+    fn is_overruled(&self, called: &View) -> bool {
+        let steering = *lock(&called.known.steering);
+        match self.followed {
+            Some(_) => {
+                let is_ours = |origin: &Origin| origin.camera == self.from && origin.id == self.id;
+                !called.follows() || !lock(&called.known.origin).as_ref().is_some_and(is_ours)
+            }
+            None => self.ordered.is_some() && !matches!(steering, Steering::LookAt(..)),
         }
+    }
+
+    fn take_up(&mut self, person: &Person, called: &View) -> Progress {
+        self.astray = None;
+        if !person.is_target {
+            called.known.select_track(person.id);
+        }
+        let before = self.followed.replace(person.id);
+        if before == Some(person.id) {
+            return Progress::Going;
+        }
+        let origin = Origin { target: person.id, id: self.id, camera: self.from.clone() };
+        *lock(&called.known.origin) = Some(origin);
+        if before.is_none() {
+            called.known.steer(Steering::Follow);
+        }
+        Progress::TakenUp(person.id)
+    }
+
+    /// Whether nobody has been followed for a while where they have to be.
+    fn is_astray(&mut self, expected: &Expected, called: &View) -> bool {
+        let target = called.motions().find(|(person, _)| person.is_target);
+        // Whose feet are not seen may be anywhere.
+        let is_there =
+            target.is_some_and(|(person, motion)| !person.is_whole() || expected.is_place_of(&motion));
+        if is_there {
+            self.astray = None;
+            return false;
+        }
+        self.astray.get_or_insert_with(Instant::now).elapsed() > ASTRAY
+    }
+
+    fn look_again(&mut self) -> Progress {
+        (self.begun, self.ordered, self.followed, self.astray) = (Instant::now(), None, None, None);
+        self.likely = Likely::default();
+        Progress::Again
+    }
+
+    fn turn(&mut self, link: &Link, from: &View, called: &View) {
         if let Some(gaze) = self.gaze(link, from, called).filter(|gaze| self.is_due(gaze, called)) {
             let now = Instant::now();
             self.ordered = Some((now, gaze));
             called.known.steer(Steering::LookAt(gaze, now));
         }
-        Progress::Going
     }
 
     /// Whether the camera is to be told, as it was not yet, or was told a place that is off by an eighth of its picture by now.
     fn is_due(&self, gaze: &Gaze, called: &View) -> bool {
         let Some((at, before)) = self.ordered else { return true };
-        let fov_deg = before.fov_deg.or_else(|| fov(called)).unwrap_or(0.0);
+        let fov_deg = before.fov_deg.or_else(|| called.fov_deg()).unwrap_or(0.0);
         at.elapsed() > ORDER_EVERY && of(gaze).angle_to_deg(of(&before)) > fov_deg / 8.0
     }
 
     /// Where the camera has to look; `None` where that is in too much doubt.
-    pub fn gaze(&self, link: &Link, from: &Seen, called: &View) -> Option<Gaze> {
-        let person = from.1.people.iter().find(|person| person.id == self.id)?;
-        let aim = link.aim(&from.1, person, LEAD)?;
+    pub fn gaze(&self, link: &Link, from: &View, called: &View) -> Option<Gaze> {
+        let aim = link.aim(from, from.person(self.id)?, LEAD_S)?;
         let middle = aim.middle();
         let widest = called.widest_fov_deg?;
         let enough = IN_PICTURE * aim.doubt_deg;
@@ -98,31 +178,38 @@ impl Call {
         let fov_deg = fov_deg.map(|fov_deg| fov_deg.max(enough).min(widest));
         let gaze = Gaze { pan_deg: middle.pan_deg, tilt_deg: middle.tilt_deg, fov_deg };
         // Whose place is known no better than that is not in the picture.
-        (enough < 1.5 * fov_deg.or_else(|| fov(called))?).then_some(gaze)
+        (enough < 1.5 * fov_deg.or_else(|| called.fov_deg())?).then_some(gaze)
     }
+}
 
-    fn found<'a>(&self, link: &Link, from: &Seen, called: &'a View) -> Option<&'a Person> {
-        self.ordered?;
-        let person = from.1.people.iter().find(|person| person.id == self.id)?;
-        let aim = link.aim(&from.1, person, Duration::ZERO)?;
-        nearest(&aim, called)
+impl Likely {
+    /// Takes who is nearest in the picture that came then; whether it is they.
+    fn is_sure(&mut self, nearest: Option<&Person>, came: Instant) -> bool {
+        self.0 = match (nearest, self.0) {
+            (None, _) => None,
+            (Some(person), Some((id, pictures, last))) if person.id == id => {
+                Some((id, pictures + u32::from(came > last), came))
+            }
+            (Some(person), _) => Some((person.id, 1, came)),
+        };
+        self.0.is_some_and(|(_, pictures, _)| pictures >= PICTURES)
     }
 }
 
 /// Whether a camera follows whom this one sees.
-pub fn follows(link: &Link, from: &Seen, person: &Person, called: &View) -> bool {
-    let Some(aim) = link.aim(&from.1, person, Duration::ZERO) else { return false };
-    nearest(&aim, called).is_some_and(|person| person.is_target)
+pub fn follows(link: &Link, from: &View, person: &Person, called: &View) -> bool {
+    let Some(expected) = link.expect(from, person, called) else { return false };
+    nearest(&expected, called, None).is_some_and(|person| person.is_target)
 }
 
-/// Who of those whom a camera sees is where somebody has to be.
-fn nearest<'a>(aim: &Aim, called: &'a View) -> Option<&'a Person> {
-    let sight = &called.seen.1;
-    let view = sight.pose_about(called.video)?.view()?;
-    let off = |person: &Person| direction(&view, person.feet()).angle_to_deg(aim.feet);
-    let seen = sight.people.iter().filter(|person| person.seen).map(|person| (person, off(person)));
-    let (person, off) = seen.min_by(|one, other| one.1.total_cmp(&other.1))?;
-    (off < GATE * aim.doubt_deg).then_some(person)
+/// Who of those whom a camera sees is where somebody has to be, and goes where they go; who is followed already before others.
+pub fn nearest<'a>(expected: &Expected, called: &'a View, followed: Option<u64>) -> Option<&'a Person> {
+    let distance = |person: &Person, motion: &_| {
+        let ahead = if followed == Some(person.id) { AHEAD } else { 0.0 };
+        Some(expected.distance(motion)? - ahead)
+    };
+    let near = called.motions().filter_map(|(person, motion)| Some((person, distance(person, &motion)?)));
+    near.min_by(|one, other| one.1.total_cmp(&other.1)).map(|(person, _)| person)
 }
 
 /// The field of view in which somebody fills the wanted part of the picture's height.
@@ -132,10 +219,6 @@ fn fills(aim: &Aim, height: f64, called: &View) -> Option<f64> {
     let shape = half(pose.horizontal_fov_deg) / half(pose.vertical_fov_deg);
     let vertical = half((aim.height_deg? / height).min(170.0));
     Some(2.0 * (shape * vertical).atan().to_degrees())
-}
-
-fn fov(called: &View) -> Option<f64> {
-    called.seen.1.poses.last().map(|pose| pose.horizontal_fov_deg)
 }
 
 fn of(gaze: &Gaze) -> Direction {

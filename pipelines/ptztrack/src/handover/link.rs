@@ -6,8 +6,11 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use handover::{Aim, Direction, Learned, Map, Pair, Place};
+use ptztrack_contract::Point;
 
-use crate::camera::{Person, Pose, Sight};
+use super::motion::{Expected, Motion};
+use super::view::{View, direction};
+use crate::camera::Person;
 
 /// A picture of each that come within so long show the same moment: no longer than one is under way.
 const SAME_MOMENT: Duration = Duration::from_millis(150);
@@ -15,13 +18,17 @@ const SAME_MOMENT: Duration = Duration::from_millis(150);
 const EVERY: Duration = Duration::from_millis(200);
 /// A camera that turns tells where it looks at least as often.
 const LONGEST_WAIT: Duration = Duration::from_secs(3);
+/// Over so long it is measured how fast somebody goes.
+const STEP_S: f64 = 0.5;
 
-/// A person whom both see, until it is known where the camera looked.
+/// Somebody in the picture that came then.
+type Appearance = (Instant, Person);
+
+/// A person whom both see, until it is known where the cameras looked.
 #[derive(Debug)]
 struct Moment {
-    at: Instant,
-    place: Place,
-    person: Person,
+    from: Appearance,
+    to: Appearance,
 }
 
 /// From a camera that calls to one that is called.
@@ -34,26 +41,21 @@ pub struct Link {
     last: Option<Instant>,
 }
 
-/// What a camera saw when.
-pub type Seen = (Instant, Sight);
-
 impl Link {
     pub fn new(map: Map) -> Self {
         Self { map, changed: false, waiting: VecDeque::new(), last: None }
     }
 
-    /// Takes what both see. `video`: how late pictures of the one that turns are. Returns whether one of them was moved.
-    pub fn see(&mut self, from: &Seen, to: &Seen, video: Duration) -> bool {
-        self.notice(from, to, video);
+    /// Takes what both see. Returns whether one of them was moved.
+    pub fn see(&mut self, from: &View, to: &View) -> bool {
+        self.notice(from, to);
         let mut moved = false;
         while let Some(moment) = self.waiting.front() {
-            let age = to.0.saturating_duration_since(moment.at);
-            if age > LONGEST_WAIT {
-                self.waiting.pop_front();
-                continue;
+            let pair = moment.pair(from, to);
+            let age = to.seen.0.saturating_duration_since(moment.to.0);
+            if pair.is_none() && age < LONGEST_WAIT {
+                break;
             }
-            let Some(pose) = to.1.pose_at(age) else { break };
-            let pair = pose.view().map(|view| pair(moment, &view));
             self.waiting.pop_front();
             match pair.map(|pair| self.map.learn(pair)) {
                 Some(Learned::Taken) => self.changed = true,
@@ -65,56 +67,55 @@ impl Link {
     }
 
     /// Keeps who is seen by both, if there is no doubt who that is.
-    fn notice(&mut self, from: &Seen, to: &Seen, video: Duration) {
-        let apart = if from.0 > to.0 { from.0 - to.0 } else { to.0 - from.0 };
-        if apart > SAME_MOMENT || self.last.is_some_and(|last| to.0 < last + EVERY) {
+    fn notice(&mut self, from: &View, to: &View) {
+        let (came, other) = (to.seen.0, from.seen.0);
+        let apart = if came > other { came - other } else { other - came };
+        if apart > SAME_MOMENT || self.last.is_some_and(|last| came < last + EVERY) {
             return;
         }
-        let whole: Vec<&Person> = from.1.people.iter().filter(|person| person.is_whole()).collect();
+        let whole: Vec<&Person> = from.people().iter().filter(|person| person.is_whole()).collect();
         // Several may be told apart by what is known already; here they are left alone.
-        let ([seen], Some(person)) = (whole.as_slice(), to.1.target()) else { return };
-        let Some(at) = to.0.checked_sub(video) else { return };
-        self.last = Some(to.0);
-        self.waiting.push_back(Moment { at, place: place(&from.1, seen), person: person.clone() });
+        let ([seen], Some(person)) = (whole.as_slice(), to.seen.1.target()) else { return };
+        self.last = Some(came);
+        self.waiting.push_back(Moment { from: (other, (*seen).clone()), to: (came, person.clone()) });
     }
 
-    /// The camera that is called looks at this place, as somebody says. Returns whether that can be so.
-    pub fn point(&mut self, x: f64, y: f64, pose: &Pose) -> bool {
-        let direction = Direction { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg };
-        let pair = Pair { place: Place::in_picture(x, y), direction, height_deg: None, person: 0 };
+    /// Takes a place that both see, as somebody says. Returns whether it can be the same.
+    pub fn point(&mut self, place: Place, direction: Direction) -> bool {
+        let pair = Pair { place, direction, height_deg: None, person: 0 };
         let learned = self.map.learn(pair) == Learned::Taken;
         self.changed |= learned;
         learned
     }
 
-    /// Where to look for somebody whom the camera that calls sees there.
-    pub fn aim(&self, sight: &Sight, person: &Person, lead: Duration) -> Option<Aim> {
-        let ahead = lead.as_secs_f64();
-        let [x, y, width, height] = person.bounds;
-        let [right, down] = person.velocity;
-        let bounds = [x + right * ahead, y + down * ahead, width, height];
-        self.map.aim(place(sight, &Person { bounds, ..person.clone() }))
+    /// Where to look for somebody whom the camera that calls sees, so many seconds after its last picture.
+    pub fn aim(&self, from: &View, person: &Person, ahead_s: f64) -> Option<Aim> {
+        self.map.aim(from.place(person, ahead_s)?)
+    }
+
+    /// Somebody as the camera that is called has to see them in its last picture.
+    pub fn expect(&self, from: &View, person: &Person, to: &View) -> Option<Expected> {
+        let (came, other) = (to.seen.0, from.seen.0);
+        let since_s = if came > other { (came - other).as_secs_f64() } else { -(other - came).as_secs_f64() };
+        let [now, then] = [since_s, since_s + STEP_S].map(|ahead_s| self.aim(from, person, ahead_s));
+        let (now, then) = (now?, then?);
+        let motion = Motion::between(now.feet, then.feet, STEP_S);
+        Some(Expected { motion, doubt_deg: now.doubt_deg })
     }
 }
 
-/// Somebody's feet as a camera sees them: in its picture, or where it turns, in a direction.
-fn place(_sight: &Sight, person: &Person) -> Place {
-    let feet = person.feet();
-    Place::in_picture(feet.x, feet.y)
-}
-
-fn pair(moment: &Moment, view: &ptztrack_contract::View) -> Pair {
-    let [feet, head] = [moment.person.feet(), moment.person.head()].map(|point| direction(view, point));
-    Pair {
-        place: moment.place,
-        direction: feet,
-        height_deg: Some(head.tilt_deg - feet.tilt_deg).filter(|height| *height > 0.0),
-        person: moment.person.id,
+impl Moment {
+    /// `None` where it is not known yet where the cameras looked.
+    fn pair(&self, from: &View, to: &View) -> Option<Pair> {
+        let (came, person) = &self.to;
+        let view = to.pose_when(*came)?.view()?;
+        let at = |point: Point| direction(&view, point);
+        let (feet, head) = (at(person.feet()), at(person.head()));
+        Some(Pair {
+            place: from.place_when(&self.from.1, self.from.0)?,
+            direction: feet,
+            height_deg: Some(head.tilt_deg - feet.tilt_deg).filter(|height| *height > 0.0),
+            person: person.id,
+        })
     }
-}
-
-/// In which direction a camera sees a point.
-pub fn direction(view: &ptztrack_contract::View, point: ptztrack_contract::Point) -> Direction {
-    let (pan_deg, tilt_deg) = view.angles_of(point);
-    Direction { pan_deg, tilt_deg }
 }

@@ -4,23 +4,27 @@
 //! camera follows whom it sees itself.
 
 mod call;
+mod calling;
 mod link;
 mod maps;
+mod motion;
+mod points;
+mod view;
 mod walkers;
 
 use std::collections::BTreeMap;
-use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use call::{Call, Progress};
-use link::{Link, Seen};
+use call::Call;
+use link::Link;
 use maps::Maps;
 use ptztrack_contract::lock::lock;
+use view::View;
 use walkers::Walkers;
 
-use crate::camera::{Known, Person, Steering};
+use crate::camera::Known;
 use crate::config::{Config, HandOver};
 use crate::event::{Event, Level};
 use crate::fleet::Fleet;
@@ -30,10 +34,6 @@ use crate::log::Log;
 const EVERY: Duration = Duration::from_millis(50);
 /// Between two times at which what was learned is kept.
 const KEEP_EVERY: Duration = Duration::from_secs(10);
-/// Somebody who was called for in vain, or is lost again, is called for again after this.
-const CALL_AGAIN: Duration = Duration::from_secs(5);
-/// What was seen longer ago says nothing of where somebody is.
-const FRESH: Duration = Duration::from_millis(500);
 
 /// The thread that hands over.
 #[derive(Debug)]
@@ -67,18 +67,6 @@ impl HandingOver {
         // One that panicked has said so.
         let _ = self.thread.join();
     }
-}
-
-/// One camera as this thread sees it in one moment.
-struct View {
-    known: Arc<Known>,
-    seen: Arc<Seen>,
-    /// How late its pictures are.
-    video: Duration,
-    /// Horizontal, zoomed out, as far as that was seen.
-    widest_fov_deg: Option<f64>,
-    /// How tall whom it follows is to be, where it zooms.
-    target_height: Option<f64>,
 }
 
 /// Sees who is where, and calls.
@@ -141,7 +129,8 @@ impl Dispatcher {
             known.into_iter().map(|known| (known.name.clone(), self.view(known))).collect();
         for wish in wishes {
             let Some(from) = views.get(&wish.from) else { continue };
-            self.walkers.entry(wish.from.clone()).or_default().see(&from.seen);
+            lock(&from.known.calls).clone_from(&wish.calls);
+            self.walkers.entry(wish.from.clone()).or_default().see(from);
             for called in &wish.calls {
                 if let Some(to) = views.get(called) {
                     self.learn((&wish.from, from), (called, to));
@@ -167,6 +156,7 @@ impl Dispatcher {
             video: known.video_delay(),
             widest_fov_deg: self.widest.get(&known.name).copied(),
             target_height: self.fleet.target_height(&known.name),
+            turns: self.fleet.turns(&known.name),
             known,
             seen,
         }
@@ -183,7 +173,7 @@ impl Dispatcher {
         if !called.follows() {
             return;
         }
-        if self.link(from, to).see(&caller.seen, &called.seen, called.video) {
+        if self.link(from, to).see(caller, called) {
             let detail = format!(
                 "{from} or {to} was moved: where {to} has to look for whom {from} sees is learned anew"
             );
@@ -191,141 +181,7 @@ impl Dispatcher {
         }
     }
 
-    /// What somebody says.
-    fn take_points(&mut self, wishes: &[HandOver], views: &BTreeMap<String, View>) {
-        for (to, called) in views {
-            for (from, x, y) in std::mem::take(&mut *lock(&called.known.points)) {
-                if !wishes.iter().any(|wish| wish.from == from && wish.calls.contains(to)) {
-                    let detail = format!("{from} does not call it: [handover.{from}] says who calls whom");
-                    self.tell(to, Level::Warning, "pointed", detail);
-                    continue;
-                }
-                let learned =
-                    called.seen.1.pose_at(called.video).map(|pose| self.link(&from, to).point(x, y, &pose));
-                let place = format!("{x:.2},{y:.2} of {from}");
-                let detail = match learned {
-                    Some(true) => format!("looks at {place}, as somebody says"),
-                    Some(false) => format!("does not look at {place}, by all that is known"),
-                    None => format!(
-                        "cannot be told that it looks at {place}: it turns, or does not say where it looks"
-                    ),
-                };
-                self.tell(to, Level::Info, "pointed", detail);
-            }
-        }
-    }
-
-    /// Sees to those that are on their way.
-    fn advance(&mut self, views: &BTreeMap<String, View>) {
-        for (to, mut call) in std::mem::take(&mut self.calls) {
-            let (Some(from), Some(called)) = (views.get(&call.from), views.get(&to)) else { continue };
-            let link = self.links.get(&(call.from.clone(), to.clone()));
-            let progress = link.map_or(Progress::Failed, |link| call.advance(link, &from.seen, called));
-            let whom = format!("target {} of {}", call.id, call.from);
-            match progress {
-                Progress::Going => {
-                    self.calls.insert(to, call);
-                    continue;
-                }
-                Progress::TakenUp(id) => {
-                    self.tell(&to, Level::Info, "taken-up", format!("target {id} is {whom}"));
-                }
-                Progress::Overruled => {}
-                Progress::Failed => {
-                    self.tell(&to, Level::Info, "not-found", format!("{whom} was not found"));
-                }
-            }
-            self.spared.insert((call.from, call.id), Instant::now() + CALL_AGAIN);
-        }
-    }
-
-    /// Calls for those whom this camera sees and nobody follows.
-    fn call(&mut self, wish: &HandOver, wishes: &[HandOver], views: &BTreeMap<String, View>) {
-        let Some(from) = views.get(&wish.from).filter(|view| view.seen.0.elapsed() < FRESH) else { return };
-        let Some(walkers) = self.walkers.get(&wish.from) else { return };
-        let in_zone = |person: &Person| {
-            let feet = person.feet();
-            wish.zones.is_empty() || wish.zones.iter().any(|zone| zone.contains(feet.x, feet.y))
-        };
-        let walking: Vec<Person> =
-            walkers.walking(&from.seen.1).filter(|person| in_zone(person)).cloned().collect();
-        for person in walking {
-            let is_spared = self.spared.contains_key(&(wish.from.clone(), person.id));
-            if is_spared || self.is_attended(wish, from, &person, views) {
-                continue;
-            }
-            let new_call = |to: &String| {
-                let called = views.get(to)?;
-                let occupied = self.precedence(to, called, wishes);
-                let is_free = called.follows() || self.calls.contains_key(to);
-                let call = || self.new_call(wish, to, (from, &person), called);
-                if is_free && occupied.is_none_or(|occupied| occupied < wish.precedence) {
-                    call()
-                } else {
-                    None
-                }
-            };
-            let free = wish.calls.iter().find_map(new_call);
-            if let Some((to, call)) = free {
-                let detail = format!("turns to target {} of {}", person.id, wish.from);
-                self.tell(&to, Level::Info, "called", detail);
-                self.calls.insert(to, call);
-            }
-        }
-    }
-
-    /// Whether a camera follows this person, or is on its way.
-    fn is_attended(
-        &self,
-        wish: &HandOver,
-        from: &View,
-        person: &Person,
-        views: &BTreeMap<String, View>,
-    ) -> bool {
-        let on_the_way = |call: &Call| call.from == wish.from && call.id == person.id;
-        self.calls.values().any(on_the_way)
-            || wish.calls.iter().any(|to| {
-                let link = self.links.get(&(wish.from.clone(), to.clone()));
-                let followed = |(link, view): (&Link, &View)| call::follows(link, &from.seen, person, view);
-                link.zip(views.get(to)).is_some_and(followed)
-            })
-    }
-
-    /// A call of this camera for this person, if it is known where they are.
-    fn new_call(
-        &self,
-        wish: &HandOver,
-        to: &str,
-        (from, person): (&View, &Person),
-        called: &View,
-    ) -> Option<(String, Call)> {
-        let link = self.links.get(&(wish.from.clone(), to.to_owned()))?;
-        let call = Call::new(wish, person.id);
-        call.gaze(link, &from.seen, called)?;
-        Some((to.to_owned(), call))
-    }
-
-    /// That of whom a camera follows or turns to; `None` where it does neither.
-    fn precedence(&self, to: &str, called: &View, wishes: &[HandOver]) -> Option<u32> {
-        if let Some(call) = self.calls.get(to) {
-            return Some(call.precedence);
-        }
-        let target = lock(&called.known.state).target_id?;
-        let origin = lock(&called.known.origin).clone().filter(|origin| origin.target == target);
-        let from = origin.and_then(|origin| wishes.iter().find(|wish| wish.from == origin.camera));
-        Some(from.map_or(0, |wish| wish.precedence))
-    }
-
     fn tell(&self, camera: &str, level: Level, event: &str, detail: String) {
         self.log.tell(&Event::new(level, Some(camera), event, detail));
-    }
-}
-
-impl View {
-    /// It is ours, it has a picture, and nothing else is wanted of it.
-    fn follows(&self) -> bool {
-        *lock(&self.known.steering) == Steering::Follow
-            && !self.known.operator.load(Ordering::Relaxed)
-            && lock(&self.known.state).picture
     }
 }

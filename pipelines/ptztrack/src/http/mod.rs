@@ -40,6 +40,7 @@ use crate::camera::{Known, Look, Steering, Turn};
 use crate::config::Http;
 use crate::fleet::Fleet;
 use crate::log::Log;
+use ptztrack_contract::Point;
 use ptztrack_contract::lock::lock;
 
 /// Who asks for a picture waits for it this long.
@@ -198,6 +199,7 @@ fn describe(known: &Known) -> serde_json::Value {
         "words": known.in_words(),
         "well": state.picture && !state.given_up,
         "target": state.target_id,
+        "calls": *lock(&known.calls),
         "handed_over": *lock(&known.steering) == Steering::HandedOver,
         "can_go_home": abilities.home,
         "can_hand_over": abilities.hand_over,
@@ -243,10 +245,23 @@ fn part(jpeg: &Bytes) -> Bytes {
 struct Place {
     x: Option<f64>,
     y: Option<f64>,
-    /// In the picture of another camera.
+    /// In the picture of another camera ...
     from: Option<String>,
+    /// ... and in that of this one; else in the middle of it.
+    here_x: Option<f64>,
+    here_y: Option<f64>,
     /// Nearer, or further away: -1 to 1.
     zoom: Option<f64>,
+}
+
+/// A place in the pictures of two cameras, and whether that can be.
+async fn point(known: &Known, from: String, there: Point, here: Point) -> Response {
+    match tokio::time::timeout(LONGEST_WAIT, known.point(from, there, here)).await {
+        Ok(Ok(Ok(said))) => format!("{said}\n").into_response(),
+        Ok(Ok(Err(reason))) => (StatusCode::CONFLICT, format!("{reason}\n")).into_response(),
+        _ => (StatusCode::CONFLICT, "no camera calls another: [handover] in the file says who does\n")
+            .into_response(),
+    }
 }
 
 /// What somebody wants of a camera.
@@ -261,10 +276,11 @@ async fn order(
         ("select", Some(x), Some(y)) => known.select(x, y),
         ("select", ..) => return (StatusCode::BAD_REQUEST, "x and y are from 0 to 1\n").into_response(),
         ("point", Some(x), Some(y)) => {
+            let here = [place.here_x, place.here_y].map(|at| within(at).unwrap_or(0.5));
             let Some(from) = place.from.filter(|from| fleet.of(from).is_some()) else {
                 return StatusCode::NOT_FOUND.into_response();
             };
-            known.point(from, x, y);
+            return point(&known, from, Point { x, y }, Point { x: here[0], y: here[1] }).await;
         }
         ("point", ..) => return (StatusCode::BAD_REQUEST, "x and y are from 0 to 1\n").into_response(),
         ("turn", ..) => match [place.x, place.y, place.zoom].map(Option::unwrap_or_default) {
