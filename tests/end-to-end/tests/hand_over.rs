@@ -157,3 +157,38 @@ fn a_place_is_clicked_in_both_pictures() {
     program.launch.wait_for_line("as somebody says");
     program.end("TERM");
 }
+
+/// Two that turn look out of the same place at the same person; how the one's directions are the other one's is known.
+#[test]
+fn of_two_cameras_that_turn_one_follows_somebody_unless_both_are_to() {
+    let mut map = Map::default();
+    for n in 0..40 {
+        let direction =
+            Direction { pan_deg: f64::from(n % 8) * 6.0 - 20.0, tilt_deg: f64::from(n / 8) * 3.0 - 14.0 };
+        map.learn(Pair { place: Place::towards(direction), direction, height_deg: Some(9.0), person: 1 });
+    }
+    for together in [false, true] {
+        let (gate, door) = (somebody_aside(looking(10.0)), somebody_aside(looking(14.0)));
+        let state = end_to_end::scratch(&format!("hand-over-two-{together}"));
+        fs::create_dir_all(&state).unwrap();
+        fs::write(state.join("map.gate.door.json"), map.to_json()).unwrap();
+        let file = |folder: &Path| {
+            let password = folder.join("password");
+            let gate = Program::entry("gate", &gate.url(), &password);
+            let door = Program::entry("door", &door.url(), &password);
+            format!("{gate}{door}[handover.gate]\ncalls = [\"door\"]\ntogether = {together}\n")
+        };
+        let environment = [("STATE_DIRECTORY", state.as_path())];
+        let mut program = Program::start_in(&format!("two-{together}"), file, &[], &environment);
+        let both = |cameras: &str| !cameras.contains("\"target\":null");
+        if together {
+            program.wait_for("/cameras", both);
+        } else {
+            program.launch.wait_for_line("to another camera that follows them");
+            program.wait_for("/cameras", |cameras| !both(cameras));
+        }
+        let output = program.end("TERM");
+        assert_eq!(output.contains("to another camera"), !together, "{output}");
+        fs::remove_dir_all(&state).unwrap();
+    }
+}

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
@@ -53,6 +54,8 @@ pub struct Known {
     pub sight: watch::Sender<Arc<(Instant, Sight)>>,
     /// What somebody has said that it sees, which nobody has taken notice of yet.
     pub points: Mutex<Vec<Pointed>>,
+    /// Tracks that it does not follow by itself, as another camera follows them.
+    pub ignored: Mutex<BTreeSet<u64>>,
     /// Whom it calls, where people are handed over.
     pub calls: Mutex<Vec<String>>,
     /// Whom another camera saw before this one took them up.
@@ -168,6 +171,7 @@ impl Known {
             looking: AtomicUsize::default(),
             sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
             points: Mutex::default(),
+            ignored: Mutex::default(),
             calls: Mutex::default(),
             origin: Mutex::default(),
             view: watch::Sender::new(Shown::default()),
@@ -218,6 +222,8 @@ impl Known {
     /// Another pipeline begins, the one before having stopped.
     pub fn begins(&self) {
         self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
+        // Its tracks have other numbers.
+        lock(&self.ignored).clear();
         self.reset_silence();
     }
 

@@ -20,6 +20,7 @@ mod video;
 mod view;
 
 use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::io;
 use std::rc::Rc;
 use std::sync::atomic::Ordering;
@@ -289,6 +290,14 @@ impl Known {
     /// Follows whom the tracker knows by this number.
     pub fn select_track(&self, id: u64) {
         self.with(|running| running.select_track(id));
+    }
+
+    /// Does not follow whom the tracker knows by these numbers, and all others again, until they are selected.
+    pub fn ignore(&self, ids: BTreeSet<u64>) {
+        if *lock(&self.ignored) != ids {
+            self.with(|running| running.ignore(&ids));
+            *lock(&self.ignored) = ids;
+        }
     }
 
     /// Follows who is at this place of the picture, 0 to 1.

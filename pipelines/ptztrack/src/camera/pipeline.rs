@@ -2,6 +2,7 @@
 
 //! One camera's pipeline, as text and as elements.
 
+use std::collections::BTreeSet;
 use std::error::Error;
 use std::fmt::Write;
 use std::sync::atomic::Ordering;
@@ -312,6 +313,13 @@ impl Running for Elements {
     fn select_track(&self, id: u64) {
         if let Some(tracker) = &self.tracker {
             tracker.emit_by_name::<()>("select-track", &[&id]);
+        }
+    }
+
+    fn ignore(&self, ids: &BTreeSet<u64>) {
+        if let Some(tracker) = &self.tracker {
+            let ids: Vec<String> = ids.iter().map(u64::to_string).collect();
+            tracker.set_property("ignored-tracks", ids.join(","));
         }
     }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::collections::BTreeSet;
 use std::fmt::Debug;
 
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,8 @@ pub trait Running: Debug + Send + Sync {
 
     /// Follows whom the tracker knows by this number.
     fn select_track(&self, id: u64);
+    /// These are followed by nobody's choice but somebody's at the page.
+    fn ignore(&self, ids: &BTreeSet<u64>);
 
     fn release(&self);
 

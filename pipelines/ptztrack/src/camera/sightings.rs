@@ -192,6 +192,8 @@ fn convert(
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use ptztrack_contract::Point;
     use ptztrack_contract::lock::lock;
 
@@ -246,6 +248,7 @@ mod tests {
         fn look(&self, _: bool) {}
         fn select(&self, _: f64, _: f64) {}
         fn select_track(&self, _: u64) {}
+        fn ignore(&self, _: &BTreeSet<u64>) {}
         fn release(&self) {}
         fn steer(&self, _: Steering) {}
         fn turn(&self, _: &Known, _: Turn) {}

@@ -19,6 +19,8 @@ pub struct HandOver {
     pub zones: Vec<Zone>,
     /// A camera that follows somebody is called only for somebody of a higher one; whom it found by itself is of 0.
     pub precedence: u32,
+    /// The cameras that are called may follow whom this one follows.
+    pub together: bool,
 }
 
 /// A polygon, 0 to 1 from the left and from the top.
@@ -70,13 +72,10 @@ impl HandOver {
 
     fn read(from: String, mut table: Table, cameras: &[CameraSettings]) -> Option<Self> {
         let of = |name: &str| cameras.iter().find(|camera| camera.name == name);
-        match of(&from) {
-            None => table.wrong(format!("handover: there is no camera `{from}`")),
-            Some(camera) if camera.kind != Kind::Fixed => {
-                table.wrong(format!("handover: `{from}` turns; only one of `kind = \"fixed\"` calls others"));
-            }
-            Some(_) => {}
+        if of(&from).is_none() {
+            table.wrong(format!("handover: there is no camera `{from}`"));
         }
+        let turns = of(&from).is_some_and(|camera| camera.kind != Kind::Fixed);
         let calls: Option<Vec<String>> = table.need("calls");
         let mut seen = BTreeSet::new();
         for called in calls.iter().flatten() {
@@ -85,18 +84,25 @@ impl HandOver {
                 Some(camera) if camera.kind == Kind::Fixed => {
                     table.wrong(format!("handover: `{called}` is fixed, so it cannot be called"));
                 }
+                Some(_) if *called == from => {
+                    table.wrong(format!("handover: `{from}` cannot call itself"));
+                }
                 Some(_) if !seen.insert(called) => {
                     table.wrong(format!("handover: `{from}` cannot call `{called}` twice"));
                 }
                 Some(_) => {}
             }
         }
-        let zones = table.get("zones").unwrap_or_default();
+        let zones: Vec<Zone> = table.get("zones").unwrap_or_default();
+        if turns && !zones.is_empty() {
+            table.wrong(format!("handover: `{from}` turns, so no zone stays where it is in its picture"));
+        }
+        let together = table.get("together").unwrap_or(false);
         let precedence = table.get_with("precedence", "a whole number from 0 to 100", |value| {
             whole(value).and_then(|number| u32::try_from(number).ok()).filter(|number| *number <= 100)
         });
         table.no_more();
-        Some(Self { from, calls: calls?, zones, precedence: precedence.unwrap_or(0) })
+        Some(Self { from, calls: calls?, zones, precedence: precedence.unwrap_or(0), together })
     }
 }
 

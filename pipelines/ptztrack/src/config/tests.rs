@@ -266,10 +266,12 @@ fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
         ("[handover.gate]\ncalls = [\"door\"]", "line 8: handover: there is no camera `gate`"),
         ("[handover.yard]\ncalls = [\"gate\"]", "line 8: handover: there is no camera `gate`"),
         ("[handover.yard]\ncalls = [\"yard\"]", "line 8: handover: `yard` is fixed, so it cannot be called"),
+        ("[handover.door]\ncalls = [\"door\"]", "line 8: handover: `door` cannot call itself"),
         (
-            "[handover.door]\ncalls = [\"hall\"]",
-            "line 8: handover: `door` turns; only one of `kind = \"fixed\"`",
+            "[handover.door]\ncalls = [\"hall\"]\nzones = [\"0,0 1,0 1,1\"]",
+            "line 8: handover: `door` turns, so no zone",
         ),
+        ("[handover.yard]\ncalls = [\"door\"]\ntogether = 1", "line 10: `together` must be true or false"),
         (
             "[handover.yard]\ncalls = [\"door\", \"door\"]",
             "line 8: handover: `yard` cannot call `door` twice",

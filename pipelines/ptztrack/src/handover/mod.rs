@@ -9,6 +9,7 @@ mod link;
 mod maps;
 mod motion;
 mod points;
+mod sharing;
 mod view;
 mod walkers;
 
@@ -21,6 +22,7 @@ use call::Call;
 use link::Link;
 use maps::Maps;
 use ptztrack_contract::lock::lock;
+use sharing::Sharing;
 use view::View;
 use walkers::Walkers;
 
@@ -79,6 +81,7 @@ struct Dispatcher {
     walkers: BTreeMap<String, Walkers>,
     /// By who is called.
     calls: BTreeMap<String, Call>,
+    sharing: Sharing,
     /// The widest field of view of each.
     widest: BTreeMap<String, f64>,
     /// Who was called for, by the camera that sees them, and until when they are not again.
@@ -94,6 +97,7 @@ impl Dispatcher {
             links: BTreeMap::new(),
             walkers: BTreeMap::new(),
             calls: BTreeMap::new(),
+            sharing: Sharing::default(),
             widest: BTreeMap::new(),
             spared: BTreeMap::new(),
         }
@@ -138,6 +142,7 @@ impl Dispatcher {
             }
         }
         self.take_points(wishes, &views);
+        self.share(wishes, &views);
         self.advance(&views);
         let now = Instant::now();
         self.spared.retain(|_, until| *until > now);
@@ -178,6 +183,35 @@ impl Dispatcher {
                 "{from} or {to} was moved: where {to} has to look for whom {from} sees is learned anew"
             );
             self.tell(to, Level::Warning, "map-void", detail);
+        }
+    }
+
+    /// Has no two cameras that turn follow the same person, unless they are to.
+    fn share(&mut self, wishes: &[HandOver], views: &BTreeMap<String, View>) {
+        self.sharing.pass(views);
+        let mut leaving = Vec::new();
+        for wish in wishes.iter().filter(|wish| !wish.together) {
+            for called in &wish.calls {
+                let both = views.get(&wish.from).zip(views.get(called)).filter(|(from, _)| from.turns);
+                let link = self.links.get(&(wish.from.clone(), called.clone()));
+                let leaves =
+                    link.zip(both).and_then(|(link, both)| self.sharing.see(link, both, Instant::now()));
+                leaving.extend(leaves);
+            }
+        }
+        for (name, view) in views {
+            view.known.ignore(self.sharing.left_by(name));
+        }
+        for (camera, id) in leaving {
+            if let Some(view) = views.get(&camera) {
+                view.known.release();
+            }
+            self.tell(
+                &camera,
+                Level::Info,
+                "left",
+                format!("leaves target {id} to another camera that follows them"),
+            );
         }
     }
 

@@ -64,6 +64,7 @@ pub async fn run() -> io::Result<()> {
                 match order {
                     Order::Select { x, y } => known.select(x, y),
                     Order::SelectTrack(id) => known.select_track(id),
+                    Order::Ignore(ids) => known.ignore(ids),
                     Order::Release => known.release(),
                     Order::Steer(hand) => known.steer(hand.into()),
                     Order::Turn(turn) => known.turn(turn),

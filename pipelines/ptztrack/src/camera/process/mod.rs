@@ -12,6 +12,7 @@ pub mod bytes;
 pub mod child;
 mod protocol;
 
+use std::collections::BTreeSet;
 use std::io::{self, BufRead, BufReader, Read, Write};
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
@@ -252,6 +253,10 @@ impl Running for Remote {
 
     fn select_track(&self, id: u64) {
         self.order(&Order::SelectTrack(id));
+    }
+
+    fn ignore(&self, ids: &BTreeSet<u64>) {
+        self.order(&Order::Ignore(ids.clone()));
     }
 
     fn release(&self) {

@@ -2,6 +2,7 @@
 
 //! What a camera's process and the one that started it tell each other: one object of JSON on a line. Both are the same program.
 
+use std::collections::BTreeSet;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -35,6 +36,7 @@ pub enum Order {
         y: f64,
     },
     SelectTrack(u64),
+    Ignore(BTreeSet<u64>),
     Release,
     Steer(Hand),
     Turn(Turn),
