@@ -87,6 +87,8 @@ impl Map {
     const CONTRADICTS: f64 = 4.0;
     /// What is doubted by more than this contradicts nobody: three times what is in doubt about anybody's feet.
     const WELL_KNOWN_DEG: f64 = 3.0;
+    /// Whoever sees the feet of somebody sees those of others beside them: a step away, ten metres from the camera.
+    const NEAR_DEG: f64 = 3.0;
     /// The homography is made anew when there is this part more to go by.
     const MORE: f64 = 0.1;
 
@@ -150,6 +152,11 @@ impl Map {
         near.truncate(near.len() / 4 + 4);
         let misfit = robust::scale(near.into_iter().map(|(_, residual)| residual));
         Some((ray, doubt.hypot(misfit)))
+    }
+
+    /// Whether the camera that calls has seen somebody there, in that direction from the one that is called.
+    pub fn covers(&self, direction: Direction) -> bool {
+        self.pairs.iter().any(|pair| pair.direction.angle_to_deg(direction) < Self::NEAR_DEG)
     }
 
     /// How many pairs it goes by.

@@ -136,7 +136,7 @@ impl Call {
 
     /// Whether nobody has been followed for a while where they have to be.
     fn is_astray(&mut self, expected: &Expected, called: &View) -> bool {
-        let target = called.motions().find(|(person, _)| person.is_target);
+        let target = called.target();
         // Whose feet are not seen may be anywhere.
         let is_there =
             target.is_some_and(|(person, motion)| !person.is_whole() || expected.is_place_of(&motion));
@@ -144,7 +144,8 @@ impl Call {
             self.astray = None;
             return false;
         }
-        self.astray.get_or_insert_with(Instant::now).elapsed() > ASTRAY
+        let came = called.seen.0;
+        came.saturating_duration_since(*self.astray.get_or_insert(came)) > ASTRAY
     }
 
     fn look_again(&mut self) -> Progress {
@@ -223,4 +224,146 @@ fn fills(aim: &Aim, height: f64, called: &View) -> Option<f64> {
 
 fn of(gaze: &Gaze) -> Direction {
     Direction { pan_deg: gaze.pan_deg, tilt_deg: gaze.tilt_deg }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use handover::{Map, Pair, Place};
+    use ptztrack_contract::Point;
+
+    use super::*;
+    use crate::camera::{Known, Pose, Sight};
+    use crate::handover::view::direction;
+
+    const PICTURE: Duration = Duration::from_millis(80);
+    /// Where somebody walks, and how fast, to the right.
+    const FEET: [f64; 2] = [0.4, 0.7];
+    const RATE: f64 = 0.2;
+
+    fn pose() -> Pose {
+        let age = Duration::ZERO;
+        Pose { age, pan_deg: 0.0, tilt_deg: -10.0, horizontal_fov_deg: 60.0, vertical_fov_deg: 46.0 }
+    }
+
+    /// Both look out of the same place, the one that turns to where the other one looks.
+    fn link() -> Link {
+        let view = pose().view().unwrap();
+        let mut map = Map::default();
+        for n in 0..100 {
+            let (x, y) = (f64::from(n % 10) / 10.0, 0.5 + f64::from(n / 10) / 20.0);
+            let direction = direction(&view, Point { x, y });
+            map.learn(Pair { place: Place::in_picture(x, y), direction, height_deg: Some(15.0), person: 1 });
+        }
+        Link::new(map)
+    }
+
+    fn person(id: u64, [x, y]: [f64; 2], rate: f64) -> Person {
+        let bounds = [x - 0.04, y - 0.3, 0.08, 0.3];
+        Person { id, bounds, velocity: [rate, 0.0], seen: true, confidence: 1.0, is_target: false }
+    }
+
+    fn view(name: &str, turns: bool, came: Instant, people: Vec<Person>) -> View {
+        let poses = if turns { vec![pose()] } else { Vec::new() };
+        let known = Arc::new(Known::new(name));
+        lock(&known.state).picture = true;
+        View {
+            known,
+            seen: Arc::new((came, Sight { people, poses, ..Sight::default() })),
+            turns,
+            video: Duration::ZERO,
+            widest_fov_deg: Some(60.0),
+            target_height: None,
+        }
+    }
+
+    /// A call of `yard` for target 3, and what `door` sees from picture to picture.
+    struct Bench {
+        call: Call,
+        link: Link,
+        door: Arc<Known>,
+        came: Instant,
+    }
+
+    impl Bench {
+        fn new() -> Self {
+            let wish = HandOver {
+                from: "yard".to_owned(),
+                calls: vec!["door".to_owned()],
+                zones: Vec::new(),
+                precedence: 0,
+                together: false,
+            };
+            let call = Call::new(&wish, 3);
+            Self {
+                call,
+                link: link(),
+                door: view("door", true, Instant::now(), Vec::new()).known,
+                came: Instant::now(),
+            }
+        }
+
+        fn see(&mut self, people: &[Person]) -> Progress {
+            self.came += PICTURE;
+            let yard = view("yard", false, self.came, vec![person(3, FEET, RATE)]);
+            let door = View { known: self.door.clone(), ..view("door", true, self.came, people.to_vec()) };
+            self.call.advance(&self.link, &yard, &door)
+        }
+
+        fn take_up(&mut self) {
+            (0..2).for_each(|_| assert_eq!(self.see(&[person(7, FEET, RATE)]), Progress::Going));
+            assert_eq!(self.see(&[person(7, FEET, RATE)]), Progress::TakenUp(7));
+        }
+    }
+
+    fn target(person: Person) -> Person {
+        Person { is_target: true, ..person }
+    }
+
+    #[test]
+    fn who_walks_as_they_do_is_taken_up_and_what_stays_where_they_pass_is_not() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.see(&[]), Progress::Going);
+        assert!(matches!(*lock(&bench.door.steering), Steering::LookAt(..)));
+        let ghost = person(6, FEET, 0.0);
+        let walker = person(7, [FEET[0] + 0.01, FEET[1]], RATE);
+        assert_eq!(bench.see(&[ghost.clone(), walker.clone()]), Progress::Going);
+        assert_eq!(bench.see(&[ghost.clone(), walker.clone()]), Progress::Going);
+        assert_eq!(bench.see(&[ghost, walker]), Progress::TakenUp(7));
+        assert_eq!(*lock(&bench.door.steering), Steering::Follow);
+        let origin = Origin { target: 7, id: 3, camera: "yard".to_owned() };
+        assert_eq!(*lock(&bench.door.origin), Some(origin));
+    }
+
+    #[test]
+    fn who_is_followed_elsewhere_is_somebody_else_and_they_are_looked_for_again() {
+        let mut bench = Bench::new();
+        bench.take_up();
+        let here = target(person(7, FEET, RATE));
+        (0..20).for_each(|_| assert_eq!(bench.see(std::slice::from_ref(&here)), Progress::Going));
+        let elsewhere = target(person(7, [0.9, 0.7], 0.0));
+        let ends = (0..20).find(|_| bench.see(std::slice::from_ref(&elsewhere)) == Progress::Again);
+        assert_eq!(ends, Some(13), "a second later");
+        assert_eq!(bench.see(&[elsewhere]), Progress::Going);
+        assert!(matches!(*lock(&bench.door.steering), Steering::LookAt(..)));
+    }
+
+    #[test]
+    fn a_new_number_of_theirs_is_taken_up_at_once() {
+        let mut bench = Bench::new();
+        bench.take_up();
+        let other = [target(person(7, [0.9, 0.7], 0.0)), person(8, FEET, RATE)];
+        assert_eq!(bench.see(&other), Progress::Going);
+        assert_eq!(bench.see(&other), Progress::Going);
+        assert_eq!(bench.see(&other), Progress::TakenUp(8));
+    }
+
+    #[test]
+    fn whom_somebody_chooses_by_hand_is_followed() {
+        let mut bench = Bench::new();
+        bench.take_up();
+        bench.door.select(0.5, 0.5);
+        assert_eq!(bench.see(&[target(person(7, FEET, RATE))]), Progress::Over);
+    }
 }

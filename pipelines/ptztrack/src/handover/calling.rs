@@ -18,6 +18,9 @@ use crate::event::Level;
 /// Somebody who was called for in vain, or is lost again, is called for again after this.
 const CALL_AGAIN: Duration = Duration::from_secs(5);
 
+/// A track behind which a fixed camera sees nobody for so long is nobody's.
+const NOBODY: Duration = Duration::from_secs(1);
+
 impl Dispatcher {
     /// Sees to those that are on their way.
     pub(super) fn advance(&mut self, views: &BTreeMap<String, View>) {
@@ -90,6 +93,25 @@ impl Dispatcher {
         }
     }
 
+    /// Sees which cameras follow a track that nobody is behind.
+    pub(super) fn look_for_nobody(
+        &mut self,
+        wishes: &[HandOver],
+        views: &BTreeMap<String, View>,
+        now: Instant,
+    ) {
+        let is_nobody = |(name, to): &(&String, &View)| {
+            let calls = wishes.iter().filter(|wish| wish.calls.contains(name));
+            calls.into_iter().any(|wish| {
+                let link = self.links.get(&(wish.from.clone(), (*name).clone()));
+                let from = views.get(&wish.from).filter(|from| !from.turns);
+                link.zip(from).is_some_and(|(link, from)| link.is_nobody(from, to))
+            })
+        };
+        let before = |name: &String| self.nobody.get(name).copied().unwrap_or(now);
+        self.nobody = views.iter().filter(is_nobody).map(|(name, _)| (name.clone(), before(name))).collect();
+    }
+
     /// Whether a camera follows this person, or is on its way.
     fn is_attended(
         &self,
@@ -128,6 +150,9 @@ impl Dispatcher {
             return Some(call.precedence);
         }
         let target = lock(&called.known.state).target_id?;
+        if self.nobody.get(to).is_some_and(|since| since.elapsed() > NOBODY) {
+            return None;
+        }
         let origin = lock(&called.known.origin).clone().filter(|origin| origin.target == target);
         let from = origin.and_then(|origin| wishes.iter().find(|wish| wish.from == origin.camera));
         Some(from.map_or(0, |wish| wish.precedence))

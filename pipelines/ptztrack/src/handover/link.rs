@@ -88,6 +88,15 @@ impl Link {
         learned
     }
 
+    /// Whether the camera that is called follows nobody: where the other one would see them, it sees nobody.
+    pub fn is_nobody(&self, from: &View, to: &View) -> bool {
+        let Some((_, motion)) = to.target().filter(|(person, _)| person.is_whole()) else { return false };
+        let is_there = |person: &Person| {
+            self.expect(from, person, to).is_none_or(|expected| expected.is_place_of(&motion))
+        };
+        from.is_fresh() && self.map.covers(motion.feet) && !from.people().iter().any(is_there)
+    }
+
     /// Where to look for somebody whom the camera that calls sees, so many seconds after its last picture.
     pub fn aim(&self, from: &View, person: &Person, ahead_s: f64) -> Option<Aim> {
         self.map.aim(from.place(person, ahead_s)?)

@@ -84,6 +84,8 @@ struct Dispatcher {
     sharing: Sharing,
     /// The widest field of view of each.
     widest: BTreeMap<String, f64>,
+    /// Cameras that follow nobody, by what a fixed one sees there, since then.
+    nobody: BTreeMap<String, Instant>,
     /// Who was called for, by the camera that sees them, and until when they are not again.
     spared: BTreeMap<(String, u64), Instant>,
 }
@@ -99,6 +101,7 @@ impl Dispatcher {
             calls: BTreeMap::new(),
             sharing: Sharing::default(),
             widest: BTreeMap::new(),
+            nobody: BTreeMap::new(),
             spared: BTreeMap::new(),
         }
     }
@@ -146,6 +149,7 @@ impl Dispatcher {
         self.advance(&views);
         let now = Instant::now();
         self.spared.retain(|_, until| *until > now);
+        self.look_for_nobody(wishes, &views, now);
         for wish in wishes {
             self.call(wish, wishes, &views);
         }

@@ -106,6 +106,11 @@ impl View {
         }
     }
 
+    /// Whom it follows, and how they go.
+    pub fn target(&self) -> Option<(&Person, Motion)> {
+        self.motions().find(|(person, _)| person.is_target)
+    }
+
     /// Where the feet of those are whom it sees, by its last picture, and how fast they go.
     pub fn motions(&self) -> impl Iterator<Item = (&Person, Motion)> {
         let view = self.last();
