@@ -11,40 +11,65 @@ use super::Spot;
 
 /// Pixels of a row that are passed over together: most of an area is empty.
 pub(super) const TOGETHER: usize = 16;
-/// Rows have room for so many times that: then blocks of it are whole, reduced ones too.
-const ROOM: usize = 4 * TOGETHER;
+/// Rows have room for so many blocks times that: then blocks of reduced ones are whole, too.
+const ROOM: usize = 4;
 
-/// How much of each pixel of an area is covered: 0 to 255.
+/// How much of each of some pixels side by side is covered: 0 to 255.
+pub(super) type Block = [u8; TOGETHER];
+
+/// How much of each pixel of an area is covered. Only blocks that something may cover are ever looked at: the outline of a box covers
+/// few of those that lie within it.
 #[derive(Debug, Default)]
 pub(super) struct Coverage {
     area: Rect,
-    /// Pixels from a row to the next, ...
+    /// Blocks from a row to the next.
     stride: usize,
-    /// ... of which there are at least those of the area; nothing but what `spans` say is covered.
-    pixels: Vec<u8>,
-    /// The columns of each row that may be covered.
-    spans: Vec<Range<usize>>,
+    blocks: Vec<Block>,
+    is_touched: Vec<bool>,
+    /// Those that may cover something: the others are nought.
+    touched: Vec<Place>,
+}
+
+/// Which block of which row.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Place {
+    pub y: usize,
+    pub block: usize,
 }
 
 impl Coverage {
     /// Nothing of `area` is covered.
     pub fn clear(&mut self, area: Rect) {
-        for (row, span) in self.pixels.chunks_exact_mut(self.stride.max(1)).zip(&self.spans) {
-            row[span.clone()].fill(0);
+        for Place { y, block } in self.touched.drain(..) {
+            let index = y * self.stride + block;
+            (self.blocks[index], self.is_touched[index]) = ([0; TOGETHER], false);
         }
-        let (width, height) = (area.width.max(0) as usize, area.height.max(0) as usize);
-        (self.area, self.stride) = (area, width.next_multiple_of(ROOM));
-        self.spans.clear();
-        self.spans.resize(height, 0..0);
-        self.pixels.resize(self.pixels.len().max(self.stride * height), 0);
+        (self.area, self.stride) = (area, 0);
+        self.stride = self.width().div_ceil(TOGETHER).next_multiple_of(ROOM);
+        let needed = self.blocks.len().max(self.stride * self.height());
+        self.blocks.resize(needed, [0; TOGETHER]);
+        self.is_touched.resize(needed, false);
     }
 
     /// Covers `area`.
     pub fn fill(&mut self, area: Rect) {
         let inside = area & self.area;
+        if inside.empty() {
+            return;
+        }
         let (left, top) = ((inside.x - self.area.x) as usize, (inside.y - self.area.y) as usize);
-        for y in top..top + inside.height as usize {
-            self.part(y, left..left + inside.width as usize).fill(u8::MAX);
+        let columns = left..left + inside.width as usize;
+        for block in blocks_of(&columns) {
+            let covered: Block =
+                std::array::from_fn(
+                    |index| {
+                        if columns.contains(&(block * TOGETHER + index)) { u8::MAX } else { 0 }
+                    },
+                );
+            for y in top..top + inside.height as usize {
+                let pixels = self.touch(Place { y, block });
+                pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| *pixel |= covered);
+            }
         }
     }
 
@@ -57,18 +82,38 @@ impl Coverage {
         self.area.width.max(0) as usize
     }
 
+    fn height(&self) -> usize {
+        self.area.height.max(0) as usize
+    }
+
     /// All of its pixels, row after row.
     #[cfg(test)]
     pub fn bytes(&self) -> Vec<u8> {
-        let row = |y: usize| &self.pixels[y * self.stride..][..self.width()];
-        (0..self.spans.len()).flat_map(row).copied().collect()
+        let row = |y: usize| &self.blocks[y * self.stride..][..self.stride].as_flattened()[..self.width()];
+        (0..self.height()).flat_map(row).copied().collect()
     }
 
     /// Columns of a row, to be covered.
     fn part(&mut self, y: usize, columns: Range<usize>) -> &mut [u8] {
-        let span = &mut self.spans[y];
-        *span = hull(span, &columns);
-        &mut self.pixels[y * self.stride..][columns]
+        for block in blocks_of(&columns) {
+            self.touch(Place { y, block });
+        }
+        let first = y * self.stride * TOGETHER;
+        &mut self.blocks.as_flattened_mut()[first + columns.start..first + columns.end]
+    }
+
+    /// A block, to be covered.
+    fn touch(&mut self, place: Place) -> &mut Block {
+        let index = place.y * self.stride + place.block;
+        if !std::mem::replace(&mut self.is_touched[index], true) {
+            self.touched.push(place);
+        }
+        &mut self.blocks[index]
+    }
+
+    /// The blocks of which anything may be covered. The last of a row may reach beyond the area, where nothing is.
+    pub fn touched(&self) -> impl Iterator<Item = (Place, &Block)> {
+        self.touched.iter().map(|place| (*place, &self.blocks[place.y * self.stride + place.block]))
     }
 
     /// The means of blocks of pixels, `across` and `down` times halved, into `out`.
@@ -82,56 +127,25 @@ impl Coverage {
 
     /// The same of blocks that are `SIDE` pixels wide.
     fn reduce_by<const SIDE: usize>(&self, down: u32, out: &mut Self) {
-        let (width, height) = (self.width().div_ceil(SIDE), self.spans.len().div_ceil(1 << down));
+        let (width, height) = (self.width().div_ceil(SIDE), self.height().div_ceil(1 << down));
         out.clear(Rect::new(0, 0, width as i32, height as i32));
-        let shift = SIDE.ilog2() + down;
-        for (y, spans) in self.spans.chunks(1 << down).enumerate() {
-            let span = spans.iter().fold(0..0, |all, span| hull(&all, span));
-            let columns = whole_blocks(&span, SIDE * TOGETHER);
-            let reduced = out.part(y, columns.start / SIDE..columns.end / SIDE).as_chunks_mut::<TOGETHER>().0;
-            for (block, reduced) in reduced.iter_mut().enumerate() {
-                let mut sums = [0; TOGETHER];
-                for row in (y << down)..(y << down) + spans.len() {
-                    let first = row * self.stride + columns.start + block * SIDE * TOGETHER;
-                    add_blocks::<SIDE>(&mut sums, &self.pixels[first..first + SIDE * TOGETHER]);
-                }
-                reduced.iter_mut().zip(sums).for_each(|(reduced, sum)| *reduced = (sum >> shift) as u8);
-            }
+        for Place { y, block } in &self.touched {
+            out.touch(Place { y: y >> down, block: block / SIDE });
         }
-    }
-
-    /// Of its rows those of which anything may be covered, from the top: the row's number, a column, and the blocks of pixels from
-    /// there on. The last may reach beyond the area, where nothing is covered.
-    pub fn rows(&self) -> impl Iterator<Item = (usize, usize, &[[u8; TOGETHER]])> {
-        self.spans.iter().enumerate().filter(|(_, span)| !span.is_empty()).map(|(y, span)| {
-            let columns = whole_blocks(span, TOGETHER);
-            (y, columns.start, self.pixels[y * self.stride..][columns].as_chunks().0)
-        })
+        let shift = SIDE.ilog2() + down;
+        for Place { y, block } in &out.touched {
+            let mut sums = [0; TOGETHER];
+            for row in (y << down)..((y + 1) << down).min(self.height()) {
+                add_blocks::<SIDE>(&mut sums, &self.blocks[row * self.stride + block * SIDE..][..SIDE]);
+            }
+            out.blocks[y * out.stride + block] = sums.map(|sum| (sum >> shift) as u8);
+        }
     }
 
     /// Covers what is at most `radius` from the line between two places, `strength` (0 to 1) of it. What is covered already
     /// stays covered as much: strokes that meet in a corner do not show there twice.
     pub fn add_stroke(&mut self, from: Spot, to: Spot, radius: f64, strength: f64) {
-        let reach = radius + 0.5;
-        let (dx, dy) = (to.x - from.x, to.y - from.y);
-        let stroke = Stroke::new((dx, dy), reach, strength);
-        let (left, right) =
-            limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, self.area.x, self.width());
-        let (top, bottom) =
-            limits(from.y.min(to.y) - reach, from.y.max(to.y) + reach, self.area.y, self.spans.len());
-        // A slanting stroke crosses a small part of each row.
-        let half = if dy == 0.0 { f64::INFINITY } else { reach * dx.hypot(dy) / dy.abs() };
-        for y in top..bottom {
-            let down = f64::from(self.area.y) + y as f64 + 0.5 - from.y;
-            let crossing = if dy == 0.0 { 0.0 } else { from.x + down * dx / dy };
-            let (near, far) = limits(crossing - half - 1.0, crossing + half + 1.0, self.area.x, self.width());
-            let columns = near.max(left)..far.min(right);
-            if columns.is_empty() {
-                continue;
-            }
-            let first = f64::from(self.area.x) + columns.start as f64 + 0.5 - from.x;
-            stroke_row(self.part(y, columns), stroke, first as f32, down as f32);
-        }
+        add_stroke(self, from, to, radius, strength);
     }
 
     /// Covers what `mask`, of which a row has `width` pixels, covers when its top left pixel lies at (`x`, `y`).
@@ -149,26 +163,15 @@ impl Coverage {
     }
 }
 
-/// The columns of both and those between them.
-fn hull(a: &Range<usize>, b: &Range<usize>) -> Range<usize> {
-    match (a.is_empty(), b.is_empty()) {
-        (true, _) => b.clone(),
-        (_, true) => a.clone(),
-        _ => a.start.min(b.start)..a.end.max(b.end),
-    }
-}
-
-/// The blocks of `side` columns that hold `columns`.
-fn whole_blocks(columns: &Range<usize>, side: usize) -> Range<usize> {
-    columns.start / side * side..columns.end.next_multiple_of(side)
+/// The blocks that hold columns of a row.
+fn blocks_of(columns: &Range<usize>) -> Range<usize> {
+    columns.start / TOGETHER..columns.end.div_ceil(TOGETHER)
 }
 
 /// Adds what is covered in blocks of `SIDE` pixels beside each other.
-fn add_blocks<const SIDE: usize>(sums: &mut [u16; TOGETHER], covered: &[u8]) {
-    if covered.iter().fold(0, |all, covered| all | covered) > 0 {
-        for (sum, block) in sums.iter_mut().zip(covered.as_chunks::<SIDE>().0) {
-            *sum += block.iter().map(|covered| u16::from(*covered)).sum::<u16>();
-        }
+fn add_blocks<const SIDE: usize>(sums: &mut [u16; TOGETHER], covered: &[Block]) {
+    for (sum, block) in sums.iter_mut().zip(covered.as_flattened().as_chunks::<SIDE>().0) {
+        *sum += block.iter().map(|covered| u16::from(*covered)).sum::<u16>();
     }
 }
 
@@ -196,19 +199,56 @@ impl Stroke {
         let strength = (255.0 * strength) as f32;
         Self { dx: dx as f32, dy: dy as f32, inverse: inverse as f32, reach: reach as f32, strength }
     }
+
+    /// Covers pixels side by side, of which the first is `x` beside and `y` below its start.
+    #[inline(always)]
+    fn cover(self, pixels: &mut [u8], x: f32, y: f32) {
+        if let Ok(block) = <&mut Block>::try_from(&mut *pixels) {
+            // Of a length that is known, the compiler makes vector code.
+            self.cover_each(block, x, y);
+        } else {
+            self.cover_each(pixels, x, y);
+        }
+    }
+
+    #[inline(always)]
+    fn cover_each(self, pixels: &mut [u8], x: f32, y: f32) {
+        let Self { dx, dy, inverse, reach, strength } = self;
+        for (index, pixel) in pixels.iter_mut().enumerate() {
+            let x = x + index as u8 as f32;
+            let along = ((x * dx + y * dy) * inverse).clamp(0.0, 1.0);
+            let (aside, below) = (x - along * dx, y - along * dy);
+            let distance = (aside * aside + below * below).sqrt();
+            let covered = strength * (reach - distance).clamp(0.0, 1.0);
+            // Its lowest bits are the rounded number: a cast, which saturates, is not made into vector code.
+            *pixel = (*pixel).max((covered + 2.0_f32.powi(23)).to_bits() as u8);
+        }
+    }
 }
 
-/// A row of pixels, the first of which is `x` beside and `y` below the stroke's start.
 #[multiversion(targets("x86_64+avx2"))]
-fn stroke_row(pixels: &mut [u8], stroke: Stroke, x: f32, y: f32) {
-    let Stroke { dx, dy, inverse, reach, strength } = stroke;
-    for (index, pixel) in pixels.iter_mut().enumerate() {
-        let x = x + index as u16 as f32;
-        let along = ((x * dx + y * dy) * inverse).clamp(0.0, 1.0);
-        let (aside, below) = (x - along * dx, y - along * dy);
-        let distance = (aside * aside + below * below).sqrt();
-        let covered = (strength * (reach - distance).clamp(0.0, 1.0) + 0.5) as u8;
-        *pixel = (*pixel).max(covered);
+fn add_stroke(coverage: &mut Coverage, from: Spot, to: Spot, radius: f64, strength: f64) {
+    let (area, width, height) = (coverage.area, coverage.width(), coverage.height());
+    let reach = radius + 0.5;
+    let (dx, dy) = (to.x - from.x, to.y - from.y);
+    let stroke = Stroke::new((dx, dy), reach, strength);
+    let (left, right) = limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, area.x, width);
+    let (top, bottom) = limits(from.y.min(to.y) - reach, from.y.max(to.y) + reach, area.y, height);
+    // A slanting stroke crosses a small part of each row.
+    let half = if dy == 0.0 { f64::INFINITY } else { reach * dx.hypot(dy) / dy.abs() + 1.0 };
+    let slope = if dy == 0.0 { 0.0 } else { dx / dy };
+    let origin = f64::from(area.x) + 0.5 - from.x;
+    for y in top..bottom {
+        let down = f64::from(area.y) + y as f64 + 0.5 - from.y;
+        let crossing = down * slope - origin;
+        let near = left.max((crossing - half) as usize);
+        let far = right.min((crossing + half).min(width as f64) as usize + 1);
+        for block in blocks_of(&(near..far)) {
+            let first = block * TOGETHER;
+            let count = TOGETHER.min(width - first);
+            let pixels = &mut coverage.touch(Place { y, block })[..count];
+            stroke.cover(pixels, (origin + first as f64) as f32, down as f32);
+        }
     }
 }
 
@@ -257,7 +297,7 @@ mod tests {
             assert!((4 * sum(&reduced)).abs_diff(sum(&coverage)) <= 4 * reduced.bytes().len() as u32);
         }
         coverage.clear(Rect::new(0, 0, 90, 4));
-        assert_eq!(coverage.rows().count(), 0);
+        assert_eq!(coverage.touched().count(), 0);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use opencv::core::{Point, Rect};
 
-use super::coverage::Coverage;
+use super::coverage::{Coverage, TOGETHER};
 use super::font::{Font, text_width};
 use super::surface::{ColourSpace, Component, Surface};
 use super::{FrameSize, Spot};
@@ -50,6 +50,17 @@ pub enum Shape {
         /// Height.
         height: f64,
         /// Fill.
+        colour: Colour,
+    },
+    /// The four sides of a box, outlined, on whole pixels.
+    Frame {
+        /// Top left corner.
+        origin: Spot,
+        /// Bottom right corner.
+        end: Spot,
+        /// Width of the sides without outline.
+        width: i32,
+        /// Of the sides.
         colour: Colour,
     },
     /// A polyline, outlined.
@@ -103,6 +114,9 @@ impl Shape {
                 let end = Spot { x: origin.x + width, y: origin.y + height };
                 Ok(around(&[*origin, end], 1.0, frame))
             }
+            Self::Frame { origin, end, width, .. } => {
+                Ok(around(&[*origin, *end], f64::from(outlined(*width)) / 2.0 + 1.0, frame))
+            }
             Self::Line { points, width, .. } | Self::Fading { points, width, .. } => {
                 Ok(around(points, f64::from(outlined(*width)) / 2.0 + 2.0, frame))
             }
@@ -126,6 +140,14 @@ impl Shape {
                 let area = Rect::new(start.x, start.y, end.x - start.x, end.y - start.y);
                 pen.layer(bounds, *colour, surface, |coverage| coverage.fill(area));
             }
+            Self::Frame { origin, end, width, colour } => {
+                for (width, colour) in stroke_and_rim(*width, *colour) {
+                    let outer = snapped(*origin, *end, width);
+                    pen.layer(bounds, colour, surface, |coverage| {
+                        frame_sides(outer, width).for_each(|side| coverage.fill(side));
+                    });
+                }
+            }
             Self::Line { points, closed, width, colour } => {
                 let sides = || {
                     let back = points.last().zip(points.first()).filter(|_| *closed && points.len() > 1);
@@ -134,8 +156,7 @@ impl Shape {
                         .map(|side| (side[0], side[1]))
                         .chain(back.map(|(from, to)| (*from, *to)))
                 };
-                let rim = OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha);
-                for (width, colour) in [(outlined(*width), rim), (*width, *colour)] {
+                for (width, colour) in stroke_and_rim(*width, *colour) {
                     let radius = f64::from(width) / 2.0;
                     pen.layer(bounds, colour, surface, |coverage| {
                         sides().for_each(|(from, to)| coverage.add_stroke(from, to, radius, 1.0));
@@ -183,6 +204,28 @@ fn outline(size: f64) -> f64 {
 
 fn outlined(width: i32) -> i32 {
     width + 2 * outline(f64::from(width)) as i32
+}
+
+/// The rim of a stroke, which is drawn first, and the stroke: their widths and colours.
+fn stroke_and_rim(width: i32, colour: Colour) -> [(i32, Colour); 2] {
+    let rim = OUTLINE.with_alpha(OUTLINE.alpha * colour.alpha);
+    [(outlined(width), rim), (width, colour)]
+}
+
+/// The pixels of a box, of which the sides are so wide.
+fn snapped(origin: Spot, end: Spot, width: i32) -> Rect {
+    // Half of an odd width lies to the right of and below the corner.
+    let (before, after) = (width / 2, width - width / 2);
+    let [left, top, right, bottom] = [origin.x, origin.y, end.x, end.y].map(|place| place.floor() as i32);
+    Rect::new(left - before, top - before, right - left + before + after, bottom - top + before + after)
+}
+
+/// The four sides of a box, so wide.
+fn frame_sides(outer: Rect, width: i32) -> impl Iterator<Item = Rect> {
+    let Rect { x, y, width: across, height: down } = outer;
+    let across_both = [y, y + down - width].map(|y| Rect::new(x, y, across, width));
+    let down_both = [x, x + across - width].map(|x| Rect::new(x, y, width, down));
+    across_both.into_iter().chain(down_both)
 }
 
 /// A drawn part of the frame.
@@ -276,7 +319,9 @@ fn around(places: &[Spot], margin: f64, frame: FrameSize) -> Rect {
         let high = values.fold(-f64::INFINITY, f64::max) + margin;
         let limit = |value: f64| value.clamp(0.0, f64::from(size)) as i32;
         let start = limit(low.floor()) / Surface::GRID * Surface::GRID;
-        (start, (limit(high.ceil()) - start).max(0))
+        let length = (limit(high.ceil()) - start).max(0) as usize;
+        // Whole blocks, where there is room for them.
+        (start, (length.next_multiple_of(TOGETHER) as i32).min(size as i32 - start))
     };
     let ((x, width), (y, height)) =
         (extent(|place| place.x, frame.width), extent(|place| place.y, frame.height));
@@ -330,6 +375,25 @@ mod tests {
         let rim = pixel(patch, 24, 20);
         assert!(rim[2] < 100 && rim[3] > 80, "{rim:?}");
         assert_eq!(pixel(patch, patch.x, patch.y), [0; 4]);
+    }
+
+    #[test]
+    fn a_frame_lies_on_whole_pixels() {
+        let (origin, end) = (Spot { x: 10.4, y: 8.0 }, Spot { x: 50.0, y: 28.0 });
+        for (width, red) in [(1, 10..11), (2, 9..11), (3, 9..12)] {
+            let patches = draw(&[Shape::Frame { origin, end, width, colour: RED }], FRAME).unwrap();
+            let [patch] = patches.as_slice() else { panic!("{} patches", patches.len()) };
+            let outline =
+                red.start - outline(f64::from(width)) as i32..red.end + outline(f64::from(width)) as i32;
+            for x in patch.x..40 {
+                let [_, _, colour, alpha] = pixel(patch, x, 18);
+                assert_eq!(
+                    (colour > 0, alpha > 0),
+                    (red.contains(&x), outline.contains(&x)),
+                    "{width} wide at {x}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -163,10 +163,9 @@ impl Scene {
     }
 
     fn outline(&mut self, rect: Rect, width: i32, colour: Colour) {
-        let (right, bottom) = (rect.x + rect.width, rect.y + rect.height);
-        let corners = [(rect.x, rect.y), (right, rect.y), (right, bottom), (rect.x, bottom)];
-        let points = corners.map(|(x, y)| self.frame.spot(Point { x, y }).snapped(width)).to_vec();
-        self.shapes.push(Shape::Line { points, closed: true, width, colour });
+        let origin = self.frame.spot(Point { x: rect.x, y: rect.y });
+        let end = self.frame.spot(Point { x: rect.x + rect.width, y: rect.y + rect.height });
+        self.shapes.push(Shape::Frame { origin, end, width, colour });
     }
 
     fn region(&mut self, region: &Region) {

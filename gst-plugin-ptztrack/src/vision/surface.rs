@@ -4,7 +4,7 @@
 
 use multiversion::multiversion;
 
-use super::coverage::{Coverage, TOGETHER};
+use super::coverage::{Block, Coverage, Place, TOGETHER};
 use super::draw::Colour;
 
 /// Where a format keeps one component (Y, U, red, ...) of its pixels, eight bits of each.
@@ -85,24 +85,27 @@ impl Surface<'_> {
             }
             let coverage = if halvings == (0, 0) { coverage } else { &*kept };
             let start = offset + (left >> halvings.0) * step + (top >> halvings.1) * stride;
-            for (y, first, covered) in coverage.rows() {
-                let line = self.planes[plane].get_mut(start + y * stride + first * step..);
-                line.into_iter().for_each(|line| blend_row(line, step, covered, value, alpha));
+            if let Some(pixels) = self.planes[plane].get_mut(start..) {
+                blend_blocks(pixels, (step.max(1), stride), coverage, value, alpha);
             }
         }
     }
 }
 
+/// Lays `value` over what is covered of one component, which is `steps` from a pixel to the next and from a row to the next.
 #[multiversion(targets("x86_64+avx2"))]
-fn blend_row(line: &mut [u8], step: usize, covered: &[[u8; TOGETHER]], value: u8, alpha: u8) {
-    let step = step.max(1);
-    for (pixels, covered) in line.chunks_mut(TOGETHER * step).zip(covered) {
-        if *covered == [0; TOGETHER] {
-            continue;
-        }
-        match <&mut [u8; TOGETHER]>::try_from(&mut *pixels) {
+fn blend_blocks(
+    component: &mut [u8],
+    (step, stride): (usize, usize),
+    coverage: &Coverage,
+    value: u8,
+    alpha: u8,
+) {
+    for (Place { y, block }, covered) in coverage.touched() {
+        let Some(pixels) = component.get_mut(y * stride + block * TOGETHER * step..) else { continue };
+        match pixels.first_chunk_mut::<TOGETHER>() {
             // Of a length that is known, the compiler makes vector code.
-            Ok(pixels) if step == 1 => lay(pixels.iter_mut(), covered, value, alpha),
+            Some(pixels) if step == 1 => lay(pixels.iter_mut(), covered, value, alpha),
             _ => lay(pixels.iter_mut().step_by(step), covered, value, alpha),
         }
     }
@@ -110,7 +113,7 @@ fn blend_row(line: &mut [u8], step: usize, covered: &[[u8; TOGETHER]], value: u8
 
 /// Lays `value` over pixels beside each other.
 #[inline(always)]
-fn lay<'a>(pixels: impl Iterator<Item = &'a mut u8>, covered: &[u8; TOGETHER], value: u8, alpha: u8) {
+fn lay<'a>(pixels: impl Iterator<Item = &'a mut u8>, covered: &Block, value: u8, alpha: u8) {
     pixels.zip(covered).for_each(|(pixel, covered)| over(pixel, value, *covered, alpha));
 }
 
