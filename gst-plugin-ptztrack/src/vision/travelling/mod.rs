@@ -13,7 +13,6 @@ mod noise;
 mod pooled;
 mod rows;
 mod samples;
-mod smear;
 mod warp;
 
 use std::time::Duration;
@@ -27,7 +26,6 @@ use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
 use self::pooled::Pooled;
 use self::samples::Sample;
-use self::smear::Smear;
 use self::warp::Warp;
 use super::Luma;
 use super::camera_motion::{displacement, to_pixels};
@@ -64,7 +62,6 @@ pub struct TravellingBackground {
     /// From the canvas to the last picture, pixels.
     to_picture: Homography,
     rested: Duration,
-    smear: Smear,
     /// Where nothing is learned: in the last picture, normalised.
     held: Option<Rect>,
     size: (usize, usize),
@@ -106,7 +103,7 @@ impl TravellingBackground {
         if self.size.0 == 0 || self.size.1 == 0 {
             return;
         }
-        if self.model.size == (0, 0) || self.smear.is_there() {
+        if self.model.size == (0, 0) {
             self.start();
         }
         let travel = motion.map_or(0.0, |motion| self.move_by(&motion.homography, elapsed));
@@ -115,10 +112,8 @@ impl TravellingBackground {
         self.lay(picture);
         self.heed_light();
         self.compare(how);
-        let another_view = motion.is_none() && self.shows_another_view();
-        let gone = motion.map(|_| travel / self.size.0 as f64);
-        self.smear.update(gone, another_view, elapsed);
-        if self.changed() > NEW_PICTURE || another_view {
+        let stale = self.changed() > NEW_PICTURE || motion.is_none() && self.shows_another_view();
+        if stale {
             self.start();
             self.lay(picture);
             self.compare(how);

@@ -156,23 +156,6 @@ fn an_unknown_motion_is_rest_where_the_picture_says_so_and_a_new_world_where_not
     assert!(background.foreground().expect("seen").bytes().iter().all(|value| *value == 128));
 }
 
-/// Nobody can tell how the first pictures moved; the last of the turn is smeared, too.
-#[test]
-fn of_a_fast_turn_nothing_is_background() {
-    let smeared = |x: f64, y: f64| (-8..=8).map(|n| room(x + 2.0 * f64::from(n), y)).sum::<f64>() / 17.0;
-    let turning = |at| Canvas::seen(SIZE, &Homography::translation(at, 0.0), smeared).noisy(2.0, 60);
-    let mut background = learned();
-    look(&mut background, &turning(-400.0), None);
-    look(&mut background, &turning(-600.0), None);
-    look(&mut background, &turning(-620.0), Some((-20.0, 0.0)));
-    for seed in 61..70 {
-        look(&mut background, &seen(-620.0, 0.0, seed), Some((0.0, 0.0)));
-        assert!(foreground(&background, ALL) < 0.01, "{seed}: {}", foreground(&background, ALL));
-    }
-    look(&mut background, &with_person(seen(-620.0, 0.0, 70), PERSON), Some((0.0, 0.0)));
-    assert!(foreground(&background, PERSON) > 0.85);
-}
-
 #[test]
 fn another_view_of_little_contrast_is_a_new_world_too() {
     let wall =
