@@ -7,9 +7,9 @@ use opencv::prelude::*;
 use ptztrack_contract::{MotionMeta, Region};
 
 use super::background::{Background, ForegroundTest};
+use super::bits::Bits;
 use super::carried_zones::CarriedZones;
 use super::contours::{Grid, fill_regions, find_regions};
-use super::extremes::Extremes;
 use super::ghosts::is_light;
 use super::morphology::clean;
 use super::persistence::Persistence;
@@ -113,7 +113,7 @@ pub struct Detector {
     /// Foreground of the last picture, cleaned; as large as the reduced picture.
     mask: Mat,
     segmentation: Segmentation,
-    extremes: Extremes,
+    bits: Bits,
     zones: Option<ZoneCache>,
     /// Where light has changed in the last picture.
     light: Vec<Region>,
@@ -248,7 +248,7 @@ impl Detector {
         self.look_in_zones(config)?;
         let (open_size, close_size) = self.sizes(config);
         let width = self.mask.cols() as usize;
-        clean(self.mask.data_bytes_mut()?, width, open_size, close_size, &mut self.extremes);
+        clean(self.mask.data_bytes_mut()?, width, open_size, close_size, &mut self.bits);
         let mut found = Vec::new();
         self.find_regions(config, &mut found)?;
         Ok(self.chosen(found, config))

@@ -115,8 +115,9 @@ fn across(contour: &[Point], grid: Grid, mut compare: impl FnMut(Point, Point)) 
 
 /// The grey level of the pixel at a place; `None` outside of the picture.
 fn level(plane: &Luma, place: Point) -> Option<f64> {
-    let (x, y) = (place.x.round(), place.y.round());
-    let inside = x >= 0.0 && y >= 0.0 && x < plane.width() as f64 && y < plane.height() as f64;
+    // Halves lie where two pixels meet.
+    let (x, y) = (place.x + 0.5, place.y + 0.5);
+    let inside = x > 0.0 && y > 0.0 && x < plane.width() as f64 && y < plane.height() as f64;
     inside.then(|| f64::from(plane.row(y as usize)[x as usize]))
 }
 

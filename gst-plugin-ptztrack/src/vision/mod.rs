@@ -25,7 +25,7 @@
 //! | 3.1 | running mean of every pixel | `background` |
 //! | 3.2 | variance over the last pictures | `background` |
 //! | 3.3 | what lies far from the mean is foreground | `background` |
-//! | 3.4, 3.5 | dilation and erosion | `morphology` (OpenCV) |
+//! | 3.4, 3.5 | dilation and erosion | `morphology`, `bits` |
 //! | 3.6, 3.7 | gradient matrix and corner strength; here its smaller eigenvalue (Shi and Tomasi) | `tracker/corners` (OpenCV) |
 //! | 3.8 to 3.11 | optical flow by least squares | `tracker/flow` (OpenCV), `camera_motion/lucas_kanade` |
 //! | 3.12 | mean-shift vector | `tracker/grey_histogram` (OpenCV) |
@@ -36,6 +36,7 @@
 //! object's speed and direction", so rates are averaged.
 
 mod background;
+mod bits;
 mod camera_motion;
 mod camera_moves;
 mod carried_zones;
@@ -44,7 +45,6 @@ mod coverage;
 mod detector;
 mod draw;
 mod duty;
-mod extremes;
 mod font;
 mod ghosts;
 mod luma;

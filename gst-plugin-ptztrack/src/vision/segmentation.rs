@@ -8,7 +8,7 @@ use opencv::imgproc;
 use opencv::prelude::*;
 
 use super::Luma;
-use super::extremes::Extremes;
+use super::bits::Bits;
 use super::morphology::clean;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
@@ -24,7 +24,7 @@ const MIN_STRONG: f64 = 1.0 / 8000.0;
 pub struct Segmentation {
     strong: Vec<u8>,
     labels: Mat,
-    extremes: Extremes,
+    bits: Bits,
     /// Of one row: sums of three pixels above each other.
     sums: Vec<u16>,
     /// Whether anything is set in each column.
@@ -49,7 +49,7 @@ impl Segmentation {
             mask.fill(0);
             return Ok(());
         }
-        clean(mask, width, open_size, close_size, &mut self.extremes);
+        clean(mask, width, open_size, close_size, &mut self.bits);
         let Some((columns, rows)) = extent(mask, width, &mut self.columns) else { return Ok(()) };
         let mut boxes = Mat::default();
         let part = Luma::packed(mask, width).crop(columns.start, rows.start, columns.len(), rows.len());
