@@ -55,6 +55,14 @@ fn known(fixed: &VirtualCamera, size: (u32, u32)) -> Map {
     map
 }
 
+/// A file in which a camera that does not turn calls one that does.
+fn yard_calls_door(yard: &VirtualCamera, door: &VirtualCamera, folder: &Path) -> String {
+    let password = folder.join("password");
+    let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
+    let door = Program::entry("door", &door.url(), &password);
+    format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
+}
+
 #[test]
 fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
     let (yard, door) = (somebody_aside(looking(16.0)), somebody_aside(looking(-20.0)));
@@ -62,12 +70,7 @@ fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
     let state = end_to_end::scratch("hand-over-state");
     fs::create_dir_all(&state).unwrap();
     fs::write(state.join("map.yard.door.json"), map).unwrap();
-    let file = |folder: &Path| {
-        let password = folder.join("password");
-        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
-        let door = Program::entry("door", &door.url(), &password);
-        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
-    };
+    let file = |folder: &Path| yard_calls_door(&yard, &door, folder);
     let environment = [("STATE_DIRECTORY", state.as_path())];
     let mut program = Program::start_in("hand-over", file, &[], &environment);
     let line = program.launch.wait_for_line("door: turns to target ");
@@ -89,12 +92,7 @@ fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
 #[test]
 fn what_a_camera_looks_at_can_be_said_by_hand() {
     let [yard, door] = [0, 1].map(|_| VirtualCamera::start(scene::nobody()).unwrap());
-    let file = |folder: &Path| {
-        let password = folder.join("password");
-        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
-        let door = Program::entry("door", &door.url(), &password);
-        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
-    };
+    let file = |folder: &Path| yard_calls_door(&yard, &door, folder);
     let mut program = Program::start("point", file, &[]);
     program.launch.wait_for_line("door: the picture is there");
     let page = program.url().replace("http://", "").replace('/', "");
@@ -121,12 +119,7 @@ fn what_a_camera_looks_at_can_be_said_by_hand() {
 #[test]
 fn a_place_is_clicked_in_both_pictures() {
     let [yard, door] = [0, 1].map(|_| VirtualCamera::start(scene::nobody()).unwrap());
-    let file = |folder: &Path| {
-        let password = folder.join("password");
-        let yard = Program::entry("yard", &yard.url(), &password) + "kind = \"fixed\"\n";
-        let door = Program::entry("door", &door.url(), &password);
-        format!("{yard}{door}[handover.yard]\ncalls = [\"door\"]\n")
-    };
+    let file = |folder: &Path| yard_calls_door(&yard, &door, folder);
     let mut program = Program::start("point-page", file, &[]);
     let mut browser = Browser::start("chromium-point");
     browser.open(&program.url());
