@@ -90,11 +90,8 @@ impl AskEvents {
         let (folder, zones) = self.place.read()?;
         let filter =
             Filter { since_ms: self.since, until_ms: self.until, camera: self.camera, ..Filter::default() };
-        let filter = match &self.zone {
-            Some(name) => zones.iter().find(|zone| zone.name == *name).map(|zone| zone.narrow(filter)),
-            None => Some(filter),
-        };
-        let filter = filter.ok_or("the file of cameras has no [zone] of that name")?;
+        let filter = Zone::narrow(&zones, self.zone.as_deref(), filter)
+            .ok_or("the file of cameras has no [zone] of that name")?;
         let mut entries = Reader::open(&folder).and_then(|reader| reader.sightings(&filter)).map_err(said)?;
         // As they came, as in a log.
         entries.reverse();

@@ -33,9 +33,11 @@ fn degrees(value: &DeValue) -> Option<f64> {
 }
 
 impl Zone {
-    /// Only those who went through it.
-    pub fn narrow(&self, filter: Filter) -> Filter {
-        Filter { camera: Some(self.camera.clone()), area: Some(self.area), ..filter }
+    /// Only those who went through the zone of a name, where one is given; `None` where there is no such zone.
+    pub fn narrow(zones: &[Self], name: Option<&str>, filter: Filter) -> Option<Filter> {
+        let Some(name) = name else { return Some(filter) };
+        let zone = zones.iter().find(|zone| zone.name == name)?;
+        Some(Filter { camera: Some(zone.camera.clone()), area: Some(zone.area), ..filter })
     }
 
     /// All tables within `[zone]`, by the cameras that there are.

@@ -77,12 +77,8 @@ impl Dispatcher {
                 let called = views.get(to)?;
                 let occupied = self.precedence(to, called, wishes);
                 let is_free = called.follows() || self.calls.contains_key(to);
-                let call = || self.new_call(wish, to, (from, &person), called);
-                if is_free && occupied.is_none_or(|occupied| occupied < wish.precedence) {
-                    call()
-                } else {
-                    None
-                }
+                let can_be_called = is_free && occupied.is_none_or(|occupied| occupied < wish.precedence);
+                can_be_called.then(|| self.new_call(wish, to, (from, &person), called)).flatten()
             };
             let free = wish.calls.iter().find_map(new_call);
             if let Some((to, call)) = free {

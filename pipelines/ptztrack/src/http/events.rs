@@ -87,10 +87,7 @@ impl Wanted {
             area: area(),
             most: Some(MOST),
         };
-        match &self.zone {
-            Some(name) => Some(zones.iter().find(|zone| zone.name == *name)?.narrow(filter)),
-            None => Some(filter),
-        }
+        Zone::narrow(zones, self.zone.as_deref(), filter)
     }
 
     /// With how much each looks like the one that was named; without one the latest are the first.
