@@ -3,7 +3,7 @@
 //! Pulls the cable between applications and the cameras that they turn, and prints a table in Markdown of how soon each rests:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && sudo -E cargo run -p end-to-end --example cable [CAMERA]
+//! cargo build --workspace --lib --bins && sudo -E cargo run --example cable [CAMERA]
 //! ```
 //! Applications run in network namespaces, which takes root and iproute2.
 #![allow(clippy::unwrap_used, clippy::expect_used)]

@@ -4,7 +4,7 @@
 //! of it:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run -p end-to-end --example clocks
+//! cargo build --workspace --lib --bins && cargo run --example clocks
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -3,7 +3,7 @@
 //! Takes a camera away from whoever follows with it, video and PTZ, and prints a table in Markdown of how soon each is back:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins --examples && cargo run -p end-to-end --example coming_back > docs/coming-back.md
+//! cargo build --workspace --lib --bins --examples && cargo run --example coming_back > docs/coming-back.md
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -17,7 +17,7 @@ use virtual_camera::Fault;
 
 const HEADER: &str = "# How soon video and control are back
 
-Video and PTZ come from one camera and are lost together. Measured by `cargo run -p end-to-end --example coming_back`; the worst of
+Video and PTZ come from one camera and are lost together. Measured by `cargo run --example coming_back`; the worst of
 three runs, from the moment when the camera can be reached again until a picture arrives, and until the camera accepts the first
 command. If the camera went on turning meanwhile, the target has to be found again after that.
 

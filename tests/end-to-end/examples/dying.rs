@@ -4,7 +4,7 @@
 //! and how soon:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run -p end-to-end --example dying > docs/dying.md
+//! cargo build --workspace --lib --bins && cargo run --example dying > docs/dying.md
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -22,7 +22,7 @@ use virtual_camera::{Fault, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
 
-What happens to a camera whose application dies while the camera turns. Measured by `cargo run -p end-to-end --example dying`, over
+What happens to a camera whose application dies while the camera turns. Measured by `cargo run --example dying`, over
 HTTP with the default properties; the worst of three runs, from the death (where the camera cannot be reached or refuses to stop: from the
 end of that) until the camera is at rest. In the last column the watchdog could not be started.
 

@@ -4,7 +4,7 @@
 //! and prints a table in Markdown of what is lost, and how long the page takes:
 //!
 //! ```sh
-//! cargo build --release --workspace --lib --bins && cargo run --release -p end-to-end --example kept
+//! cargo build --release --workspace --lib --bins && cargo run --release --example kept
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 

@@ -4,7 +4,7 @@
 //! of view, how fast the camera turned, and what the user is told:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run -p end-to-end --example lossy
+//! cargo build --workspace --lib --bins && cargo run --example lossy
 //! ```
 //! Packets are lost where UDP hands them over; what goes by TCP is late in a proxy, video and control alike.
 #![allow(clippy::unwrap_used, clippy::expect_used)]

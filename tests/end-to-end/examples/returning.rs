@@ -4,7 +4,7 @@
 //! without a restart:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && sudo -E cargo run -p end-to-end --example returning
+//! cargo build --workspace --lib --bins && sudo -E cargo run --example returning
 //! ```
 //! An address that changes behind its name takes root, as the names that the system knows are changed for that program.
 #![allow(clippy::unwrap_used, clippy::expect_used)]

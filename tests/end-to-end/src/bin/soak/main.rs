@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Lets four cameras be followed by the program for a while, by two codecs, with recordings, a page that is looked at and a broker,
+//! Lets cameras be followed by the program for a while, by two codecs, with recordings, a page that is looked at and a broker,
 //! while everything happens to them and to it; and gives an account: every camera at rest, nothing grown, nothing lost. Otherwise the
 //! exit status is 1.
 //!
 //! ```sh
 //! make soak    # DURATION=600 seconds, SEED=1; leaves samples.csv, soak.png and account.md in target/soak
-//! target/debug/soak --reconnects 40000    # connections that end, and nothing else, so many of all cameras
+//! target/debug/soak --reconnects 40000 --cameras 12    # connections that end, and nothing else, so many of all cameras
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -35,6 +35,9 @@ struct Options {
     /// Instead: until so many connections have ended, of all cameras.
     #[arg(long, default_value_t = 0)]
     reconnects: u64,
+    /// Each with a program of its own.
+    #[arg(long, default_value_t = 4)]
+    cameras: usize,
     /// Another one is another course of events.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -49,8 +52,6 @@ const SAMPLE_EVERY: Duration = Duration::from_secs(5);
 /// A person walks up and down for so long, once the time is over or where nobody knows: more than a night.
 const LONGEST: Duration = Duration::from_secs(100_000);
 
-const CAMERAS: usize = 4;
-
 fn main() -> ExitCode {
     let options = Options::parse();
     std::fs::create_dir_all(&options.out).unwrap();
@@ -62,7 +63,7 @@ fn main() -> ExitCode {
     let watchdog = Watchdog::new("soak");
     let broker = Broker::start();
     let start = |number| Camera::start(number, options.seed, lasts, &watchdog, &broker);
-    let cameras: Vec<_> = (0..CAMERAS).map(start).collect();
+    let cameras: Vec<_> = (0..options.cameras).map(start).collect();
     let begin = Instant::now();
     let mut samples = Samples::default();
     let accounts: Vec<Account> = std::thread::scope(|scope| {
@@ -72,7 +73,7 @@ fn main() -> ExitCode {
                 let probe = camera.probe();
                 let run = move || match options.reconnects {
                     0 => camera.run(|| begin.elapsed() >= duration),
-                    reconnects => camera.reconnect(reconnects.div_ceil(CAMERAS as u64)),
+                    reconnects => camera.reconnect(reconnects.div_ceil(options.cameras as u64)),
                 };
                 (probe, scope.spawn(run))
             })
