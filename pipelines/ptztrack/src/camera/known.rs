@@ -58,6 +58,8 @@ pub struct Known {
     pub ignored: Mutex<BTreeSet<u64>>,
     /// Whom it calls, where people are handed over.
     pub calls: Mutex<Vec<String>>,
+    /// Number of whom somebody selected in the picture, of a camera that people are handed over from or to.
+    pub selected: Mutex<Option<u64>>,
     /// Whom another camera saw before this one took them up.
     pub origin: Mutex<Option<Origin>>,
     /// The last picture for who looks.
@@ -173,6 +175,7 @@ impl Known {
             points: Mutex::default(),
             ignored: Mutex::default(),
             calls: Mutex::default(),
+            selected: Mutex::default(),
             origin: Mutex::default(),
             view: watch::Sender::new(Shown::default()),
             packets: packets::channel(),
@@ -224,6 +227,7 @@ impl Known {
         self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
         // Its tracks have other numbers.
         lock(&self.ignored).clear();
+        lock(&self.selected).take();
         self.reset_silence();
     }
 

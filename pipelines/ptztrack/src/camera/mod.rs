@@ -303,6 +303,7 @@ impl Known {
     /// Follows who is at this place of the picture, 0 to 1.
     pub fn select(&self, x: f64, y: f64) {
         lock(&self.origin).take();
+        *lock(&self.selected) = self.sight.borrow().1.person_at(Point { x, y }).map(|person| person.id);
         self.with(|running| running.select(x, y));
     }
 
@@ -324,6 +325,7 @@ impl Known {
 
     pub fn release(&self) {
         lock(&self.origin).take();
+        lock(&self.selected).take();
         self.with(|running| running.release());
     }
 

@@ -72,6 +72,8 @@ impl From<&Track> for Person {
 impl Person {
     /// Boxes that come so near to the picture's edge may be cut off by it.
     const EDGE: f64 = 0.01;
+    /// A click so far beside a box means it, too: the tracker's 12 pixels, of 640.
+    const CLICK_REACH: f64 = 0.02;
 
     /// Where they are so many seconds later, if they go on as they do.
     pub fn ahead(&self, seconds: f64) -> Self {
@@ -87,6 +89,14 @@ impl Person {
     pub fn centre(&self) -> Point {
         let [x, y, width, height] = self.bounds;
         Point { x: x + width / 2.0, y: y + height / 2.0 }
+    }
+
+    fn covers(&self, place: Point) -> bool {
+        let [x, y, width, height] = self.bounds;
+        let spans = |from: f64, length: f64, at: f64| {
+            (from - Self::CLICK_REACH..=from + length + Self::CLICK_REACH).contains(&at)
+        };
+        spans(x, width, place.x) && spans(y, height, place.y)
     }
 
     pub fn head(&self) -> Point {
@@ -148,6 +158,13 @@ impl Sight {
     /// The target, where it is seen from head to feet.
     pub fn target(&self) -> Option<&Person> {
         self.people.iter().find(|person| person.is_target && person.is_whole())
+    }
+
+    /// Who is at a place of the picture: of several the smallest, as the tracker has it.
+    pub fn person_at(&self, place: Point) -> Option<&Person> {
+        let area = |person: &Person| person.bounds[2] * person.bounds[3];
+        let there = self.people.iter().filter(|person| person.seen && person.covers(place));
+        there.min_by(|one, other| area(one).total_cmp(&area(other)))
     }
 
     /// About where the camera looked so long ago: by its own word, or else by dead reckoning.
@@ -302,16 +319,24 @@ mod tests {
         assert_eq!(told.poses.len(), POSES);
     }
 
+    fn person(bounds: [f64; 4]) -> Person {
+        Person { id: 1, bounds, velocity: [0.0; 2], seen: true, confidence: 1.0, is_target: false }
+    }
+
+    #[test]
+    fn a_click_means_the_smallest_there() {
+        let child = Person { id: 2, ..person([0.42, 0.5, 0.05, 0.2]) };
+        let people = vec![person([0.4, 0.2, 0.1, 0.5]), child];
+        let sight = Sight { people, ..Sight::default() };
+        let at = |x, y| sight.person_at(Point { x, y }).map(|person| person.id);
+        assert_eq!(
+            [at(0.45, 0.3), at(0.45, 0.6), at(0.51, 0.3), at(0.6, 0.3)],
+            [Some(1), Some(2), Some(1), None]
+        );
+    }
+
     #[test]
     fn who_is_cut_off_is_not_whole() {
-        let person = |bounds| Person {
-            id: 1,
-            bounds,
-            velocity: [0.0; 2],
-            seen: true,
-            confidence: 1.0,
-            is_target: false,
-        };
         assert!(person([0.4, 0.2, 0.1, 0.5]).is_whole());
         assert!(!person([0.4, 0.2, 0.1, 0.8]).is_whole());
         assert!(!Person { seen: false, ..person([0.4, 0.2, 0.1, 0.5]) }.is_whole());

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use super::call::nearest;
 use super::link::Link;
 use super::view::View;
-use crate::camera::Person;
+use crate::camera::{Origin, Person};
 use ptztrack_contract::lock::lock;
 
 /// Two who are in the same place for so long are the same.
@@ -29,8 +29,8 @@ pub struct Sharing {
 }
 
 impl Sharing {
-    /// Takes what two cameras see of whom the first one follows. Returns who is not to be followed by one of them any more, as the
-    /// other one does.
+    /// Takes what two cameras see of whom the first one follows. Returns who is to be released now by one of them, as the other one
+    /// follows them; once a second, for as long as they are followed all the same.
     pub fn see(&mut self, link: &Link, (from, to): (&View, &View), now: Instant) -> Option<Track> {
         let target = from.people().iter().find(|person| person.is_target)?;
         let one = from.track(target);
@@ -46,11 +46,23 @@ impl Sharing {
         if now - *since < SAME {
             return None;
         }
-        let other = to.track(person);
-        // Who took them over from another camera keeps them.
-        let took_over = person.is_target && to.took_over(person, &from.known.name);
-        let (leaves, keeps) = if took_over { (one, other) } else { (other, one) };
-        if self.left.contains_key(&leaves) || (self.left.contains_key(&keeps) && !took_over) {
+        *since = now;
+        self.settle((from, target), (to, person))
+    }
+
+    /// Decides which of two cameras leaves the person to the other one.
+    fn settle(&mut self, (from, target): (&View, &Person), (to, person): (&View, &Person)) -> Option<Track> {
+        let (one, other) = (from.track(target), to.track(person));
+        let was_called = to.was_called_for(person, &one);
+        let is_left = self.left.get(&one) == Some(&other);
+        let from_leaves = was_called || is_left || to.has_claim(person);
+        let (leaves, keeps, stays) = if from_leaves {
+            let stays = if was_called { from.was_selected(target) } else { from.has_claim(target) };
+            (one, other, stays)
+        } else {
+            (other, one, to.has_claim(person))
+        };
+        if stays || (self.left.contains_key(&keeps) && !was_called) {
             return None;
         }
         self.left.remove(&keeps);
@@ -84,9 +96,23 @@ impl View {
         (self.known.name.clone(), person.id)
     }
 
-    fn took_over(&self, person: &Person, from: &str) -> bool {
-        let origin = lock(&self.known.origin);
-        origin.as_ref().is_some_and(|origin| origin.target == person.id && origin.camera == from)
+    /// Whether it follows them because the camera of that track called it for them.
+    fn was_called_for(&self, person: &Person, (camera, id): &Track) -> bool {
+        let is_theirs = |origin: &Origin| origin.camera == *camera && origin.id == *id;
+        person.is_target && self.origin(person).as_ref().is_some_and(is_theirs)
+    }
+
+    /// Whether it follows them because somebody selected them, or some camera called it for them.
+    fn has_claim(&self, person: &Person) -> bool {
+        self.was_selected(person) || (person.is_target && self.origin(person).is_some())
+    }
+
+    fn was_selected(&self, person: &Person) -> bool {
+        person.is_target && *lock(&self.known.selected) == Some(person.id)
+    }
+
+    fn origin(&self, person: &Person) -> Option<Origin> {
+        lock(&self.known.origin).clone().filter(|origin| origin.target == person.id)
     }
 }
 
@@ -97,7 +123,7 @@ mod tests {
     use handover::{Direction, Map, Pair, Place};
 
     use super::*;
-    use crate::camera::{Known, Origin, Pose, Sight};
+    use crate::camera::{Known, Pose, Sight};
 
     fn link() -> Link {
         let mut map = Map::default();
@@ -135,20 +161,63 @@ mod tests {
         [gate, door].into_iter().map(|view| (view.known.name.clone(), view)).collect()
     }
 
-    /// Who leaves when the gate has called the door, for a second.
-    fn leaves(sharing: &mut Sharing, gate: &View, door: &View) -> Option<Track> {
-        let now = Instant::now();
-        let link = link();
-        let first = sharing.see(&link, (gate, door), now);
-        assert_eq!(first, None, "they may have met by chance");
-        sharing.see(&link, (gate, door), now + SAME)
+    /// The gate calls the door; both look at one person.
+    struct Bench {
+        sharing: Sharing,
+        link: Link,
+        now: Instant,
+        gate: View,
+        door: View,
+    }
+
+    impl Bench {
+        fn new(gate_follows: bool, door_follows: bool) -> Self {
+            let (gate, door) = (view("gate", 3, gate_follows), view("door", 7, door_follows));
+            Self { sharing: Sharing::default(), link: link(), now: Instant::now(), gate, door }
+        }
+
+        fn called(self, camera: &str, id: u64) -> Self {
+            *lock(&self.door.known.origin) = Some(Origin { target: 7, id, camera: camera.to_owned() });
+            self
+        }
+
+        fn selected(self) -> Self {
+            *lock(&self.door.known.selected) = Some(7);
+            self
+        }
+
+        /// Who is released a second later.
+        fn see(&mut self) -> Option<Track> {
+            self.now += SAME;
+            self.sharing.see(&self.link, (&self.gate, &self.door), self.now)
+        }
+
+        /// The same where the door calls the gate.
+        fn see_back(&mut self) -> Option<Track> {
+            self.now += SAME;
+            self.sharing.see(&self.link, (&self.door, &self.gate), self.now)
+        }
+
+        fn leaves(&mut self) -> Option<Track> {
+            assert_eq!(self.see(), None, "they may have met by chance");
+            self.see()
+        }
+
+        fn left(&self) -> [BTreeSet<u64>; 2] {
+            ["gate", "door"].map(|camera| self.sharing.left_by(camera))
+        }
+    }
+
+    fn track(camera: &str, id: u64) -> Option<Track> {
+        Some((camera.to_owned(), id))
     }
 
     #[test]
     fn the_one_that_is_called_leaves_them_until_they_are_free() {
-        let (mut sharing, gate, door) = (Sharing::default(), view("gate", 3, true), view("door", 7, true));
-        assert_eq!(leaves(&mut sharing, &gate, &door), Some(("door".to_owned(), 7)));
-        assert_eq!((sharing.left_by("door"), sharing.left_by("gate")), ([7].into(), BTreeSet::new()));
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.leaves(), track("door", 7));
+        assert_eq!(bench.left(), [BTreeSet::new(), [7].into()]);
+        let Bench { mut sharing, gate, door, .. } = bench;
         sharing.pass(&views(gate, door));
         assert_eq!(sharing.left_by("door"), [7].into());
         sharing.pass(&views(view("gate", 3, false), view("door", 7, false)));
@@ -156,18 +225,82 @@ mod tests {
     }
 
     #[test]
-    fn who_took_them_over_keeps_them() {
-        let (mut sharing, gate, door) = (Sharing::default(), view("gate", 3, true), view("door", 7, true));
-        let origin = Origin { target: 7, id: 3, camera: "gate".to_owned() };
-        *lock(&door.known.origin) = Some(origin);
-        assert_eq!(leaves(&mut sharing, &gate, &door), Some(("gate".to_owned(), 3)));
-        assert_eq!((sharing.left_by("gate"), sharing.left_by("door")), ([3].into(), BTreeSet::new()));
+    fn who_is_left_is_released_whenever_they_are_the_target_again() {
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.leaves(), track("door", 7));
+        bench.door = view("door", 7, false);
+        assert_eq!(bench.see(), None, "they are left");
+        bench.door = view("door", 7, true);
+        assert_eq!(bench.see(), track("door", 7));
+        let soon = bench.sharing.see(&bench.link, (&bench.gate, &bench.door), bench.now + SAME / 2);
+        assert_eq!(soon, None, "a camera takes a while to release");
+    }
+
+    #[test]
+    fn of_two_that_call_each_other_the_same_one_leaves_them_every_time() {
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.leaves(), track("door", 7));
+        assert_eq!(bench.see_back(), None);
+        assert_eq!(bench.see_back(), track("door", 7));
+        assert_eq!(bench.see(), track("door", 7));
+        assert_eq!(bench.left(), [BTreeSet::new(), [7].into()]);
+    }
+
+    #[test]
+    fn who_was_called_for_them_keeps_them() {
+        let mut bench = Bench::new(true, true).called("gate", 3);
+        assert_eq!(bench.leaves(), track("gate", 3));
+        assert_eq!(bench.left(), [[3].into(), BTreeSet::new()]);
+    }
+
+    #[test]
+    fn who_was_left_before_is_kept_by_who_is_called_for_them() {
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.leaves(), track("door", 7));
+        let mut bench = bench.called("gate", 3);
+        assert_eq!(bench.see(), track("gate", 3));
+        assert_eq!(bench.left(), [[3].into(), BTreeSet::new()]);
+    }
+
+    #[test]
+    fn who_was_called_by_a_third_camera_keeps_them() {
+        let mut bench = Bench::new(true, true).called("yard", 1);
+        assert_eq!(bench.leaves(), track("gate", 3));
+    }
+
+    #[test]
+    fn whom_somebody_selected_is_left_by_neither() {
+        let mut bench = Bench::new(true, true).selected();
+        assert_eq!(bench.leaves(), track("gate", 3), "who found them by itself leaves them");
+        *lock(&bench.gate.known.selected) = Some(3);
+        bench.sharing = Sharing::default();
+        assert_eq!(bench.leaves(), None);
+        let mut bench = Bench::new(true, true).called("gate", 3);
+        *lock(&bench.gate.known.selected) = Some(3);
+        assert_eq!(bench.leaves(), None);
+        assert_eq!(bench.left(), [BTreeSet::new(), BTreeSet::new()]);
     }
 
     #[test]
     fn whom_another_one_follows_is_left_before_they_are_chosen() {
-        let (mut sharing, gate, door) = (Sharing::default(), view("gate", 3, true), view("door", 7, false));
-        assert_eq!(leaves(&mut sharing, &gate, &door), None, "nothing is to be released");
-        assert_eq!(sharing.left_by("door"), [7].into());
+        let mut bench = Bench::new(true, false);
+        assert_eq!(bench.leaves(), None, "nothing is to be released");
+        assert_eq!(bench.left(), [BTreeSet::new(), [7].into()]);
+    }
+
+    #[test]
+    fn nobody_is_left_to_a_camera_that_leaves_them_to_a_third_one() {
+        let mut bench = Bench::new(true, true);
+        bench.sharing.left.insert(("gate".to_owned(), 3), ("hall".to_owned(), 1));
+        assert_eq!(bench.leaves(), None);
+    }
+
+    #[test]
+    fn somebody_else_in_the_same_place_counts_from_anew() {
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.see(), None);
+        bench.door = view("door", 8, true);
+        assert_eq!(bench.see(), None);
+        assert_eq!(bench.see(), track("door", 8));
     }
 }
