@@ -268,7 +268,7 @@ impl Application {
             }
             Self::Program(what) | Self::Confined(what) => {
                 let application = plugin_folder().join("application");
-                let mut command = confinement.map_or_else(|| tool("env"), Confinement::enter);
+                let mut command = confinement.map_or_else(with_default_signals, Confinement::enter);
                 command.arg(application).args([what, &camera.url(), scene::USER]);
                 command.env("CAMERA_PASSWORD", scene::PASSWORD);
                 command
@@ -289,6 +289,13 @@ impl Application {
             _ => String::new(),
         }
     }
+}
+
+/// Runs a program that ignores no signal: one that was started by `nohup` hands that on.
+fn with_default_signals() -> Command {
+    let mut command = tool("env");
+    command.arg("--default-signal");
+    command
 }
 
 /// A watchdog apart from any application, until this is dropped.
