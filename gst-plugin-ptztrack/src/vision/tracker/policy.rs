@@ -155,10 +155,14 @@ fn stands_at(place: Rect2f, bounds: Rect2f) -> bool {
         && bounds.height < NEARER * place.height
 }
 
-/// Whether somebody is still coming into view, or leaving: a leg goes before the body.
+/// Whether somebody is still coming into view, or leaving: a leg goes before the body. Of whoever is cut off by the lower edge only, head
+/// and trunk are there, which may be all that is ever seen of them: somebody near walks past below.
 fn is_entering(tracks: &Tracks, bounds: Rect2f, frame: Frame) -> bool {
     let parts = tracks.seen().map(Track::seen_bounds).filter(|part| may_be_one(bounds, *part));
-    parts.into_iter().any(|part| frame.cut_sides(part).contains(&true))
+    parts.into_iter().any(|part| {
+        let [left, top, right, _] = frame.cut_sides(part);
+        left || top || right
+    })
 }
 
 /// The smallest of the tracks seen in this picture that a click at `point` means, a little beside it too.
@@ -275,6 +279,12 @@ mod tests {
             chain.see(&[path(n as f32)], Some(ego));
             chain.choose(Choice::Largest, true).is_some()
         })
+    }
+
+    #[test]
+    fn whoever_walks_past_below_is_chosen_at_once() {
+        let head = [at(100.0, 400.0, 70.0, 80.0)];
+        assert_eq!(seen(5, &head).chosen(), Some(head[0]));
     }
 
     #[test]
