@@ -6,7 +6,11 @@
 //! now says where to expect it. The map that comes of it tells where corners are taken, what the correlation filter
 //! learns, where box and centre of mass lie, and whether the target is there at all.
 
+mod silhouette;
+
 use opencv::core::{Point2f, Rect2f};
+
+pub(super) use silhouette::{Halves, Shape, Template};
 
 use super::colour::{Colour, ColourModel, Histogram};
 use super::geometry::{centre, scaled};
@@ -21,8 +25,6 @@ const MOVES: f32 = 2.5;
 const RESTS: f32 = -1.2;
 /// One cue says no more than this of a cell: a few bright cells are not worth the whole body.
 const LARGEST: f32 = 2.0;
-/// Silhouettes are compared in this surrounding of the box, in widths and heights of it.
-const COMPARED: (f32, f32) = (1.3, 1.15);
 /// Odds that a cell belongs to the target from which it is counted as figure, and below which as ground.
 const FIGURE: f32 = 0.6;
 const GROUND: f32 = 0.3;
@@ -214,140 +216,6 @@ impl Evidence {
     }
 }
 
-/// What is seen of the upper and the lower half of a body: a table may hide one of them.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Halves {
-    pub upper: f32,
-    pub lower: f32,
-}
-
-impl Halves {
-    /// Both together.
-    pub fn sum(self) -> f32 {
-        self.upper + self.lower
-    }
-
-    /// Their mean.
-    pub fn mean(self) -> f32 {
-        0.5 * self.sum()
-    }
-
-    /// Each by itself with that of `other`.
-    pub fn with(self, other: Self, combine: impl Fn(f32, f32) -> f32) -> Self {
-        Self { upper: combine(self.upper, other.upper), lower: combine(self.lower, other.lower) }
-    }
-}
-
-/// The silhouette that the target had until now: how likely each cell around the box belongs to it.
-#[derive(Debug, Clone)]
-pub(super) struct Shape {
-    grid: Grid,
-    share: Vec<f32>,
-}
-
-impl Shape {
-    /// An upright person fills the ellipse in the box.
-    pub fn upright(grid: Grid) -> Self {
-        let share = (0..grid.columns * grid.rows).map(|index| {
-            let (x, y) = normalised(index, grid);
-            let radius = x.hypot(y);
-            (0.9 - 0.8 * ((radius - 0.85) / 0.3).clamp(0.0, 1.0)).max(0.05)
-        });
-        Self { grid, share: share.collect() }
-    }
-
-    /// Learns the figure of `map`, which lies around the box.
-    pub fn learn(&mut self, map: &FigureMap, rate: f32) {
-        for (share, new) in self.share.iter_mut().zip(&map.probability) {
-            *share += (*new - *share) * rate;
-        }
-    }
-
-    /// The silhouette, larger by `scale`, to be held against evidence.
-    pub fn template(&self, scale: f32) -> Template {
-        let mut template = Template::default();
-        self.cut(scale, &mut template);
-        template
-    }
-
-    /// The same in the memory of another template.
-    pub fn cut(&self, scale: f32, template: &mut Template) {
-        let Grid { columns, rows } = self.grid;
-        let middle = (columns as f32 / 2.0, rows as f32 / 2.0);
-        let window = |compared: f32, context: f32, count: usize| {
-            let half = 0.5 * compared / context * count as f32;
-            let first = (count as f32 / 2.0 - half).round().max(0.0) as usize;
-            first..count - first
-        };
-        let window_x = window(COMPARED.0, CONTEXT.0, columns);
-        let window_y = window(COMPARED.1, CONTEXT.1, rows);
-        let at = |x: usize, y: usize| {
-            if scale == 1.0 {
-                return self.share[y * columns + x];
-            }
-            let from = |place: usize, middle: f32| (place as f32 + 0.5 - middle) / scale + middle - 0.5;
-            let (x, y) = (from(x, middle.0).round(), from(y, middle.1).round());
-            let inside = x >= 0.0 && y >= 0.0 && (x as usize) < columns && (y as usize) < rows;
-            if inside { self.share[y as usize * columns + x as usize] } else { 0.05 }
-        };
-        let row = |y: usize| window_x.clone().map(move |x| (x, y));
-        let count = (window_x.len() * window_y.len()).max(1) as f32;
-        let mean = window_y.clone().map(|y| row(y).map(|(x, y)| at(x, y)).sum::<f32>()).sum::<f32>() / count;
-        let mut weights = std::mem::take(&mut template.weights);
-        weights.clear();
-        weights.extend(window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean));
-        let first = (window_x.start as i32, window_y.start as i32);
-        let upper_rows = window_y.filter(|y| (*y as f32) < middle.1).count();
-        let (upper, lower) = weights.split_at(upper_rows * window_x.len());
-        let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
-        let norm = Halves { upper: norm(upper), lower: norm(lower) };
-        *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
-    }
-
-    /// Logarithm of the odds that a cell belongs to the target by its place alone.
-    fn log_odds(&self, index: usize) -> f32 {
-        let share = self.share[index].clamp(0.05, 0.95);
-        (share / (1.0 - share)).ln()
-    }
-}
-
-/// A silhouette of some size, less its mean: made once, and held against the evidence at many places.
-#[derive(Debug, Default)]
-pub(super) struct Template {
-    /// Column and row of its first cell.
-    first: (i32, i32),
-    columns: usize,
-    /// Rows that belong to the upper half of the body.
-    upper_rows: usize,
-    weights: Vec<f32>,
-    /// Sum of the weights' magnitudes.
-    norm: Halves,
-}
-
-impl Template {
-    /// How well the silhouette, moved by so many cells, fits the evidence: -1 to 1, near 0 before a wall of one colour.
-    pub fn fit(&self, evidence: &Evidence, moved: (i32, i32)) -> Halves {
-        let (left, top) = (self.first.0 + moved.0, self.first.1 + moved.1);
-        let mut sums = Halves::default();
-        for (y, weights) in self.weights.chunks_exact(self.columns).enumerate() {
-            let (odds, skipped) = evidence.row(left, top + y as i32);
-            let seen = weights.iter().skip(skipped).zip(odds);
-            let sum = if y < self.upper_rows { &mut sums.upper } else { &mut sums.lower };
-            *sum += seen.map(|(weight, odds)| weight * odds).sum::<f32>();
-        }
-        sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
-    }
-}
-
-/// Place of a cell in half sizes of the box from its middle: -1 to 1 inside.
-fn normalised(index: usize, grid: Grid) -> (f32, f32) {
-    let (column, row) = (index % grid.columns, index / grid.columns);
-    let at = |place: usize, count: usize, context: f32| {
-        ((place as f32 + 0.5) / count as f32 - 0.5) * 2.0 * context
-    };
-    (at(column, grid.columns, CONTEXT.0), at(row, grid.rows, CONTEXT.1))
-}
-
 /// How likely each cell around the box is part of the target.
 #[derive(Debug, Clone)]
 pub(super) struct FigureMap {
@@ -416,128 +284,4 @@ impl FigureMap {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::vision::SceneView;
-
-    const GRID: Grid = Grid { columns: 36, rows: 60 };
-    const BOX: Rect2f = Rect2f { x: 100.0, y: 60.0, width: 40.0, height: 100.0 };
-
-    /// A person of one grey before a wall of another, and what the background says of it.
-    struct Scene {
-        luma: Vec<u8>,
-        foreground: Vec<u8>,
-    }
-
-    impl Scene {
-        const SIZE: (usize, usize) = (320, 240);
-
-        fn new(person: Rect2f, grey: u8, seen_to_move: u8) -> Self {
-            let pixels = || {
-                (0..Self::SIZE.0 * Self::SIZE.1)
-                    .map(|i| Point2f::new((i % Self::SIZE.0) as f32 + 0.5, (i / Self::SIZE.0) as f32 + 0.5))
-            };
-            let of = |here: u8, else_: u8| {
-                pixels().map(|p| if person.contains(p) { here } else { else_ }).collect()
-            };
-            Self { luma: of(grey, 150), foreground: of(seen_to_move, 0) }
-        }
-
-        fn cells(&self, bounds: Rect2f) -> Cells {
-            let plane = |data| Luma::new(data, Self::SIZE.0, Self::SIZE.1, Self::SIZE.0).expect("whole");
-            let luma = plane(&self.luma);
-            let scene = SceneView {
-                camera_motion: None,
-                luma,
-                chroma: None,
-                foreground: plane(&self.foreground),
-                background: luma,
-            };
-            let seen = Observation { luma, scene: Some(scene) };
-            Cells::observe(&seen, bounds, GRID)
-        }
-    }
-
-    #[test]
-    fn what_moves_is_figure_and_the_wall_is_ground() {
-        let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
-        assert!(map.at(centre(BOX)) > 0.95);
-        assert!(map.at(Point2f::new(BOX.x - 15.0, 110.0)) < 0.1);
-        assert_eq!(map.at(Point2f::new(0.0, 0.0)), 0.0, "beyond the map");
-    }
-
-    #[test]
-    fn the_silhouette_fits_best_where_the_person_is() {
-        let moved = BOX + Point2f::new(8.0, 0.0);
-        let cells = Scene::new(moved, 60, 255).cells(BOX);
-        let evidence = cells.evidence(None);
-        let template = Shape::upright(GRID).template(1.0);
-        let best = (-6..=6)
-            .flat_map(|x| (-6..=6).map(move |y| (x, y)))
-            .max_by(|a, b| {
-                let fit = |moved| template.fit(&evidence, moved).mean();
-                fit(*a).total_cmp(&fit(*b))
-            })
-            .expect("some");
-        // A cell is 2.67 pixels wide.
-        assert!((best.0 - 3).abs() <= 1 && best.1.abs() <= 1, "{best:?}");
-    }
-
-    #[test]
-    fn a_known_wall_fits_nobody() {
-        let cells = Scene::new(Rect2f::default(), 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
-        assert!(fit.mean().abs() < 0.05, "{fit:?}");
-    }
-
-    #[test]
-    fn behind_a_table_the_upper_half_still_fits() {
-        let upper = Rect2f { height: 50.0, ..BOX };
-        let cells = Scene::new(upper, 60, 255).cells(BOX);
-        let fit = Shape::upright(GRID).template(1.0).fit(&cells.evidence(None), (0, 0));
-        assert!(fit.upper > 0.4 && fit.lower < 0.1, "{fit:?}");
-    }
-
-    /// Of somebody of that grey who moves.
-    fn colours_of(grey: u8) -> ColourModel {
-        let cells = Scene::new(BOX, grey, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
-        let ([upper, lower], ground) = cells.histograms(&map);
-        ColourModel::new([upper.expect("seen"), lower.expect("seen")], ground.expect("seen"))
-    }
-
-    /// How well an upright silhouette of these colours fits the scene.
-    fn fit(scene: &Scene, colours: &ColourModel, alone: f32) -> f32 {
-        let evidence = scene.cells(BOX).evidence(Some(Looks { colours, alone }));
-        Shape::upright(GRID).template(1.0).fit(&evidence, (0, 0)).mean()
-    }
-
-    #[test]
-    fn colours_find_who_stands_still_again() {
-        // Seen to move first, then nothing moves any more.
-        let colours = colours_of(60);
-        let still = fit(&Scene::new(BOX, 60, 128), &colours, f32::INFINITY);
-        assert!(still > 0.4, "{still}");
-        let gone = fit(&Scene::new(Rect2f::default(), 60, 128), &colours, f32::INFINITY);
-        assert!(gone.abs() < 0.05, "{gone}");
-    }
-
-    #[test]
-    fn beside_others_who_moves_in_other_colours_is_not_the_target() {
-        let colours = colours_of(60);
-        let fit = |grey, alone| fit(&Scene::new(BOX, grey, 255), &colours, alone);
-        let (own, other) = (fit(60, 0.5), fit(220, 0.5));
-        assert!(own > 0.4 && other < 0.5 * own, "{own} {other}");
-        assert!(fit(220, f32::INFINITY) > 0.4, "alone, whoever moves is the target");
-    }
-
-    #[test]
-    fn the_centre_of_mass_is_that_of_the_figure() {
-        let cells = Scene::new(BOX, 60, 255).cells(BOX);
-        let map = FigureMap::new(&cells, &cells.evidence(None), &Shape::upright(GRID));
-        let mass = map.centre_of_mass(BOX).expect("seen");
-        assert!((mass - centre(BOX)).norm() < 2.0, "{mass:?}");
-        assert_eq!(map.centre_of_mass(BOX + Point2f::new(900.0, 0.0)), None);
-    }
-}
+mod tests;

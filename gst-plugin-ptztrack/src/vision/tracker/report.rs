@@ -57,6 +57,24 @@ pub struct Tracked {
 }
 
 impl Tracked {
+    /// Tells of a target of that number; who came and went stays.
+    pub(super) fn tell_of(&mut self, state: TargetState, id: u64, target: &dyn Follow, frame: Frame) {
+        let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
+        let points = target.points();
+        let kept = points.members().map(feature(true));
+        let rejected = points.rejected().iter().copied().map(feature(false));
+        self.features.clear();
+        self.features.extend(kept.chain(rejected));
+        let estimate = target.estimate();
+        let ego = estimate.ego_velocity;
+        (self.state, self.id, self.released) = (state, id, None);
+        self.bounds = frame.rect(estimate.bounds);
+        self.centroid = frame.point(estimate.centroid);
+        self.velocity = frame.vector(estimate.own_velocity + ego.unwrap_or_default());
+        self.ego_velocity = ego.map(|ego| frame.vector(ego));
+        self.confidence = f64::from(estimate.confidence);
+    }
+
     /// Tells of a group in place of the target in it.
     pub(super) fn become_group(&mut self, group: &GroupEstimate, frame: Frame) {
         let (own, ego) = (frame.vector(group.own_velocity), self.ego_velocity.unwrap_or_default());
@@ -81,39 +99,6 @@ pub(super) fn reported(track: &Track, target: u64, frame: Frame) -> ptztrack_con
         },
         confidence: f64::from(track.confidence()),
         is_target: track.id == target,
-    }
-}
-
-/// What is told of a target of that number; `features` is memory.
-pub(super) fn tracked_of(
-    state: TargetState,
-    id: u64,
-    target: &dyn Follow,
-    frame: Frame,
-    mut features: Vec<Feature>,
-) -> Tracked {
-    let feature = |kept: bool| move |position: Point2f| Feature { position: frame.point(position), kept };
-    let points = target.points();
-    let kept = points.members().map(feature(true));
-    let rejected = points.rejected().iter().copied().map(feature(false));
-    features.clear();
-    features.extend(kept.chain(rejected));
-    let estimate = target.estimate();
-    let ego = estimate.ego_velocity;
-    Tracked {
-        state,
-        changes: Vec::new(),
-        released: None,
-        id,
-        bounds: frame.rect(estimate.bounds),
-        centroid: frame.point(estimate.centroid),
-        velocity: frame.vector(estimate.own_velocity + ego.unwrap_or_default()),
-        ego_velocity: ego.map(|ego| frame.vector(ego)),
-        unchanged_for: None,
-        confidence: f64::from(estimate.confidence),
-        features,
-        tracks: Vec::new(),
-        track_changes: Vec::new(),
     }
 }
 

@@ -13,7 +13,7 @@ use super::ego_motion::EgoMotion;
 use super::geometry::Frame;
 use super::group::Group;
 use super::policy::{Choice, Policy, tell_apart};
-use super::report::{Detection, Tracked, reported, tracked_of};
+use super::report::{Detection, Tracked, reported};
 use super::target::{Follow, Sight};
 use super::tracks::{Region, Rules, Tracks};
 use crate::vision::Observation;
@@ -39,7 +39,8 @@ struct Target {
 }
 
 enum Phase {
-    Searching,
+    /// And who was lost last, by number.
+    Searching(Option<u64>),
     Tracking(Target),
     /// And for how many seconds.
     Occluded(Target, f64),
@@ -49,7 +50,7 @@ impl Phase {
     /// The number of the track that is followed.
     fn target(&self) -> Option<u64> {
         match self {
-            Self::Searching => None,
+            Self::Searching(_) => None,
             Self::Tracking(target) | Self::Occluded(target, _) => Some(target.id),
         }
     }
@@ -65,11 +66,14 @@ pub struct Tracker {
     stillness: Stillness,
     request: Option<TargetRequest>,
     camera_rests: bool,
-    /// Number of who was lost last.
-    lost: Option<u64>,
     /// Size of the last frame; `None` where nothing that was remembered holds for the next.
     size: Option<(usize, usize)>,
-    /// Memory for the next frame's features, tracks and regions.
+    memory: Memory,
+}
+
+/// Memory for what is told of the next frame, and for what was seen in it.
+#[derive(Default)]
+struct Memory {
     features: Vec<Feature>,
     reported: Vec<ptztrack_contract::Track>,
     regions: Vec<Region>,
@@ -81,25 +85,21 @@ impl Tracker {
     pub fn new(config: Config) -> Self {
         Self {
             config,
-            phase: Phase::Searching,
+            phase: Phase::Searching(None),
             tracks: Tracks::default(),
             policy: Policy::default(),
             group: Group::default(),
             stillness: Stillness::default(),
             request: None,
             camera_rests: true,
-            lost: None,
             size: None,
-            features: Vec::new(),
-            reported: Vec::new(),
-            regions: Vec::new(),
-            people: Vec::new(),
+            memory: Memory::default(),
         }
     }
 
     /// Takes back what it reported, as memory for the next frame.
     pub fn recycle(&mut self, features: Vec<Feature>, tracks: Vec<ptztrack_contract::Track>) {
-        (self.features, self.reported) = (features, tracks);
+        (self.memory.features, self.memory.reported) = (features, tracks);
     }
 
     /// Changes how it works from the next frame on.
@@ -140,55 +140,54 @@ impl Tracker {
         let dt_s = if dt_s.is_finite() { dt_s.max(MIN_DT_S) } else { f64::INFINITY };
         let size = (seen.luma.width(), seen.luma.height());
         let frame = Frame { width: size.0.max(1) as f32, height: size.1.max(1) as f32 };
-        let mut changes = Vec::new();
         let same_stream = self.size.replace(size) == Some(size) && dt_s <= MAX_DT_S;
         if !same_stream {
-            // Another picture, or one from another time: nothing that was remembered holds.
-            self.tracks.restart();
-            self.policy.restart();
-            self.group.disband();
-            self.stillness = Stillness::default();
-            self.lost = None;
+            self.forget();
         }
         self.watch(seen, detections, frame, if same_stream { dt_s } else { MIN_DT_S });
-        let request = self.request.take();
-        let mut phase = std::mem::replace(&mut self.phase, Phase::Searching);
-        let mut tracked = Tracked { features: std::mem::take(&mut self.features), ..Tracked::default() };
-        tracked.features.clear();
-        if !same_stream {
-            if let Phase::Tracking(target) | Phase::Occluded(target, _) = &phase {
-                tracked = tracked_of(TargetState::Lost, target.id, &*target.follow, frame, tracked.features);
-                changes.push(TargetChange::Lost);
-                phase = Phase::Searching;
-            }
+        let mut tracked = self.blank();
+        let phase = std::mem::replace(&mut self.phase, Phase::Searching(None));
+        let phase = if same_stream {
+            self.follow(phase, seen, dt_s, frame, &mut tracked)?
         } else {
-            phase = self.follow(phase, seen, dt_s, frame, &mut tracked, &mut changes)?;
-        }
-        phase = match request {
-            Some(TargetRequest::Release) => {
-                self.let_go(phase, ReleaseReason::Request, frame, &mut tracked, &mut changes)
-            }
-            Some(request) => match self.requested(request, &phase, frame) {
-                Some(id) => self.take_over(phase, seen, id, frame, &mut tracked, &mut changes)?,
-                None => phase,
-            },
-            None => phase,
+            lose(&phase, frame, &mut tracked);
+            Phase::Searching(None)
         };
-        if matches!(phase, Phase::Searching) && changes.is_empty() {
-            phase = self.acquire_chosen(seen, frame, &mut tracked, &mut changes)?;
+        let mut phase = self.obey(phase, seen, frame, &mut tracked)?;
+        if let Phase::Searching(lost) = phase
+            && tracked.changes.is_empty()
+        {
+            phase = self.acquire_chosen(seen, lost, frame, &mut tracked)?;
         }
-        let target = phase.target();
-        self.follow_group(target, seen, dt_s, frame, &mut tracked);
-        let target = target.unwrap_or(0);
-        tracked.tracks = std::mem::take(&mut self.reported);
-        tracked.tracks.clear();
+        self.follow_group(phase.target(), seen, dt_s, frame, &mut tracked);
+        self.tell_of_everybody(phase.target().unwrap_or(0), frame, &mut tracked);
+        self.phase = phase;
+        let scene = seen.scene.as_ref();
+        tracked.unchanged_for = scene.map(|scene| self.stillness.see(&scene.luma, dt_s));
+        Ok(tracked)
+    }
+
+    /// Another picture, or one from another time: nothing that was remembered holds.
+    fn forget(&mut self) {
+        self.tracks.restart();
+        self.policy.restart();
+        self.group.disband();
+        self.stillness = Stillness::default();
+    }
+
+    /// Tells of nobody.
+    fn blank(&mut self) -> Tracked {
+        let Memory { features, reported, .. } = &mut self.memory;
+        features.clear();
+        reported.clear();
+        let (features, tracks) = (std::mem::take(features), std::mem::take(reported));
+        Tracked { features, tracks, ..Tracked::default() }
+    }
+
+    fn tell_of_everybody(&self, target: u64, frame: Frame, tracked: &mut Tracked) {
         let told = self.tracks.iter().filter(|track| track.journey.unseen_s <= TOLD_S || track.id == target);
         tracked.tracks.extend(told.map(|track| reported(track, target, frame)));
         tracked.track_changes.extend(self.tracks.events().iter().copied());
-        self.phase = phase;
-        let scene = seen.scene.as_ref();
-        let unchanged_for = scene.map(|scene| self.stillness.see(&scene.luma, dt_s));
-        Ok(Tracked { changes, unchanged_for, ..tracked })
     }
 
     /// How the background moved, by what is seen of it or by what is known of the camera.
@@ -198,18 +197,17 @@ impl Tracker {
 
     /// Keeps account of everybody, whether a target is followed or not.
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
-        let mut regions = std::mem::take(&mut self.regions);
+        let Memory { regions, people, .. } = &mut self.memory;
         regions.clear();
         for detection in detections {
-            self.config.profile.read(detection, frame, &mut self.people, &mut regions);
+            self.config.profile.read(detection, frame, people, regions);
         }
         let Config { confirm_frames, coast_s, memory_s, detector_pause_s, .. } = self.config;
         let coast_s = coast_s.max(DECAY_S);
         let rules = Rules { confirm_pictures: confirm_frames, coast_s, memory_s, detector_pause_s };
         let ego = self.ego_motion(seen);
-        self.tracks.update(seen, regions.drain(..), ego, dt_s, rules);
+        self.tracks.update(seen, self.memory.regions.drain(..), ego, dt_s, rules);
         self.policy.pass(&self.tracks, ego, dt_s);
-        self.regions = regions;
     }
 
     fn follow(
@@ -219,10 +217,9 @@ impl Tracker {
         dt_s: f64,
         frame: Frame,
         tracked: &mut Tracked,
-        changes: &mut Vec<TargetChange>,
     ) -> opencv::Result<Phase> {
         let (mut target, hidden_s) = match phase {
-            Phase::Searching => return Ok(Phase::Searching),
+            Phase::Searching(_) => return Ok(phase),
             Phase::Tracking(target) => (target, None),
             Phase::Occluded(target, hidden_s) => (target, Some(hidden_s + dt_s)),
         };
@@ -239,9 +236,9 @@ impl Tracker {
             Sight::Hidden | Sight::Gone => TargetState::Lost,
         };
         match (state, hidden_s) {
-            (TargetState::Tracking, Some(_)) => changes.push(TargetChange::Reacquired),
-            (TargetState::Occluded, None) => changes.push(TargetChange::Occluded),
-            (TargetState::Lost, _) => changes.push(TargetChange::Lost),
+            (TargetState::Tracking, Some(_)) => tracked.changes.push(TargetChange::Reacquired),
+            (TargetState::Occluded, None) => tracked.changes.push(TargetChange::Occluded),
+            (TargetState::Lost, _) => tracked.changes.push(TargetChange::Lost),
             _ => {}
         }
         target.dwell.pass(dt_s);
@@ -259,22 +256,15 @@ impl Tracker {
             (_, Some(ego)) => ego.apply_to(target.seen_at),
             _ => target.seen_at,
         };
-        *tracked =
-            tracked_of(state, target.id, &*target.follow, frame, std::mem::take(&mut tracked.features));
+        tracked.tell_of(state, target.id, &*target.follow, frame);
         let exhausted = target.dwell.exhausted(self.config.limits).filter(|_| state != TargetState::Lost);
         if let Some(reason) = exhausted {
             self.policy.park(target.id, target.follow.estimate().bounds);
-            return Ok(self.let_go(Phase::Tracking(target), reason, frame, tracked, changes));
+            return Ok(self.let_go(Phase::Tracking(target), reason, frame, tracked));
         }
         if self.is_outdone(&target, frame) {
             self.policy.park(target.id, target.seen_at);
-            return Ok(self.let_go(
-                Phase::Tracking(target),
-                ReleaseReason::Stationary,
-                frame,
-                tracked,
-                changes,
-            ));
+            return Ok(self.let_go(Phase::Tracking(target), ReleaseReason::Stationary, frame, tracked));
         }
         Ok(match state {
             TargetState::Tracking => Phase::Tracking(target),
@@ -283,10 +273,7 @@ impl Tracker {
                 tracked.confidence *= left;
                 Phase::Occluded(target, hidden_s.unwrap_or(0.0))
             }
-            _ => {
-                self.lost = Some(target.id);
-                Phase::Searching
-            }
+            _ => Phase::Searching(Some(target.id)),
         })
     }
 
@@ -322,102 +309,17 @@ impl Tracker {
                 .choose(&self.tracks, choice, None, must_travel, frame)
                 .is_some_and(|track| track.id != target.id)
     }
+}
 
-    fn take_over(
-        &mut self,
-        old: Phase,
-        seen: &Observation,
-        id: u64,
-        frame: Frame,
-        tracked: &mut Tracked,
-        changes: &mut Vec<TargetChange>,
-    ) -> opencv::Result<Phase> {
-        let old = self.let_go(old, ReleaseReason::Request, frame, tracked, changes);
-        match self.acquire(seen, id)? {
-            Some(target) => Ok(self.begin(target, frame, tracked, changes)),
-            None => Ok(old),
-        }
-    }
-
-    fn let_go(
-        &mut self,
-        phase: Phase,
-        reason: ReleaseReason,
-        frame: Frame,
-        tracked: &mut Tracked,
-        changes: &mut Vec<TargetChange>,
-    ) -> Phase {
-        if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
-            if reason != ReleaseReason::Stationary {
-                // It may move, and would be taken again at once.
-                self.policy.release(target.id);
-            }
-            *tracked = tracked_of(
-                TargetState::Searching,
-                target.id,
-                &*target.follow,
-                frame,
-                std::mem::take(&mut tracked.features),
-            );
-            tracked.features.clear();
-            tracked.released = Some(reason);
-            changes.push(TargetChange::Released);
-        }
-        Phase::Searching
-    }
-
-    fn acquire_chosen(
-        &mut self,
-        seen: &Observation,
-        frame: Frame,
-        tracked: &mut Tracked,
-        changes: &mut Vec<TargetChange>,
-    ) -> opencv::Result<Phase> {
-        let Config { choice, must_travel, .. } = self.config;
-        let chosen = self.policy.choose(&self.tracks, choice, self.lost, must_travel, frame);
-        let Some(id) = chosen.map(|track| track.id) else { return Ok(Phase::Searching) };
-        match self.acquire(seen, id)? {
-            Some(mut target) => {
-                if must_travel {
-                    target.dwell = DwellTime::on_trial();
-                }
-                Ok(self.begin(target, frame, tracked, changes))
-            }
-            None => Ok(Phase::Searching),
-        }
-    }
-
-    /// Takes up the track of that number; `None` where it cannot be followed.
-    fn acquire(&mut self, seen: &Observation, id: u64) -> opencv::Result<Option<Target>> {
-        let Some(track) = self.tracks.get(id) else { return Ok(None) };
-        let follow = self.config.profile.acquire(seen, track, self.tracks.region(track))?;
-        let seen_at = track.seen_bounds();
-        let Some(follow) = follow else { return Ok(None) };
-        self.lost = None;
-        self.tracks.target(id);
-        Ok(Some(Target { id, follow, dwell: DwellTime::default(), seen_at }))
-    }
-
-    fn begin(
-        &mut self,
-        target: Target,
-        frame: Frame,
-        tracked: &mut Tracked,
-        changes: &mut Vec<TargetChange>,
-    ) -> Phase {
-        self.policy.take(target.id);
-        changes.push(TargetChange::Acquired);
-        *tracked = tracked_of(
-            TargetState::Tracking,
-            target.id,
-            &*target.follow,
-            frame,
-            std::mem::take(&mut tracked.features),
-        );
-        Phase::Tracking(target)
+/// Tells that the target, where there was one, is lost.
+fn lose(phase: &Phase, frame: Frame, tracked: &mut Tracked) {
+    if let Phase::Tracking(target) | Phase::Occluded(target, _) = phase {
+        tracked.tell_of(TargetState::Lost, target.id, &*target.follow, frame);
+        tracked.changes.push(TargetChange::Lost);
     }
 }
 
+mod acquisition;
 mod requests;
 #[cfg(test)]
 mod tests;

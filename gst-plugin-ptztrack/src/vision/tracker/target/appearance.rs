@@ -85,7 +85,7 @@ impl Appearance {
             memory: Memory::default(),
         };
         appearance.look_closely(seen, bounds);
-        let fit = appearance.shape.template(1.0).fit(&appearance.memory.evidence, (0, 0));
+        let fit = appearance.shape.template().fit(&appearance.memory.evidence, (0, 0));
         appearance.usual = Usual::at_first(fit);
         appearance.learn_filter(seen, bounds, 1.0)?;
         Ok(appearance)
@@ -121,7 +121,7 @@ impl Appearance {
     pub fn locate(&mut self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
         self.look_at(seen, bounds);
         self.filter.respond(&seen.luma, bounds, &mut self.memory.response)?;
-        self.shape.cut(1.0, &mut self.memory.template);
+        self.shape.cut(&mut self.memory.template);
         let Memory { cells, evidence, template, response, .. } = &self.memory;
         let cell = cells.cell() * FINER as f32;
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);

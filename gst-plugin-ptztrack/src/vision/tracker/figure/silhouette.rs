@@ -1,0 +1,133 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! The silhouette of a target, and how well it fits what is seen.
+
+use super::{CONTEXT, Evidence, FigureMap, Grid, LARGEST};
+
+/// Silhouettes are compared in this surrounding of the box, in widths and heights of it.
+const COMPARED: (f32, f32) = (1.3, 1.15);
+
+/// What is seen of the upper and the lower half of a body: a table may hide one of them.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(in super::super) struct Halves {
+    pub upper: f32,
+    pub lower: f32,
+}
+
+impl Halves {
+    /// Both together.
+    pub fn sum(self) -> f32 {
+        self.upper + self.lower
+    }
+
+    /// Their mean.
+    pub fn mean(self) -> f32 {
+        0.5 * self.sum()
+    }
+
+    /// Each by itself with that of `other`.
+    pub fn with(self, other: Self, combine: impl Fn(f32, f32) -> f32) -> Self {
+        Self { upper: combine(self.upper, other.upper), lower: combine(self.lower, other.lower) }
+    }
+}
+
+/// The silhouette that the target had until now: how likely each cell around the box belongs to it.
+#[derive(Debug, Clone)]
+pub(in super::super) struct Shape {
+    grid: Grid,
+    share: Vec<f32>,
+}
+
+impl Shape {
+    /// An upright person fills the ellipse in the box.
+    pub fn upright(grid: Grid) -> Self {
+        let share = (0..grid.columns * grid.rows).map(|index| {
+            let (x, y) = normalised(index, grid);
+            let radius = x.hypot(y);
+            (0.9 - 0.8 * ((radius - 0.85) / 0.3).clamp(0.0, 1.0)).max(0.05)
+        });
+        Self { grid, share: share.collect() }
+    }
+
+    /// Learns the figure of `map`, which lies around the box.
+    pub fn learn(&mut self, map: &FigureMap, rate: f32) {
+        for (share, new) in self.share.iter_mut().zip(&map.probability) {
+            *share += (*new - *share) * rate;
+        }
+    }
+
+    /// The silhouette, to be held against evidence.
+    pub fn template(&self) -> Template {
+        let mut template = Template::default();
+        self.cut(&mut template);
+        template
+    }
+
+    /// The same in the memory of another template.
+    pub fn cut(&self, template: &mut Template) {
+        let Grid { columns, rows } = self.grid;
+        let window = |compared: f32, context: f32, count: usize| {
+            let half = 0.5 * compared / context * count as f32;
+            let first = (count as f32 / 2.0 - half).round().max(0.0) as usize;
+            first..count - first
+        };
+        let window_x = window(COMPARED.0, CONTEXT.0, columns);
+        let window_y = window(COMPARED.1, CONTEXT.1, rows);
+        let at = |x: usize, y: usize| self.share[y * columns + x];
+        let row = |y: usize| window_x.clone().map(move |x| (x, y));
+        let count = (window_x.len() * window_y.len()).max(1) as f32;
+        let mean = window_y.clone().map(|y| row(y).map(|(x, y)| at(x, y)).sum::<f32>()).sum::<f32>() / count;
+        let mut weights = std::mem::take(&mut template.weights);
+        weights.clear();
+        weights.extend(window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean));
+        let first = (window_x.start as i32, window_y.start as i32);
+        let upper_rows = window_y.filter(|y| 2 * y < rows).count();
+        let (upper, lower) = weights.split_at(upper_rows * window_x.len());
+        let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
+        let norm = Halves { upper: norm(upper), lower: norm(lower) };
+        *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
+    }
+
+    /// Logarithm of the odds that a cell belongs to the target by its place alone.
+    pub(super) fn log_odds(&self, index: usize) -> f32 {
+        let share = self.share[index].clamp(0.05, 0.95);
+        (share / (1.0 - share)).ln()
+    }
+}
+
+/// A silhouette less its mean: made once, and held against the evidence at many places.
+#[derive(Debug, Default)]
+pub(in super::super) struct Template {
+    /// Column and row of its first cell.
+    first: (i32, i32),
+    columns: usize,
+    /// Rows that belong to the upper half of the body.
+    upper_rows: usize,
+    weights: Vec<f32>,
+    /// Sum of the weights' magnitudes.
+    norm: Halves,
+}
+
+impl Template {
+    /// How well the silhouette, moved by so many cells, fits the evidence: -1 to 1, near 0 before a wall of one colour.
+    pub fn fit(&self, evidence: &Evidence, moved: (i32, i32)) -> Halves {
+        let (left, top) = (self.first.0 + moved.0, self.first.1 + moved.1);
+        let mut sums = Halves::default();
+        for (y, weights) in self.weights.chunks_exact(self.columns).enumerate() {
+            let (odds, skipped) = evidence.row(left, top + y as i32);
+            let seen = weights.iter().skip(skipped).zip(odds);
+            let sum = if y < self.upper_rows { &mut sums.upper } else { &mut sums.lower };
+            *sum += seen.map(|(weight, odds)| weight * odds).sum::<f32>();
+        }
+        sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
+    }
+}
+
+/// Place of a cell in half sizes of the box from its middle: -1 to 1 inside.
+fn normalised(index: usize, grid: Grid) -> (f32, f32) {
+    let (column, row) = (index % grid.columns, index / grid.columns);
+    let at = |place: usize, count: usize, context: f32| {
+        ((place as f32 + 0.5) / count as f32 - 0.5) * 2.0 * context
+    };
+    (at(column, grid.columns, CONTEXT.0), at(row, grid.rows, CONTEXT.1))
+}

@@ -1,0 +1,87 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! How a track becomes the target, and how the target is let go.
+
+use ptztrack_contract::{ReleaseReason, TargetChange, TargetState};
+
+use super::{Phase, Target, Tracker};
+use crate::vision::Observation;
+use crate::vision::tracker::config::{Config, TargetRequest};
+use crate::vision::tracker::dwell_time::DwellTime;
+use crate::vision::tracker::geometry::Frame;
+use crate::vision::tracker::report::Tracked;
+
+impl Tracker {
+    /// Carries out what was asked for.
+    pub(super) fn obey(
+        &mut self,
+        phase: Phase,
+        seen: &Observation,
+        frame: Frame,
+        tracked: &mut Tracked,
+    ) -> opencv::Result<Phase> {
+        let Some(request) = self.request.take() else { return Ok(phase) };
+        if let TargetRequest::Release = request {
+            return Ok(self.let_go(phase, ReleaseReason::Request, frame, tracked));
+        }
+        let Some(id) = self.requested(request, &phase, frame) else { return Ok(phase) };
+        let free = self.let_go(phase, ReleaseReason::Request, frame, tracked);
+        let target = self.acquire(seen, id)?;
+        Ok(target.map_or(free, |target| self.begin(target, frame, tracked)))
+    }
+
+    /// Lets the target go, where there is one.
+    pub(super) fn let_go(
+        &mut self,
+        phase: Phase,
+        reason: ReleaseReason,
+        frame: Frame,
+        tracked: &mut Tracked,
+    ) -> Phase {
+        let (Phase::Tracking(target) | Phase::Occluded(target, _)) = phase else { return phase };
+        if reason != ReleaseReason::Stationary {
+            // It may move, and would be taken again at once.
+            self.policy.release(target.id);
+        }
+        tracked.tell_of(TargetState::Searching, target.id, &*target.follow, frame);
+        tracked.features.clear();
+        tracked.released = Some(reason);
+        tracked.changes.push(TargetChange::Released);
+        Phase::Searching(None)
+    }
+
+    /// Takes up whom the policy chooses, who was `lost` before all others.
+    pub(super) fn acquire_chosen(
+        &mut self,
+        seen: &Observation,
+        lost: Option<u64>,
+        frame: Frame,
+        tracked: &mut Tracked,
+    ) -> opencv::Result<Phase> {
+        let Config { choice, must_travel, .. } = self.config;
+        let chosen = self.policy.choose(&self.tracks, choice, lost, must_travel, frame);
+        let Some(id) = chosen.map(|track| track.id) else { return Ok(Phase::Searching(lost)) };
+        let Some(mut target) = self.acquire(seen, id)? else { return Ok(Phase::Searching(lost)) };
+        if must_travel {
+            target.dwell = DwellTime::on_trial();
+        }
+        Ok(self.begin(target, frame, tracked))
+    }
+
+    /// Takes up the track of that number; `None` where it cannot be followed.
+    fn acquire(&mut self, seen: &Observation, id: u64) -> opencv::Result<Option<Target>> {
+        let Some(track) = self.tracks.get(id) else { return Ok(None) };
+        let seen_at = track.seen_bounds();
+        let follow = self.config.profile.acquire(seen, track, self.tracks.region(track))?;
+        let Some(follow) = follow else { return Ok(None) };
+        self.tracks.target(id);
+        Ok(Some(Target { id, follow, dwell: DwellTime::default(), seen_at }))
+    }
+
+    fn begin(&mut self, target: Target, frame: Frame, tracked: &mut Tracked) -> Phase {
+        self.policy.take(target.id);
+        tracked.changes.push(TargetChange::Acquired);
+        tracked.tell_of(TargetState::Tracking, target.id, &*target.follow, frame);
+        Phase::Tracking(target)
+    }
+}
