@@ -7,6 +7,7 @@ use rumqttc::{MqttState, Packet};
 
 use crate::camera::{picture_size, process};
 use crate::config::Config;
+use crate::handover::Exchange;
 use crate::http;
 
 /// More than a broker may say at once by default.
@@ -46,6 +47,12 @@ pub fn broker(said: &[u8]) -> bool {
 /// A line of a camera's own process. GStreamer has to be initialised.
 pub fn word(line: &[u8]) -> bool {
     process::hear(line)
+}
+
+/// What another process says of who its cameras see.
+pub fn tracks(said: &[u8]) -> bool {
+    let (exchange, _) = Exchange::new();
+    exchange.hear("door", said).is_ok()
 }
 
 /// A stream of pictures, of which the first byte chooses the codec; whether it announces a size.

@@ -15,10 +15,10 @@ use tokio::time::{Interval, interval};
 use crate::config::{Config, Http, NotLoaded, Watchdogs};
 use crate::event::{Event, Level};
 use crate::fleet::Fleet;
-use crate::handover::HandingOver;
+use crate::handover::{Exchange, HandingOver};
 use crate::http::{self, Events};
 use crate::log::Log;
-use crate::mqtt::Publisher;
+use crate::mqtt::{Exchanging, Publisher};
 use crate::restream::Restreaming;
 use crate::shard::Shard;
 use crate::store::Keeper;
@@ -84,7 +84,9 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     let keeper = Keeper::start(&config.store, &log);
     fleet.apply(config.cameras.clone());
     let tell = |err: &std::io::Error| log.error("not-handing-over", format!("nobody is handed over: {err}"));
-    let handing_over = HandingOver::start(&config, fleet.clone(), log.clone()).inspect_err(tell).ok();
+    let (exchange, exchanging) = exchange(&origin, &config, &log).unzip();
+    let handing_over =
+        HandingOver::start(&config, fleet.clone(), exchange, log.clone()).inspect_err(tell).ok();
     let restreaming = config.restream.as_ref().and_then(|restream| {
         let started = Restreaming::start(restream, &config.cameras, fleet.clone(), log.clone());
         let tell = |reason: &String| {
@@ -153,10 +155,29 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     if let Some(keeper) = keeper {
         let _ = tokio::task::spawn_blocking(|| keeper.end()).await;
     }
+    exchanging.iter().for_each(Exchanging::end);
     if let Some(publisher) = publisher {
         publisher.end().await;
     }
     Ok(())
+}
+
+/// With the other processes that share the cameras, where there are any.
+fn exchange(origin: &Origin, config: &Config, log: &Arc<Log>) -> Option<(Arc<Exchange>, Exchanging)> {
+    origin.shard()?;
+    let Some(mqtt) = &config.mqtt else {
+        if config.hands_over_to_others() {
+            let detail = "people are handed over to and from other processes only with [mqtt] in the file";
+            log.tell(&Event::new(Level::Warning, None, "not-handing-over", detail.to_owned()));
+        }
+        return None;
+    };
+    let (exchange, saying) = Exchange::new();
+    let started = Exchanging::start(mqtt, exchange.clone(), saying, log.clone());
+    let tell = |err: &session::Error| {
+        log.error("not-handing-over", format!("nobody is handed over to or from other processes: {err}"));
+    };
+    Some((exchange, started.inspect_err(tell).ok()?))
 }
 
 /// Nobody is followed the worse for a page that is not there: it is tried again.

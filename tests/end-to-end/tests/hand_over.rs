@@ -11,7 +11,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use browser::Browser;
-use end_to_end::{PATIENCE, Program, plugin_folder, scene, tool};
+use end_to_end::{Broker, PATIENCE, Program, plugin_folder, scene, tool};
 use handover::{Direction, Map, Pair, Place};
 use virtual_camera::{Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
@@ -87,6 +87,37 @@ fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
     // Nobody has a word for the one that does not turn.
     assert!(yard.commands().iter().all(|command| !command.query.contains("move=")), "{:?}", yard.commands());
     fs::remove_dir_all(&state).unwrap();
+}
+
+/// Two processes and a broker: each turns the camera that it has.
+#[test]
+fn whom_a_camera_of_one_process_sees_the_camera_of_another_one_turns_to() {
+    let (hall, door) = (somebody_aside(looking(16.0)), somebody_aside(looking(-20.0)));
+    let broker = Broker::start();
+    let states = [0, 1].map(|shard| end_to_end::scratch(&format!("hand-over-shard-{shard}")));
+    states.iter().for_each(|state| fs::create_dir_all(state).unwrap());
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        let hall = Program::entry("hall", &hall.url(), &password) + "kind = \"fixed\"\n";
+        let door = Program::entry("door", &door.url(), &password);
+        let mqtt = format!("[mqtt]\nhost = \"127.0.0.1\"\nport = {}\n", broker.port);
+        format!("{hall}{door}[handover.hall]\ncalls = [\"door\"]\n{mqtt}")
+    };
+    fs::write(states[1].join("map.hall.door.json"), known(&hall, hall.view_size()).to_json()).unwrap();
+    let [of_hall, mut of_door] = [0, 1].map(|shard: usize| {
+        let environment = [("STATE_DIRECTORY", states[shard].as_path())];
+        Program::start_in(&format!("shard-{shard}"), file, &["--shard", &format!("{shard}/2")], &environment)
+    });
+    let line = of_door.launch.wait_for_line("door: turns to target ");
+    assert!(line.ends_with(" of hall"), "{line}");
+    of_door.wait_for("/cameras", |cameras| cameras.contains("of hall)") && !cameras.contains("\"hall\""));
+    assert!(door.status().pan_deg > 0.0, "{:?}", door.status());
+    // Another process knows its own cameras only.
+    let said = of_hall.end("TERM");
+    assert!(!said.contains("door: "), "{said}");
+    of_door.end("TERM");
+    assert!(scene::rests(&door, door.now()).is_some(), "left turning: {:?}", door.commands().last());
+    states.iter().for_each(|state| fs::remove_dir_all(state).unwrap());
 }
 
 #[test]

@@ -14,7 +14,7 @@ pub use others::*;
 /// A target: takes anything, says whether it was understood, and never panics.
 pub type Target = fn(&[u8]) -> bool;
 
-pub const TARGETS: [(&str, Target); 20] = [
+pub const TARGETS: [(&str, Target); 21] = [
     ("challenge", challenge),
     ("position", position),
     ("limits", limits),
@@ -33,6 +33,7 @@ pub const TARGETS: [(&str, Target); 20] = [
     ("log_in", log_in),
     ("broker", broker),
     ("word", word),
+    ("tracks", tracks),
     ("watchdog", watchdog),
     ("structure", structure),
 ];

@@ -36,6 +36,10 @@ pub fn broker(bytes: &[u8]) -> bool {
     parsers::broker(bytes)
 }
 
+pub fn tracks(bytes: &[u8]) -> bool {
+    parsers::tracks(bytes)
+}
+
 pub fn word(bytes: &[u8]) -> bool {
     with_gstreamer();
     parsers::word(bytes)

@@ -225,10 +225,15 @@ impl Known {
     /// Another pipeline begins, the one before having stopped.
     pub fn begins(&self) {
         self.processed_before.store(self.processed.load(Ordering::Relaxed), Ordering::Relaxed);
-        // Its tracks have other numbers.
+        self.forget_tracks();
+        self.reset_silence();
+    }
+
+    /// Another pipeline's tracks have other numbers.
+    pub fn forget_tracks(&self) {
         lock(&self.ignored).clear();
         lock(&self.selected).take();
-        self.reset_silence();
+        lock(&self.origin).take();
     }
 
     /// The last picture counts from now.

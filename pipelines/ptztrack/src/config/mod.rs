@@ -118,6 +118,12 @@ impl Config {
         if lacks.is_empty() { Ok(()) } else { Err(lacks.join("\n")) }
     }
 
+    /// Whether a camera that is not among these calls one of these, or is called by one.
+    pub fn hands_over_to_others(&self) -> bool {
+        let ours = |name: &String| self.cameras.iter().any(|camera| camera.name == *name);
+        self.hand_over.iter().any(|wish| wish.calls.iter().any(|called| ours(called) != ours(&wish.from)))
+    }
+
     fn read(mut root: Table) -> Self {
         let http = root.table("http").and_then(Http::read);
         let mqtt = root.table("mqtt").and_then(Mqtt::read);

@@ -252,6 +252,19 @@ fn a_zone_is_a_part_of_what_a_camera_sees() {
 }
 
 #[test]
+fn a_share_hands_over_to_others_where_one_of_two_cameras_is_not_in_it() {
+    let cameras = "[camera.yard]\naddress = \"http://a\"\n[camera.door]\naddress = \"http://b\"\n[camera.hall]\naddress = \"http://c\"\n";
+    let config = parse(&format!("{cameras}[handover.yard]\ncalls = [\"door\"]\n")).unwrap();
+    for (share, does) in
+        [(&["yard", "door"][..], false), (&["yard"], true), (&["door", "hall"], true), (&["hall"], false)]
+    {
+        let mut config = config.clone();
+        config.cameras.retain(|camera| share.contains(&camera.name.as_str()));
+        assert_eq!(config.hands_over_to_others(), does, "{share:?}");
+    }
+}
+
+#[test]
 fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
     let cameras = "[camera.yard]\naddress = \"http://a\"\nkind = \"fixed\"\n[camera.door]\naddress = \"http://b\"\n[camera.hall]\naddress = \"http://c\"\n";
     let config = parse(&format!("{cameras}[handover.yard]\ncalls = [\"door\"]\nprecedence = 3\n")).unwrap();

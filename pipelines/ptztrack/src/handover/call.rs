@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use handover::{Aim, Direction};
 
+use super::exchange::Errand;
 use super::link::Link;
 use super::motion::Expected;
 use super::view::View;
@@ -32,11 +33,7 @@ const ASTRAY: Duration = Duration::from_secs(1);
 /// Somebody to turn to.
 #[derive(Debug)]
 pub struct Call {
-    /// The camera that sees them.
-    pub from: String,
-    /// Their number there.
-    pub id: u64,
-    pub precedence: u32,
+    pub errand: Errand,
     begun: Instant,
     ordered: Option<(Instant, Gaze)>,
     likely: Likely,
@@ -67,9 +64,7 @@ pub enum Progress {
 impl Call {
     pub fn new(wish: &HandOver, id: u64) -> Self {
         Self {
-            from: wish.from.clone(),
-            id,
-            precedence: wish.precedence,
+            errand: Errand { from: wish.from.clone(), id, precedence: wish.precedence },
             begun: Instant::now(),
             ordered: None,
             likely: Likely::default(),
@@ -80,7 +75,7 @@ impl Call {
 
     /// Goes on with it.
     pub fn advance(&mut self, link: &Link, from: &View, called: &View) -> Progress {
-        let person = from.person(self.id).filter(|_| from.is_fresh());
+        let person = from.person(self.errand.id).filter(|_| from.is_fresh());
         if self.is_overruled(called) || (self.followed.is_some() && person.is_none()) {
             return Progress::Over;
         }
@@ -95,7 +90,7 @@ impl Call {
             (Some(_), Some(expected)) if self.is_astray(&expected, called) => self.look_again(),
             (Some(_), _) => Progress::Going,
             (None, _) if self.begun.elapsed() > LONGEST => {
-                called.known.steer(Steering::Follow);
+                self.cancel(called);
                 Progress::Failed
             }
             (None, _) => {
@@ -105,12 +100,24 @@ impl Call {
         }
     }
 
+    pub fn has_taken_up(&self) -> bool {
+        self.followed.is_some()
+    }
+
+    /// Has the camera follow again, where it was sent somewhere.
+    pub fn cancel(&self, called: &View) {
+        if self.followed.is_none() && matches!(*lock(&called.known.steering), Steering::LookAt(..)) {
+            called.known.steer(Steering::Follow);
+        }
+    }
+
     /// Whether somebody else has the camera, or has chosen whom it follows.
     fn is_overruled(&self, called: &View) -> bool {
         let steering = *lock(&called.known.steering);
         match self.followed {
             Some(_) => {
-                let is_ours = |origin: &Origin| origin.camera == self.from && origin.id == self.id;
+                let is_ours =
+                    |origin: &Origin| origin.camera == self.errand.from && origin.id == self.errand.id;
                 !called.follows() || !lock(&called.known.origin).as_ref().is_some_and(is_ours)
             }
             None => self.ordered.is_some() && !matches!(steering, Steering::LookAt(..)),
@@ -126,7 +133,7 @@ impl Call {
         if before == Some(person.id) {
             return Progress::Going;
         }
-        let origin = Origin { target: person.id, id: self.id, camera: self.from.clone() };
+        let origin = Origin { target: person.id, id: self.errand.id, camera: self.errand.from.clone() };
         *lock(&called.known.origin) = Some(origin);
         if before.is_none() {
             called.known.steer(Steering::Follow);
@@ -171,7 +178,7 @@ impl Call {
 
     /// Where the camera has to look; `None` where that is in too much doubt.
     pub fn gaze(&self, link: &Link, from: &View, called: &View) -> Option<Gaze> {
-        let aim = link.aim(from, from.person(self.id)?, LEAD_S)?;
+        let aim = link.aim(from, from.person(self.errand.id)?, LEAD_S)?;
         let middle = aim.middle();
         let widest = called.widest_fov_deg?;
         let enough = IN_PICTURE * aim.doubt_deg;
@@ -230,53 +237,11 @@ fn of(gaze: &Gaze) -> Direction {
 mod tests {
     use std::sync::Arc;
 
-    use handover::{Map, Pair, Place};
-    use ptztrack_contract::Point;
-
     use super::*;
-    use crate::camera::{Known, Pose, Sight};
-    use crate::handover::view::direction;
+    use crate::camera::Known;
+    use crate::handover::stage::{FEET, RATE, link, person, target, view, wish};
 
     const PICTURE: Duration = Duration::from_millis(80);
-    /// Where somebody walks, and how fast, to the right.
-    const FEET: [f64; 2] = [0.4, 0.7];
-    const RATE: f64 = 0.2;
-
-    fn pose() -> Pose {
-        let age = Duration::ZERO;
-        Pose { age, pan_deg: 0.0, tilt_deg: -10.0, horizontal_fov_deg: 60.0, vertical_fov_deg: 46.0 }
-    }
-
-    /// Both look out of the same place, the one that turns to where the other one looks.
-    fn link() -> Link {
-        let view = pose().view().unwrap();
-        let mut map = Map::default();
-        for n in 0..100 {
-            let (x, y) = (f64::from(n % 10) / 10.0, 0.5 + f64::from(n / 10) / 20.0);
-            let direction = direction(&view, Point { x, y });
-            map.learn(Pair { place: Place::in_picture(x, y), direction, height_deg: Some(15.0), person: 1 });
-        }
-        Link::new(map)
-    }
-
-    fn person(id: u64, [x, y]: [f64; 2], rate: f64) -> Person {
-        let bounds = [x - 0.04, y - 0.3, 0.08, 0.3];
-        Person { id, bounds, velocity: [rate, 0.0], seen: true, confidence: 1.0, is_target: false }
-    }
-
-    fn view(name: &str, turns: bool, came: Instant, people: Vec<Person>) -> View {
-        let poses = if turns { vec![pose()] } else { Vec::new() };
-        let known = Arc::new(Known::new(name));
-        lock(&known.state).picture = true;
-        View {
-            known,
-            seen: Arc::new((came, Sight { people, poses, ..Sight::default() })),
-            turns,
-            video: Duration::ZERO,
-            widest_fov_deg: Some(60.0),
-            target_height: None,
-        }
-    }
 
     /// A call of `yard` for target 3, and what `door` sees from picture to picture.
     struct Bench {
@@ -288,14 +253,7 @@ mod tests {
 
     impl Bench {
         fn new() -> Self {
-            let wish = HandOver {
-                from: "yard".to_owned(),
-                calls: vec!["door".to_owned()],
-                zones: Vec::new(),
-                precedence: 0,
-                together: false,
-            };
-            let call = Call::new(&wish, 3);
+            let call = Call::new(&wish(&["door"]), 3);
             Self {
                 call,
                 link: link(),
@@ -315,10 +273,6 @@ mod tests {
             (0..2).for_each(|_| assert_eq!(self.see(&[person(7, FEET, RATE)]), Progress::Going));
             assert_eq!(self.see(&[person(7, FEET, RATE)]), Progress::TakenUp(7));
         }
-    }
-
-    fn target(person: Person) -> Person {
-        Person { is_target: true, ..person }
     }
 
     #[test]

@@ -53,7 +53,8 @@ impl Maps {
     /// A file that is broken off halfway never takes the place of the last one.
     pub fn keep(&self, from: &str, to: &str, map: &Map) {
         let Some(path) = self.path(from, to) else { return };
-        let new = path.with_extension("new");
+        // Processes that share the cameras may share the folder.
+        let new = path.with_extension(format!("{}.new", std::process::id()));
         let written: io::Result<()> = fs::write(&new, map.to_json()).and_then(|()| fs::rename(&new, &path));
         if let Err(err) = written
             && !self.warned.swap(true, Ordering::Relaxed)

@@ -5,20 +5,26 @@
 
 mod call;
 mod calling;
+mod exchange;
 mod link;
 mod maps;
 mod motion;
 mod points;
 mod sharing;
+#[cfg(test)]
+mod stage;
 mod view;
 mod walkers;
 
 use std::collections::BTreeMap;
+use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
 use call::Call;
+use exchange::Errand;
+pub use exchange::{Exchange, Message};
 use link::Link;
 use maps::Maps;
 use ptztrack_contract::lock::lock;
@@ -46,14 +52,19 @@ pub struct HandingOver {
 }
 
 impl HandingOver {
-    /// Starts it.
+    /// Starts it, for cameras of other processes, too, where there is an exchange with these.
     ///
     /// # Errors
     /// Where the system has no thread left.
-    pub fn start(config: &Config, fleet: Arc<Fleet>, log: Arc<Log>) -> std::io::Result<Self> {
+    pub fn start(
+        config: &Config,
+        fleet: Arc<Fleet>,
+        exchange: Option<Arc<Exchange>>,
+        log: Arc<Log>,
+    ) -> std::io::Result<Self> {
         let wishes = Arc::new(Mutex::new(config.hand_over.clone()));
         let watched = Arc::downgrade(&wishes);
-        let work = move || Dispatcher::new(fleet, log).run(&watched);
+        let work = move || Dispatcher::new(fleet, exchange, log).run(&watched);
         let thread = thread::Builder::new().name("hand-over".to_owned()).spawn(work)?;
         Ok(Self { wishes, thread })
     }
@@ -74,6 +85,7 @@ impl HandingOver {
 /// Sees who is where, and calls.
 struct Dispatcher {
     fleet: Arc<Fleet>,
+    exchange: Option<Arc<Exchange>>,
     log: Arc<Log>,
     maps: Maps,
     /// By who calls and who is called.
@@ -82,6 +94,10 @@ struct Dispatcher {
     /// By who is called.
     calls: BTreeMap<String, Call>,
     sharing: Sharing,
+    /// How many pipelines each has had.
+    pipelines: BTreeMap<String, u64>,
+    /// When the last picture came of which others were told.
+    told: BTreeMap<String, Instant>,
     /// The widest field of view of each.
     widest: BTreeMap<String, f64>,
     /// Cameras that follow nobody, by what a fixed one sees there, since then.
@@ -91,15 +107,18 @@ struct Dispatcher {
 }
 
 impl Dispatcher {
-    fn new(fleet: Arc<Fleet>, log: Arc<Log>) -> Self {
+    fn new(fleet: Arc<Fleet>, exchange: Option<Arc<Exchange>>, log: Arc<Log>) -> Self {
         Self {
             maps: Maps::new(log.clone()),
             fleet,
+            exchange,
             log,
             links: BTreeMap::new(),
             walkers: BTreeMap::new(),
             calls: BTreeMap::new(),
             sharing: Sharing::default(),
+            pipelines: BTreeMap::new(),
+            told: BTreeMap::new(),
             widest: BTreeMap::new(),
             nobody: BTreeMap::new(),
             spared: BTreeMap::new(),
@@ -130,13 +149,11 @@ impl Dispatcher {
     }
 
     fn tick(&mut self, wishes: &[HandOver]) {
-        let concerned = |known: &Arc<Known>| wishes.iter().any(|wish| wish.concerns(&known.name));
-        let known: Vec<_> = self.fleet.known().into_iter().filter(concerned).collect();
-        let views: BTreeMap<String, View> =
-            known.into_iter().map(|known| (known.name.clone(), self.view(known))).collect();
+        let views = self.views(wishes);
         for wish in wishes {
             let Some(from) = views.get(&wish.from) else { continue };
-            lock(&from.known.calls).clone_from(&wish.calls);
+            let is_here = |name: &&String| views.get(*name).is_some_and(|view| view.is_here);
+            *lock(&from.known.calls) = wish.calls.iter().filter(is_here).cloned().collect();
             self.walkers.entry(wish.from.clone()).or_default().see(from);
             for called in &wish.calls {
                 if let Some(to) = views.get(called) {
@@ -146,7 +163,7 @@ impl Dispatcher {
         }
         self.take_points(wishes, &views);
         self.share(wishes, &views);
-        self.advance(&views);
+        self.advance(wishes, &views);
         let now = Instant::now();
         self.spared.retain(|_, until| *until > now);
         self.look_for_nobody(wishes, &views, now);
@@ -155,19 +172,68 @@ impl Dispatcher {
         }
     }
 
-    fn view(&mut self, known: Arc<Known>) -> View {
-        let seen = known.sight.borrow().clone();
-        for pose in &seen.1.poses {
-            let widest = self.widest.entry(known.name.clone()).or_default();
-            *widest = widest.max(pose.horizontal_fov_deg);
+    /// All cameras that are concerned: ours, of which others are told, and those that others tell of.
+    fn views(&mut self, wishes: &[HandOver]) -> BTreeMap<String, View> {
+        let concerned = |name: &str| wishes.iter().any(|wish| wish.concerns(name));
+        let ours = self.fleet.known().into_iter().filter(|known| concerned(&known.name));
+        let ours: Vec<View> = ours.map(|known| self.view(known)).collect();
+        let others =
+            self.exchange.as_ref().map(|exchange| exchange.views(Instant::now())).unwrap_or_default();
+        ours.iter().for_each(|view| self.tell_others(view));
+        let others = others.into_iter().filter(|view| concerned(&view.known.name));
+        let mut views = BTreeMap::new();
+        for mut view in others.chain(ours) {
+            let name = view.known.name.clone();
+            view.widest_fov_deg = self.widest(&view);
+            self.notice_pipeline(&view);
+            // One that is here is what it is, whatever others say.
+            views.insert(name, view);
         }
+        views
+    }
+
+    fn view(&self, known: Arc<Known>) -> View {
+        let seen = known.sight.borrow().clone();
         View {
+            is_here: true,
             video: known.video_delay(),
-            widest_fov_deg: self.widest.get(&known.name).copied(),
+            widest_fov_deg: None,
             target_height: self.fleet.target_height(&known.name),
             turns: self.fleet.turns(&known.name),
+            errand: self.on_its_way(&known.name),
             known,
             seen,
+        }
+    }
+
+    fn on_its_way(&self, camera: &str) -> Option<Errand> {
+        self.calls.get(camera).filter(|call| !call.has_taken_up()).map(|call| call.errand.clone())
+    }
+
+    fn tell_others(&mut self, view: &View) {
+        let Some(exchange) = &self.exchange else { return };
+        let came = view.seen.0;
+        if self.told.insert(view.known.name.clone(), came) != Some(came) {
+            exchange.tell(view);
+        }
+    }
+
+    /// The widest field of view so far.
+    fn widest(&mut self, view: &View) -> Option<f64> {
+        let fields = view.seen.1.poses.iter().map(|pose| pose.horizontal_fov_deg);
+        let before = self.widest.get(&view.known.name).copied();
+        let widest = fields.chain(before).max_by(f64::total_cmp)?;
+        self.widest.insert(view.known.name.clone(), widest);
+        Some(widest)
+    }
+
+    /// With another pipeline all that is known by a track's number is void.
+    fn notice_pipeline(&mut self, view: &View) {
+        let (name, pipelines) = (&view.known.name, view.known.rebuilt.load(Ordering::Relaxed));
+        if self.pipelines.insert(name.clone(), pipelines).is_some_and(|before| before != pipelines) {
+            self.sharing.forget(name);
+            self.walkers.remove(name);
+            self.spared.retain(|(camera, _), _| camera != name);
         }
     }
 
@@ -186,7 +252,9 @@ impl Dispatcher {
             let detail = format!(
                 "{from} or {to} was moved: where {to} has to look for whom {from} sees is learned anew"
             );
-            self.tell(to, Level::Warning, "map-void", detail);
+            if called.is_here {
+                self.tell(to, Level::Warning, "map-void", detail);
+            }
         }
     }
 
@@ -207,9 +275,9 @@ impl Dispatcher {
             view.known.ignore(self.sharing.left_by(name));
         }
         for (camera, id) in leaving {
-            if let Some(view) = views.get(&camera) {
-                view.known.release();
-            }
+            // One of another process is released there.
+            let Some(view) = views.get(&camera).filter(|view| view.is_here) else { continue };
+            view.known.release();
             self.tell(
                 &camera,
                 Level::Info,

@@ -79,6 +79,12 @@ impl Sharing {
         self.left.retain(|_, keeps| is_followed(keeps));
     }
 
+    /// The tracks of a camera have other numbers from now on.
+    pub fn forget(&mut self, camera: &str) {
+        self.same.retain(|((one, _), other), _| one != camera && other != camera);
+        self.left.retain(|(leaves, _), (keeps, _)| leaves != camera && keeps != camera);
+    }
+
     /// Whom a camera leaves to others.
     pub fn left_by(&self, camera: &str) -> BTreeSet<u64> {
         self.left.keys().filter(|(name, _)| name == camera).map(|(_, id)| *id).collect()
@@ -120,20 +126,9 @@ impl View {
 mod tests {
     use std::sync::Arc;
 
-    use handover::{Direction, Map, Pair, Place};
-
     use super::*;
     use crate::camera::{Known, Pose, Sight};
-
-    fn link() -> Link {
-        let mut map = Map::default();
-        for n in 0..60 {
-            let (pan_deg, tilt_deg) = (f64::from(n % 10) * 5.0 - 25.0, f64::from(n / 10) * 4.0 - 26.0);
-            let direction = Direction { pan_deg, tilt_deg };
-            map.learn(Pair { place: Place::towards(direction), direction, height_deg: Some(9.0), person: 1 });
-        }
-        Link::new(map)
-    }
+    use crate::handover::stage::turning_link;
 
     /// A camera that sees one person, and follows them or not.
     fn view(name: &str, id: u64, is_target: bool) -> View {
@@ -148,6 +143,8 @@ mod tests {
         };
         let sight = Sight { people: vec![person], poses: vec![pose], ..Sight::default() };
         View {
+            is_here: true,
+            errand: None,
             known: Arc::new(Known::new(name)),
             seen: Arc::new((Instant::now(), sight)),
             turns: true,
@@ -173,7 +170,7 @@ mod tests {
     impl Bench {
         fn new(gate_follows: bool, door_follows: bool) -> Self {
             let (gate, door) = (view("gate", 3, gate_follows), view("door", 7, door_follows));
-            Self { sharing: Sharing::default(), link: link(), now: Instant::now(), gate, door }
+            Self { sharing: Sharing::default(), link: turning_link(), now: Instant::now(), gate, door }
         }
 
         fn called(self, camera: &str, id: u64) -> Self {
@@ -286,6 +283,14 @@ mod tests {
         let mut bench = Bench::new(true, false);
         assert_eq!(bench.leaves(), None, "nothing is to be released");
         assert_eq!(bench.left(), [BTreeSet::new(), [7].into()]);
+    }
+
+    #[test]
+    fn whoever_has_the_number_of_somebody_after_a_camera_came_back_is_not_left() {
+        let mut bench = Bench::new(true, true);
+        assert_eq!(bench.leaves(), track("door", 7));
+        bench.sharing.forget("door");
+        assert_eq!(bench.left(), [BTreeSet::new(), BTreeSet::new()]);
     }
 
     #[test]

@@ -8,6 +8,7 @@ use handover::{Direction, Place};
 use ptztrack_contract::Point;
 use ptztrack_contract::lock::lock;
 
+use super::exchange::Errand;
 use super::motion::Motion;
 use crate::camera::{Known, Person, Pose, Sight, Steering};
 
@@ -18,6 +19,8 @@ const STEP: Duration = Duration::from_millis(200);
 
 /// One camera as it is seen in one moment.
 pub struct View {
+    /// This process runs it.
+    pub is_here: bool,
     pub known: Arc<Known>,
     /// What it saw last, and when.
     pub seen: Arc<(Instant, Sight)>,
@@ -29,10 +32,12 @@ pub struct View {
     pub widest_fov_deg: Option<f64>,
     /// How tall whom it follows is to be, where it zooms.
     pub target_height: Option<f64>,
+    /// For whom it was called, while it is on its way.
+    pub errand: Option<Errand>,
 }
 
 impl View {
-    /// It is ours, it has a picture, and nothing else is wanted of it.
+    /// Nobody else moves it, it has a picture, and nothing else is wanted of it.
     pub fn follows(&self) -> bool {
         *lock(&self.known.steering) == Steering::Follow
             && !self.known.operator.load(Ordering::Relaxed)
@@ -41,6 +46,16 @@ impl View {
 
     pub fn is_fresh(&self) -> bool {
         self.seen.0.elapsed() < FRESH
+    }
+
+    /// Whether it was called for this track of another camera: it is on its way, or follows them as its target.
+    pub fn is_called_for(&self, camera: &str, id: u64) -> bool {
+        let target = lock(&self.known.state).target_id;
+        let origin = lock(&self.known.origin);
+        self.errand.as_ref().is_some_and(|errand| errand.from == camera && errand.id == id)
+            || origin.as_ref().is_some_and(|origin| {
+                origin.camera == camera && origin.id == id && target == Some(origin.target)
+            })
     }
 
     pub fn people(&self) -> &[Person] {

@@ -3,6 +3,7 @@
 //! What happens, told to an MQTT broker: events as they come, and what is kept there for who comes later.
 
 mod topics;
+mod tracks;
 
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -15,6 +16,7 @@ use rumqttc::{
 use tokio::sync::broadcast::error::RecvError;
 use tokio::task::JoinHandle;
 use topics::{OFFLINE, ONLINE, Topics};
+pub use tracks::Exchanging;
 
 use crate::config::Mqtt;
 use crate::event::Event;
@@ -57,18 +59,9 @@ impl Publisher {
         log: Arc<Log>,
     ) -> Result<Self, session::Error> {
         let topics = Topics::new(settings, shard, pictures);
-        let id = format!("ptztrack-{}-{}", glib::host_name(), std::process::id());
-        let mut options = MqttOptions::new(id, &settings.host, settings.port);
-        options.set_keep_alive(KEEP_ALIVE);
+        let mut options = options(settings, "")?;
         options.set_max_packet_size(LONGEST_HEARD, LONGEST_SAID);
         options.set_last_will(LastWill::new(topics.availability(), OFFLINE, QoS::AtLeastOnce, true));
-        if let Some(credentials) = &settings.credentials {
-            options.set_credentials(&credentials.user, credentials.password.reveal());
-        }
-        if let Some(trust) = &settings.tls {
-            let tls = TlsConfiguration::Rustls(Arc::new(trust.client_config(true)?));
-            options.set_transport(Transport::tls_with_config(tls));
-        }
         let (client, events) = AsyncClient::new(options, WAITING);
         let connected = Arc::new(AtomicBool::default());
         let broker = format!("{}:{}", settings.host, settings.port);
@@ -88,6 +81,21 @@ impl Publisher {
         let _ = self.client.try_disconnect();
         let _ = tokio::time::timeout(LONGEST_END, self.connection).await;
     }
+}
+
+/// Where the broker is, and who we are; `what` tells our connections apart.
+fn options(settings: &Mqtt, what: &str) -> Result<MqttOptions, session::Error> {
+    let id = format!("ptztrack-{}-{}{what}", glib::host_name(), std::process::id());
+    let mut options = MqttOptions::new(id, &settings.host, settings.port);
+    options.set_keep_alive(KEEP_ALIVE);
+    if let Some(credentials) = &settings.credentials {
+        options.set_credentials(&credentials.user, credentials.password.reveal());
+    }
+    if let Some(trust) = &settings.tls {
+        let tls = TlsConfiguration::Rustls(Arc::new(trust.client_config(true)?));
+        options.set_transport(Transport::tls_with_config(tls));
+    }
+    Ok(options)
 }
 
 /// Says once that the broker is away, and once that it is there.

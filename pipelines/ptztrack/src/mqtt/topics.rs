@@ -54,6 +54,16 @@ impl Topics {
         format!("{}/camera/{camera}/picture", self.own)
     }
 
+    /// Of who is seen where, for those that share the cameras.
+    pub fn tracks(&self, camera: &str) -> String {
+        format!("{}/camera/{camera}/tracks", self.own)
+    }
+
+    /// The camera of such a topic.
+    pub fn camera_of_tracks<'a>(&self, topic: &'a str) -> Option<&'a str> {
+        topic.strip_prefix(&self.own)?.strip_prefix("/camera/")?.strip_suffix("/tracks")
+    }
+
     fn state(&self, camera: &str) -> String {
         format!("{}/camera/{camera}/state", self.own)
     }
@@ -148,6 +158,13 @@ mod tests {
         let entity: Value = serde_json::from_str(&kept[1].1).unwrap();
         assert_eq!(entity["value_template"], "{{ value_json.following }}");
         assert_eq!(entity["availability_topic"], "ptztrack/availability");
+    }
+
+    #[test]
+    fn a_topic_of_tracks_tells_whose_they_are() {
+        let topics = topics(Some("0/2"));
+        assert_eq!(topics.camera_of_tracks(&topics.tracks("door")), Some("door"));
+        assert_eq!(topics.camera_of_tracks("ptztrack/camera/door/state"), None);
     }
 
     #[test]

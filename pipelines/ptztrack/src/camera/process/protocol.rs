@@ -147,6 +147,9 @@ impl Report {
             *lock(&known.steering) = self.hand.into();
             known.operator.store(self.operator, Ordering::Relaxed);
         }
+        if known.rebuilt.load(Ordering::Relaxed) != self.rebuilt {
+            known.forget_tracks();
+        }
         let counters = [
             (&known.pictures, self.pictures),
             (&known.processed, self.processed),
@@ -181,12 +184,16 @@ mod tests {
         let line = serde_json::to_string(&Word::Report(Box::new(Report::of(&there, 2)))).unwrap();
         let Ok(Word::Report(report)) = serde_json::from_str(&line) else { panic!("{line}") };
         let here = Known::new("door");
+        here.ignored.lock().unwrap().insert(7);
         report.tell(&here, 3);
+        assert_eq!(here.ignored.lock().unwrap().len(), 1, "it is the same pipeline");
         assert_eq!(here.control(), Control::Ours, "an order is on its way");
         report.tell(&here, 2);
         assert_eq!(here.control(), Control::HandedOver);
         assert!(lock(&here.state).picture);
         assert_eq!((here.pictures.load(Ordering::Relaxed), here.times[0].read()), (7, (3, 0.5)));
         assert!(!here.is_stuck());
+        Report { rebuilt: 1, ..*report }.tell(&here, 2);
+        assert!(here.ignored.lock().unwrap().is_empty(), "its tracks have other numbers");
     }
 }
