@@ -60,8 +60,8 @@ mod forms {
     pub use crate::error::ContractError;
     pub use crate::events::{CameraEvent, TrackerEvent};
     pub use crate::messages::{
-        CameraChange, CameraMessage, MotionChange, MotionMessage, ReleaseReason, TargetChange, TargetMessage,
-        Times,
+        CameraChange, CameraMessage, MOVE_REFUSED, MotionChange, MotionMessage, ReleaseReason, TargetChange,
+        TargetMessage, Times,
     };
     pub use crate::meta::BufferMeta;
     pub use crate::motion::{MOTION_ROI, MotionMeta, Region};

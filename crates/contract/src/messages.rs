@@ -6,6 +6,9 @@ use crate::codec::{self, Reader};
 use crate::named::named_enum;
 use crate::{ContractError, Point, Rect, TargetState, Vector};
 
+/// Name of the details of a warning that the camera refuses to be sent to a position, be it home.
+pub const MOVE_REFUSED: &str = "ptztrack-move-refused";
+
 /// The three times that GStreamer's own analysers put on a message; `None` where the stream has none.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Times {

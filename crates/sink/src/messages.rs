@@ -4,7 +4,7 @@
 
 use gst::prelude::*;
 use gst::subclass::prelude::*;
-use ptztrack_contract::{CameraChange, CameraMessage, Times};
+use ptztrack_contract::{CameraChange, CameraMessage, MOVE_REFUSED, Times};
 use servo::AxisFinding;
 
 use session::session::{ConnectionChange, ControlOwner};
@@ -104,7 +104,8 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Session(SessionEvent::HomeRefused(err))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera refuses to go home: {err}; it stays where it is. Correct `home`")
+                ("the camera refuses to be sent to a position: {err}; it stays where it is. Correct `home` or `look-at`, or do without them"),
+                details: gst::Structure::new_empty(MOVE_REFUSED)
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::Mode(mode))) => gst::element_imp_info!(
                 self,

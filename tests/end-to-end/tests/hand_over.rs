@@ -13,7 +13,7 @@ use std::time::Duration;
 use browser::Browser;
 use end_to_end::{Broker, PATIENCE, Program, plugin_folder, scene, tool};
 use handover::{Direction, Map, Pair, Place};
-use virtual_camera::{Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
+use virtual_camera::{Moves, Pose, Settings, SyntheticSettings, VirtualCamera, Waypoint, World};
 
 /// Somebody walks to and fro to the right of what the camera that turns sees at first.
 fn somebody_aside(home: Pose) -> VirtualCamera {
@@ -86,6 +86,25 @@ fn whom_a_fixed_camera_sees_another_turns_to_and_follows() {
     assert!(scene::rests(&door, door.now()).is_some(), "left turning: {:?}", door.commands().last());
     // Nobody has a word for the one that does not turn.
     assert!(yard.commands().iter().all(|command| !command.query.contains("move=")), "{:?}", yard.commands());
+    fs::remove_dir_all(&state).unwrap();
+}
+
+#[test]
+fn a_camera_that_takes_no_moves_to_a_position_is_called_no_more() {
+    let yard = somebody_aside(looking(16.0));
+    let moves = Moves { absolute: false, ..Moves::default() };
+    let door =
+        VirtualCamera::start(Settings { moves, home: Some(looking(-20.0)), ..scene::nobody() }).unwrap();
+    let state = end_to_end::scratch("hand-over-refused");
+    fs::create_dir_all(&state).unwrap();
+    fs::write(state.join("map.yard.door.json"), known(&yard, yard.view_size()).to_json()).unwrap();
+    let file = |folder: &Path| yard_calls_door(&yard, &door, folder);
+    let environment = [("STATE_DIRECTORY", state.as_path())];
+    let mut program = Program::start_in("hand-over-refused", file, &[], &environment);
+    program.launch.wait_for_line("door: warning: refuses to turn where another camera sees somebody");
+    program.wait_for("/cameras", |cameras| !cameras.contains("turns to whom another one sees"));
+    assert_eq!(door.status().pan_deg, -20.0);
+    program.end("TERM");
     fs::remove_dir_all(&state).unwrap();
 }
 

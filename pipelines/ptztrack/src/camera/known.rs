@@ -102,6 +102,8 @@ pub struct State {
     pub target_id: Option<u64>,
     /// What was told last that is not as it should be.
     pub trouble: Option<String>,
+    /// How often the camera refused to be sent to a position.
+    pub refused_moves: u64,
     /// It will not be tried again by itself.
     pub given_up: bool,
 }

@@ -6,7 +6,7 @@ use std::sync::atomic::Ordering;
 
 use gst::MessageView;
 use ptztrack_contract::lock::lock;
-use ptztrack_contract::{CameraChange, CameraMessage, TargetChange, TargetMessage};
+use ptztrack_contract::{CameraChange, CameraMessage, MOVE_REFUSED, TargetChange, TargetMessage};
 
 use super::known::{Known, SEARCHING};
 use crate::event::{Event, Level};
@@ -39,6 +39,9 @@ impl Listener {
             }
             MessageView::Eos(_) => self.ends(),
             MessageView::Warning(warning) => {
+                if warning.details().is_some_and(|details| details.name() == MOVE_REFUSED) {
+                    lock(&self.known.state).refused_moves += 1;
+                }
                 self.trouble(Level::Warning, "warning", warning.error().message().to_owned(), "");
             }
             MessageView::Element(element) => {

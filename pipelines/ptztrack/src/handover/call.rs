@@ -36,6 +36,8 @@ pub struct Call {
     pub errand: Errand,
     begun: Instant,
     ordered: Option<(Instant, Gaze)>,
+    /// How often the camera had refused to be sent anywhere before it was told to turn.
+    refusals: u64,
     likely: Likely,
     /// Their number here, once they are followed.
     followed: Option<u64>,
@@ -59,6 +61,8 @@ pub enum Progress {
     Over,
     /// They were not found.
     Failed,
+    /// The camera refuses to turn.
+    Refused,
 }
 
 impl Call {
@@ -67,6 +71,7 @@ impl Call {
             errand: Errand { from: wish.from.clone(), id, precedence: wish.precedence },
             begun: Instant::now(),
             ordered: None,
+            refusals: 0,
             likely: Likely::default(),
             followed: None,
             astray: None,
@@ -92,6 +97,10 @@ impl Call {
             (None, _) if self.begun.elapsed() > LONGEST => {
                 self.cancel(called);
                 Progress::Failed
+            }
+            (None, _) if self.was_refused(called) => {
+                self.cancel(called);
+                Progress::Refused
             }
             (None, _) => {
                 self.turn(link, from, called);
@@ -164,9 +173,16 @@ impl Call {
     fn turn(&mut self, link: &Link, from: &View, called: &View) {
         if let Some(gaze) = self.gaze(link, from, called).filter(|gaze| self.is_due(gaze, called)) {
             let now = Instant::now();
-            self.ordered = Some((now, gaze));
+            if self.ordered.replace((now, gaze)).is_none() {
+                self.refusals = lock(&called.known.state).refused_moves;
+            }
             called.known.steer(Steering::LookAt(gaze, now));
         }
+    }
+
+    /// Whether the camera has refused to turn, as one does that takes no move to a position.
+    fn was_refused(&self, called: &View) -> bool {
+        self.ordered.is_some() && lock(&called.known.state).refused_moves != self.refusals
     }
 
     /// Whether the camera is to be told, as it was not yet, or was told a place that is off by an eighth of its picture by now.
@@ -311,6 +327,17 @@ mod tests {
         assert_eq!(bench.see(&other), Progress::Going);
         assert_eq!(bench.see(&other), Progress::Going);
         assert_eq!(bench.see(&other), Progress::TakenUp(8));
+    }
+
+    #[test]
+    fn a_camera_that_refuses_to_turn_follows_again() {
+        let mut bench = Bench::new();
+        lock(&bench.door.state).refused_moves = 2;
+        assert_eq!(bench.see(&[]), Progress::Going);
+        assert_eq!(bench.see(&[]), Progress::Going, "it refused others");
+        lock(&bench.door.state).refused_moves = 3;
+        assert_eq!(bench.see(&[]), Progress::Refused);
+        assert_eq!(*lock(&bench.door.steering), Steering::Follow);
     }
 
     #[test]

@@ -19,6 +19,9 @@ use crate::event::Level;
 /// Somebody who was called for in vain, or is lost again, is called for again after this.
 const CALL_AGAIN: Duration = Duration::from_secs(5);
 
+/// A camera that refused to turn is not called for so long: what else the reason was may be over.
+const REFUSED: Duration = Duration::from_secs(60);
+
 /// A track behind which a fixed camera sees nobody for so long is nobody's.
 const NOBODY: Duration = Duration::from_secs(1);
 
@@ -52,13 +55,26 @@ impl Dispatcher {
                 Progress::Failed => {
                     self.tell(&to, Level::Info, "not-found", format!("{whom} was not found"));
                 }
+                Progress::Refused => self.leave_alone(&to),
                 Progress::Over => {}
             }
-            if matches!(progress, Progress::Failed | Progress::Over) {
+            if matches!(progress, Progress::Failed | Progress::Refused | Progress::Over) {
                 self.spared.insert((from, id), Instant::now() + CALL_AGAIN);
             } else {
                 self.calls.insert(to, call);
             }
+        }
+    }
+
+    /// Calls it no more for a while. That is said once.
+    fn leave_alone(&mut self, to: &str) {
+        if self.refused.insert(to.to_owned(), Instant::now() + REFUSED).is_none() {
+            let detail = format!(
+                "refuses to turn where another camera sees somebody: without moves to a position (ONVIF's AbsoluteMove, VAPIX' \
+                 pan= and tilt=) it cannot be called. It follows whom it sees itself, and is called again after {} s",
+                REFUSED.as_secs()
+            );
+            self.tell(to, Level::Warning, "not-called", detail);
         }
     }
 
@@ -84,7 +100,9 @@ impl Dispatcher {
                 let called = views.get(to)?;
                 let occupied = self.precedence(to, called, wishes).max(self.waits_for(to, views));
                 let is_free = called.follows() || self.errand(to, called).is_some();
-                let can_be_called = is_free && occupied.is_none_or(|occupied| occupied < wish.precedence);
+                let can_be_called = called.can_be_called
+                    && is_free
+                    && occupied.is_none_or(|occupied| occupied < wish.precedence);
                 can_be_called.then(|| self.new_call(wish, to, (from, &person), called)).flatten()
             };
             let free = wish.calls.iter().find_map(new_call);
@@ -275,6 +293,7 @@ mod tests {
         assert_eq!(Site::new().change("door", |door| follow(door, 5)).called(), ["gate"]);
         let taken = |door: &mut View| *lock(&door.known.steering) = Steering::HandedOver;
         assert_eq!(Site::new().change("door", taken).called(), ["gate"]);
+        assert_eq!(Site::new().change("door", |door| door.can_be_called = false).called(), ["gate"]);
         let mut site = Site::new().change("door", |door| follow(door, 5));
         site.wishes[0].precedence = 1;
         assert_eq!(site.called(), ["door"], "it has found them itself");

@@ -30,6 +30,7 @@ pub struct Report {
     /// It is late by so much itself.
     video: Duration,
     turns: bool,
+    can_be_called: bool,
     /// It follows, and nothing else is wanted of it.
     follows: bool,
     target: Option<u64>,
@@ -67,6 +68,7 @@ struct Heard {
     errand: Option<Errand>,
     video: Duration,
     turns: bool,
+    can_be_called: bool,
     /// As if it were here; nothing runs it, so what it is told has no effect.
     known: Arc<Known>,
 }
@@ -97,8 +99,11 @@ impl Exchange {
         let known =
             heard.get(camera).map_or_else(|| Arc::new(Known::new(camera)), |heard| heard.known.clone());
         report.make_known(&known);
-        let Report { errand, video, turns, .. } = report;
-        heard.insert(camera.to_owned(), Heard { at: Instant::now(), errand, video, turns, known });
+        let Report { errand, video, turns, can_be_called, .. } = report;
+        heard.insert(
+            camera.to_owned(),
+            Heard { at: Instant::now(), errand, video, turns, can_be_called, known },
+        );
         Ok(())
     }
 
@@ -112,9 +117,19 @@ impl Exchange {
 
 impl From<Heard> for View {
     fn from(heard: Heard) -> Self {
-        let Heard { errand, video, turns, known, .. } = heard;
+        let Heard { errand, video, turns, can_be_called, known, .. } = heard;
         let seen = known.sight.borrow().clone();
-        Self { is_here: false, errand, video, turns, known, seen, widest_fov_deg: None, target_height: None }
+        Self {
+            is_here: false,
+            errand,
+            video,
+            turns,
+            can_be_called,
+            known,
+            seen,
+            widest_fov_deg: None,
+            target_height: None,
+        }
     }
 }
 
@@ -126,6 +141,7 @@ impl Report {
             age: view.seen.0.elapsed(),
             video: view.video,
             turns: view.turns,
+            can_be_called: view.can_be_called,
             follows: view.follows(),
             target: lock(&known.state).target_id,
             selected: *lock(&known.selected),
@@ -204,7 +220,7 @@ mod tests {
         exchange.hear("door", said.as_bytes()).unwrap();
         let views = exchange.views(before);
         let [there] = views.as_slice() else { panic!("{}", views.len()) };
-        assert!(!there.is_here && there.turns && there.follows());
+        assert!(!there.is_here && there.turns && there.follows() && there.can_be_called);
         assert_eq!((&there.seen.1, &there.errand, there.video), (&door.seen.1, &door.errand, door.video));
         assert_eq!(lock(&there.known.state).target_id, Some(7));
         assert_eq!(*lock(&there.known.selected), Some(7));

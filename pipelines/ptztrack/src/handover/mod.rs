@@ -104,6 +104,8 @@ struct Dispatcher {
     nobody: BTreeMap<String, Instant>,
     /// Who was called for, by the camera that sees them, and until when they are not again.
     spared: BTreeMap<(String, u64), Instant>,
+    /// Cameras that refused to turn, and until when they are not called again.
+    refused: BTreeMap<String, Instant>,
 }
 
 impl Dispatcher {
@@ -122,6 +124,7 @@ impl Dispatcher {
             widest: BTreeMap::new(),
             nobody: BTreeMap::new(),
             spared: BTreeMap::new(),
+            refused: BTreeMap::new(),
         }
     }
 
@@ -196,6 +199,7 @@ impl Dispatcher {
         let seen = known.sight.borrow().clone();
         View {
             is_here: true,
+            can_be_called: self.refused.get(&known.name).is_none_or(|until| *until < Instant::now()),
             video: known.video_delay(),
             widest_fov_deg: None,
             target_height: self.fleet.target_height(&known.name),
@@ -233,6 +237,7 @@ impl Dispatcher {
         if self.pipelines.insert(name.clone(), pipelines).is_some_and(|before| before != pipelines) {
             self.sharing.forget(name);
             self.walkers.remove(name);
+            self.refused.remove(name);
             self.spared.retain(|(camera, _), _| camera != name);
         }
     }

@@ -144,6 +144,7 @@ mod tests {
         let sight = Sight { people: vec![person], poses: vec![pose], ..Sight::default() };
         View {
             is_here: true,
+            can_be_called: true,
             errand: None,
             known: Arc::new(Known::new(name)),
             seen: Arc::new((Instant::now(), sight)),

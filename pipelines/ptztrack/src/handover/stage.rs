@@ -57,6 +57,7 @@ pub fn view(name: &str, turns: bool, came: Instant, people: Vec<Person>) -> View
     lock(&known.state).picture = true;
     View {
         is_here: true,
+        can_be_called: true,
         errand: None,
         known,
         seen: Arc::new((came, Sight { people, poses, ..Sight::default() })),

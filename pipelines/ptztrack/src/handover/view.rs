@@ -24,8 +24,10 @@ pub struct View {
     pub known: Arc<Known>,
     /// What it saw last, and when.
     pub seen: Arc<(Instant, Sight)>,
-    /// It can be called, and tells where it looks.
+    /// It tells where it looks.
     pub turns: bool,
+    /// Nothing is known that speaks against it.
+    pub can_be_called: bool,
     /// How late its pictures are.
     pub video: Duration,
     /// Horizontal, zoomed out, as far as that was seen.
