@@ -15,7 +15,7 @@ use rustix::fs::{FlockOperation, flock};
 pub const FILE: &str = "events.db";
 
 /// Of the tables below; another one is moved aside.
-const VERSION: i32 = 1;
+const VERSION: i32 = 2;
 
 /// Whoever else writes has this long.
 const LONGEST_WAIT: Duration = Duration::from_secs(5);
@@ -32,7 +32,7 @@ const TABLES: &str = "
         from_ms INTEGER NOT NULL,
         to_ms INTEGER NOT NULL,
         way_deg REAL NOT NULL,
-        path TEXT NOT NULL,
+        path BLOB NOT NULL,
         quality REAL,
         looks BLOB,
         file TEXT,
@@ -44,7 +44,7 @@ const TABLES: &str = "
         sighting INTEGER PRIMARY KEY REFERENCES sighting ON DELETE CASCADE,
         jpeg BLOB NOT NULL
     );
-    PRAGMA user_version = 1;
+    PRAGMA user_version = 2;
     COMMIT;
 ";
 

@@ -32,7 +32,7 @@ pub struct Entry {
 
 /// What an [`Entry`] is read from, but for its path, which is longer than all the rest.
 const BRIEF: &str = "id, camera, run_ms, track, from_ms, to_ms, way_deg, file, offset_ms, looks, \
-     EXISTS (SELECT 1 FROM picture WHERE picture.sighting = sighting.id) AS has_picture";
+     quality IS NOT NULL AS has_picture";
 
 /// All that an [`Entry`] is read from.
 pub(crate) fn columns() -> String {
@@ -136,9 +136,9 @@ pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
 }
 
 fn path(row: &Row) -> rusqlite::Result<Vec<Step>> {
-    let path: String = row.get("path")?;
-    serde_json::from_str(&path)
-        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(11, rusqlite::types::Type::Text, err.into()))
+    let bytes = row.get_ref("path")?.as_blob()?;
+    postcard::from_bytes(bytes)
+        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(11, rusqlite::types::Type::Blob, err.into()))
 }
 
 fn pathless(row: &Row) -> rusqlite::Result<Entry> {

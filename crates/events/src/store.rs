@@ -138,7 +138,7 @@ fn write(transaction: &Transaction, new: &Sighting) -> rusqlite::Result<i64> {
         }
         None => (None, Cow::Borrowed(new)),
     };
-    let path = serde_json::to_string(&sighting.path)
+    let path = postcard::to_stdvec(&sighting.path)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
     let recording = sighting.recording.as_ref();
     transaction.execute(
