@@ -64,6 +64,13 @@ impl Sighting {
         self.path.windows(2).map(|pair| angle_deg(pair[0], pair[1])).sum()
     }
 
+    /// What it takes in memory, about.
+    pub fn bytes(&self) -> usize {
+        let picture =
+            self.picture.as_ref().map_or(0, |picture| picture.jpeg.len() + picture.looks.bytes().len());
+        size_of::<Self>() + size_of_val(&*self.path) + picture
+    }
+
     /// One sighting of both, the other one being of the same track, later: somebody whom the camera took up again.
     pub(crate) fn join(&mut self, later: Self) {
         self.from_ms = self.from_ms.min(later.from_ms);

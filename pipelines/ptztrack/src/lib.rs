@@ -24,6 +24,7 @@ mod restream;
 mod service;
 mod shard;
 mod store;
+mod waiting;
 
 use std::io::Write;
 use std::process::ExitCode;

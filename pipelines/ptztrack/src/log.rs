@@ -2,13 +2,13 @@
 
 use std::io::{IsTerminal, Write, stderr};
 use std::sync::Mutex;
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use events::Sighting;
 use ptztrack_contract::lock::lock;
 use tokio::sync::broadcast;
 
 use crate::event::{Event, Level};
+use crate::waiting::{self, MOST_BYTES, Sightings, Waiting};
 
 /// How a line looks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
@@ -29,13 +29,11 @@ pub struct Log {
     /// For whoever tells it elsewhere too.
     events: broadcast::Sender<Event>,
     /// For whoever keeps who was followed.
-    sightings: Mutex<Option<SyncSender<Sighting>>>,
+    sightings: Mutex<Option<Waiting>>,
 }
 
 /// So many events wait for somebody who is slow; those before are lost to them.
 const WAITING: usize = 256;
-/// So many of those who were followed wait for a disk that is slow; those after them are lost. Each may have a picture.
-const SIGHTINGS_WAITING: usize = 64;
 
 impl Log {
     pub fn new(format: Format) -> Self {
@@ -76,19 +74,24 @@ impl Log {
         self.events.subscribe()
     }
 
-    /// Has somebody who was followed kept, where anybody keeps that. Waits for nothing.
+    /// Has somebody who was followed kept, where anybody keeps that. Waits for nothing; the first who is lost is said.
     pub fn keep(&self, sighting: Sighting) {
-        if let Some(sightings) = &*lock(&self.sightings) {
-            // Whoever keeps them says so where there is no place for more.
-            let _ = sightings.try_send(sighting);
+        let put = lock(&self.sightings).as_ref().map(|waiting| waiting.put(sighting));
+        if put == Some(Err(1)) {
+            let detail = format!(
+                "those who were followed wait for the disk, {} MiB of them, which is all there is room for: whoever is followed from \
+                 now on is lost until they are kept",
+                MOST_BYTES >> 20
+            );
+            self.tell(&Event::new(Level::Warning, None, "events-lost", detail));
         }
     }
 
     /// All who are followed from now on, until [`Self::keep_no_more`].
-    pub fn sightings(&self) -> Receiver<Sighting> {
-        let (sender, receiver) = sync_channel(SIGHTINGS_WAITING);
-        *lock(&self.sightings) = Some(sender);
-        receiver
+    pub fn sightings(&self) -> Sightings {
+        let (waiting, sightings) = waiting::line();
+        *lock(&self.sightings) = Some(waiting);
+        sightings
     }
 
     pub fn keep_no_more(&self) {

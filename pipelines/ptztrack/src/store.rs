@@ -14,6 +14,7 @@ use events::{Error, Retention, Sighting};
 use crate::config::Store;
 use crate::event::{Event, Level};
 use crate::log::Log;
+use crate::waiting::{Count, Sightings};
 
 /// Between two tries; twice as long each time.
 const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
@@ -52,34 +53,32 @@ impl Store {
 pub struct Keeper {
     log: Arc<Log>,
     ended: Receiver<()>,
+    count: Arc<Count>,
 }
 
 impl Keeper {
     /// Keeps from now on who was followed; nobody where nothing is to be kept.
     pub fn start(settings: &Store, log: &Arc<Log>) -> Option<Self> {
         settings.what?;
-        let keeping = settings.place().map(|folder| Keeping {
-            folder,
-            retention: settings.retention,
-            log: log.clone(),
-            open: None,
-            in_trouble: false,
+        let started = settings.place().and_then(|folder| {
+            let sightings = log.sightings();
+            let keeping = Keeping::new(folder, settings.retention, log.clone(), sightings.count());
+            Self::spawn(keeping, sightings).map_err(|err| err.to_string())
         });
-        let started = keeping.and_then(|keeping| Self::spawn(keeping, log).map_err(|err| err.to_string()));
         let tell = |reason: &String| {
             log.tell(&Event::new(Level::Warning, None, "events-not-kept", not_kept(reason)));
         };
         started.inspect_err(tell).ok()
     }
 
-    fn spawn(mut keeping: Keeping, log: &Arc<Log>) -> io::Result<Self> {
+    fn spawn(mut keeping: Keeping, sightings: Sightings) -> io::Result<Self> {
         let (ending, ended) = channel();
-        let sightings = log.sightings();
+        let (log, count) = (keeping.log.clone(), keeping.count.clone());
         thread::Builder::new().name("events".to_owned()).spawn(move || {
             keeping.run(&sightings);
             drop(ending);
         })?;
-        Ok(Self { log: log.clone(), ended })
+        Ok(Self { log, ended, count })
     }
 
     /// Waits until all is kept; not for ever.
@@ -87,6 +86,11 @@ impl Keeper {
         self.log.keep_no_more();
         // Nothing is ever sent: it ends with the thread.
         let _ = self.ended.recv_timeout(LONGEST_END);
+        let lost = self.count.waiting() + self.count.take_lost();
+        if lost > 0 {
+            let detail = format!("{lost} who were followed are lost: the disk did not take them in time");
+            self.log.tell(&Event::new(Level::Warning, None, "events-lost", detail));
+        }
     }
 }
 
@@ -98,16 +102,25 @@ struct Keeping {
     folder: PathBuf,
     retention: Retention,
     log: Arc<Log>,
+    /// Of those who wait to be kept.
+    count: Arc<Count>,
     open: Option<events::Store>,
     in_trouble: bool,
 }
 
 impl Keeping {
-    fn run(&mut self, sightings: &Receiver<Sighting>) {
+    fn new(folder: PathBuf, retention: Retention, log: Arc<Log>, count: Arc<Count>) -> Self {
+        Self { folder, retention, log, count, open: None, in_trouble: false }
+    }
+
+    fn run(&mut self, sightings: &Sightings) {
         self.persist(|keeping| keeping.retain());
         loop {
-            match sightings.recv_timeout(LOOK) {
-                Ok(sighting) => self.persist(|keeping| keeping.keep(&sighting)),
+            match sightings.next(LOOK) {
+                Ok(sighting) => {
+                    self.persist(|keeping| keeping.keep(&sighting));
+                    sightings.done(&sighting);
+                }
                 Err(RecvTimeoutError::Timeout) => self.persist(|keeping| keeping.retain()),
                 Err(RecvTimeoutError::Disconnected) => return,
             }
@@ -129,8 +142,10 @@ impl Keeping {
             thread::sleep(pause);
             pause = (pause * 2).min(LONGEST_PAUSE);
         }
-        if std::mem::take(&mut self.in_trouble) {
-            self.log.info("events-kept", "who is followed is kept again");
+        let lost = self.count.take_lost();
+        if std::mem::take(&mut self.in_trouble) || lost > 0 {
+            let lost = if lost > 0 { format!("; {lost} are lost") } else { String::new() };
+            self.log.info("events-kept", format!("who is followed is kept again{lost}"));
         }
     }
 
@@ -189,23 +204,16 @@ fn moved(aside: &Path) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use std::fs::File;
 
-    /// As on a disk that loses what was written, for two programs. Both keep the next ones in one file.
-    #[test]
-    fn a_file_that_breaks_while_it_is_written_is_moved_aside_once() {
-        let folder = std::env::temp_dir().join(format!("ptztrack-breaks-{}", std::process::id()));
-        let log = Arc::new(Log::unwritten());
-        let mut told = log.subscribe();
-        let retention = Retention { age: Duration::MAX, bytes: u64::MAX };
-        let [mut first, mut second] = [log.clone(), log].map(|log| Keeping {
-            folder: folder.clone(),
-            retention,
-            log,
-            open: None,
-            in_trouble: false,
-        });
-        let sighting = |track| Sighting {
+    use events::{Looks, Picture};
+    use tokio::sync::broadcast;
+
+    use super::*;
+    use crate::waiting::MOST_BYTES;
+
+    fn sighting(track: u64) -> Sighting {
+        Sighting {
             camera: "door".to_owned(),
             run_ms: 0,
             track,
@@ -214,7 +222,49 @@ mod tests {
             path: Vec::new(),
             picture: None,
             recording: None,
-        };
+        }
+    }
+
+    /// Told by the log so far.
+    fn said(told: &mut broadcast::Receiver<Event>) -> Vec<(String, String)> {
+        std::iter::from_fn(|| told.try_recv().ok()).map(|event| (event.event, event.detail)).collect()
+    }
+
+    /// While another program has the folder, and after it.
+    #[test]
+    fn who_finds_no_room_is_lost_and_that_is_said_with_how_many() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-locked-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let other = File::create(folder.join("events.lock")).unwrap();
+        other.lock().unwrap();
+        let log = Arc::new(Log::unwritten());
+        let mut told = log.subscribe();
+        let settings = Store { folder: Some(folder.clone()), ..Store::default() };
+        let keeper = Keeper::start(&settings, &log).unwrap();
+        let picture = Picture { jpeg: vec![0; MOST_BYTES / 8], quality: 1.0, looks: Looks::default() };
+        (1..=10).for_each(|track| log.keep(Sighting { picture: Some(picture.clone()), ..sighting(track) }));
+        // An eighth and a little more each: seven find room.
+        let told_so_far = said(&mut told);
+        assert!(matches!(&told_so_far[..], [(event, _)] if event == "events-lost"), "{told_so_far:?}");
+        drop(other);
+        let again = told.blocking_recv().unwrap();
+        assert!(again.event == "events-kept" && again.detail.ends_with("; 3 are lost"), "{again:?}");
+        let kept: Vec<_> = (1..=7).map(|_| told.blocking_recv().unwrap().event).collect();
+        assert_eq!(kept, ["event-kept"; 7]);
+        keeper.end();
+        assert_eq!(said(&mut told), []);
+        std::fs::remove_dir_all(folder).unwrap();
+    }
+
+    /// As on a disk that loses what was written, for two programs. Both keep the next ones in one file.
+    #[test]
+    fn a_file_that_breaks_while_it_is_written_is_moved_aside_once() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-breaks-{}", std::process::id()));
+        let log = Arc::new(Log::unwritten());
+        let mut told = log.subscribe();
+        let retention = Retention { age: Duration::MAX, bytes: u64::MAX };
+        let [mut first, mut second] =
+            [log.clone(), log].map(|log| Keeping::new(folder.clone(), retention, log, Arc::default()));
         first.persist(|keeping| keeping.keep(&sighting(1)));
         first.open = None;
         let mut bytes = std::fs::read(folder.join(events::FILE)).unwrap();
@@ -227,8 +277,7 @@ mod tests {
         let mut tracks: Vec<u64> = kept.iter().map(|entry| entry.sighting.track).collect();
         tracks.sort_unstable();
         assert_eq!(tracks, [2, 3]);
-        let said: Vec<String> =
-            std::iter::from_fn(|| told.try_recv().ok()).map(|event| event.event).collect();
+        let said: Vec<String> = said(&mut told).into_iter().map(|(event, _)| event).collect();
         assert_eq!(said, ["event-kept", "events-moved-aside", "event-kept", "event-kept"]);
         std::fs::remove_dir_all(folder).unwrap();
     }

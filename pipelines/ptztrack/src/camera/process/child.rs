@@ -6,10 +6,8 @@ use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream as StdUnixStream;
 use std::sync::Arc;
-use std::sync::mpsc::Receiver;
 use std::time::Duration;
 
-use events::Sighting;
 use rustix::process::{Resource, Rlimit, setrlimit};
 use serde::de::DeserializeOwned;
 use tokio::io::{AsyncBufReadExt, AsyncWriteExt, BufReader, Lines};
@@ -23,6 +21,7 @@ use super::line;
 use super::protocol::{Order, Report, Start, Word};
 use crate::camera::{self, Camera, Look, Packet, Shown};
 use crate::log::Log;
+use crate::waiting::Sightings;
 
 /// Between two reports.
 const EVERY: Duration = Duration::from_millis(500);
@@ -139,8 +138,9 @@ impl Child {
         self.say(&Word::Report(Box::new(Report::of(&camera.known, self.heard)))).await
     }
 
-    async fn say_all(&mut self, sightings: &Receiver<Sighting>) -> io::Result<()> {
-        for sighting in sightings.try_iter() {
+    async fn say_all(&mut self, sightings: &Sightings) -> io::Result<()> {
+        while let Some(sighting) = sightings.try_next() {
+            sightings.done(&sighting);
             self.say(&Word::Sighting(Box::new(sighting))).await?;
         }
         Ok(())
