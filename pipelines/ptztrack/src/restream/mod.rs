@@ -13,6 +13,7 @@ mod feed;
 mod payloader;
 
 use std::collections::BTreeMap;
+use std::net::SocketAddr;
 use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -23,6 +24,7 @@ use gst_rtsp_server::{
     RTSP_TOKEN_MEDIA_FACTORY_ROLE, RTSPAuth, RTSPFilterResult, RTSPServer, RTSPToken, gio, gst_rtsp,
     prelude::*,
 };
+use pipeline_supervisor::Backoff;
 use ptztrack_contract::lock::lock;
 use tokio::runtime::Handle;
 
@@ -40,8 +42,9 @@ const MOST_CLIENTS: usize = 128;
 /// How often sessions whose client vanished are looked for, in seconds.
 const CLEANING: u32 = 5;
 
-/// Between two tries to have the address.
-const LISTEN_AGAIN: Duration = Duration::from_secs(5);
+/// Between two tries to begin; twice as long each time.
+const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// For clients to be told that it ends.
 const LONGEST_END: Duration = Duration::from_secs(2);
@@ -73,7 +76,6 @@ impl Restreaming {
         let server = RTSPServer::new();
         server.set_address(&settings.listen.ip().to_string());
         server.set_service(&settings.listen.port().to_string());
-        server.set_auth(auth(settings)?.as_ref());
         if let Some(pool) = server.thread_pool() {
             // One for each client: who waits for a camera's first picture keeps nobody else waiting.
             pool.set_max_threads(-1);
@@ -90,8 +92,7 @@ impl Restreaming {
             }
         });
         let main_loop = glib::MainLoop::new(Some(&context), false);
-        let scheme = if settings.tls.is_some() { "rtsps" } else { "rtsp" };
-        context.spawn(listen(server.clone(), context.clone(), scheme, log));
+        context.spawn(serve(server.clone(), context.clone(), settings.clone(), log));
         let (ending, ended) = channel();
         let running = main_loop.clone();
         let run = move || {
@@ -147,35 +148,35 @@ fn path(camera: &str) -> String {
 }
 
 /// Nobody is followed the worse for a server that is not there: it is tried again.
-async fn listen(server: RTSPServer, context: glib::MainContext, scheme: &'static str, log: Arc<Log>) {
+async fn serve(server: RTSPServer, context: glib::MainContext, settings: Restream, log: Arc<Log>) {
     let mut told = false;
-    loop {
-        match server.create_source(gio::Cancellable::NONE) {
-            Ok(source) => {
-                source.attach(Some(&context));
-                break;
-            }
-            Err(err) if !std::mem::replace(&mut told, true) => {
-                let address = format!("{}:{}", server.address().unwrap_or_default(), server.service());
-                let detail = format!("nothing is passed on at {address}: {err}; it is tried again");
-                log.tell(&Event::new(Level::Warning, None, "not-restreaming", detail));
-            }
-            Err(_) => {}
+    let mut pauses = Backoff::new(SHORTEST_PAUSE, LONGEST_PAUSE, Duration::MAX);
+    while let Err(reason) = listen(&server, &context, &settings) {
+        if !std::mem::replace(&mut told, true) {
+            let detail = format!("nothing is passed on at {}: {reason}; it is tried again", settings.listen);
+            log.tell(&Event::new(Level::Warning, None, "not-restreaming", detail));
         }
-        glib::timeout_future(LISTEN_AGAIN).await;
+        glib::timeout_future(pauses.after(Duration::ZERO)).await;
     }
-    let address = server.address().unwrap_or_default();
-    let host = if address.contains(':') { format!("[{address}]") } else { address.to_string() };
-    log.info(
-        "restreaming",
-        format!("passes the cameras on at {scheme}://{host}:{}/NAME", server.bound_port()),
-    );
+    let scheme = if settings.tls.is_some() { "rtsps" } else { "rtsp" };
+    let bound = u16::try_from(server.bound_port()).unwrap_or_default();
+    let address = SocketAddr::new(settings.listen.ip(), bound);
+    log.info("restreaming", format!("passes the cameras on at {scheme}://{address}/NAME"));
     loop {
         glib::timeout_future_seconds(CLEANING).await;
         if let Some(sessions) = server.session_pool() {
             sessions.cleanup();
         }
     }
+}
+
+/// # Errors
+/// Why nobody can connect, in words.
+fn listen(server: &RTSPServer, context: &glib::MainContext, settings: &Restream) -> Result<(), String> {
+    server.set_auth(auth(settings)?.as_ref());
+    let source = server.create_source(gio::Cancellable::NONE).map_err(|err| err.to_string())?;
+    source.attach(Some(context));
+    Ok(())
 }
 
 /// By Digest; over TLS, where there is a certificate.
