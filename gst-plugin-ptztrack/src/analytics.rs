@@ -10,8 +10,8 @@ use gst_analytics::{AnalyticsODMtd, AnalyticsRelationMeta, RelTypes};
 use gst_video::VideoInfo;
 use ptztrack_contract::{MOTION_ROI, Rect, Track, TrackState};
 
-/// The class of those whom our own detector finds. It tells people from others no more than by how they move.
-const PERSON: &str = "person";
+/// The class of whatever our own detector finds, which does not tell people from vehicles.
+const OBJECT: &str = "object";
 
 /// The boxes of this class that a detector has left.
 pub fn boxes(buffer: &gst::BufferRef, info: &VideoInfo, class: &str) -> Vec<Rect> {
@@ -57,7 +57,7 @@ impl Analytics {
         if seen.peek().is_none() {
             return Ok(());
         }
-        let class = glib::Quark::from_str(if roi_type == MOTION_ROI { PERSON } else { roi_type });
+        let class = glib::Quark::from_str(if roi_type == MOTION_ROI { OBJECT } else { roi_type });
         // A detector may have left its own there.
         let mut meta = if buffer.meta::<AnalyticsRelationMeta>().is_some() {
             buffer.meta_mut::<AnalyticsRelationMeta>().ok_or_else(|| glib::bool_error!("no relation meta"))?

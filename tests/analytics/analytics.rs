@@ -70,7 +70,7 @@ fn everybody_is_an_object_with_class_confidence_and_number() {
             .collect();
         let expected: Vec<_> = tracks(buffer)
             .iter()
-            .map(|track| ("person".to_owned(), track.id, pixels(track), track.confidence as f32))
+            .map(|track| ("object".to_owned(), track.id, pixels(track), track.confidence as f32))
             .collect();
         assert_eq!(told, expected);
         seen += told.len();
@@ -90,7 +90,7 @@ fn another_element_makes_documents_of_it() {
     let text = std::str::from_utf8(&map).unwrap();
     let [left, top, width, height] = pixels(&track);
     for expected in [
-        ">person<".to_owned(),
+        ">object<".to_owned(),
         format!("left=\"{left}\""),
         format!("top=\"{top}\""),
         format!("right=\"{}\"", left + width),
@@ -119,7 +119,7 @@ fn objects_of_another_element_are_followed() {
         })
     };
     let target = |buffer: &gst::Buffer| TargetMeta::of(buffer).unwrap().unwrap();
-    let followed = follow("person");
+    let followed = follow("object");
     let tracking = followed.iter().filter(|buffer| target(buffer).state == TargetState::Tracking).count();
     assert!(tracking > 30, "{tracking} of {}", followed.len());
     let nobody = follow("car");

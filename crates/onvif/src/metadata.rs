@@ -12,14 +12,18 @@ use quick_xml::events::{BytesDecl, BytesText, Event};
 
 const SCHEMA: &str = "http://www.onvif.org/ver10/schema";
 
-/// Somebody in a picture.
+/// The class of all: people and vehicles are not told apart. ONVIF has no word of its own for that; without any class a box is
+/// skipped by some readers.
+const CLASS: &str = "Object";
+
+/// Somebody or something in a picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Object {
     /// The same in each picture in which they are seen.
     pub id: u64,
     /// Left, top, width and height of the box: parts of the picture, from its left and its top.
     pub bounds: [f64; 4],
-    /// How likely there is somebody: 0 to 1.
+    /// How likely there is: 0 to 1.
     pub likelihood: f64,
 }
 
@@ -38,7 +42,7 @@ impl Object {
                 within(writer, "tt:Class", &[], |writer| {
                     let class = writer.create_element("tt:Type");
                     let class = class.with_attribute(("Likelihood", number(self.likelihood).as_str()));
-                    class.write_text_content(BytesText::new("Human")).map(drop)
+                    class.write_text_content(BytesText::new(CLASS)).map(drop)
                 })
             })
         })
@@ -108,7 +112,7 @@ mod tests {
             <tt:Frame UtcTime=\"2025-11-25T16:31:15.040000Z\"><tt:Object ObjectId=\"7\"><tt:Appearance><tt:Shape>\
             <tt:BoundingBox left=\"-0.50000\" top=\"0.00000\" right=\"0.00000\" bottom=\"-1.00000\"/>\
             <tt:CenterOfGravity x=\"-0.25000\" y=\"-0.50000\"/></tt:Shape>\
-            <tt:Class><tt:Type Likelihood=\"0.87500\">Human</tt:Type></tt:Class></tt:Appearance></tt:Object>\
+            <tt:Class><tt:Type Likelihood=\"0.87500\">Object</tt:Type></tt:Class></tt:Appearance></tt:Object>\
             </tt:Frame></tt:VideoAnalytics></tt:MetadataStream>";
         assert_eq!(text, expected);
     }

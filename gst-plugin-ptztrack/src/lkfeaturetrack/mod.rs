@@ -17,7 +17,7 @@
 //!
 //! Where the plugin is built with GStreamer 1.24 or later, its analytics library (`GstAnalyticsRelationMeta`) is spoken, too: object
 //! detections whose class is `roi-type` count as detections, whichever element has made them, and every track that is seen is attached as an
-//! object detection of that class (`person` where it is `bgavgdetect` who detects) with the track's confidence, related to a
+//! object detection of that class (`object` where it is `bgavgdetect` who detects) with the track's confidence, related to a
 //! tracking of its number.
 //!
 //! ## Groups

@@ -175,7 +175,8 @@ fn a_library_from_pypi_reads_who_is_where() {
     assert!(side("@left") < side("@right") && side("@bottom") < side("@top"), "{read}");
     let class = &seen["tt:Class"]["tt:Type"][0];
     let likelihood = class["@Likelihood"].as_f64().unwrap();
-    assert!(class["$"] == "Human" && (0.0..=1.0).contains(&likelihood), "{read}");
+    // People are not told from vehicles.
+    assert!(class["$"] == "Object" && (0.0..=1.0).contains(&likelihood), "{read}");
     fs::remove_file(file).unwrap();
     program.end("TERM");
 }
