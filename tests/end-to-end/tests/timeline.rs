@@ -214,7 +214,12 @@ fn the_timeline_fits_a_phone() {
     let dark = json!({"features": [{"name": "prefers-color-scheme", "value": "dark"}]});
     browser.call("Emulation.setEmulatedMedia", dark);
     browser.call("Emulation.setDeviceMetricsOverride", phone);
+    browser.value("refresh()");
     browser.wait_for("document.querySelectorAll('article').length == 39");
+    // The first hour with somebody in it is in sight, right of the cameras' names.
+    let in_sight = "(({left, right}) => document.querySelector('tbody th').getBoundingClientRect().right <= left && right <= innerWidth)\
+         (document.querySelector('td:has(button)').getBoundingClientRect())";
+    assert_eq!(browser.value(in_sight), true);
     browser.wait_for(
         "[...document.querySelectorAll('article img')].slice(0, 4).every(image => image.naturalWidth == 60)",
     );
