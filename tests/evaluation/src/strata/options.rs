@@ -44,15 +44,22 @@ pub struct StrataArgs {
     /// Folder of the recordings
     #[arg(long, value_name = "FOLDER", default_value = "target/evaluation/recordings")]
     pub recordings: PathBuf,
+    // What conflicts with a required option lifts the requirement, in clap: so each that needs `open_loop` says what it does not go with.
     /// Replace what these stages say by the truth: motion, regions, owner, hidden, speed, size, lag, bias, jitter
-    #[arg(long, value_name = "STAGE", value_delimiter = ',', requires = "open_loop")]
+    #[arg(
+        long,
+        value_name = "STAGE",
+        value_delimiter = ',',
+        requires = "open_loop",
+        conflicts_with = "closed_loop"
+    )]
     pub replace: Vec<Stage>,
     /// Show each scene with no stage, each alone, all but each and all replaced, and write a table of what that changes
-    #[arg(long, requires = "open_loop", conflicts_with = "replace")]
+    #[arg(long, requires = "open_loop", conflicts_with_all = ["closed_loop", "replace"])]
     pub by_stage: bool,
     /// Write truth, regions and tracks of everybody into this folder, as MOTChallenge text: in open loop beside what else is
     /// written, of --still-recording instead of it
-    #[arg(long, value_name = "FOLDER", requires = "shown")]
+    #[arg(long, value_name = "FOLDER", requires = "shown", conflicts_with = "closed_loop")]
     pub motchallenge: Option<PathBuf>,
 }
 
