@@ -182,7 +182,7 @@ impl Call {
 
     /// Whether the camera has refused to turn, as one does that takes no move to a position.
     fn was_refused(&self, called: &View) -> bool {
-        self.ordered.is_some() && lock(&called.known.state).refused_moves != self.refusals
+        self.ordered.is_some() && lock(&called.known.state).refused_moves > self.refusals
     }
 
     /// Whether the camera is to be told, as it was not yet, or was told a place that is off by an eighth of its picture by now.

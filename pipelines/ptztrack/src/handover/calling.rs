@@ -19,7 +19,7 @@ use crate::event::Level;
 /// Somebody who was called for in vain, or is lost again, is called for again after this.
 const CALL_AGAIN: Duration = Duration::from_secs(5);
 
-/// A camera that refused to turn is not called for so long: what else the reason was may be over.
+/// A camera that refused to turn is not called for so long: the reason may be over by then.
 const REFUSED: Duration = Duration::from_secs(60);
 
 /// A track behind which a fixed camera sees nobody for so long is nobody's.
@@ -58,12 +58,22 @@ impl Dispatcher {
                 Progress::Refused => self.leave_alone(&to),
                 Progress::Over => {}
             }
-            if matches!(progress, Progress::Failed | Progress::Refused | Progress::Over) {
-                self.spared.insert((from, id), Instant::now() + CALL_AGAIN);
-            } else {
-                self.calls.insert(to, call);
+            match progress {
+                Progress::Failed | Progress::Over => {
+                    self.spared.insert((from, id), Instant::now() + CALL_AGAIN);
+                }
+                // Another one is called in its place.
+                Progress::Refused => {}
+                Progress::Going | Progress::TakenUp(_) | Progress::Again => {
+                    self.calls.insert(to, call);
+                }
             }
         }
+    }
+
+    /// Whether it refused to turn lately.
+    pub(super) fn has_refused(&self, camera: &str) -> bool {
+        self.refused.get(camera).is_some_and(|until| *until > Instant::now())
     }
 
     /// Calls it no more for a while. That is said once.
@@ -101,6 +111,7 @@ impl Dispatcher {
                 let occupied = self.precedence(to, called, wishes).max(self.waits_for(to, views));
                 let is_free = called.follows() || self.errand(to, called).is_some();
                 let can_be_called = called.can_be_called
+                    && !self.has_refused(to)
                     && is_free
                     && occupied.is_none_or(|occupied| occupied < wish.precedence);
                 can_be_called.then(|| self.new_call(wish, to, (from, &person), called)).flatten()
@@ -286,6 +297,16 @@ mod tests {
         assert_eq!(site.called(), ["door"]);
         assert!(matches!(*lock(&site.known("door").steering), Steering::LookAt(..)));
         assert_eq!(*lock(&site.known("gate").steering), Steering::Follow);
+    }
+
+    #[test]
+    fn another_one_is_called_at_once_in_place_of_one_that_refuses() {
+        let mut site = Site::new();
+        assert_eq!(site.called(), ["door"]);
+        assert_eq!(site.called(), ["door"], "it is told where to look");
+        lock(&site.known("door").state).refused_moves += 1;
+        assert_eq!(site.called(), ["gate"]);
+        assert_eq!(site.called(), ["gate"]);
     }
 
     #[test]

@@ -199,7 +199,7 @@ impl Dispatcher {
         let seen = known.sight.borrow().clone();
         View {
             is_here: true,
-            can_be_called: self.refused.get(&known.name).is_none_or(|until| *until < Instant::now()),
+            can_be_called: !self.has_refused(&known.name),
             video: known.video_delay(),
             widest_fov_deg: None,
             target_height: self.fleet.target_height(&known.name),
@@ -271,8 +271,12 @@ impl Dispatcher {
             for called in &wish.calls {
                 let both = views.get(&wish.from).zip(views.get(called)).filter(|(from, _)| from.turns);
                 let link = self.links.get(&(wish.from.clone(), called.clone()));
-                let leaves =
-                    link.zip(both).and_then(|(link, both)| self.sharing.see(link, both, Instant::now()));
+                let mutual = wishes
+                    .iter()
+                    .any(|back| back.from == *called && !back.together && back.calls.contains(&wish.from));
+                let leaves = link
+                    .zip(both)
+                    .and_then(|(link, both)| self.sharing.see(link, both, mutual, Instant::now()));
                 leaving.extend(leaves);
             }
         }

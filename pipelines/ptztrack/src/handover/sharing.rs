@@ -29,9 +29,16 @@ pub struct Sharing {
 }
 
 impl Sharing {
-    /// Takes what two cameras see of whom the first one follows. Returns who is to be released now by one of them, as the other one
-    /// follows them; once a second, for as long as they are followed all the same.
-    pub fn see(&mut self, link: &Link, (from, to): (&View, &View), now: Instant) -> Option<Track> {
+    /// Takes what two cameras see of whom the first one follows, which calls the other one, or each the other where it is `mutual`.
+    /// Returns who is to be released now by one of them, as the other one follows them; once a second, for as long as they are
+    /// followed all the same.
+    pub fn see(
+        &mut self,
+        link: &Link,
+        (from, to): (&View, &View),
+        mutual: bool,
+        now: Instant,
+    ) -> Option<Track> {
         let target = from.people().iter().find(|person| person.is_target)?;
         let one = from.track(target);
         let key = (one.clone(), to.known.name.clone());
@@ -47,22 +54,29 @@ impl Sharing {
             return None;
         }
         *since = now;
-        self.settle((from, target), (to, person))
+        self.settle((from, target), (to, person), mutual)
     }
 
-    /// Decides which of two cameras leaves the person to the other one.
-    fn settle(&mut self, (from, target): (&View, &Person), (to, person): (&View, &Person)) -> Option<Track> {
+    /// Decides which of two cameras leaves the person to the other one. Of two that call each other the last by name does, where neither
+    /// has a claim: processes that share the cameras have to come to the same, whoever of them looks first.
+    fn settle(
+        &mut self,
+        (from, target): (&View, &Person),
+        (to, person): (&View, &Person),
+        mutual: bool,
+    ) -> Option<Track> {
         let (one, other) = (from.track(target), to.track(person));
         let was_called = to.was_called_for(person, &one);
-        let is_left = self.left.get(&one) == Some(&other);
-        let from_leaves = was_called || is_left || to.has_claim(person);
+        let is_last = mutual && person.is_target && one > other;
+        let from_leaves = was_called || is_last || to.has_claim(person);
         let (leaves, keeps, stays) = if from_leaves {
             let stays = if was_called { from.was_selected(target) } else { from.has_claim(target) };
             (one, other, stays)
         } else {
             (other, one, to.has_claim(person))
         };
-        if stays || (self.left.contains_key(&keeps) && !was_called) {
+        let is_free = self.left.get(&keeps).is_none_or(|to| *to == leaves);
+        if stays || !(is_free || was_called) {
             return None;
         }
         self.left.remove(&keeps);
@@ -164,6 +178,8 @@ mod tests {
         sharing: Sharing,
         link: Link,
         now: Instant,
+        /// The door calls the gate as well.
+        mutual: bool,
         gate: View,
         door: View,
     }
@@ -171,7 +187,8 @@ mod tests {
     impl Bench {
         fn new(gate_follows: bool, door_follows: bool) -> Self {
             let (gate, door) = (view("gate", 3, gate_follows), view("door", 7, door_follows));
-            Self { sharing: Sharing::default(), link: turning_link(), now: Instant::now(), gate, door }
+            let (sharing, link) = (Sharing::default(), turning_link());
+            Self { sharing, link, now: Instant::now(), mutual: false, gate, door }
         }
 
         fn called(self, camera: &str, id: u64) -> Self {
@@ -184,16 +201,20 @@ mod tests {
             self
         }
 
+        fn each_other(self) -> Self {
+            Self { mutual: true, ..self }
+        }
+
         /// Who is released a second later.
         fn see(&mut self) -> Option<Track> {
             self.now += SAME;
-            self.sharing.see(&self.link, (&self.gate, &self.door), self.now)
+            self.sharing.see(&self.link, (&self.gate, &self.door), self.mutual, self.now)
         }
 
-        /// The same where the door calls the gate.
+        /// The same as the door sees it.
         fn see_back(&mut self) -> Option<Track> {
             self.now += SAME;
-            self.sharing.see(&self.link, (&self.door, &self.gate), self.now)
+            self.sharing.see(&self.link, (&self.door, &self.gate), self.mutual, self.now)
         }
 
         fn leaves(&mut self) -> Option<Track> {
@@ -230,18 +251,35 @@ mod tests {
         assert_eq!(bench.see(), None, "they are left");
         bench.door = view("door", 7, true);
         assert_eq!(bench.see(), track("door", 7));
-        let soon = bench.sharing.see(&bench.link, (&bench.gate, &bench.door), bench.now + SAME / 2);
+        let soon = bench.sharing.see(&bench.link, (&bench.gate, &bench.door), false, bench.now + SAME / 2);
         assert_eq!(soon, None, "a camera takes a while to release");
     }
 
+    /// As in two processes, each of which looks from its own camera first.
     #[test]
-    fn of_two_that_call_each_other_the_same_one_leaves_them_every_time() {
-        let mut bench = Bench::new(true, true);
-        assert_eq!(bench.leaves(), track("door", 7));
+    fn of_two_that_call_each_other_the_same_one_leaves_them_whoever_looks_first() {
+        let mut bench = Bench::new(true, true).each_other();
+        assert_eq!(bench.leaves(), track("gate", 3));
         assert_eq!(bench.see_back(), None);
-        assert_eq!(bench.see_back(), track("door", 7));
-        assert_eq!(bench.see(), track("door", 7));
+        assert_eq!(bench.see_back(), track("gate", 3));
+        assert_eq!(bench.left(), [[3].into(), BTreeSet::new()]);
+        let mut bench = Bench::new(true, true).each_other();
+        assert_eq!(bench.see_back(), None);
+        assert_eq!(bench.see_back(), track("gate", 3));
+        assert_eq!(bench.see(), None);
+        assert_eq!(bench.see(), track("gate", 3));
+        assert_eq!(bench.left(), [[3].into(), BTreeSet::new()]);
+    }
+
+    /// One that follows nobody yet is told to leave them; once both do, the last by name leaves.
+    #[test]
+    fn who_was_to_leave_them_may_keep_them() {
+        let mut bench = Bench::new(true, false).each_other();
+        assert_eq!(bench.leaves(), None);
         assert_eq!(bench.left(), [BTreeSet::new(), [7].into()]);
+        bench.door = view("door", 7, true);
+        assert_eq!(bench.see(), track("gate", 3));
+        assert_eq!(bench.left(), [[3].into(), BTreeSet::new()]);
     }
 
     #[test]
@@ -267,7 +305,7 @@ mod tests {
     }
 
     #[test]
-    fn whom_somebody_selected_is_left_by_neither() {
+    fn whom_somebody_selected_is_kept() {
         let mut bench = Bench::new(true, true).selected();
         assert_eq!(bench.leaves(), track("gate", 3), "who found them by itself leaves them");
         *lock(&bench.gate.known.selected) = Some(3);
