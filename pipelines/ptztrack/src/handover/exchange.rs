@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
@@ -37,7 +37,7 @@ pub struct Report {
     selected: Option<u64>,
     origin: Option<Origin>,
     errand: Option<Errand>,
-    /// How many pipelines it has had: with each, tracks are numbered anew.
+    /// Another number with each of its pipelines, of a process that was started anew as well: tracks are numbered anew.
     pipelines: u64,
 }
 
@@ -57,6 +57,8 @@ pub type Message = (String, String);
 /// Between the thread that hands over and whoever passes messages on.
 #[derive(Debug)]
 pub struct Exchange {
+    /// When it began, milliseconds since 1970: no camera has a new pipeline as often.
+    began_ms: u64,
     said: mpsc::Sender<Message>,
     heard: Mutex<BTreeMap<String, Heard>>,
 }
@@ -76,12 +78,14 @@ struct Heard {
 impl Exchange {
     pub fn new() -> (Arc<Self>, mpsc::Receiver<Message>) {
         let (said, saying) = mpsc::channel(WAITING);
-        (Arc::new(Self { said, heard: Mutex::default() }), saying)
+        let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let began_ms = u64::try_from(since.as_millis()).unwrap_or_default();
+        (Arc::new(Self { began_ms, said, heard: Mutex::default() }), saying)
     }
 
     /// Tells others of a camera.
     pub fn tell(&self, view: &View) {
-        if let Ok(text) = serde_json::to_string(&Report::of(view)) {
+        if let Ok(text) = serde_json::to_string(&Report::of(view, self.began_ms)) {
             // Where it finds no place, the next one will.
             let _ = self.said.try_send((view.known.name.clone(), text));
         }
@@ -134,7 +138,7 @@ impl From<Heard> for View {
 }
 
 impl Report {
-    fn of(view: &View) -> Self {
+    fn of(view: &View, began_ms: u64) -> Self {
         let known = &view.known;
         Self {
             sight: view.seen.1.clone(),
@@ -147,7 +151,7 @@ impl Report {
             selected: *lock(&known.selected),
             origin: lock(&known.origin).clone(),
             errand: view.errand.clone(),
-            pipelines: known.rebuilt.load(Ordering::Relaxed),
+            pipelines: began_ms.saturating_add(known.rebuilt.load(Ordering::Relaxed)),
         }
     }
 
@@ -170,8 +174,10 @@ impl Report {
         if let Some(pose) = wrong {
             return Err(format!("no camera looks like that: {pose:?}"));
         }
-        if self.age.max(self.video) > LATEST {
-            return Err(format!("a picture that is {:?} late", self.age.max(self.video)));
+        let ages = poses.iter().chain(reckoned).map(|pose| pose.age);
+        let latest = ages.fold(self.age.max(self.video), Duration::max);
+        if latest > LATEST {
+            return Err(format!("a picture or a direction that is {latest:?} late"));
         }
         let fast = rate_deg_s.iter().find(|rate| rate.abs() > 1000.0);
         fast.map_or(Ok(()), |rate| Err(format!("no camera turns by {rate} degrees per second")))
@@ -238,6 +244,7 @@ mod tests {
             ("\"velocity\":[0.2,0.0]", "\"velocity\":[0.2,1e30]"),
             ("\"rate_deg_s\":[0.0,0.0]", "\"rate_deg_s\":[0.0,1e9]"),
             ("\"secs\":0,\"nanos\":120000000", "\"secs\":18446744073709551615,\"nanos\":120000000"),
+            ("\"age\":{\"secs\":0,\"nanos\":0}", "\"age\":{\"secs\":100,\"nanos\":0}"),
             ("\"turns\":true", "\"turns\":7"),
         ] {
             assert!(said.contains(right), "{right}: {said}");
@@ -249,11 +256,14 @@ mod tests {
     #[test]
     fn with_another_pipeline_its_tracks_are_others() {
         let (door, said) = said();
-        lock(&door.known.ignored).insert(9);
         let report: Report = serde_json::from_str(&said).unwrap();
         report.make_known(&door.known);
+        lock(&door.known.ignored).insert(9);
+        report.make_known(&door.known);
         assert!(lock(&door.known.ignored).contains(&9));
-        Report { pipelines: 1, ..report }.make_known(&door.known);
+        let anew = Report::of(&door, 1_700_000_000_000);
+        assert_ne!(anew.pipelines, report.pipelines, "of a process that was started anew");
+        anew.make_known(&door.known);
         assert!(lock(&door.known.ignored).is_empty());
     }
 }

@@ -5,7 +5,7 @@
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use rumqttc::{AsyncClient, EventLoop, Incoming, MqttOptions, Publish, QoS};
+use rumqttc::{AsyncClient, EventLoop, Incoming, MqttOptions, Publish, QoS, SubscribeReasonCode};
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
@@ -17,14 +17,14 @@ use crate::log::Log;
 
 /// Somebody takes a quarter of a kilobyte; no picture shows a thousand.
 const LONGEST: usize = 256 * 1024;
-/// Later ones tell more.
-const WAITING: usize = 16;
+/// As many as come at once: a picture of each of many cameras. Later ones tell more.
+const WAITING: usize = 64;
 
 /// The connection, for as long as it lasts.
 pub struct Exchanging([JoinHandle<()>; 2]);
 
 impl Exchanging {
-    /// Connects; whether that succeeds is told by the other connection.
+    /// Connects. Where that fails, or the broker lets nobody hear the tracks, that is said once.
     ///
     /// # Errors
     /// Where the certificates that are to be believed cannot be read.
@@ -65,13 +65,19 @@ struct Hearing {
 
 impl Hearing {
     async fn run(self, mut events: EventLoop) {
-        let mut warned = false;
+        let (mut warned, mut away) = (false, false);
         loop {
             match events.poll().await {
                 Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
+                    away = false;
                     // The queue is empty: nothing is said before this.
                     let _ = self.client.try_subscribe(self.topics.tracks("+"), QoS::AtMostOnce);
                     self.connected.store(true, Ordering::Relaxed);
+                }
+                Ok(rumqttc::Event::Incoming(Incoming::SubAck(answer))) => {
+                    if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
+                        self.not_exchanged("it lets this client hear none");
+                    }
                 }
                 Ok(rumqttc::Event::Incoming(Incoming::Publish(publish))) => {
                     if let Err(detail) = self.hear(&publish)
@@ -81,12 +87,24 @@ impl Hearing {
                     }
                 }
                 Ok(_) => {}
-                Err(_) => {
+                Err(err) => {
                     self.connected.store(false, Ordering::Relaxed);
+                    if !std::mem::replace(&mut away, true) {
+                        self.not_exchanged(&err.to_string());
+                    }
                     tokio::time::sleep(PAUSE).await;
                 }
             }
         }
+    }
+
+    fn not_exchanged(&self, reason: &str) {
+        let topic = self.topics.tracks("+");
+        let detail = format!(
+            "the MQTT broker passes no {topic} on: {reason}. Nobody is handed over to or from cameras of other processes; \
+             allow this user to connect twice, and to read and write there"
+        );
+        self.log.error("tracks-not-exchanged", detail);
     }
 
     fn hear(&self, Publish { topic, payload, .. }: &Publish) -> Result<(), String> {
