@@ -36,8 +36,8 @@ struct Options {
     #[arg(long, default_value_t = 0)]
     reconnects: u64,
     /// Each with a program of its own.
-    #[arg(long, default_value_t = 4)]
-    cameras: usize,
+    #[arg(long, default_value_t = 4, value_parser = clap::value_parser!(u64).range(1..))]
+    cameras: u64,
     /// Another one is another course of events.
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -62,7 +62,7 @@ fn main() -> ExitCode {
     };
     let watchdog = Watchdog::new("soak");
     let broker = Broker::start();
-    let start = |number| Camera::start(number, options.seed, lasts, &watchdog, &broker);
+    let start = |number: u64| Camera::start(number as usize, options.seed, lasts, &watchdog, &broker);
     let cameras: Vec<_> = (0..options.cameras).map(start).collect();
     let begin = Instant::now();
     let mut samples = Samples::default();
@@ -73,7 +73,7 @@ fn main() -> ExitCode {
                 let probe = camera.probe();
                 let run = move || match options.reconnects {
                     0 => camera.run(|| begin.elapsed() >= duration),
-                    reconnects => camera.reconnect(reconnects.div_ceil(options.cameras as u64)),
+                    reconnects => camera.reconnect(reconnects.div_ceil(options.cameras)),
                 };
                 (probe, scope.spawn(run))
             })
