@@ -23,7 +23,7 @@ pub struct Object {
     pub id: u64,
     /// Left, top, width and height of the box: parts of the picture, from its left and its top.
     pub bounds: [f64; 4],
-    /// How likely there is: 0 to 1.
+    /// How likely it is that there is something: 0 to 1.
     pub likelihood: f64,
 }
 

@@ -156,10 +156,10 @@ fn stands_at(place: Rect2f, bounds: Rect2f) -> bool {
 }
 
 /// Whether somebody is still coming into view, or leaving: a leg goes before the body. Of whoever is cut off by the lower edge only, head
-/// and trunk are there, which may be all that is ever seen of them: somebody near walks past below.
+/// and trunk are there, by a camera that hangs upright, which may be all that is ever seen of them: somebody near walks past below.
 fn is_entering(tracks: &Tracks, bounds: Rect2f, frame: Frame) -> bool {
-    let parts = tracks.seen().map(Track::seen_bounds).filter(|part| may_be_one(bounds, *part));
-    parts.into_iter().any(|part| {
+    let mut parts = tracks.seen().map(Track::seen_bounds).filter(|part| may_be_one(bounds, *part));
+    parts.any(|part| {
         let [left, top, right, _] = frame.cut_sides(part);
         left || top || right
     })
