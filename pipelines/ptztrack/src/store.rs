@@ -10,6 +10,7 @@ use std::thread;
 use std::time::{Duration, SystemTime};
 
 use events::{Error, Retention, Sighting};
+use pipeline_supervisor::Backoff;
 
 use crate::config::Store;
 use crate::event::{Event, Level};
@@ -129,7 +130,7 @@ impl Keeping {
 
     /// Tries until it is done. The failure is said once, and its end.
     fn persist(&mut self, mut what: impl FnMut(&mut Self) -> Result<(), Error>) {
-        let mut pause = SHORTEST_PAUSE;
+        let mut pauses = Backoff::new(SHORTEST_PAUSE, LONGEST_PAUSE, Duration::MAX);
         while let Err(err) = what(self) {
             // Whatever was wrong may be mended in the next one.
             let broken = self.open.take().filter(|_| err.is_corrupt());
@@ -139,8 +140,7 @@ impl Keeping {
                     format!("{}; the cameras follow, and it is tried again", not_kept(&err.to_string()));
                 self.log.tell(&Event::new(Level::Warning, None, "events-not-kept", detail));
             }
-            thread::sleep(pause);
-            pause = (pause * 2).min(LONGEST_PAUSE);
+            thread::sleep(pauses.after(Duration::ZERO));
         }
         let lost = self.count.take_lost();
         if std::mem::take(&mut self.in_trouble) || lost > 0 {

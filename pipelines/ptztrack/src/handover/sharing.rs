@@ -138,35 +138,14 @@ impl View {
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::camera::{Known, Pose, Sight};
-    use crate::handover::stage::turning_link;
+    use crate::handover::stage::{person, target, turning_link, view as seeing};
 
     /// A camera that sees one person, and follows them or not.
     fn view(name: &str, id: u64, is_target: bool) -> View {
-        let bounds = [0.46, 0.4, 0.08, 0.3];
-        let person = Person { id, bounds, velocity: [0.0; 2], seen: true, confidence: 1.0, is_target };
-        let pose = Pose {
-            age: Duration::ZERO,
-            pan_deg: 0.0,
-            tilt_deg: -10.0,
-            horizontal_fov_deg: 60.0,
-            vertical_fov_deg: 46.0,
-        };
-        let sight = Sight { people: vec![person], poses: vec![pose], ..Sight::default() };
-        View {
-            is_here: true,
-            can_be_called: true,
-            errand: None,
-            known: Arc::new(Known::new(name)),
-            seen: Arc::new((Instant::now(), sight)),
-            turns: true,
-            video: Duration::ZERO,
-            widest_fov_deg: Some(60.0),
-            target_height: None,
-        }
+        let person = person(id, [0.5, 0.7], 0.0);
+        let person = if is_target { target(person) } else { person };
+        seeing(name, true, Instant::now(), vec![person])
     }
 
     fn views(gate: View, door: View) -> BTreeMap<String, View> {
