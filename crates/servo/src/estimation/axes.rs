@@ -16,7 +16,7 @@ pub struct AxisEstimator {
     tilt: AxisSense,
     /// Until it is known whether they are exchanged, one of them is moved at a time: whether it is pan, and since when.
     alone: Option<(bool, Time)>,
-    /// Pictures in a row in which it rested although it was told to turn as fast as it may.
+    /// Pictures in which it rested although it was told to turn as fast as it may, since it last turned.
     rests: u32,
     /// How often that bound was doubled.
     raised: u32,
@@ -144,8 +144,13 @@ impl AxisEstimator {
     fn heed_rest(&mut self, turn: &ObservedRotation, history: &CommandHistory, noise: f64) {
         let least = Self::NEARLY * self.cautious_deg_s();
         let mut told = history.rates_between(turn.from - Self::LATEST, turn.to);
-        let rests = turn.rate.largest() <= noise && told.all(|rate| rate.largest() >= least);
-        self.rests = if rests { self.rests + 1 } else { 0 };
+        let turns = turn.rate.largest() > noise;
+        if turns {
+            self.rests = 0;
+        } else if told.all(|rate| rate.largest() >= least) {
+            // Whoever is followed is seen for moments only by a camera that rests: these add up.
+            self.rests += 1;
+        }
         if self.rests >= AxisSense::DECISIVE && self.raised < Self::MOST_RAISED {
             (self.rests, self.raised) = (0, self.raised + 1);
         }
@@ -206,11 +211,11 @@ mod tests {
     }
 
     /// Twelve pictures a second of a camera told to pan at `told`, which the background shows to do `seen`.
-    fn watch(axes: &mut AxisEstimator, told: PanTilt, seen: PanTilt, pictures: u64) -> Option<AxisFinding> {
+    fn watch(axes: &mut AxisEstimator, told: PanTilt, seen: PanTilt, pictures: u32) -> Option<AxisFinding> {
         let mut history = CommandHistory::default();
         history.push(ms(0), told);
         let mut found = None;
-        for picture in 0..pictures {
+        for picture in 0..u64::from(pictures) {
             let from = ms(2000 + 80 * picture);
             let turn = ObservedRotation { from, to: from + ms(80), rate: seen };
             found = axes.see(&turn, &history, 55.0).or(found);
@@ -292,6 +297,20 @@ mod tests {
             assert_eq!(watch(&mut axes, told, PanTilt::default(), 11), None);
             assert_eq!(allowed(&mut axes), most);
         }
+    }
+
+    #[test]
+    fn rests_add_up_until_it_turns() {
+        let mut axes = AxisEstimator::default();
+        let allowed = |axes: &mut AxisEstimator| axes.cautious(PanTilt::new(90.0, 0.0), ms(0)).pan;
+        let (fast, slow) = (PanTilt::new(CAUTIOUS, 0.0), PanTilt::new(0.0, 2.0));
+        watch(&mut axes, fast, PanTilt::default(), AxisSense::DECISIVE - 1);
+        watch(&mut axes, slow, PanTilt::new(0.0, 2.0), 1);
+        watch(&mut axes, fast, PanTilt::default(), AxisSense::DECISIVE - 1);
+        assert_eq!(allowed(&mut axes), CAUTIOUS, "it turned in between");
+        watch(&mut axes, slow, PanTilt::default(), 50);
+        watch(&mut axes, fast, PanTilt::default(), 1);
+        assert_eq!(allowed(&mut axes), 2.0 * CAUTIOUS);
     }
 
     #[test]
