@@ -40,6 +40,8 @@ enum Stopped {
     /// A stop, so long after the cable was in again.
     ByUs(Duration),
     Never,
+    /// Nobody was followed: what the application said.
+    NeverTurned(String),
 }
 
 fn main() -> ExitCode {
@@ -61,7 +63,11 @@ fn main() -> ExitCode {
         for _ in 0..AT_ONCE {
             scope.spawn(|| {
                 for (number, case) in std::iter::from_fn(take) {
-                    println!("| {} | {} |", case.name(), case.run(u8::try_from(number).unwrap()));
+                    let stopped = case.run(u8::try_from(number).unwrap());
+                    println!("| {} | {stopped} |", case.name());
+                    if let Stopped::NeverTurned(said) = stopped {
+                        println!("{}: {said}", case.name());
+                    }
                 }
             });
         }
@@ -98,7 +104,7 @@ impl Case {
         let turns = |status: &Status| status.pan_rate_deg_s.hypot(status.tilt_rate_deg_s) > TURNS;
         if !camera.wait_for(PATIENCE, turns) {
             launch.read_for(Duration::ZERO);
-            panic!("{}: the camera never turned: {}", self.name(), launch.seen().join("\n"));
+            return Stopped::NeverTurned(launch.seen().join("\n"));
         }
         cable.pull().unwrap();
         let pulled = camera.now();
@@ -125,6 +131,7 @@ impl Display for Stopped {
                 write!(f, "a stop, once the cable is in again | {:.1} s after that", rested.as_secs_f64())
             }
             Self::Never => write!(f, "nothing | it turns on"),
+            Self::NeverTurned(_) => write!(f, "nobody was followed | it never turned"),
         }
     }
 }

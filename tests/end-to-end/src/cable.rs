@@ -3,25 +3,36 @@
 //! A cable between an application and its camera that can be pulled: packets are lost, and nobody is told.
 
 use std::net::Ipv4Addr;
+use std::path::Path;
 use std::process::Command;
 
 /// A network namespace for an application, and its only cable; both go when this is dropped.
 pub struct Cable {
     /// Also the name of its end on the camera's side.
     namespace: String,
-    /// The third byte of its addresses.
-    number: u8,
+    /// Which of the networks for tests it is.
+    network: u32,
 }
 
+/// For tests of network devices (RFC 2544), so that no real network is meant.
+const TEST_NETWORKS: Ipv4Addr = Ipv4Addr::new(198, 18, 0, 0);
+/// Bits of a network's number: each has four of a /15's addresses.
+const NETWORK_BITS: u32 = 15;
+/// Bits of a cable's number among those of its process.
+const CABLE_BITS: u32 = 5;
+
 impl Cable {
-    /// Lays one, different from all others of this number.
+    /// Lays one, different from all others of this number below 32, of this process or another.
     ///
     /// # Errors
     /// What `ip` says where this process may not: it takes root and iproute2.
     pub fn lay(number: u8) -> Result<Self, String> {
-        let cable = Self { namespace: format!("ptz{}-{number}", std::process::id()), number };
+        take_away_what_was_left();
+        let process = std::process::id();
+        let network = (process << CABLE_BITS | u32::from(number)) & ((1 << NETWORK_BITS) - 1);
+        let cable = Self { namespace: format!("{PREFIX}{process}-{number}"), network };
         let Self { namespace, .. } = &cable;
-        let (here, there) = (cable.camera_side(), Ipv4Addr::new(10, 255, number, 2));
+        let (here, there) = (cable.camera_side(), cable.side(2));
         ip(&format!("netns add {namespace}"))?;
         ip(&format!("link add {namespace} type veth peer name cable netns {namespace}"))?;
         ip(&format!("address add {here}/30 dev {namespace}"))?;
@@ -34,7 +45,11 @@ impl Cable {
 
     /// Where the application finds the camera.
     pub fn camera_side(&self) -> Ipv4Addr {
-        Ipv4Addr::new(10, 255, self.number, 1)
+        self.side(1)
+    }
+
+    fn side(&self, host: u32) -> Ipv4Addr {
+        Ipv4Addr::from(u32::from(TEST_NETWORKS) + 4 * self.network + host)
     }
 
     /// Runs a program at its far end.
@@ -55,7 +70,7 @@ impl Cable {
     /// # Errors
     /// What `ip` says.
     pub fn pull(&self) -> Result<(), String> {
-        ip(&format!("link set {} down", self.namespace))
+        ip(&format!("link set {} down", self.namespace)).map(drop)
     }
 
     /// Everything passes again.
@@ -63,21 +78,39 @@ impl Cable {
     /// # Errors
     /// What `ip` says.
     pub fn plug(&self) -> Result<(), String> {
-        ip(&format!("link set {} up", self.namespace))
+        ip(&format!("link set {} up", self.namespace)).map(drop)
     }
 }
 
 impl Drop for Cable {
     fn drop(&mut self) {
-        // One end of the link takes the other with it. What was never made cannot be taken away.
-        let _ = ip(&format!("link delete {}", self.namespace));
-        let _ = ip(&format!("netns delete {}", self.namespace));
+        take_away(&self.namespace);
     }
 }
 
-fn ip(arguments: &str) -> Result<(), String> {
+/// An interface's name has 15 characters at most, and a process' number up to 7.
+const PREFIX: &str = "ptz-";
+
+/// Processes that were killed left theirs.
+fn take_away_what_was_left() {
+    for left in ip("netns list").unwrap_or_default().lines() {
+        let name = left.split_whitespace().next().unwrap_or_default();
+        let process = name.strip_prefix(PREFIX).and_then(|rest| rest.split('-').next());
+        if process.is_some_and(|process| !Path::new("/proc").join(process).exists()) {
+            take_away(name);
+        }
+    }
+}
+
+fn take_away(namespace: &str) {
+    // One end of the link takes the other with it. What was never made cannot be taken away.
+    let _ = ip(&format!("link delete {namespace}"));
+    let _ = ip(&format!("netns delete {namespace}"));
+}
+
+fn ip(arguments: &str) -> Result<String, String> {
     let done = Command::new("ip").args(arguments.split(' ')).output();
     let done = done.map_err(|err| format!("ip cannot be run: {err}"))?;
     let said = || format!("ip {arguments}: {}", String::from_utf8_lossy(&done.stderr).trim());
-    if done.status.success() { Ok(()) } else { Err(said()) }
+    if done.status.success() { Ok(String::from_utf8_lossy(&done.stdout).into_owned()) } else { Err(said()) }
 }
