@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::sync::mpsc;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use end_to_end::{PATIENCE, Running, scene};
 use gst::prelude::*;
@@ -61,8 +61,10 @@ fn wait_for_a_move(camera: &VirtualCamera) {
         command.status == 204 && command.query.contains("move=") && !command.query.contains("move=0,0")
     };
     let (before, mut seen) = (camera.status().commands, 0);
+    let until = Instant::now() + PATIENCE;
     while !camera.commands_after(before).iter().any(is_move) {
-        assert!(camera.wait_for(PATIENCE, |status| status.commands > seen), "control did not resume");
+        let left = until.saturating_duration_since(Instant::now());
+        assert!(camera.wait_for(left, |status| status.commands > seen), "control did not resume");
         seen = camera.status().commands;
     }
 }
