@@ -40,6 +40,7 @@ mod bits;
 mod camera_motion;
 mod camera_moves;
 mod carried_zones;
+mod components;
 mod contours;
 mod coverage;
 mod detector;

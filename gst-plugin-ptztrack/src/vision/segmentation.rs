@@ -3,12 +3,10 @@
 use std::ops::Range;
 
 use multiversion::multiversion;
-use opencv::core::Mat;
-use opencv::imgproc;
-use opencv::prelude::*;
 
 use super::Luma;
 use super::bits::Bits;
+use super::components::{Components, Run};
 use super::morphology::clean;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
@@ -23,12 +21,10 @@ const MIN_STRONG: f64 = 1.0 / 8000.0;
 #[derive(Debug, Default)]
 pub struct Segmentation {
     strong: Vec<u8>,
-    labels: Mat,
     bits: Bits,
+    components: Components,
     /// Of one row: sums of three pixels above each other.
     sums: Vec<u16>,
-    /// Whether anything is set in each column.
-    columns: Vec<u8>,
     /// Of a part's columns.
     heights: Vec<usize>,
 }
@@ -42,32 +38,23 @@ impl Segmentation {
         open_size: usize,
         close_size: (usize, usize),
         mask: &mut [u8],
-    ) -> opencv::Result<()> {
+    ) {
         let (width, height) = (likelihood.width(), likelihood.height());
         let needed = (MIN_STRONG * (width * height) as f64).ceil() as usize;
         if self.threshold(likelihood, mask) < needed {
             mask.fill(0);
-            return Ok(());
+            return;
         }
         clean(mask, width, open_size, close_size, &mut self.bits);
-        let Some((columns, rows)) = extent(mask, width, &mut self.columns) else { return Ok(()) };
-        let mut boxes = Mat::default();
-        let part = Luma::packed(mask, width).crop(columns.start, rows.start, columns.len(), rows.len());
-        let count = part.with_mat(|part| {
-            imgproc::connected_components_with_stats_def(
-                part,
-                &mut self.labels,
-                &mut boxes,
-                &mut Mat::default(),
-            )
-        })?;
-        for label in 1..count {
-            let part = Part::of(&boxes, label, (columns.start, rows.start))?;
-            let is_sure = part.count(&self.labels, &self.strong, width)? >= needed;
-            let kept = if is_sure { part.upright(&self.labels, &mut self.heights)? } else { 0..0 };
-            part.keep(kept, &self.labels, mask, width)?;
+        self.components.find(mask, width);
+        for runs in self.components.parts() {
+            let columns = extent(runs);
+            let is_sure = count(runs, &self.strong, width) >= needed;
+            let kept = if is_sure { upright(runs, columns.clone(), &mut self.heights) } else { 0..0 };
+            if kept != columns {
+                keep(runs, &kept, mask, width);
+            }
         }
-        Ok(())
     }
 
     /// Leaves what is likely in `mask` and what is sure in `strong`, and counts that.
@@ -119,97 +106,48 @@ fn threshold_row(
     usize::from(count)
 }
 
-/// The columns and rows that hold all that is set; `None` where nothing is. `columns` is memory.
-fn extent(mask: &[u8], width: usize, columns: &mut Vec<u8>) -> Option<(Range<usize>, Range<usize>)> {
-    let is_set = |row: &[u8]| row.iter().fold(0, |any, pixel| any | pixel) > 0;
-    let rows = || mask.chunks_exact(width.max(1));
-    let (first, last) = (rows().position(is_set)?, rows().rposition(is_set)?);
-    columns.clear();
-    columns.resize(width, 0);
-    for row in rows().take(last + 1).skip(first) {
-        columns.iter_mut().zip(row).for_each(|(any, pixel)| *any |= pixel);
-    }
-    let set = |any: &u8| *any > 0;
-    let (left, right) = (columns.iter().position(set)?, columns.iter().rposition(set)?);
-    Some((left..right + 1, first..last + 1))
-}
-
 /// Columns of a region with less than this part of its tallest one may be a shadow on the floor beside somebody upright ...
 const LOW: f32 = 0.3;
 /// ... and are one where they go on for so many heights of it: farther than a foot or a hand reaches.
 const LONG: f32 = 0.25;
 
-/// A connected part of the mask: its number among the labels, its box in pixels of these, and where they begin.
-struct Part {
-    label: i32,
-    first: (usize, usize),
-    columns: Range<usize>,
-    rows: Range<usize>,
+/// The columns of a part.
+fn extent(runs: &[Run]) -> Range<usize> {
+    let start = runs.iter().map(|run| run.columns.start).min().unwrap_or(0);
+    start..runs.iter().map(|run| run.columns.end).max().unwrap_or(start)
 }
 
-impl Part {
-    fn of(boxes: &Mat, label: i32, first: (usize, usize)) -> opencv::Result<Self> {
-        let side = |side: i32| boxes.at_2d::<i32>(label, side).map(|value| *value as usize);
-        let (left, top) = (side(imgproc::CC_STAT_LEFT)?, side(imgproc::CC_STAT_TOP)?);
-        let (width, height) = (side(imgproc::CC_STAT_WIDTH)?, side(imgproc::CC_STAT_HEIGHT)?);
-        Ok(Self { label, first, columns: left..left + width, rows: top..top + height })
-    }
+/// How many pixels of a part are set in another mask, whose rows are `width` pixels.
+fn count(runs: &[Run], other: &[u8], width: usize) -> usize {
+    let pixels = runs.iter().flat_map(|run| &other[run.row * width..][run.columns.clone()]);
+    pixels.map(|pixel| usize::from(*pixel > 0)).sum()
+}
 
-    /// Its pixels that are set in another mask, whose rows are `width` pixels.
-    fn count(&self, labels: &Mat, other: &[u8], width: usize) -> opencv::Result<usize> {
-        let mut count = 0;
-        for row in self.rows.clone() {
-            let set = other[self.pixels(row, width)].iter().zip(self.line(labels, row)?);
-            count += set.filter(|(pixel, label)| **pixel > 0 && **label == self.label).count();
-        }
-        Ok(count)
+/// The `columns` of a part without a long low tail on either side: somebody stands upright, and their shadow lies (by the heights of
+/// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003). `heights` is memory.
+fn upright(runs: &[Run], columns: Range<usize>, heights: &mut Vec<usize>) -> Range<usize> {
+    heights.clear();
+    heights.resize(columns.len(), 0);
+    for run in runs {
+        let heights = &mut heights[run.columns.start - columns.start..run.columns.end - columns.start];
+        heights.iter_mut().for_each(|height| *height += 1);
     }
+    let tallest = heights.iter().copied().max().unwrap_or(0) as f32;
+    let low = |height: &&usize| (**height as f32) < LOW * tallest;
+    let long = |tail: usize| if tail as f32 >= LONG * tallest { tail } else { 0 };
+    let before = long(heights.iter().take_while(low).count());
+    let after = long(heights.iter().rev().take_while(low).count());
+    columns.start + before..columns.end - after
+}
 
-    /// Its columns without a long low tail on either side: somebody stands upright, and their shadow lies (by the heights of
-    /// columns, as Hsieh et al., "Shadow elimination for effective moving object detection", 2003). `heights` is memory.
-    fn upright(&self, labels: &Mat, heights: &mut Vec<usize>) -> opencv::Result<Range<usize>> {
-        heights.clear();
-        heights.resize(self.columns.len(), 0);
-        for row in self.rows.clone() {
-            let line = self.line(labels, row)?;
-            line.iter()
-                .zip(&mut *heights)
-                .for_each(|(label, height)| *height += usize::from(*label == self.label));
-        }
-        let tallest = heights.iter().copied().max().unwrap_or(0) as f32;
-        let low = |height: &&usize| (**height as f32) < LOW * tallest;
-        let long = |tail: usize| if tail as f32 >= LONG * tallest { tail } else { 0 };
-        let before = long(heights.iter().take_while(low).count());
-        let after = long(heights.iter().rev().take_while(low).count());
-        Ok(self.columns.start + before..self.columns.end - after)
-    }
-
-    /// Clears its pixels in the mask but for those in these columns.
-    fn keep(&self, kept: Range<usize>, labels: &Mat, mask: &mut [u8], width: usize) -> opencv::Result<()> {
-        if kept == self.columns {
-            return Ok(());
-        }
-        for row in self.rows.clone() {
-            let line = self.line(labels, row)?;
-            let pixels = &mut mask[self.pixels(row, width)];
-            for ((column, pixel), label) in self.columns.clone().zip(pixels).zip(line) {
-                if *label == self.label && !kept.contains(&column) {
-                    *pixel = 0;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// A row of the labels within its box.
-    fn line<'a>(&self, labels: &'a Mat, row: usize) -> opencv::Result<&'a [i32]> {
-        Ok(&labels.at_row::<i32>(row as i32)?[self.columns.clone()])
-    }
-
-    /// Where that row lies in a mask.
-    fn pixels(&self, row: usize, width: usize) -> Range<usize> {
-        let start = (self.first.1 + row) * width + self.first.0;
-        start + self.columns.start..start + self.columns.end
+/// Clears a part in the mask but for those columns.
+fn keep(runs: &[Run], kept: &Range<usize>, mask: &mut [u8], width: usize) {
+    for Run { row, columns, .. } in runs {
+        let pixels = &mut mask[row * width..][columns.clone()];
+        let before = kept.start.clamp(columns.start, columns.end) - columns.start;
+        let after = kept.end.clamp(columns.start, columns.end) - columns.start;
+        pixels[..before].fill(0);
+        pixels[before.max(after)..].fill(0);
     }
 }
 
@@ -232,7 +170,7 @@ mod tests {
         }
         let mut mask = vec![0; SIZE.0 * SIZE.1];
         let luma = Luma::packed(&likelihood, SIZE.0);
-        Segmentation::default().segment(&luma, 3, (3, 7), &mut mask).unwrap();
+        Segmentation::default().segment(&luma, 3, (3, 7), &mut mask);
         mask.iter().map(|pixel| i32::from(*pixel > 0)).sum()
     }
 
