@@ -5,11 +5,11 @@
 //! Somebody's outline is an edge of the picture, and runs across a background that has none there. The outline of a ghost
 //! is an edge of the background, where the picture has none.
 
-use opencv::core::{self, Mat, Size};
-use opencv::imgproc;
+use multiversion::multiversion;
 use ptztrack_contract::{Point, Region};
 
 use super::Luma;
+use super::blur::Blur;
 use super::contours::Grid;
 use super::scene_model::SceneView;
 use super::travelling::UNKNOWN;
@@ -22,45 +22,47 @@ const STRONGER: f64 = 1.5;
 const LEAST_EDGE: f64 = 8.0;
 /// Places at which the contour is looked at.
 const LEAST_PLACES: u32 = 16;
-/// Pixels that are looked at together to tell whether picture and background are the same but for their sharpness.
-const COARSE: i32 = 9;
-/// Share of their difference that is left then, below which they are the same.
+/// Share of the difference of picture and background that is left of them blurred, below which they are the same but for their
+/// sharpness.
 const UNSHARP: f64 = 0.4;
 
 /// Less of the difference than this ends at the contour of light that changed: a cloud's shadow has no outline, somebody has.
 const SOFT: f64 = 0.3;
 
-/// Whether nobody is where `region` is: it is a ghost, or what is known of the background there is not sharp.
-///
-/// # Errors
-/// Where OpenCV fails, which no picture should make it do.
-pub fn is_nobody(scene: &SceneView, region: &Region) -> opencv::Result<bool> {
-    Ok(is_ghost(scene, region) || is_unsharp(scene, region)?)
+/// Finds regions in which nobody is; kept as memory for the next one.
+#[derive(Debug, Default)]
+pub struct Ghosts {
+    /// Of the picture and of the background.
+    blurs: [Blur; 2],
 }
 
-/// Whether picture and background are the same but for what is finer than [`COARSE`]: the background was learned while the
-/// camera turned, from blurred pictures that lay a little beside each other.
-fn is_unsharp(scene: &SceneView, region: &Region) -> opencv::Result<bool> {
-    let (width, height) = (scene.luma.width(), scene.luma.height());
-    let (x, y, columns, rows) = region.bounds.to_pixels(width as u32, height as u32);
-    let [picture, known] = [scene.luma, scene.background]
-        .map(|plane| plane.crop(x as usize, y as usize, columns as usize, rows as usize));
-    let fine = picture.with_mat(|picture| known.with_mat(|known| difference(picture, known)))?;
-    let coarse = difference(&blurred(&picture)?, &blurred(&known)?)?;
-    Ok(coarse < UNSHARP * fine)
+impl Ghosts {
+    /// Whether nobody is where `region` is: it is a ghost, or what is known of the background there is not sharp.
+    pub fn is_nobody(&mut self, scene: &SceneView, region: &Region) -> bool {
+        is_ghost(scene, region) || self.is_unsharp(scene, region)
+    }
+
+    /// Whether picture and background are the same but for what is fine: the background was learned while the camera turned, from
+    /// blurred pictures that lay a little beside each other.
+    fn is_unsharp(&mut self, scene: &SceneView, region: &Region) -> bool {
+        let (width, height) = (scene.luma.width(), scene.luma.height());
+        let (x, y, columns, rows) = region.bounds.to_pixels(width as u32, height as u32);
+        let [picture, known] = [scene.luma, scene.background]
+            .map(|plane| plane.crop(x as usize, y as usize, columns as usize, rows as usize));
+        let [of_picture, of_known] = &mut self.blurs;
+        let (mut fine, mut coarse) = (0, 0);
+        for y in 0..picture.height() {
+            fine += difference(picture.row(y), known.row(y));
+            coarse += difference(of_picture.row(&picture, y), of_known.row(&known, y));
+        }
+        f64::from(coarse) < UNSHARP * f64::from(fine)
+    }
 }
 
-fn blurred(plane: &Luma) -> opencv::Result<Mat> {
-    let mut blurred = Mat::default();
-    plane.with_mat(|plane| imgproc::blur_def(plane, &mut blurred, Size::new(COARSE, COARSE)))?;
-    Ok(blurred)
-}
-
-/// Mean difference of two planes, grey levels.
-fn difference(a: &Mat, b: &Mat) -> opencv::Result<f64> {
-    let mut off = Mat::default();
-    core::absdiff(a, b, &mut off)?;
-    Ok(core::mean_def(&off)?[0])
+/// The sum of differences of two rows, grey levels.
+#[multiversion(targets("x86_64+avx2"))]
+fn difference(a: &[u8], b: &[u8]) -> u32 {
+    a.iter().zip(b).map(|(a, b)| u32::from(a.abs_diff(*b))).sum()
 }
 
 /// Whether the contour of `region` is an edge of the background, not of the picture.
@@ -165,7 +167,7 @@ mod tests {
     }
 
     fn judge(picture: &Canvas, background: &Canvas, region: &Region) -> bool {
-        is_nobody(&scene(picture, background), region).unwrap()
+        Ghosts::default().is_nobody(&scene(picture, background), region)
     }
 
     #[test]

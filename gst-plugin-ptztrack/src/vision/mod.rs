@@ -37,6 +37,7 @@
 
 mod background;
 mod bits;
+mod blur;
 mod camera_motion;
 mod camera_moves;
 mod carried_zones;

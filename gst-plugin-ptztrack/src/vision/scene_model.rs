@@ -6,7 +6,7 @@ use ptztrack_contract::{CameraMotion, Homography, Rect, Region};
 
 use super::Luma;
 use super::camera_motion::CameraMotionEstimator;
-use super::ghosts::is_nobody;
+use super::ghosts::Ghosts;
 use super::picture::{Picture, Reduced};
 use super::reduce::divisor;
 use super::travelling::TravellingBackground;
@@ -34,6 +34,7 @@ pub struct SceneModel {
     motion: CameraMotionEstimator,
     background: TravellingBackground,
     camera_motion: Option<CameraMotion>,
+    ghosts: Ghosts,
 }
 
 impl SceneModel {
@@ -71,11 +72,13 @@ impl SceneModel {
 
     /// Where nobody is, of the regions that were found in the last picture, what stays the same is background at once.
     pub fn forget_ghosts<'a>(&mut self, regions: impl Iterator<Item = &'a Region>) -> opencv::Result<()> {
+        let mut ghosts = std::mem::take(&mut self.ghosts);
         for region in regions {
-            if is_nobody(&self.view(), region)? {
+            if ghosts.is_nobody(&self.view(), region) {
                 self.background.adopt(&region.contour)?;
             }
         }
+        self.ghosts = ghosts;
         Ok(())
     }
 
