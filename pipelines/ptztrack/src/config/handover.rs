@@ -61,7 +61,12 @@ impl Read for Vec<Zone> {
 impl HandOver {
     /// Whether a camera calls or is called.
     pub fn concerns(&self, camera: &str) -> bool {
-        self.from == camera || self.calls.iter().any(|called| called == camera)
+        self.cameras().any(|concerned| concerned == camera)
+    }
+
+    /// Whoever calls or is called.
+    pub fn cameras(&self) -> impl Iterator<Item = &String> {
+        std::iter::once(&self.from).chain(&self.calls)
     }
 
     /// All tables within `[handover]`, by the cameras that there are.

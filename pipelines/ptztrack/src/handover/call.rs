@@ -11,7 +11,7 @@ use super::exchange::Errand;
 use super::link::Link;
 use super::motion::Expected;
 use super::view::View;
-use crate::camera::{Gaze, Origin, Person, Steering};
+use crate::camera::{Gaze, Known, Origin, Person, Steering};
 use crate::config::HandOver;
 use ptztrack_contract::lock::lock;
 
@@ -95,11 +95,11 @@ impl Call {
             (Some(_), Some(expected)) if self.is_astray(&expected, called) => self.look_again(),
             (Some(_), _) => Progress::Going,
             (None, _) if self.begun.elapsed() > LONGEST => {
-                self.cancel(called);
+                self.cancel(&called.known);
                 Progress::Failed
             }
             (None, _) if self.was_refused(called) => {
-                self.cancel(called);
+                self.cancel(&called.known);
                 Progress::Refused
             }
             (None, _) => {
@@ -114,9 +114,9 @@ impl Call {
     }
 
     /// Has the camera follow again, where it was sent somewhere.
-    pub fn cancel(&self, called: &View) {
-        if self.followed.is_none() && matches!(*lock(&called.known.steering), Steering::LookAt(..)) {
-            called.known.steer(Steering::Follow);
+    pub fn cancel(&self, called: &Known) {
+        if self.followed.is_none() && matches!(*lock(&called.steering), Steering::LookAt(..)) {
+            called.steer(Steering::Follow);
         }
     }
 
@@ -254,7 +254,6 @@ mod tests {
     use std::sync::Arc;
 
     use super::*;
-    use crate::camera::Known;
     use crate::handover::stage::{FEET, RATE, link, person, target, view, wish};
 
     const PICTURE: Duration = Duration::from_millis(80);

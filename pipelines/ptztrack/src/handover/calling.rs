@@ -33,7 +33,7 @@ impl Dispatcher {
             let Errand { from, id, .. } = call.errand.clone();
             let caller = views.get(&from).filter(|_| !gives_way(&to, &call, wishes, views));
             let Some(caller) = caller else {
-                call.cancel(called);
+                call.cancel(&called.known);
                 continue;
             };
             let link = self.links.get(&(from.clone(), to.clone()));
@@ -307,6 +307,20 @@ mod tests {
         lock(&site.known("door").state).refused_moves += 1;
         assert_eq!(site.called(), ["gate"]);
         assert_eq!(site.called(), ["gate"]);
+    }
+
+    #[test]
+    fn one_that_is_not_to_be_called_any_more_follows_again() {
+        let mut site = Site::new();
+        assert_eq!(site.called(), ["door"]);
+        assert_eq!(site.called(), ["door"], "it is told where to look");
+        let cameras: Vec<_> = site.views.values().map(|view| view.known.clone()).collect();
+        lock(&site.known("gate").ignored).insert(9);
+        site.dispatcher.change(&site.wishes, &cameras);
+        assert!(matches!(*lock(&site.known("door").steering), Steering::LookAt(..)), "nothing has changed");
+        site.dispatcher.change(&[], &cameras);
+        assert_eq!(*lock(&site.known("door").steering), Steering::Follow);
+        assert!(site.dispatcher.calls.is_empty() && lock(&site.known("gate").ignored).is_empty());
     }
 
     #[test]

@@ -16,7 +16,7 @@ mod stage;
 mod view;
 mod walkers;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex, Weak};
 use std::thread::{self, JoinHandle};
@@ -130,8 +130,13 @@ impl Dispatcher {
 
     fn run(mut self, wishes: &Weak<Mutex<Vec<HandOver>>>) {
         let mut kept = Instant::now();
+        let mut before = Vec::new();
         while let Some(wishes) = wishes.upgrade() {
             let wishes = lock(&wishes).clone();
+            if wishes != before {
+                self.change(&wishes, &self.fleet.known());
+                before.clone_from(&wishes);
+            }
             if !wishes.is_empty() {
                 self.tick(&wishes);
             }
@@ -148,6 +153,26 @@ impl Dispatcher {
         for ((from, to), link) in self.links.iter_mut().filter(|(_, link)| link.changed) {
             link.changed = false;
             self.maps.keep(from, to, &link.map);
+        }
+    }
+
+    /// The file says something else: nobody is called any more by a camera that is not to call them, and what a camera was told for
+    /// the sake of others is over where it works with none.
+    fn change(&mut self, wishes: &[HandOver], cameras: &[Arc<Known>]) {
+        let is_over = |to: &String, call: &mut Call| {
+            !wishes.iter().any(|wish| wish.from == call.errand.from && wish.calls.contains(to))
+        };
+        for (to, call) in self.calls.extract_if(.., is_over) {
+            cameras.iter().filter(|known| known.name == to).for_each(|known| call.cancel(known));
+        }
+        for known in cameras {
+            if !wishes.iter().any(|wish| wish.concerns(&known.name)) {
+                self.sharing.forget(&known.name);
+                known.ignore(BTreeSet::new());
+            }
+            if !wishes.iter().any(|wish| wish.from == known.name) {
+                lock(&known.calls).clear();
+            }
         }
     }
 
@@ -182,7 +207,11 @@ impl Dispatcher {
         let ours: Vec<View> = ours.map(|known| self.view(known)).collect();
         let others =
             self.exchange.as_ref().map(|exchange| exchange.views(Instant::now())).unwrap_or_default();
-        ours.iter().for_each(|view| self.tell_others(view));
+        let is_ours = |name: &String| ours.iter().any(|view| view.known.name == *name);
+        let concerns_others =
+            |name: &str| wishes.iter().any(|wish| wish.concerns(name) && !wish.cameras().all(is_ours));
+        let told = ours.iter().filter(|view| concerns_others(&view.known.name));
+        told.for_each(|view| self.tell_others(view));
         let others = others.into_iter().filter(|view| concerned(&view.known.name));
         let mut views = BTreeMap::new();
         for mut view in others.chain(ours) {
