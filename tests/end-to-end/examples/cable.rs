@@ -39,6 +39,8 @@ enum Stopped {
     ByItself(Duration),
     /// A stop, so long after the cable was in again.
     ByUs(Duration),
+    /// A move with whoever is followed, so long after the cable was in again: it obeys.
+    Steered(Duration),
     Never,
     /// Nobody was followed: what the application said.
     NeverTurned(String),
@@ -115,11 +117,16 @@ impl Case {
         if let Some(rested) = rested {
             return Stopped::ByItself(rested);
         }
+        let told = camera.status().commands;
         cable.plug().unwrap();
         let plugged = camera.now();
-        // Whoever is in control again may follow at once.
-        let stopped = camera.wait_for(LIMIT, |status| !status.moving);
-        if stopped { Stopped::ByUs(camera.now().saturating_sub(plugged)) } else { Stopped::Never }
+        let is_told = camera.wait_for(LIMIT, |status| !status.moving || status.commands > told);
+        let after = camera.now().saturating_sub(plugged);
+        match camera.status().moving {
+            _ if !is_told => Stopped::Never,
+            true => Stopped::Steered(after),
+            false => Stopped::ByUs(after),
+        }
     }
 }
 
@@ -129,6 +136,9 @@ impl Display for Stopped {
             Self::ByItself(rested) => write!(f, "its own `Timeout` | {:.1} s", rested.as_secs_f64()),
             Self::ByUs(rested) => {
                 write!(f, "a stop, once the cable is in again | {:.1} s after that", rested.as_secs_f64())
+            }
+            Self::Steered(rested) => {
+                write!(f, "a move, once the cable is in again | {:.1} s after that", rested.as_secs_f64())
             }
             Self::Never => write!(f, "nothing | it turns on"),
             Self::NeverTurned(_) => write!(f, "nobody was followed | it never turned"),

@@ -4,7 +4,7 @@
 //! of view, how fast the camera turned, and what the user is told:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run --example lossy
+//! cargo build --workspace --lib --bins && cargo run --example lossy [NETWORK]
 //! ```
 //! Packets are lost where UDP hands them over; what goes by TCP is late in a proxy, video and control alike.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
@@ -28,16 +28,27 @@ fn main() {
     println!(
         "| network | in view | out of view for at most | turns at most | warnings |\n|---|---|---|---|---|"
     );
+    let only = std::env::args().nth(1).unwrap_or_default();
+    let is_wanted = |network: &str| network.contains(&only);
     for lost in [0, 1, 10, 50] {
-        by_udp(lost);
+        let share = lost as f64 / PACKETS as f64 * 100.0;
+        let network = format!("{share} % of packets lost, UDP");
+        if is_wanted(&network) {
+            by_udp(&network, lost);
+        }
     }
     let ms = Duration::from_millis;
-    by_tcp("200 ms of jitter", Way::Late(ms(0), ms(200)), WATCHED);
-    by_tcp("2 s of bufferbloat for 10 s, then none", Way::Late(ms(2000), ms(0)), Duration::from_secs(10));
+    let late = [
+        ("200 ms of jitter", Way::Late(ms(0), ms(200)), WATCHED),
+        ("2 s of bufferbloat for 10 s, then none", Way::Late(ms(2000), ms(0)), Duration::from_secs(10)),
+    ];
+    for (network, way, lasts) in late.into_iter().filter(|(network, ..)| is_wanted(network)) {
+        by_tcp(network, way, lasts);
+    }
 }
 
 /// H.264 by RTSP over UDP, of which so many packets in a thousand are lost.
-fn by_udp(lost: u64) {
+fn by_udp(network: &str, lost: u64) {
     let camera = VirtualCamera::start(scene::near_person()).unwrap();
     let source = scene::rtsp(&camera, "h264").replace("latency=0", "latency=0 protocols=udp");
     let follow = format!("{source} ! bgavgdetect ! lkfeaturetrack ! {}", scene::servo(&camera));
@@ -49,8 +60,7 @@ fn by_udp(lost: u64) {
     });
     running.pipeline().set_state(gst::State::Playing).unwrap();
     scene::wait_until_following(&camera);
-    let share = lost as f64 / PACKETS as f64 * 100.0;
-    print(&format!("{share} % of packets lost, UDP"), &camera, &mut running, WATCHED);
+    print(network, &camera, &mut running, WATCHED);
 }
 
 /// Loses packets by chance.
