@@ -104,7 +104,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Session(SessionEvent::HomeRefused(err))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera refuses to be sent to a position: {err}; it stays where it is. Correct `home` or `look-at`, or do without them"),
+                ("the camera refuses to be sent to a position, for `home` or `look-at`: {err}; it stays where it is. Correct them, or do without"),
                 details: gst::Structure::new_empty(MOVE_REFUSED)
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::Mode(mode))) => gst::element_imp_info!(
