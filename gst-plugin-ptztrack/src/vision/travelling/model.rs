@@ -201,17 +201,20 @@ impl Model {
     /// Learns the noise from what is background for sure.
     pub fn note_noise(&self, picture: &Sampled, spans: &[(usize, usize)], noise: &mut Noise) {
         for (y, &(start, end)) in spans.iter().enumerate() {
-            for x in (start..end).skip(y % SAMPLING).step_by(SAMPLING) {
-                let at = y * self.size.0 + x;
-                let flat = self.range[at] <= FLAT;
-                if self.likelihood[at] < UNKNOWN && self.age[at] > 2 * KNOWN && flat {
-                    let off = |seen: u8, mean: u16| (f32::from(seen) - f32::from(mean) / 256.0).abs();
-                    let luma = off(picture.luma[at], self.luma[at]);
-                    let chroma = picture.chroma.as_ref().map_or(0.0, |chroma| {
-                        0.5 * (off(chroma[0][at], self.chroma[0][at])
-                            + off(chroma[1][at], self.chroma[1][at]))
-                    });
-                    noise.note(self.shown[at], luma, chroma);
+            let row = y * self.size.0 + start..y * self.size.0 + end.max(start);
+            let (age, range) = (&self.age[row.clone()], &self.range[row.clone()]);
+            let (likelihood, shown) = (&self.likelihood[row.clone()], &self.shown[row.clone()]);
+            let (seen, mean) = (&picture.luma[row.clone()], &self.luma[row.clone()]);
+            let chroma = picture.chroma.as_ref().map(|[u, v]| {
+                let [mean_u, mean_v] = &self.chroma;
+                [(&u[row.clone()], &mean_u[row.clone()]), (&v[row.clone()], &mean_v[row.clone()])]
+            });
+            for x in (y % SAMPLING..row.len()).step_by(SAMPLING) {
+                if likelihood[x] < UNKNOWN && age[x] > 2 * KNOWN && range[x] <= FLAT {
+                    let off =
+                        |seen: &[u8], mean: &[u16]| (f32::from(seen[x]) - f32::from(mean[x]) / 256.0).abs();
+                    let chroma = chroma.map_or(0.0, |[u, v]| 0.5 * (off(u.0, u.1) + off(v.0, v.1)));
+                    noise.note(shown[x], off(seen, mean), chroma);
                 }
             }
         }
@@ -229,7 +232,6 @@ impl Model {
         how: Comparison,
         held: Option<Rect>,
     ) {
-        let weights = rows::Weights::new(how.min_weight);
         let mut alphas = std::mem::take(&mut self.alphas);
         let around = held.map(|held| Rect {
             x: held.x - AROUND * held.width,
@@ -240,7 +242,7 @@ impl Model {
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
             alphas.resize(row.len(), 0);
-            rows::alphas(&mut alphas, &self.likelihood[row.clone()], &self.age[row.clone()], &weights);
+            rows::alphas(&mut alphas, &self.likelihood[row.clone()], &self.age[row.clone()], how.min_weight);
             if let Some(around) = around.filter(|_| self.age[row.clone()].contains(&UNSEEN)) {
                 let unseen = alphas.iter_mut().zip(&self.age[row.clone()]).zip(start..);
                 let unseen = unseen.filter(|((_, age), x)| **age == UNSEEN && lies_in(around, *x, y));
@@ -257,33 +259,40 @@ impl Model {
             rows::grow_older(&mut self.age[row.clone()], &mut self.waited[row.clone()], &alphas);
             for (part, alphas) in alphas.chunks(rows::PART).enumerate() {
                 if rows::any_foreground(alphas) {
-                    let first = start + rows::PART * part;
-                    for (x, _) in (first..).zip(alphas).filter(|(_, alpha)| **alpha == 0) {
-                        let held = || held.is_some_and(|held| lies_in(held, x, y));
-                        self.wait(picture, y * self.size.0 + x, how, held);
-                    }
+                    self.wait(picture, (start + rows::PART * part, y), alphas, how, held);
                 }
             }
         }
         self.alphas = alphas;
     }
 
-    /// What a foreground pixel's candidate makes of the picture.
-    fn wait(&mut self, picture: &Sampled, at: usize, how: Comparison, held: impl Fn() -> bool) {
-        let seen = [
-            picture.luma[at],
-            picture.chroma.as_ref().map_or(128, |chroma| chroma[0][at]),
-            picture.chroma.as_ref().map_or(128, |chroma| chroma[1][at]),
-        ];
-        let alike = (0..3).all(|k| seen[k].abs_diff(self.candidate[k][at]) <= CANDIDATE_TOLERANCE);
-        for (candidate, &seen) in self.candidate.iter_mut().zip(&seen) {
-            candidate[at] = if alike { near(candidate[at], seen) } else { seen };
-        }
-        self.waited[at] = if alike { self.waited[at].saturating_add(how.ticks) } else { 0 };
-        // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
-        let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);
-        if self.waited[at] >= how.patience.min(seen_for) && (self.age[at] == UNSEEN || !held()) {
-            self.adopt(at);
+    /// What the candidates of foreground pixels, those of `alphas` that are nought, make of a part of a row of the picture, which begins
+    /// at column and row `first`.
+    fn wait(
+        &mut self,
+        picture: &Sampled,
+        (x, y): (usize, usize),
+        alphas: &[u16],
+        how: Comparison,
+        held: Option<Rect>,
+    ) {
+        let first = y * self.size.0 + x;
+        let part = first..first + alphas.len();
+        let grey = [128; rows::PART];
+        let [u, v] = match &picture.chroma {
+            Some(chroma) => chroma.each_ref().map(|plane| &plane[part.clone()]),
+            None => [&grey[..alphas.len()]; 2],
+        };
+        let candidates = self.candidate.each_mut().map(|plane| &mut plane[part.clone()]);
+        let seen = [&picture.luma[part.clone()], u, v];
+        rows::wait(candidates, &mut self.waited[part.clone()], seen, alphas, how.ticks);
+        for (at, _) in part.zip(alphas).filter(|(_, alpha)| **alpha == 0) {
+            // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
+            let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);
+            let held = || held.is_some_and(|held| lies_in(held, x + at - first, y));
+            if self.waited[at] >= how.patience.min(seen_for) && (self.age[at] == UNSEEN || !held()) {
+                self.adopt(at);
+            }
         }
     }
 
@@ -354,17 +363,9 @@ impl Model {
     }
 }
 
-/// Grey levels within which a candidate is still the same.
-const CANDIDATE_TOLERANCE: u8 = 12;
-
 /// How far around somebody's box nothing is learned that is seen for the first time, in sizes of the box.
 const AROUND: f64 = 0.4;
 
 fn lies_in(bounds: Rect, x: usize, y: usize) -> bool {
     bounds.contains(Point { x: x as f64, y: y as f64 })
-}
-
-/// A quarter of the way.
-fn near(from: u8, to: u8) -> u8 {
-    ((u16::from(from) * 3 + u16::from(to) + 2) / 4) as u8
 }

@@ -61,8 +61,18 @@ pub(super) fn likelihoods(
         let squares = off * off / variance + colour[index];
         let known = age.min(f32::from(KNOWN)) / f32::from(KNOWN);
         let level = 128.0 + known * (squares * (128.0 / EVEN) - 128.0);
-        out[index] = level.clamp(0.0, 255.0) as u8;
+        out[index] = whole_part(level.clamp(0.0, 255.0)) as u8;
     }
+}
+
+/// What is before the point of a number from 0 to 65535. A cast, which saturates, is not made into vector code.
+#[inline(always)]
+pub(super) fn whole_part(number: f32) -> u16 {
+    // So large that a number with it added has no room for fractions, and the nearest whole one in its lowest bits.
+    const LARGE: f32 = (1 << 23) as f32;
+    let nearest = number + LARGE - LARGE;
+    let below = if nearest > number { nearest - 1.0 } else { nearest };
+    (below + LARGE).to_bits() as u16
 }
 
 /// Means in whole grey levels.
@@ -116,42 +126,15 @@ pub(super) fn count(likelihoods: &[u8]) -> (u32, u32) {
     (known, foreground)
 }
 
-/// By how many of 65536 parts a picture is learned at each age: the younger, the more.
-#[derive(Debug)]
-pub(super) struct Weights {
-    of_age: [u16; 256],
-    /// From this age on they stay the same.
-    settled: u8,
-}
-
-impl Weights {
-    /// Of ages in pictures, none below `min_weight`.
-    pub fn new(min_weight: f32) -> Self {
-        let weight = |age: u8| (1.0 / (f32::from(age) + 1.0)).max(min_weight);
-        let mut of_age = [0; 256];
-        for (alpha, age) in of_age.iter_mut().zip(0..=u8::MAX) {
-            *alpha = (65536.0 * weight(age)).min(65535.0) as u16;
-        }
-        let settled = of_age.iter().position(|alpha| *alpha == of_age[255]).unwrap_or(255);
-        Self { of_age, settled: settled as u8 }
-    }
-}
-
-/// By how many of 65536 parts each pixel is learned; nothing of what is foreground.
+/// By how many of 65536 parts each pixel is learned: the younger, the more, and none less than `min_weight`; nothing of what is
+/// foreground.
 #[multiversion(targets("x86_64+avx2"))]
-pub(super) fn alphas(out: &mut [u16], likelihood: &[u8], age: &[u8], weights: &Weights) {
-    // What is unknown is learned, too: it is 128 and no more.
-    let learned = |likelihood: u8, weight: u16| if likelihood <= UNKNOWN { weight } else { 0 };
-    let settled = weights.of_age[255];
-    let parts = likelihood.chunks(PART).zip(age.chunks(PART));
-    for (out, (likelihood, age)) in out.chunks_mut(PART).zip(parts) {
-        if age.iter().fold(u8::MAX, |least, &age| least.min(age)) >= weights.settled {
-            out.iter_mut().zip(likelihood).for_each(|(out, &likely)| *out = learned(likely, settled));
-        } else {
-            for (out, (&likely, &age)) in out.iter_mut().zip(likelihood.iter().zip(age)) {
-                *out = learned(likely, weights.of_age[usize::from(age)]);
-            }
-        }
+pub(super) fn alphas(out: &mut [u16], likelihood: &[u8], age: &[u8], min_weight: f32) {
+    for (out, (&likely, &age)) in out.iter_mut().zip(likelihood.iter().zip(age)) {
+        let weight = (1.0 / (f32::from(age) + 1.0)).max(min_weight);
+        let alpha = whole_part((65536.0 * weight).min(65535.0));
+        // What is unknown is learned, too: it is 128 and no more.
+        *out = if likely <= UNKNOWN { alpha } else { 0 };
     }
 }
 
@@ -186,10 +169,53 @@ pub(super) fn learn_mean(mean: &mut [u16], seen: &[u8], alphas: &[u16]) {
     }
 }
 
-/// (3.1) in 8.8 fixed point: `alpha` of 65536 parts of the way.
+/// (3.1) in 8.8 fixed point: `alpha` of 65536 parts of the way, but for its lowest bit, in numbers of 16 bits, of which the most fit
+/// into a register.
 #[inline(always)]
 fn towards(from: u16, to: u16, alpha: u16) -> u16 {
-    let way = i32::from(to) - i32::from(from);
-    // Rounded, so that a small alpha pulls to neither side.
-    (i32::from(from) + ((way * i32::from(alpha >> 1) + (1 << 14)) >> 15)) as u16
+    let (up, down) = (to.saturating_sub(from), from.saturating_sub(to));
+    let (way, alpha) = (up | down, alpha & !1);
+    let (high, low) = (((u32::from(way) * u32::from(alpha)) >> 16) as u16, way.wrapping_mul(alpha));
+    // Rounded, so that a small alpha pulls to neither side; halves go up.
+    let step = high + (low.saturating_sub(u16::from(down > 0)) >> 15);
+    if down > 0 { from - step } else { from + step }
+}
+
+/// What candidates make of a part of a row of the picture: `seen`, `ticks` after the picture before. Only those of foreground, whose
+/// `alphas` are nought, change.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn wait(
+    candidates: [&mut [u8]; 3],
+    waited: &mut [u8],
+    seen: [&[u8]; 3],
+    alphas: &[u16],
+    ticks: u8,
+) {
+    // 255 for those that are as they were: few planes at a time, as the compiler has to know that none lies on another.
+    let mut alike = [u8::MAX; PART];
+    for (candidate, seen) in candidates.iter().zip(seen) {
+        for (alike, (&candidate, &seen)) in alike.iter_mut().zip(candidate.iter().zip(seen)) {
+            *alike &= if seen.abs_diff(candidate) <= CANDIDATE_TOLERANCE { u8::MAX } else { 0 };
+        }
+    }
+    for (candidate, seen) in candidates.into_iter().zip(seen) {
+        let pixels = candidate.iter_mut().zip(seen).zip(alike.iter().zip(alphas));
+        for ((candidate, &seen), (&alike, &alpha)) in pixels {
+            let changed = if alike > 0 { near(*candidate, seen) } else { seen };
+            *candidate = if alpha == 0 { changed } else { *candidate };
+        }
+    }
+    for (waited, (&alike, &alpha)) in waited.iter_mut().zip(alike.iter().zip(alphas)) {
+        let longer = waited.saturating_add(ticks) & alike;
+        *waited = if alpha == 0 { longer } else { *waited };
+    }
+}
+
+/// Grey levels within which a candidate is still the same.
+const CANDIDATE_TOLERANCE: u8 = 12;
+
+/// A quarter of the way.
+#[inline(always)]
+fn near(from: u8, to: u8) -> u8 {
+    ((u16::from(from) * 3 + u16::from(to) + 2) / 4) as u8
 }
