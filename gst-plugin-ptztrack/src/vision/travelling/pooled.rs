@@ -7,6 +7,7 @@ use multiversion::multiversion;
 
 use super::model::{Model, Row, Sampled, UNKNOWN};
 use super::noise::PER_MEAN_DEVIATION;
+use super::rows::whole_part;
 
 /// Pixels of a side of a cell: two blocks of coding side by side in a picture that was reduced by two.
 const CELL: usize = 4;
@@ -34,17 +35,26 @@ const PLAIN: f32 = 0.3;
 /// such cells were left out, noise of long tails would be believed to be ever less.
 const NOISE_REACH: f32 = 3.0;
 
-/// What one cell of the canvas shows.
-#[derive(Debug, Clone, Copy, Default)]
-struct Cell {
-    /// How much lighter it is than the background, grey levels; NaN where that is not known.
-    off: f32,
+/// What the cells of the canvas show, row after row.
+#[derive(Debug, Default)]
+struct Cells {
+    /// How much lighter each is than the background, grey levels; NaN where that is not known.
+    off: Vec<f32>,
     /// The bin of its texture.
-    bin: usize,
+    bin: Vec<u8>,
     /// `off` beside that of the light, in deviations of the noise; 0 where it is not known.
-    z: f32,
+    z: Vec<f32>,
     /// Whether most of its pixels are foreground by themselves.
-    is_plain: bool,
+    is_plain: Vec<bool>,
+}
+
+impl Cells {
+    fn resize(&mut self, count: usize) {
+        self.off.resize(count, f32::NAN);
+        self.bin.resize(count, 0);
+        self.z.resize(count, 0.0);
+        self.is_plain.resize(count, false);
+    }
 }
 
 /// Deviations of cells of the background by texture, grey levels.
@@ -58,11 +68,24 @@ impl Default for CellNoise {
 }
 
 impl CellNoise {
-    fn learn(&mut self, cells: &[Cell]) {
+    /// Tells by how many deviations the cells, so many `across`, differ from the `light` of their tiles, and learns from them.
+    fn weigh(&mut self, cells: &mut Cells, light: &[f32], across: usize) {
         let mut sums = [(0.0_f32, 0.0_f32); BINS];
-        for cell in cells.iter().filter(|cell| !cell.off.is_nan()) {
-            let (sum, count) = &mut sums[cell.bin];
-            (*sum, *count) = (*sum + cell.z.abs().min(NOISE_REACH) * self.0[cell.bin], *count + 1.0);
+        let rows = cells.z.chunks_exact_mut(across.max(1)).zip(cells.off.chunks_exact(across.max(1)));
+        for ((y, (z, off)), bin) in rows.enumerate().zip(cells.bin.chunks_exact(across.max(1))) {
+            let light = &light[y / TILE * across.div_ceil(TILE)..];
+            let tiles = z.chunks_mut(TILE).zip(off.chunks(TILE)).zip(bin.chunks(TILE));
+            for (((z, off), bin), light) in tiles.zip(light) {
+                for ((z, off), bin) in z.iter_mut().zip(off).zip(bin) {
+                    *z = 0.0;
+                    if !off.is_nan() {
+                        let believed = self.0[usize::from(*bin)];
+                        *z = (off - light) / believed;
+                        let (sum, count) = &mut sums[usize::from(*bin)];
+                        (*sum, *count) = (*sum + z.abs().min(NOISE_REACH) * believed, *count + 1.0);
+                    }
+                }
+            }
         }
         for (believed, (sum, count)) in self.0.iter_mut().zip(sums) {
             if count >= MIN_CELLS {
@@ -77,7 +100,7 @@ impl CellNoise {
 pub(super) struct Pooled {
     at_rest: CellNoise,
     turning: CellNoise,
-    cells: Vec<Cell>,
+    cells: Cells,
     /// Memory: sums over a row of cells, by columns of pixels; what is known of a tile and around it; medians of tiles, and the light
     /// of each.
     columns: Columns,
@@ -107,15 +130,7 @@ impl Pooled {
         self.gather(model, picture, spans, (across, down));
         self.find_light(across, down);
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
-        for (y, row) in self.cells.chunks_exact_mut(across.max(1)).enumerate() {
-            let light = &self.light[y / TILE * across.div_ceil(TILE)..];
-            for (cells, light) in row.chunks_mut(TILE).zip(light) {
-                for cell in cells {
-                    cell.z = if cell.off.is_nan() { 0.0 } else { (cell.off - light) / noise.0[cell.bin] };
-                }
-            }
-        }
-        noise.learn(&self.cells);
+        noise.weigh(&mut self.cells, &self.light, across);
         self.forget_shadows(across);
         self.mark(model, across);
     }
@@ -129,7 +144,7 @@ impl Pooled {
         (across, down): (usize, usize),
     ) {
         let width = model.size.0;
-        self.cells.clear();
+        self.cells.resize(across * down);
         for y in 0..down {
             self.columns.clear(width);
             for (row, &(start, end)) in spans.iter().enumerate().skip(y * CELL).take(CELL) {
@@ -141,7 +156,9 @@ impl Pooled {
                     );
                 }
             }
-            self.cells.extend(self.columns.cells().take(across));
+            let row = y * across..(y + 1) * across;
+            let Cells { off, bin, is_plain, .. } = &mut self.cells;
+            pool(&self.columns, &mut off[row.clone()], &mut bin[row.clone()], &mut is_plain[row]);
         }
     }
 
@@ -152,10 +169,11 @@ impl Pooled {
         self.tiles.clear();
         for tile in 0..wide * high {
             let (left, top) = (tile % wide * TILE, tile / wide * TILE);
-            let rows = self.cells.chunks_exact(across).skip(top).take(TILE);
             known.clear();
-            let offs = rows.flat_map(|row| row[left..(left + TILE).min(across)].iter().map(|cell| cell.off));
-            known.extend(offs.filter(|off| !off.is_nan()));
+            for row in self.cells.off.chunks_exact(across).skip(top).take(TILE) {
+                let tile = &row[left..(left + TILE).min(across)];
+                tile.iter().filter(|off| !off.is_nan()).for_each(|off| known.push(*off));
+            }
             self.tiles.push(median(known).unwrap_or(f32::NAN));
         }
         self.light.clear();
@@ -172,11 +190,11 @@ impl Pooled {
 
     /// Forgets cells that hang together with plain foreground.
     fn forget_shadows(&mut self, across: usize) {
-        let limit = EVEN.sqrt();
+        let Cells { z, is_plain, .. } = &mut self.cells;
         self.looked_at.clear();
-        self.looked_at.resize(self.cells.len(), false);
-        for first in 0..self.cells.len() {
-            if self.looked_at[first] || self.cells[first].z.abs() < limit {
+        self.looked_at.resize(z.len(), false);
+        for first in 0..z.len() {
+            if !tells(z[first]) || self.looked_at[first] {
                 continue;
             }
             self.component.clear();
@@ -185,39 +203,50 @@ impl Pooled {
             let (mut next, mut plain) = (0, 0);
             while let Some(&at) = self.component.get(next) {
                 next += 1;
-                plain += usize::from(self.cells[at].is_plain);
-                for near in neighbours(at, across, self.cells.len()) {
-                    let cell = self.cells[near];
-                    if !self.looked_at[near] && (cell.is_plain || cell.z.abs() >= limit) {
+                plain += usize::from(is_plain[at]);
+                for near in neighbours(at, across, z.len()) {
+                    if !self.looked_at[near] && (is_plain[near] || tells(z[near])) {
                         self.looked_at[near] = true;
                         self.component.push(near);
                     }
                 }
             }
             if plain as f32 >= PLAIN * self.component.len() as f32 {
-                self.component.iter().for_each(|&at| self.cells[at].z = 0.0);
+                self.component.iter().for_each(|&at| z[at] = 0.0);
             }
         }
     }
 
     /// Raises the likelihood of the pixels, between the middles of four cells each.
     fn mark(&self, model: &mut Model, across: usize) {
-        let limit = EVEN.sqrt();
-        let tells = |cell: &Cell| cell.z.abs() >= limit;
-        let rows = || self.cells.chunks_exact(across.max(1));
+        let rows = || self.cells.z.chunks_exact(across.max(1));
+        let mut lower_tells = rows().next().is_some_and(any_tells);
         for (y, (upper, lower)) in rows().zip(rows().skip(1)).enumerate() {
             // Most rows tell of nobody.
-            if !upper.iter().chain(lower).any(tells) {
+            let upper_tells = std::mem::replace(&mut lower_tells, any_tells(lower));
+            if !upper_tells && !lower_tells {
                 continue;
             }
-            for x in (0..across.saturating_sub(1))
-                .filter(|&x| upper[x..x + 2].iter().chain(&lower[x..x + 2]).any(tells))
-            {
-                let corners = [upper[x].z, upper[x + 1].z, lower[x].z, lower[x + 1].z];
-                blend(model, corners, (x * CELL + CELL / 2, y * CELL + CELL / 2));
+            for (x, (upper, lower)) in upper.windows(2).zip(lower.windows(2)).enumerate() {
+                if upper.iter().chain(lower).any(|z| tells(*z)) {
+                    let corners = [upper[0], upper[1], lower[0], lower[1]];
+                    blend(model, corners, (x * CELL + CELL / 2, y * CELL + CELL / 2));
+                }
             }
         }
     }
+}
+
+/// Whether so many deviations tell of somebody.
+#[inline(always)]
+fn tells(z: f32) -> bool {
+    z * z >= EVEN
+}
+
+/// Whether any of a row does.
+#[multiversion(targets("x86_64+avx2"))]
+fn any_tells(row: &[f32]) -> bool {
+    row.iter().fold(false, |any, z| any | tells(*z))
 }
 
 /// The cells around one of a grid that is so many `across` and holds `count`.
@@ -264,27 +293,26 @@ impl Columns {
             background.likelihood,
         );
     }
-
-    /// The cells of the row.
-    fn cells(&self) -> impl Iterator<Item = Cell> {
-        let off = self.off.as_chunks::<CELL>().0.iter();
-        let counts =
-            [&self.texture, &self.known, &self.plain].map(|plane| plane.as_chunks::<CELL>().0.iter());
-        let [texture, known, plain] = counts.map(|plane| plane.map(|cell| cell.iter().sum::<u16>()));
-        let sums = off.map(|cell| cell.iter().sum::<i32>()).zip(texture).zip(known.zip(plain));
-        sums.map(|((off, texture), (known, plain))| Cell::of(off, texture, known, plain))
-    }
 }
 
-impl Cell {
-    /// From the sums of differences (8.8) and textures of its `known` pixels, and how many there are, and how many are `plain` foreground.
-    fn of(off: i32, texture: u16, known: u16, plain: u16) -> Self {
-        if known < LEAST_KNOWN {
-            return Self { off: f32::NAN, is_plain: plain >= LEAST_KNOWN, ..Self::default() };
-        }
-        let texture = f32::from(texture) / f32::from(known);
-        let bin = ((texture / BIN) as usize).min(BINS - 1);
-        Self { off: off as f32 / (256.0 * f32::from(known)), bin, z: 0.0, is_plain: false }
+/// Leaves a row of cells, from the sums of the columns.
+#[multiversion(targets("x86_64+avx2"))]
+fn pool(columns: &Columns, off: &mut [f32], bin: &mut [u8], is_plain: &mut [bool]) {
+    let count = off.len();
+    let (bin, is_plain) = (&mut bin[..count], &mut is_plain[..count]);
+    let differences = &columns.off.as_chunks::<CELL>().0[..count];
+    let [textures, knowns, plains] =
+        [&columns.texture, &columns.known, &columns.plain].map(|plane| &plane.as_chunks::<CELL>().0[..count]);
+    for cell in 0..count {
+        let sum = |columns: &[[u16; CELL]]| columns[cell].iter().sum::<u16>();
+        let (texture, known, plain) = (sum(textures), sum(knowns), sum(plains));
+        let is_known = known >= LEAST_KNOWN;
+        let known = f32::from(known);
+        let difference: i32 = differences[cell].iter().sum();
+        off[cell] = if is_known { difference as f32 / (256.0 * known) } else { f32::NAN };
+        let texture = (f32::from(texture) / known / BIN).min((BINS - 1) as f32);
+        bin[cell] = if is_known { whole_part(texture) as u8 } else { 0 };
+        is_plain[cell] = !is_known && plain >= LEAST_KNOWN;
     }
 }
 
@@ -333,11 +361,10 @@ mod tests {
     /// What is believed of cells without texture that differ by these grey levels in every picture.
     fn learned(offs: &[f32]) -> f32 {
         let mut noise = CellNoise::default();
-        for _ in 0..1000 {
-            let cell = |&off: &f32| Cell { off, z: off / noise.0[0], ..Cell::default() };
-            let cells: Vec<Cell> = offs.iter().map(cell).collect();
-            noise.learn(&cells);
-        }
+        let mut cells = Cells { off: offs.to_vec(), ..Cells::default() };
+        cells.resize(offs.len());
+        let light = vec![0.0; offs.len().div_ceil(TILE)];
+        (0..1000).for_each(|_| noise.weigh(&mut cells, &light, offs.len()));
         noise.0[0]
     }
 
