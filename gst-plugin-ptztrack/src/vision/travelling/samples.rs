@@ -29,10 +29,13 @@ pub(super) fn take(
     let width = mean.len() / spans.len().max(1);
     samples.clear();
     for (y, &(start, end)) in spans.iter().enumerate().step_by(SAMPLING) {
-        let places = (start..end).skip(y % SAMPLING).step_by(SAMPLING).map(|x| y * width + x);
-        samples.extend(places.filter(|&at| age[at] >= KNOWN).filter_map(|at| {
-            let sample = Sample { mean: f32::from(mean[at]) / 256.0, seen: f32::from(seen[at]) };
-            (TELLS.contains(&sample.mean) && TELLS.contains(&sample.seen)).then_some(sample)
-        }));
+        let row = y * width + start..y * width + end.max(start);
+        let (seen, mean, age) = (&seen[row.clone()], &mean[row.clone()], &age[row.clone()]);
+        for x in (0..row.len()).step_by(SAMPLING) {
+            let sample = Sample { mean: f32::from(mean[x]) / 256.0, seen: f32::from(seen[x]) };
+            if age[x] >= KNOWN && TELLS.contains(&sample.mean) && TELLS.contains(&sample.seen) {
+                samples.push(sample);
+            }
+        }
     }
 }

@@ -144,20 +144,25 @@ impl Shift {
 }
 
 /// The shifts of the blocks from row `top` on.
-#[multiversion(targets("x86_64+avx2"))]
 fn shifts(columns: usize, top: usize, to_source: &Homography, out: &mut Vec<Shift>) {
     let middle = |first: usize| first as f64 + (BLOCK as f64 - 1.0) / 2.0;
     let y = middle(top);
     out.clear();
-    out.extend((0..columns).map(|column| {
+    for column in 0..columns {
         let x = middle(column * BLOCK);
         let to = to_source.apply(Point { x, y });
-        // `as` saturates: what goes to infinity is outside.
-        let parts = |d: f64| ((d * f64::from(PARTS)).round() as i32).clamp(-1 << 24, 1 << 24);
         let (x, y) = (parts(to.x - x), parts(to.y - y));
         let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
-        Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) }
-    }));
+        out.push(Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) });
+    }
+}
+
+/// The nearest whole number of parts.
+#[inline(always)]
+fn parts(pixels: f64) -> i32 {
+    // As `round`, which is a function of a library. `as` saturates: what goes to infinity is outside.
+    let half = 0.5_f64.next_down().copysign(pixels);
+    ((pixels * f64::from(PARTS) + half) as i32).clamp(-1 << 24, 1 << 24)
 }
 
 /// What of these columns and rows a source of that size covers.
