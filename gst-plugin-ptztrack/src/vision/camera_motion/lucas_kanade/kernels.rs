@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{LANES, MAX_ROW};
+use super::{LANES, MAX_ROW, MAX_SIDE};
 
 /// Parts of a grey level that a template tells apart.
 const SCALE: f32 = 64.0;
@@ -63,35 +63,60 @@ pub(super) fn take(
 /// right of and below the first of `seen`, whose rows are `stride` apart.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn mismatch(rows: &[i16], seen: &[u8], stride: usize, part: (f32, f32), side: usize) -> [f32; 2] {
-    let lanes = side.next_multiple_of(LANES);
-    let (mut above, mut off) = (EMPTY, EMPTY);
-    let (above, off) = (&mut above[..lanes], &mut off[..lanes]);
+    // Of a length that is known, a row stays in registers.
+    let sums = match side.div_ceil(LANES) {
+        1 => mismatch_of::<1>(rows, seen, stride, part),
+        2 => mismatch_of::<2>(rows, seen, stride, part),
+        3 => mismatch_of::<3>(rows, seen, stride, part),
+        _ => mismatch_of::<4>(rows, seen, stride, part),
+    };
+    sums.map(|sums| per_pixel(sums.iter().sum(), side))
+}
+
+/// The same of a window that is so many `GROUPS` of lanes wide, summed in lanes.
+#[inline(always)]
+fn mismatch_of<const GROUPS: usize>(
+    rows: &[i16],
+    seen: &[u8],
+    stride: usize,
+    part: (f32, f32),
+) -> [[f32; LANES]; 2] {
+    let off = differ::<GROUPS>(rows, seen, stride, part);
     let mut sums = [[0.0; LANES]; 2];
-    across(seen, part.0, above);
-    for (y, row) in rows.chunks_exact(3 * lanes).enumerate() {
-        let (known, gradients) = row.split_at(lanes);
-        differ(&seen[(y + 1) * stride..][..=lanes], known, part, above, off);
-        // Each by itself: a loop that adds to both is not made one of whole registers.
-        for (sums, gradient) in sums.iter_mut().zip(gradients.chunks_exact(lanes)) {
-            add_products(off, gradient, sums);
+    // Each by itself: a loop that adds to both is not made one of whole registers.
+    for (first, sums) in [GROUPS, 2 * GROUPS].into_iter().zip(&mut sums) {
+        for (off, row) in off.iter().zip(rows.as_chunks::<LANES>().0.chunks_exact(3 * GROUPS)) {
+            add_products(off.as_flattened(), row[first..first + GROUPS].as_flattened(), sums);
         }
     }
-    sums.map(|sums| per_pixel(sums.iter().sum(), side))
+    sums
 }
 
 /// Mean absolute difference of what is seen and what is known, grey levels; where it lies as for [`mismatch`].
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn residual(rows: &[i16], seen: &[u8], stride: usize, part: (f32, f32), side: usize) -> f32 {
-    let lanes = side.next_multiple_of(LANES);
-    let (mut above, mut off) = (EMPTY, EMPTY);
-    let (above, off) = (&mut above[..lanes], &mut off[..lanes]);
-    let mut sum = 0.0;
-    across(seen, part.0, above);
-    for (y, row) in rows.chunks_exact(3 * lanes).enumerate() {
-        differ(&seen[(y + 1) * stride..][..=lanes], &row[..lanes], part, above, off);
-        sum += off[..side].iter().map(|off| off.abs()).sum::<f32>();
-    }
+    let sum = match side.div_ceil(LANES) {
+        1 => residual_of::<1>(rows, seen, stride, part, side),
+        2 => residual_of::<2>(rows, seen, stride, part, side),
+        3 => residual_of::<3>(rows, seen, stride, part, side),
+        _ => residual_of::<4>(rows, seen, stride, part, side),
+    };
     SCALE * per_pixel(sum, side)
+}
+
+/// The sum of differences in a window that is so many `GROUPS` of lanes wide.
+#[inline(always)]
+fn residual_of<const GROUPS: usize>(
+    rows: &[i16],
+    seen: &[u8],
+    stride: usize,
+    part: (f32, f32),
+    side: usize,
+) -> f32 {
+    let off = differ::<GROUPS>(rows, seen, stride, part);
+    let row =
+        |off: &[[f32; LANES]; GROUPS]| off.as_flattened()[..side].iter().map(|off| off.abs()).sum::<f32>();
+    off[..side].iter().map(row).sum()
 }
 
 /// The sum of products of two numbers in [`SCALE`]ths, over the pixels of a window.
@@ -120,18 +145,32 @@ fn across_lanes(seen: &[u8], part: f32) -> [f32; LANES] {
     out
 }
 
-/// How what is seen between the row `above` and the next one differs from what is known. Leaves the next row in `above`.
+/// How the rows of a window, each so many `GROUPS` of lanes, differ from what is known.
 #[inline(always)]
-fn differ(seen: &[u8], known: &[i16], part: (f32, f32), above: &mut [f32], off: &mut [f32]) {
-    let rows = above.as_chunks_mut::<LANES>().0.iter_mut().zip(off.as_chunks_mut::<LANES>().0);
-    for (index, ((above, off), known)) in rows.zip(known.as_chunks::<LANES>().0).enumerate() {
-        let below = across_lanes(&seen[index * LANES..], part.0);
-        for lane in 0..LANES {
-            let value = above[lane] + part.1 * (below[lane] - above[lane]);
-            off[lane] = value * SCALE - f32::from(known[lane]);
-        }
-        *above = below;
+fn differ<const GROUPS: usize>(
+    rows: &[i16],
+    seen: &[u8],
+    stride: usize,
+    part: (f32, f32),
+) -> [[[f32; LANES]; GROUPS]; MAX_SIDE] {
+    let mut off = [[[0.0; LANES]; GROUPS]; MAX_SIDE];
+    let mut above = [[0.0; LANES]; GROUPS];
+    for (group, above) in above.iter_mut().enumerate() {
+        *above = across_lanes(&seen[group * LANES..], part.0);
     }
+    let known = rows.as_chunks::<LANES>().0.chunks_exact(3 * GROUPS);
+    for (y, (off, known)) in off.iter_mut().zip(known).enumerate() {
+        let seen = &seen[(y + 1) * stride..][..=GROUPS * LANES];
+        for group in 0..GROUPS {
+            let below = across_lanes(&seen[group * LANES..], part.0);
+            for lane in 0..LANES {
+                let value = above[group][lane] + part.1 * (below[lane] - above[group][lane]);
+                off[group][lane] = value * SCALE - f32::from(known[group][lane]);
+            }
+            above[group] = below;
+        }
+    }
+    off
 }
 
 /// A row `part` of the way from one to the next.
