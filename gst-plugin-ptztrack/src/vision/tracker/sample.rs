@@ -2,6 +2,8 @@
 
 //! A part of a picture at another size.
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use opencv::core::Rect2f;
 
@@ -53,11 +55,23 @@ impl Column {
     }
 }
 
+/// Which part of a picture of that size is sampled, and so many samples across and down.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Part {
+    area: Rect2f,
+    samples: (usize, usize),
+    size: (usize, usize),
+}
+
 /// Samples parts of pictures, and keeps its memory for the next one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Sampler {
+    /// Where samples lie: mostly the same part of a few planes is sampled.
+    part: Option<Part>,
     across: Vec<Column>,
     down: Vec<Tap>,
+    /// The columns of pixels that samples lie between.
+    columns: Range<usize>,
     sums: Vec<u16>,
     /// Each sum with the next one.
     pairs: Vec<u64>,
@@ -75,50 +89,53 @@ impl Sampler {
     ) {
         pixels.clear();
         pixels.resize(width * height, 0);
+        let size = (luma.width(), luma.height());
+        if size.0 * size.1 * pixels.len() == 0 {
+            return;
+        }
+        let part = Part { area, samples: (width, height), size };
         // Taking one pixel of many would see patterns that are not there: take up to 3x3 and average them.
         match (area.width / width as f32).round().clamp(1.0, 3.0) as usize {
-            1 => self.average::<1>(luma, area, width, height, pixels),
-            2 => self.average::<2>(luma, area, width, height, pixels),
-            _ => self.average::<3>(luma, area, width, height, pixels),
+            1 => self.average::<1>(luma, part, pixels),
+            2 => self.average::<2>(luma, part, pixels),
+            _ => self.average::<3>(luma, part, pixels),
         }
     }
 
     /// The same with `FINE` x `FINE` samples for each pixel.
-    fn average<const FINE: usize>(
-        &mut self,
-        luma: &Luma,
-        area: Rect2f,
-        width: usize,
-        height: usize,
-        pixels: &mut [u8],
-    ) {
-        let Self { across, down, sums, pairs } = self;
-        let taps = |start: f32, length: f32, count: usize, size: usize| {
-            let step = length / (count * FINE) as f32;
-            (0..count * FINE).map(move |index| Tap::at(index, start, step, size))
-        };
-        let columns = taps(area.x, area.width, width, luma.width());
-        let (Some(first), Some(last)) = (columns.clone().next(), columns.clone().next_back()) else { return };
-        if luma.width() * luma.height() == 0 {
-            return;
+    fn average<const FINE: usize>(&mut self, luma: &Luma, part: Part, pixels: &mut [u8]) {
+        if self.part.replace(part) != Some(part) {
+            self.place::<FINE>(part);
         }
-        let (left, right) = (first.before, last.after(luma.width()) + 1);
-        across.clear();
-        across.extend(columns.map(|tap| Column::of(tap, left)));
-        down.clear();
-        down.extend(taps(area.y, area.height, height, luma.height()));
-        // One more, of which nothing is taken, beyond the border.
-        sums.resize(right - left + 1, 0);
-        pairs.resize(right - left, 0);
-        for (row, taps) in pixels.chunks_exact_mut(width).zip(down.as_chunks::<FINE>().0) {
+        let Self { across, down, columns, sums, pairs, .. } = self;
+        for (row, taps) in pixels.chunks_exact_mut(part.samples.0).zip(down.as_chunks::<FINE>().0) {
             sums.fill(0);
             for tap in taps {
                 let (upper, lower) = (luma.row(tap.before), luma.row(tap.after(luma.height())));
-                add(sums, &upper[left..right], &lower[left..right], tap.part);
+                add(sums, &upper[columns.clone()], &lower[columns.clone()], tap.part);
             }
             pair(sums, pairs);
             average::<FINE>(row, pairs, across);
         }
+    }
+
+    /// Finds where the samples of a part lie.
+    fn place<const FINE: usize>(&mut self, Part { area, samples, size }: Part) {
+        let taps = |start: f32, length: f32, count: usize, size: usize| {
+            let step = length / (count * FINE) as f32;
+            (0..count * FINE).map(move |index| Tap::at(index, start, step, size))
+        };
+        let columns = taps(area.x, area.width, samples.0, size.0);
+        let (first, last) = (columns.clone().next(), columns.clone().next_back());
+        let left = first.map_or(0, |tap| tap.before);
+        self.columns = left..last.map_or(left, |tap| tap.after(size.0) + 1);
+        self.across.clear();
+        self.across.extend(columns.map(|tap| Column::of(tap, left)));
+        self.down.clear();
+        self.down.extend(taps(area.y, area.height, samples.1, size.1));
+        // One more, of which nothing is taken, beyond the border.
+        self.sums.resize(self.columns.len() + 1, 0);
+        self.pairs.resize(self.columns.len(), 0);
     }
 }
 
