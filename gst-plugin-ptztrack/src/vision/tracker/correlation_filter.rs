@@ -103,9 +103,18 @@ impl CorrelationFilter {
         Grid { columns: self.columns, rows: self.rows }
     }
 
-    /// Looks for the target around `bounds`, at its size, and leaves the answer in `response`.
-    pub fn respond(&mut self, luma: &Luma, bounds: Rect2f, response: &mut Response) -> opencv::Result<()> {
-        self.describe(luma, bounds)?;
+    /// Works out the features around `bounds`, one plane each: where to look for the target, or where it is learned.
+    pub fn describe(&mut self, luma: &Luma, bounds: Rect2f) -> opencv::Result<()> {
+        let area = scaled(bounds, CONTEXT.0, CONTEXT.1);
+        self.features.describe(luma, area, self.columns, self.rows)?;
+        for channel in &mut self.features.channels {
+            channel.iter_mut().zip(&self.window).for_each(|(value, weight)| *value *= weight);
+        }
+        Ok(())
+    }
+
+    /// Looks for the target around what was described, at its size, and leaves the answer in `response`.
+    pub fn respond(&mut self, response: &mut Response) -> opencv::Result<()> {
         let Memory { whole, product, spectrum, values: answer, .. } = &mut self.memory;
         for (channel, whole) in self.features.channels.iter().zip(all_of(whole)) {
             transform(channel, self.rows, spectrum, whole)?;
@@ -121,12 +130,11 @@ impl CorrelationFilter {
         Ok(())
     }
 
-    /// Learns what is in `bounds` now, as far as `figure` (a share for each cell) belongs to the target: so the filter
+    /// Learns what was described, as far as `figure` (a share for each cell) belongs to the target: so the filter
     /// knows the person and not the wall (after CSR-DCF, Lukežič et al., "Discriminative Correlation Filter with Channel
     /// and Spatial Reliability", CVPR 2017, whose solver is left out). `rate` 0 to 1 is the weight against all that was
     /// seen before.
-    pub fn learn(&mut self, luma: &Luma, bounds: Rect2f, figure: &[f32], rate: f32) -> opencv::Result<()> {
-        self.describe(luma, bounds)?;
+    pub fn learn(&mut self, figure: &[f32], rate: f32) -> opencv::Result<()> {
         self.transform_halves(figure)?;
         let Memory { whole, halves, product, .. } = &mut self.memory;
         let [upper, lower] = &*halves;
@@ -162,16 +170,6 @@ impl CorrelationFilter {
                 }));
                 transform(masked, self.rows, plane, spectrum)?;
             }
-        }
-        Ok(())
-    }
-
-    /// Works out the features around `bounds`, one plane each.
-    fn describe(&mut self, luma: &Luma, bounds: Rect2f) -> opencv::Result<()> {
-        let area = scaled(bounds, CONTEXT.0, CONTEXT.1);
-        self.features.describe(luma, area, self.columns, self.rows)?;
-        for channel in &mut self.features.channels {
-            channel.iter_mut().zip(&self.window).for_each(|(value, weight)| *value *= weight);
         }
         Ok(())
     }

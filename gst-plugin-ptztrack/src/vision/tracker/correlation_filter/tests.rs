@@ -27,14 +27,20 @@ fn figure(grid: Grid) -> Vec<f32> {
 
 fn trained(luma: &Luma) -> CorrelationFilter {
     let mut filter = CorrelationFilter::new(PERSON).expect("filter");
-    let figure = figure(filter.grid());
-    filter.learn(luma, PERSON, &figure, 1.0).expect("learn");
+    learn(&mut filter, luma, PERSON, 1.0);
     filter
+}
+
+fn learn(filter: &mut CorrelationFilter, luma: &Luma, bounds: Rect2f, rate: f32) {
+    let figure = figure(filter.grid());
+    filter.describe(luma, bounds).expect("described");
+    filter.learn(&figure, rate).expect("learn");
 }
 
 fn respond(filter: &mut CorrelationFilter, luma: &Luma, bounds: Rect2f) -> Response {
     let mut response = Response::default();
-    filter.respond(luma, bounds, &mut response).expect("respond");
+    filter.describe(luma, bounds).expect("described");
+    filter.respond(&mut response).expect("respond");
     response
 }
 
@@ -83,10 +89,7 @@ fn learning_takes_over() {
     let mut filter = trained(&person_at(PERSON.x, PERSON.y).luma());
     let mut other = Scene::new(320, 240).background((33.0, 57.0));
     other.paint(PERSON, 1234);
-    let figure = figure(filter.grid());
-    for _ in 0..10 {
-        filter.learn(&other.luma(), PERSON, &figure, 0.5).expect("learn");
-    }
+    (0..10).for_each(|_| learn(&mut filter, &other.luma(), PERSON, 0.5));
     assert!(peak(&respond(&mut filter, &other.luma(), PERSON)).1 > 0.5);
 }
 
@@ -100,8 +103,7 @@ fn any_shape_and_place_is_survived() {
         Rect2f::new(0.0, 0.0, 900.0, 3.0),
     ] {
         let mut filter = CorrelationFilter::new(bounds).expect("filter");
-        let figure = figure(filter.grid());
-        filter.learn(&picture.luma(), bounds, &figure, 1.0).expect("learn");
+        learn(&mut filter, &picture.luma(), bounds, 1.0);
         assert!(respond(&mut filter, &picture.luma(), bounds).at((0, 0)).sum().is_finite());
     }
 }

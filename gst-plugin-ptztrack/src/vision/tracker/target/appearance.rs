@@ -14,6 +14,8 @@ use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, L
 const FINER: usize = 2;
 /// How far around its expected place the target is looked for in one picture, cells of the filter.
 const REACH: i32 = 4;
+/// More than a silhouette ever fits, which is 1 but for rounding.
+const BEST_FIT: f32 = 1.001;
 /// How fast what the target looks like is learned, per second, and never more at once; how often, seconds.
 const LEARNING_PER_S: f32 = 0.8;
 const MAX_LEARNING: f32 = 0.15;
@@ -47,6 +49,10 @@ pub(super) struct Appearance {
     alone_s: f32,
     /// Since something was learned.
     learned_s: f32,
+    /// Where the cells of `memory`, and what the filter has a description of, lie, if that is in the picture that is looked at: the
+    /// target is mostly where it was expected, and nothing there is worked out twice.
+    looked_at: Option<Rect2f>,
+    described: Option<Rect2f>,
     memory: Memory,
 }
 
@@ -82,6 +88,8 @@ impl Appearance {
             usual: Usual::at_first(Halves::default()),
             alone_s: f32::INFINITY,
             learned_s: 0.0,
+            looked_at: None,
+            described: None,
             memory: Memory::default(),
         };
         appearance.look_closely(seen, bounds);
@@ -96,8 +104,10 @@ impl Appearance {
         &self.map
     }
 
-    /// Whether somebody else is near: one who was seen beside the target may be behind it, or it behind them, a moment later.
+    /// Goes on to the next picture, in which somebody else may be near: one who was seen beside the target may be behind it, or it
+    /// behind them, a moment later.
     pub fn watch_others(&mut self, near: bool, dt_s: f32) {
+        (self.looked_at, self.described) = (None, None);
         self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
         self.learned_s += dt_s;
     }
@@ -111,6 +121,9 @@ impl Appearance {
 
     /// Looks around a box: cells and their evidence.
     fn look_at(&mut self, seen: &Observation, bounds: Rect2f) {
+        if self.looked_at.replace(bounds) == Some(bounds) {
+            return;
+        }
         let Memory { cells, evidence, .. } = &mut self.memory;
         cells.look(seen, bounds, self.grid);
         let alone = ALONE_BESIDE_OTHERS + self.alone_s / OTHERS_TIME_S;
@@ -120,18 +133,25 @@ impl Appearance {
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
     pub fn locate(&mut self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
         self.look_at(seen, bounds);
-        self.filter.respond(&seen.luma, bounds, &mut self.memory.response)?;
+        self.describe(seen, bounds)?;
+        self.filter.respond(&mut self.memory.response)?;
         self.shape.cut(&mut self.memory.template);
         let Memory { cells, evidence, template, response, .. } = &self.memory;
         let cell = cells.cell() * FINER as f32;
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
-        let score = |(x, y): (i32, i32)| {
+        let chance = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            self.agreement(template, evidence, response, (x, y)) * (-0.5 * (u * u + v * v)).exp()
+            (-0.5 * (u * u + v * v)).exp()
         };
+        let score =
+            |place| (self.looks(response, place) + silhouette(template, evidence, place)) * chance(place);
+        // Where even a silhouette that fits could not make up for the looks, it need not be held against what is seen.
+        let least = score((0, 0));
+        let is_possible =
+            |place: &(i32, i32)| (self.looks(response, *place) + BEST_FIT) * chance(*place) >= least;
         let places = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
         let (mut best, mut height) = ((0, 0), f32::NEG_INFINITY);
-        for place in places {
+        for place in places.filter(is_possible) {
             let value = score(place);
             if value > height {
                 (best, height) = (place, value);
@@ -150,17 +170,18 @@ impl Appearance {
         Ok(Place { bounds: bounds + offset, fit, response: answer, share })
     }
 
-    /// What filter and silhouette say together of a displacement in cells of the filter.
-    fn agreement(
-        &self,
-        silhouette: &Template,
-        evidence: &Evidence,
-        response: &Response,
-        (x, y): (i32, i32),
-    ) -> f32 {
-        let moved = (x * FINER as i32, y * FINER as i32);
-        let looks = 0.5 * response.at((x, y)).sum() / self.usual.response();
-        looks.max(0.0) + silhouette.fit(evidence, moved).mean().max(0.0)
+    /// What the filter says of a displacement in cells of it.
+    fn looks(&self, response: &Response, place: (i32, i32)) -> f32 {
+        (0.5 * response.at(place).sum() / self.usual.response()).max(0.0)
+    }
+
+    /// Has the filter describe what is in `bounds`.
+    fn describe(&mut self, seen: &Observation, bounds: Rect2f) -> opencv::Result<()> {
+        if self.described != Some(bounds) {
+            self.filter.describe(&seen.luma, bounds)?;
+            self.described = Some(bounds);
+        }
+        Ok(())
     }
 
     /// Learns looks, silhouette and colours as they are in `bounds`, which was looked at closely: `place` is what was seen there.
@@ -186,7 +207,13 @@ impl Appearance {
 
     /// Has the filter learn the figure.
     fn learn_filter(&mut self, seen: &Observation, bounds: Rect2f, rate: f32) -> opencv::Result<()> {
+        self.describe(seen, bounds)?;
         self.map.reduce(FINER, &mut self.memory.figure);
-        self.filter.learn(&seen.luma, bounds, &self.memory.figure, rate)
+        self.filter.learn(&self.memory.figure, rate)
     }
+}
+
+/// What the silhouette says of a displacement in cells of the filter.
+fn silhouette(template: &Template, evidence: &Evidence, (x, y): (i32, i32)) -> f32 {
+    template.fit(evidence, (x * FINER as i32, y * FINER as i32)).mean().max(0.0)
 }
