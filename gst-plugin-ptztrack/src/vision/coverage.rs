@@ -111,6 +111,14 @@ impl Coverage {
         &mut self.blocks[index]
     }
 
+    /// Covers a block at least so much.
+    #[inline(always)]
+    fn cover(&mut self, place: Place, covered: &Block) {
+        for (pixel, covered) in self.touch(place).iter_mut().zip(covered) {
+            *pixel = (*pixel).max(*covered);
+        }
+    }
+
     /// The blocks of which anything may be covered. The last of a row may reach beyond the area, where nothing is.
     pub fn touched(&self) -> impl Iterator<Item = (Place, &Block)> {
         self.touched.iter().map(|place| (*place, &self.blocks[place.y * self.stride + place.block]))
@@ -140,12 +148,6 @@ impl Coverage {
             }
             out.blocks[y * out.stride + block] = sums.map(|sum| (sum >> shift) as u8);
         }
-    }
-
-    /// Covers what is at most `radius` from the line between two places, `strength` (0 to 1) of it. What is covered already
-    /// stays covered as much: strokes that meet in a corner do not show there twice.
-    pub fn add_stroke(&mut self, from: Spot, to: Spot, radius: f64, strength: f64) {
-        add_stroke(self, from, to, radius, strength);
     }
 
     /// Covers what `mask`, of which a row has `width` pixels, covers when its top left pixel lies at (`x`, `y`).
@@ -188,50 +190,56 @@ struct Stroke {
     dy: f32,
     /// One by the square of its length; 0 for a dot.
     inverse: f32,
-    reach: f32,
     strength: f32,
 }
 
 impl Stroke {
-    fn new((dx, dy): (f64, f64), reach: f64, strength: f64) -> Self {
+    fn new((dx, dy): (f64, f64), strength: f64) -> Self {
         let square = dx * dx + dy * dy;
         let inverse = if square > 0.0 { 1.0 / square } else { 0.0 };
-        let strength = (255.0 * strength) as f32;
-        Self { dx: dx as f32, dy: dy as f32, inverse: inverse as f32, reach: reach as f32, strength }
+        Self { dx: dx as f32, dy: dy as f32, inverse: inverse as f32, strength: (255.0 * strength) as f32 }
     }
 
-    /// Covers pixels side by side, of which the first is `x` beside and `y` below its start.
+    /// How far the pixels of a block are from it, of which the first is `x` beside and `y` below its start.
     #[inline(always)]
-    fn cover(self, pixels: &mut [u8], x: f32, y: f32) {
-        if let Ok(block) = <&mut Block>::try_from(&mut *pixels) {
-            // Of a length that is known, the compiler makes vector code.
-            self.cover_each(block, x, y);
-        } else {
-            self.cover_each(pixels, x, y);
-        }
-    }
-
-    #[inline(always)]
-    fn cover_each(self, pixels: &mut [u8], x: f32, y: f32) {
-        let Self { dx, dy, inverse, reach, strength } = self;
-        for (index, pixel) in pixels.iter_mut().enumerate() {
+    fn distances(self, x: f32, y: f32) -> [f32; TOGETHER] {
+        let Self { dx, dy, inverse, .. } = self;
+        let mut distances = [0.0; TOGETHER];
+        for (index, distance) in distances.iter_mut().enumerate() {
             let x = x + index as u8 as f32;
             let along = ((x * dx + y * dy) * inverse).clamp(0.0, 1.0);
             let (aside, below) = (x - along * dx, y - along * dy);
-            let distance = (aside * aside + below * below).sqrt();
-            let covered = strength * (reach - distance).clamp(0.0, 1.0);
-            // Its lowest bits are the rounded number: a cast, which saturates, is not made into vector code.
-            *pixel = (*pixel).max((covered + 2.0_f32.powi(23)).to_bits() as u8);
+            *distance = (aside * aside + below * below).sqrt();
         }
+        distances
+    }
+
+    /// How much of the pixels is covered by what reaches so far.
+    #[inline(always)]
+    fn covered(self, distances: &[f32; TOGETHER], reach: f32) -> Block {
+        let mut block = [0; TOGETHER];
+        for (pixel, distance) in block.iter_mut().zip(distances) {
+            let covered = self.strength * (reach - distance).clamp(0.0, 1.0);
+            // Its lowest bits are the rounded number: a cast, which saturates, is not made into vector code.
+            *pixel = (covered + 2.0_f32.powi(23)).to_bits() as u8;
+        }
+        block
     }
 }
 
+/// Covers in two layers of the same area what is at most so many `radii`, the larger first, from the line between two places,
+/// `strength` (0 to 1) of it. What is covered already stays covered as much: strokes that meet in a corner do not show there twice.
 #[multiversion(targets("x86_64+avx2"))]
-fn add_stroke(coverage: &mut Coverage, from: Spot, to: Spot, radius: f64, strength: f64) {
-    let (area, width, height) = (coverage.area, coverage.width(), coverage.height());
-    let reach = radius + 0.5;
+pub(super) fn add_stroke(
+    [rim, inner]: &mut [Coverage; 2],
+    (from, to): (Spot, Spot),
+    radii: [f64; 2],
+    strength: f64,
+) {
+    let (area, width, height) = (rim.area, rim.width(), rim.height());
+    let [reach, inner_reach] = radii.map(|radius| radius + 0.5);
     let (dx, dy) = (to.x - from.x, to.y - from.y);
-    let stroke = Stroke::new((dx, dy), reach, strength);
+    let stroke = Stroke::new((dx, dy), strength);
     let (left, right) = limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, area.x, width);
     let (top, bottom) = limits(from.y.min(to.y) - reach, from.y.max(to.y) + reach, area.y, height);
     // A slanting stroke crosses a small part of each row.
@@ -245,9 +253,14 @@ fn add_stroke(coverage: &mut Coverage, from: Spot, to: Spot, radius: f64, streng
         let far = right.min((crossing + half).min(width as f64) as usize + 1);
         for block in blocks_of(&(near..far)) {
             let first = block * TOGETHER;
-            let count = TOGETHER.min(width - first);
-            let pixels = &mut coverage.touch(Place { y, block })[..count];
-            stroke.cover(pixels, (origin + first as f64) as f32, down as f32);
+            let mut distances = stroke.distances((origin + first as f64) as f32, down as f32);
+            // Nothing is covered beyond the area.
+            distances[TOGETHER.min(width - first)..].fill(f32::INFINITY);
+            rim.cover(Place { y, block }, &stroke.covered(&distances, reach as f32));
+            let covered = stroke.covered(&distances, inner_reach as f32);
+            if covered.iter().fold(0, |any, covered| any | covered) > 0 {
+                inner.cover(Place { y, block }, &covered);
+            }
         }
     }
 }
@@ -258,10 +271,14 @@ mod tests {
     use proptest::prelude::*;
 
     fn covered(area: Rect, strokes: &[(Spot, Spot, f64)]) -> Vec<Vec<u8>> {
-        let mut coverage = Coverage::default();
-        coverage.clear(area);
-        strokes.iter().for_each(|(from, to, radius)| coverage.add_stroke(*from, *to, *radius, 1.0));
-        coverage.bytes().chunks_exact(coverage.width().max(1)).map(<[u8]>::to_vec).collect()
+        let mut layers = [Coverage::default(), Coverage::default()];
+        layers.iter_mut().for_each(|layer| layer.clear(area));
+        for (from, to, radius) in strokes {
+            add_stroke(&mut layers, (*from, *to), [radius + 2.0, *radius], 1.0);
+        }
+        let [rim, inner] = layers.map(|layer| layer.bytes());
+        assert!(rim.iter().zip(&inner).all(|(rim, inner)| rim >= inner));
+        inner.chunks_exact(area.width.max(1) as usize).map(<[u8]>::to_vec).collect()
     }
 
     #[test]

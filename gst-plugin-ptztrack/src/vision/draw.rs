@@ -2,7 +2,7 @@
 
 use opencv::core::{Point, Rect};
 
-use super::coverage::{Coverage, TOGETHER};
+use super::coverage::{Coverage, TOGETHER, add_stroke};
 use super::font::{Font, text_width};
 use super::surface::{ColourSpace, Component, Surface};
 use super::{FrameSize, Spot};
@@ -156,35 +156,32 @@ impl Shape {
                         .map(|side| (side[0], side[1]))
                         .chain(back.map(|(from, to)| (*from, *to)))
                 };
-                for (width, colour) in stroke_and_rim(*width, *colour) {
-                    let radius = f64::from(width) / 2.0;
-                    pen.layer(bounds, colour, surface, |coverage| {
-                        sides().for_each(|(from, to)| coverage.add_stroke(from, to, radius, 1.0));
-                    });
-                }
+                let both = stroke_and_rim(*width, *colour);
+                let radii = both.map(|(width, _)| f64::from(width) / 2.0);
+                pen.outlined(bounds, both.map(|(_, colour)| colour), surface, |layers| {
+                    sides().for_each(|side| add_stroke(layers, side, radii, 1.0));
+                });
             }
             Self::Fading { points, width, colour } => {
                 let strength = |index: usize| (index + 1) as f64 / points.len() as f64;
-                for (width, colour) in [(outlined(*width), OUTLINE), (*width, *colour)] {
-                    let radius = f64::from(width) / 2.0;
-                    pen.layer(bounds, colour, surface, |coverage| {
-                        for (index, side) in points.windows(2).enumerate() {
-                            coverage.add_stroke(side[0], side[1], radius, strength(index));
-                        }
-                    });
-                }
+                let radii = [outlined(*width), *width].map(|width| f64::from(width) / 2.0);
+                pen.outlined(bounds, [OUTLINE, *colour], surface, |layers| {
+                    for (index, side) in points.windows(2).enumerate() {
+                        add_stroke(layers, (side[0], side[1]), radii, strength(index));
+                    }
+                });
             }
             Self::Dot { centre, radius, colour } => {
-                for (radius, colour) in [(radius + outline(*radius), OUTLINE), (*radius, *colour)] {
-                    pen.layer(bounds, colour, surface, |coverage| {
-                        coverage.add_stroke(*centre, *centre, radius, 1.0);
-                    });
-                }
+                let radii = [radius + outline(*radius), *radius];
+                pen.outlined(bounds, [OUTLINE, *colour], surface, |layers| {
+                    add_stroke(layers, (*centre, *centre), radii, 1.0);
+                });
             }
             Self::Text { origin, text, height, colour } => {
-                pen.coverage.clear(bounds);
-                pen.font.write(text, *origin, *height, &mut pen.coverage)?;
-                surface.blend(&pen.coverage, *colour, &mut pen.reduced);
+                let [coverage, _] = &mut pen.layers;
+                coverage.clear(bounds);
+                pen.font.write(text, *origin, *height, coverage)?;
+                surface.blend(coverage, *colour, &mut pen.reduced);
             }
         }
         Ok(())
@@ -246,7 +243,8 @@ pub struct OverlayRectangle {
 /// Draws shapes, and keeps letters and memory for the next picture.
 #[derive(Debug, Default)]
 pub struct Pen {
-    coverage: Coverage,
+    /// A stroke's rim, or what has none, and the stroke.
+    layers: [Coverage; 2],
     reduced: Coverage,
     font: Font,
 }
@@ -305,9 +303,25 @@ impl Pen {
         surface: &mut Surface,
         cover: impl FnOnce(&mut Coverage),
     ) {
-        self.coverage.clear(bounds);
-        cover(&mut self.coverage);
-        surface.blend(&self.coverage, colour, &mut self.reduced);
+        let [coverage, _] = &mut self.layers;
+        coverage.clear(bounds);
+        cover(coverage);
+        surface.blend(coverage, colour, &mut self.reduced);
+    }
+
+    /// Lays the colours of a rim and its stroke, one over the other, over what `cover` covers of each within `bounds`.
+    fn outlined(
+        &mut self,
+        bounds: Rect,
+        colours: [Colour; 2],
+        surface: &mut Surface,
+        cover: impl FnOnce(&mut [Coverage; 2]),
+    ) {
+        self.layers.iter_mut().for_each(|layer| layer.clear(bounds));
+        cover(&mut self.layers);
+        for (layer, colour) in self.layers.iter().zip(colours) {
+            surface.blend(layer, colour, &mut self.reduced);
+        }
     }
 }
 
