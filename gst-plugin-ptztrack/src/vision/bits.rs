@@ -137,6 +137,12 @@ fn low_bits(count: usize) -> u64 {
 /// A bit for each of at most 64 pixels, the first one the lowest.
 fn packed(pixels: &[u8]) -> u64 {
     let (eights, rest) = pixels.as_chunks::<8>();
+    // Most of a mask is black.
+    if eights.iter().fold(0, |any, eight| any | u64::from_le_bytes(*eight)) == 0
+        && rest.iter().all(|pixel| *pixel == 0)
+    {
+        return 0;
+    }
     let mut last = [0; 8];
     last[..rest.len()].copy_from_slice(rest);
     // The product has the lowest bit of each byte side by side at its top.
