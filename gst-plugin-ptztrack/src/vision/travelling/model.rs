@@ -285,7 +285,10 @@ impl Model {
         };
         let candidates = self.candidate.each_mut().map(|plane| &mut plane[part.clone()]);
         let seen = [&picture.luma[part.clone()], u, v];
-        rows::wait(candidates, &mut self.waited[part.clone()], seen, alphas, how.ticks);
+        let times = (how.ticks, how.patience.min(MIN_PATIENCE));
+        if !rows::wait(candidates, &mut self.waited[part.clone()], seen, alphas, times) {
+            return;
+        }
         for (at, _) in part.zip(alphas).filter(|(_, alpha)| **alpha == 0) {
             // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
             let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);

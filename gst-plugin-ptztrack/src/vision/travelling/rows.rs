@@ -182,15 +182,15 @@ fn towards(from: u16, to: u16, alpha: u16) -> u16 {
 }
 
 /// What candidates make of a part of a row of the picture: `seen`, `ticks` after the picture before. Only those of foreground, whose
-/// `alphas` are nought, change.
+/// `alphas` are nought, change. Whether any of these has been the same for so many ticks as is the least `patience`.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn wait(
     candidates: [&mut [u8]; 3],
     waited: &mut [u8],
     seen: [&[u8]; 3],
     alphas: &[u16],
-    ticks: u8,
-) {
+    (ticks, patience): (u8, u8),
+) -> bool {
     // 255 for those that are as they were: few planes at a time, as the compiler has to know that none lies on another.
     let mut alike = [u8::MAX; PART];
     for (candidate, seen) in candidates.iter().zip(seen) {
@@ -205,10 +205,13 @@ pub(super) fn wait(
             *candidate = if alpha == 0 { changed } else { *candidate };
         }
     }
+    let mut is_any_due = false;
     for (waited, (&alike, &alpha)) in waited.iter_mut().zip(alike.iter().zip(alphas)) {
         let longer = waited.saturating_add(ticks) & alike;
         *waited = if alpha == 0 { longer } else { *waited };
+        is_any_due |= (alpha == 0) & (longer >= patience);
     }
+    is_any_due
 }
 
 /// Grey levels within which a candidate is still the same.
