@@ -338,6 +338,22 @@ mod tests {
     }
 
     #[test]
+    fn what_stays_where_nobody_is_seen_keeps_a_camera_from_no_call() {
+        let following = |rate: f64| {
+            let mut site = Site::new().change("door", |door| {
+                let elsewhere = target(person(7, [0.8, 0.9], rate));
+                *door = view("door", true, door.seen.0, vec![elsewhere]);
+                follow(door, 7);
+            });
+            let long_ago = Instant::now().checked_sub(2 * NOBODY).unwrap();
+            site.dispatcher.look_for_nobody(&site.wishes, &site.views, long_ago);
+            site.called()[0].to_owned()
+        };
+        assert_eq!(following(0.0), "door");
+        assert_eq!(following(RATE), "gate", "whoever walks is somebody");
+    }
+
+    #[test]
     fn whoever_is_followed_or_spared_is_not_called_for() {
         let theirs =
             |door: &mut View| *door = view("door", true, door.seen.0, vec![target(person(7, FEET, RATE))]);

@@ -88,9 +88,11 @@ impl Link {
         learned
     }
 
-    /// Whether the camera that is called follows nobody: where the other one would see them, it sees nobody.
+    /// Whether the camera that is called follows nobody: what it follows stays where it is, and where the other one would see them, it
+    /// sees nobody. Who goes somewhere is somebody, though the other one may have lost them.
     pub fn is_nobody(&self, from: &View, to: &View) -> bool {
-        let Some((_, motion)) = to.target().filter(|(person, _)| person.is_whole()) else { return false };
+        let stays = |(person, motion): &(&Person, Motion)| person.is_whole() && !motion.goes();
+        let Some((_, motion)) = to.target().filter(stays) else { return false };
         let is_there = |person: &Person| {
             self.expect(from, person, to).is_none_or(|expected| expected.is_place_of(&motion))
         };

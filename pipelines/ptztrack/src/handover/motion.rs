@@ -28,6 +28,11 @@ impl Motion {
         Self { feet, rate_deg_s: [right / seconds, (then.tilt_deg - feet.tilt_deg) / seconds] }
     }
 
+    /// Whether they are surely on their way.
+    pub fn goes(&self) -> bool {
+        self.speed() > RATE_DOUBT_DEG_S
+    }
+
     fn speed(&self) -> f64 {
         self.rate_deg_s[0].hypot(self.rate_deg_s[1])
     }
