@@ -79,8 +79,7 @@ impl Supervisor {
     /// Ends the stream, and everything after it. From any thread; returns at once.
     pub fn end(&self) {
         self.0.told_to_end.store(true, Ordering::SeqCst);
-        let this = self.clone();
-        self.later(move || {
+        self.later(|this| {
             let pipeline = lock(&this.0.pipeline).clone();
             match pipeline {
                 Some(pipeline) => {
@@ -94,8 +93,7 @@ impl Supervisor {
 
     /// Starts the pipeline anew, as something is wrong that it did not notice. From any thread; returns at once.
     pub fn restart(&self) {
-        let this = self.clone();
-        self.later(move || {
+        self.later(|this| {
             if lock(&this.0.pipeline).is_some() {
                 this.0.main_loop.quit();
             }
@@ -103,17 +101,33 @@ impl Supervisor {
     }
 
     /// Done by the loop, in its thread, even where it does not run yet.
-    fn later(&self, what: impl FnOnce() + Send + 'static) {
-        let source = glib::idle_source_new(None, glib::Priority::DEFAULT, {
-            let mut what = Some(what);
-            move || {
+    fn later(&self, what: impl FnOnce(&Self) + Send + 'static) {
+        let mut what = Some(what);
+        let source = glib::idle_source_new(
+            None,
+            glib::Priority::DEFAULT,
+            self.once(move |this| {
                 if let Some(what) = what.take() {
-                    what();
+                    what(this);
                 }
-                glib::ControlFlow::Break
-            }
-        });
+            }),
+        );
         source.attach(Some(&self.0.main_loop.context()));
+    }
+
+    /// Of a source that is done once. One that waits for a loop that never runs again must not hold it: each would keep the other, and
+    /// a descriptor.
+    fn once(
+        &self,
+        mut what: impl FnMut(&Self) + Send + 'static,
+    ) -> impl FnMut() -> glib::ControlFlow + Send + 'static {
+        let state = Arc::downgrade(&self.0);
+        move || {
+            if let Some(state) = state.upgrade() {
+                what(&Self(state));
+            }
+            glib::ControlFlow::Break
+        }
     }
 
     fn told_to_end(&self) -> bool {
@@ -159,11 +173,8 @@ impl Supervisor {
 
     /// Whatever the main loop runs for is over after this.
     fn wait_at_most(&self, time: Duration) {
-        let main_loop = self.0.main_loop.clone();
-        let source = glib::timeout_source_new(time, None, glib::Priority::DEFAULT, move || {
-            main_loop.quit();
-            glib::ControlFlow::Break
-        });
+        let quit = self.once(|this| this.0.main_loop.quit());
+        let source = glib::timeout_source_new(time, None, glib::Priority::DEFAULT, quit);
         source.attach(Some(&self.0.main_loop.context()));
     }
 }
@@ -171,4 +182,44 @@ impl Supervisor {
 /// Nothing panics while one of these is held.
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
     mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Something that lives as long as its sources.
+    fn witness(context: &glib::MainContext) -> std::sync::Weak<()> {
+        let (kept, hour) = (Arc::new(()), Duration::from_secs(3600));
+        let witness = Arc::downgrade(&kept);
+        let source = glib::timeout_source_new(hour, None, glib::Priority::DEFAULT, move || {
+            let _ = &kept;
+            glib::ControlFlow::Continue
+        });
+        source.attach(Some(context));
+        witness
+    }
+
+    #[test]
+    fn nothing_is_left_of_one_that_was_told_to_end() {
+        gst::init().unwrap();
+        let context = glib::MainContext::new();
+        let witness = witness(&context);
+        let supervisor = Supervisor::new(&context);
+        let build = || {
+            let pipeline = gst::parse::launch("fakesrc ! fakesink").map_err(|err| err.to_string())?;
+            Ok(pipeline.downcast::<gst::Pipeline>().ok())
+        };
+        let ends = supervisor.clone();
+        let end = move |message: &gst::Message| {
+            if message.type_() == gst::MessageType::StreamStart {
+                ends.end();
+            }
+        };
+        context.with_thread_default(|| supervisor.run(build, end).unwrap()).unwrap();
+        // As whoever asks for the end of a camera does that was given up.
+        supervisor.end();
+        drop((context, supervisor));
+        assert!(witness.upgrade().is_none());
+    }
 }
