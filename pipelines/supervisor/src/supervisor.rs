@@ -102,16 +102,7 @@ impl Supervisor {
 
     /// Done by the loop, in its thread, even where it does not run yet.
     fn later(&self, what: impl FnOnce(&Self) + Send + 'static) {
-        let mut what = Some(what);
-        let source = glib::idle_source_new(
-            None,
-            glib::Priority::DEFAULT,
-            self.once(move |this| {
-                if let Some(what) = what.take() {
-                    what(this);
-                }
-            }),
-        );
+        let source = glib::idle_source_new(None, glib::Priority::DEFAULT, self.once(what));
         source.attach(Some(&self.0.main_loop.context()));
     }
 
@@ -119,11 +110,12 @@ impl Supervisor {
     /// a descriptor.
     fn once(
         &self,
-        mut what: impl FnMut(&Self) + Send + 'static,
+        what: impl FnOnce(&Self) + Send + 'static,
     ) -> impl FnMut() -> glib::ControlFlow + Send + 'static {
         let state = Arc::downgrade(&self.0);
+        let mut what = Some(what);
         move || {
-            if let Some(state) = state.upgrade() {
+            if let Some((what, state)) = what.take().zip(state.upgrade()) {
                 what(&Self(state));
             }
             glib::ControlFlow::Break
@@ -212,7 +204,11 @@ mod tests {
         };
         let ends = supervisor.clone();
         let end = move |message: &gst::Message| {
-            if message.type_() == gst::MessageType::StreamStart {
+            // Before it plays, a source that is told to end may wait for a sink that waits for it.
+            if let gst::MessageView::StateChanged(change) = message.view()
+                && change.current() == gst::State::Playing
+                && message.src().is_some_and(|source| source.is::<gst::Pipeline>())
+            {
                 ends.end();
             }
         };
