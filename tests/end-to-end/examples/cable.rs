@@ -15,7 +15,7 @@ use std::thread;
 use std::time::Duration;
 
 use end_to_end::{Cable, Front, GstLaunch, PATIENCE, scene, tool};
-use virtual_camera::{OnvifSettings, Quirk, Settings, Status, VirtualCamera};
+use virtual_camera::{OnvifSettings, Quirk, ReceivedCommand, Settings, Status, VirtualCamera};
 
 /// It must turn as fast as this to be left turning, °/s.
 const TURNS: f64 = 1.0;
@@ -120,14 +120,25 @@ impl Case {
         let told = camera.status().commands;
         cable.plug().unwrap();
         let plugged = camera.now();
-        let is_told = camera.wait_for(LIMIT, |status| !status.moving || status.commands > told);
-        let after = camera.now().saturating_sub(plugged);
-        match camera.status().moving {
-            _ if !is_told => Stopped::Never,
-            true => Stopped::Steered(after),
-            false => Stopped::ByUs(after),
+        let rested = camera.wait_for(LIMIT, |status| !status.moving).then(|| camera.now());
+        // Whoever is in control again may follow at once; of one that was killed only what was under way can come.
+        let moves = camera.commands_after(told).into_iter().filter(|_| !matches!(self, Self::VapixKilled));
+        let steered = moves.filter(is_move).map(|command| command.time).next();
+        let after = |time: Duration| time.saturating_sub(plugged);
+        match (rested, steered) {
+            (_, Some(steered)) if rested.is_none_or(|rested| steered < rested) => {
+                Stopped::Steered(after(steered))
+            }
+            (Some(rested), _) => Stopped::ByUs(after(rested)),
+            (None, _) => Stopped::Never,
         }
     }
+}
+
+/// No stop, and no question.
+fn is_move(command: &ReceivedCommand) -> bool {
+    let ReceivedCommand { query, .. } = command;
+    query.contains("ContinuousMove") || query.contains("move=") && !query.contains("move=0,0")
 }
 
 impl Display for Stopped {
