@@ -21,6 +21,7 @@ pub mod session;
 mod settings;
 pub mod task;
 pub mod watchdog;
+mod zoom_step;
 
 pub use client::{Client, Protocol};
 pub use command::{Command, Stop};
@@ -30,3 +31,4 @@ pub use exchange::{
     Attributes, Next, Parameters, Query, QueuePlace, QueueRequest, Request, Response, SessionEvent,
 };
 pub use settings::{LoopSettings, SessionSettings};
+pub use zoom_step::ZoomStep;

@@ -1,21 +1,9 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! `home`, `look-at` and the zoom as properties and statistics have them.
+//! `home` and `look-at` as properties have them.
 
 use servo::{Home, PanTilt, Position};
-
-/// The zoom's last step, zoomed in, as users have it; the first is 1.
-const LAST_STEP: f64 = 9999.0;
-
-/// The part of the zoom's travel that a step is, 1 to 9999.
-pub fn travel(step: f64) -> f64 {
-    (step - 1.0) / (LAST_STEP - 1.0)
-}
-
-/// The step that a part of the zoom's travel is, to a ten thousandth.
-pub fn zoom_step(travel: f64) -> f64 {
-    ((1.0 + travel * (LAST_STEP - 1.0)) * 1e4).round() / 1e4
-}
+use session::ZoomStep;
 
 /// Reads `start`, `pan,tilt` or `pan,tilt,zoom` in degrees and zoom steps, or the name of a preset.
 ///
@@ -30,7 +18,7 @@ pub fn parse_home(text: &str) -> Result<Home, String> {
         // A preset may be called 7; a direction has two parts.
         None | Some([_]) => Ok(Home::Preset(text.to_owned())),
         Some([pan, tilt]) => position(*pan, *tilt, None),
-        Some([pan, tilt, zoom]) => position(*pan, *tilt, Some(*zoom)),
+        Some([pan, tilt, zoom]) => position(*pan, *tilt, Some(ZoomStep(*zoom))),
         Some(_) => Err(format!("`{text}` has more parts than pan,tilt,zoom")),
     }
 }
@@ -55,13 +43,17 @@ pub fn parse_look_at(text: &str) -> Result<Home, String> {
     Ok(Home::View { direction, fov_deg })
 }
 
-fn position(pan: f64, tilt: f64, step: Option<f64>) -> Result<Home, String> {
+fn position(pan: f64, tilt: f64, step: Option<ZoomStep>) -> Result<Home, String> {
     let turns = [pan, tilt].iter().all(|angle| (-180.0..=180.0).contains(angle));
-    let zooms = step.is_none_or(|step| (1.0..=LAST_STEP).contains(&step));
+    let zooms = step.is_none_or(|step| (ZoomStep::FIRST..=ZoomStep::LAST).contains(&step));
     if !turns || !zooms {
         return Err("pan and tilt must be from -180 to 180 degrees, zoom from 1 to 9999 steps".to_owned());
     }
-    Ok(Home::Position(Position { pan_deg: Some(pan), tilt_deg: Some(tilt), zoom: step.map(travel) }))
+    Ok(Home::Position(Position {
+        pan_deg: Some(pan),
+        tilt_deg: Some(tilt),
+        zoom: step.map(ZoomStep::travel),
+    }))
 }
 
 /// What [`parse_home`] and [`parse_look_at`] read.
@@ -69,7 +61,8 @@ pub fn home_text(home: &Home) -> String {
     match home {
         Home::Start => "start".to_owned(),
         Home::Position(position) => {
-            let zoom = position.zoom.map_or_else(String::new, |travel| format!(",{}", zoom_step(travel)));
+            let zoom =
+                position.zoom.map_or_else(String::new, |travel| format!(",{}", ZoomStep::at(travel).0));
             format!("{},{}{zoom}", position.pan_deg.unwrap_or(0.0), position.tilt_deg.unwrap_or(0.0))
         }
         Home::Preset(name) => name.clone(),

@@ -10,10 +10,11 @@ use glib::{HasParamSpec, ParamSpec, Value};
 use gst::prelude::*;
 
 use ptztrack_contract::mistaken_unit;
+use session::ZoomStep;
 use session::http::{Authentication, Location, Secret};
 
 use crate::Particulars;
-use crate::home::{home_text, parse_home, parse_look_at, travel, zoom_step};
+use crate::home::{home_text, parse_home, parse_look_at};
 use crate::settings::{Settings, Steering};
 
 /// When a value that was set counts, and who must hear of it.
@@ -269,17 +270,11 @@ impl<'a> Table<'a> {
 
     /// Steps of the optical zoom, whole ones.
     fn zoom_steps(&self, name: &str, takes: Takes, blurb: &str, field: Field<f64>) -> Property {
-        let builder = glib::ParamSpecUInt::builder(name).minimum(1).maximum(9999);
-        // Within 1 to 9999, whole.
-        let spec =
-            mutable(builder.default_value(zoom_step(self.default_of(field)) as u32).blurb(blurb), takes)
-                .build();
-        converted(
-            (spec, takes),
-            field,
-            |part| zoom_step(part) as u32,
-            |step: u32| Ok(travel(f64::from(step))),
-        )
+        let step = |travel: f64| u32::from(ZoomStep::at(travel).whole());
+        let (first, last) = (ZoomStep::FIRST.whole().into(), ZoomStep::LAST.whole().into());
+        let builder = glib::ParamSpecUInt::builder(name).minimum(first).maximum(last);
+        let spec = mutable(builder.default_value(step(self.default_of(field))).blurb(blurb), takes).build();
+        converted((spec, takes), field, step, |step: u32| Ok(ZoomStep(f64::from(step)).travel()))
     }
 
     fn switch(&self, name: &str, takes: Takes, blurb: &str, field: Field<bool>) -> Property {

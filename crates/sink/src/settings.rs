@@ -7,9 +7,7 @@ use std::time::Duration;
 
 use servo::{Home, Range, ServoSettings, SoftLimits};
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
-use session::{LoopSettings, SessionSettings};
-
-use crate::home::zoom_step;
+use session::{LoopSettings, SessionSettings, ZoomStep};
 
 /// To what the camera is steered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -158,7 +156,7 @@ impl Settings {
 
 /// The same of parts of the zoom's travel, in steps.
 fn uncross_zoom(limits: &mut Range, kept: Range) -> Option<String> {
-    let steps = |travel: Range| Range { min: zoom_step(travel.min), max: zoom_step(travel.max) };
+    let steps = |travel: Range| Range { min: ZoomStep::at(travel.min).0, max: ZoomStep::at(travel.max).0 };
     let refused = uncross("zoom", &mut steps(*limits), steps(kept))?;
     *limits = kept;
     Some(refused)

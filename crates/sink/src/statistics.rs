@@ -5,10 +5,8 @@
 use std::time::Duration;
 
 use servo::{Estimates, Mode, is_endless};
-use session::Status;
 use session::task::Statistics;
-
-use crate::home::zoom_step;
+use session::{Status, ZoomStep};
 
 /// The property's value for the sink of this name; `None`: there is no camera task.
 pub fn stats(sink: &str, statistics: Option<&Statistics>) -> gst::Structure {
@@ -58,6 +56,10 @@ fn structure(sink: &str, state: &str, statistics: &Statistics) -> gst::Structure
         .field_if_some("speeds", statistics.estimates.map(|estimates| speeds(&estimates)))
         .field_if_some("last-error", statistics.last_error.as_deref())
         .build()
+}
+
+fn zoom_step(travel: f64) -> f64 {
+    ZoomStep::at(travel).0
 }
 
 /// Degrees per second of the speed steps 1 to 100.

@@ -3,9 +3,9 @@
 use std::fmt;
 
 use servo::Motion;
-use session::{Command, Stop};
+use session::{Command, Stop, ZoomStep};
 
-use crate::steps::{speed_step, zoom_step};
+use crate::steps::speed_step;
 
 /// A command as `ptz.cgi` takes it: its part of the query string.
 #[derive(Debug, Clone, Copy)]
@@ -33,7 +33,7 @@ fn moving(f: &mut fmt::Formatter<'_>, motion: &Motion) -> fmt::Result {
         }
         Motion::Absolute { pan_deg, tilt_deg, speed, zoom } => {
             write!(f, "pan={pan_deg:.4}&tilt={tilt_deg:.4}&speed={}", speed_step(speed).max(1))?;
-            zoom.map_or(Ok(()), |zoom| write!(f, "&zoom={}", zoom_step(zoom)))
+            zoom.map_or(Ok(()), |zoom| write!(f, "&zoom={}", ZoomStep::at(zoom).whole()))
         }
         Motion::Centre { x, y, width, height, magnify } => {
             match magnify {

@@ -13,7 +13,7 @@ use servo::{
     Estimates, HardLimits, Measurement, PanTilt, Position, Range, ServoSettings, Time, View, Visibility,
     around_deg,
 };
-use session::{Command, Error, Stop};
+use session::{Command, Error, Stop, ZoomStep};
 use session::{Next, Query, Request, Response};
 use virtual_camera::{Head, Kinematics, Motion, Optics, Pose, ProportionalSpeed, ZOOM_RANGE};
 
@@ -305,12 +305,15 @@ impl Simulation {
             Request::Query(Query::Position) if self.setup.tells_position => Response::Position(Position {
                 pan_deg: Some(around_deg(0.0, self.pose().pan)),
                 tilt_deg: Some(self.pose().tilt),
-                zoom: Some(travel(self.head.now().pose.zoom_step.round())),
+                zoom: Some(ZoomStep(self.head.now().pose.zoom_step.round()).travel()),
             }),
             Request::Query(Query::Limits) => Response::Limits(HardLimits {
                 pan_deg: Some(range(self.setup.pan_limits_deg())),
                 tilt_deg: Some(range(TILT_LIMITS_DEG)),
-                zoom: Some(Range { min: travel(ZOOM_RANGE.0), max: travel(ZOOM_RANGE.1) }),
+                zoom: Some(Range {
+                    min: ZoomStep(ZOOM_RANGE.0).travel(),
+                    max: ZoomStep(ZOOM_RANGE.1).travel(),
+                }),
                 field_angle_deg: Some(range((OPTICS.fov_deg(ZOOM_RANGE.1), WIDE_FOV_DEG))),
             }),
             Request::Query(_) => return Err(Error::Camera("none".to_owned())),
@@ -327,11 +330,6 @@ impl Simulation {
 
 fn range((min, max): (f64, f64)) -> Range {
     Range { min, max }
-}
-
-/// The part of the zoom's travel that a step of the head's is.
-fn travel(step: f64) -> f64 {
-    (step - 1.0) / 9998.0
 }
 
 /// What the head is to do, which counts in steps.
@@ -352,7 +350,7 @@ fn motions(command: &Command) -> Vec<Motion> {
             Motion::Absolute {
                 pan_deg: Some(pan_deg),
                 tilt_deg: Some(tilt_deg),
-                zoom_step: zoom.map(|travel| (1.0 + travel * 9998.0).round()),
+                zoom_step: zoom.map(|travel| f64::from(ZoomStep::at(travel).whole())),
             },
         ],
         servo::Motion::Centre { x, y, width, height, magnify } => {
