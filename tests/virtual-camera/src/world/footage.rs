@@ -22,7 +22,7 @@ const KEPT: usize = 8;
 /// A longer way ahead is sought, a shorter one decoded.
 const SEEK_BEYOND: u64 = 100;
 /// For decoders that come from a cold disk, on a busy machine.
-const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
+pub(super) const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
 
 /// Why there is nothing to see.
 #[derive(Debug, thiserror::Error)]
@@ -81,7 +81,7 @@ impl Footage {
         std::fs::File::open(&path)
             .map_err(|source| FootageError::Unreadable { path: path.clone(), source })?;
         let undecodable = |reason: String| FootageError::Undecodable { path: path.clone(), reason };
-        let pipeline = decoder(&path).map_err(|error| undecodable(error.to_string()))?;
+        let pipeline = decoder(&path, "I420").map_err(|error| undecodable(error.to_string()))?;
         let sink = pipeline.by_name("sink").and_downcast::<gst_app::AppSink>();
         let sink = sink.ok_or_else(|| undecodable("the decoder has no sink".into()))?;
         let started = pipeline.set_state(gst::State::Paused).is_ok() && pipeline.state(PATIENCE).0.is_ok();
@@ -202,10 +202,13 @@ impl Drop for Footage {
     }
 }
 
-fn decoder(path: &std::path::Path) -> Result<gst::Pipeline, glib::Error> {
-    let launch = "filesrc name=source ! decodebin ! videoconvert ! videoscale \
-                  ! video/x-raw,format=I420,pixel-aspect-ratio=1/1 ! appsink name=sink sync=false max-buffers=4";
-    let pipeline = gst::parse::launch(launch)?;
+/// Reads a file into an `appsink` that is called `sink`, in a format of raw video.
+pub(super) fn decoder(path: &std::path::Path, format: &str) -> Result<gst::Pipeline, glib::Error> {
+    let launch = format!(
+        "filesrc name=source ! decodebin ! videoconvert ! videoscale \
+         ! video/x-raw,format={format},pixel-aspect-ratio=1/1 ! appsink name=sink sync=false max-buffers=4"
+    );
+    let pipeline = gst::parse::launch(&launch)?;
     let pipeline = pipeline
         .downcast::<gst::Pipeline>()
         .map_err(|_| glib::Error::new(gst::ParseError::Syntax, "the decoder is no pipeline"))?;
@@ -215,7 +218,8 @@ fn decoder(path: &std::path::Path) -> Result<gst::Pipeline, glib::Error> {
     Ok(pipeline)
 }
 
-fn reason(pipeline: &gst::Pipeline) -> String {
+/// Why it gives no picture.
+pub(super) fn reason(pipeline: &gst::Pipeline) -> String {
     let error = pipeline.bus().and_then(|bus| bus.pop_filtered(&[gst::MessageType::Error]));
     match error.as_ref().map(|message| message.view()) {
         Some(gst::MessageView::Error(error)) => error.error().to_string(),
@@ -223,7 +227,7 @@ fn reason(pipeline: &gst::Pipeline) -> String {
     }
 }
 
-fn stop(pipeline: &gst::Pipeline) {
+pub(super) fn stop(pipeline: &gst::Pipeline) {
     // Going to NULL cannot fail in a way that leaves anything to do.
     let _ = pipeline.set_state(gst::State::Null);
 }

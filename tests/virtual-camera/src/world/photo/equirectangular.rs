@@ -8,7 +8,7 @@ use std::{
     sync::{Arc, Mutex, OnceLock},
 };
 
-use super::{obstacle::Obstacle, settings::PhotoError, way::turned};
+use super::{obstacle::Obstacle, rgba::Rgba, settings::PhotoError, way::turned};
 use crate::{
     geometry::rotation,
     kinematics::Pose,
@@ -38,13 +38,12 @@ impl Equirectangular {
     }
 
     fn decode(path: &Path) -> Result<Self, PhotoError> {
-        let picture = decode(path)?.to_rgb8();
-        let (width, height) = (picture.width() as usize, picture.height() as usize);
+        let Rgba { width, height, pixels } = Rgba::read(path)?;
         if width != 2 * height || width % 4 != 0 || height < 16 {
             let reason = format!("a panorama is twice as wide as high, not {width}x{height}");
             return Err(PhotoError::Nonsense { path: path.into(), reason });
         }
-        let colours: Vec<[u8; 3]> = picture.pixels().map(|pixel| yuv(pixel.0)).collect();
+        let colours: Vec<[u8; 3]> = pixels.iter().map(|&[r, g, b, _]| yuv([r, g, b])).collect();
         let plane = |step: usize, part: usize| {
             let padded = width / step * 3 / 2;
             let value = |i: usize| {
@@ -163,13 +162,6 @@ impl Rays {
         let [right, down, ahead] = self.ray(x, y);
         (right.atan2(ahead).to_degrees(), -down.atan2(right.hypot(ahead)).to_degrees())
     }
-}
-
-/// The picture in a file, as it is.
-pub(super) fn decode(path: &Path) -> Result<image::DynamicImage, PhotoError> {
-    let bytes = std::fs::read(path).map_err(|source| PhotoError::Unreadable { path: path.into(), source })?;
-    image::load_from_memory(&bytes)
-        .map_err(|error| PhotoError::Undecodable { path: path.into(), reason: error.to_string() })
 }
 
 /// BT.601 in video range.

@@ -7,6 +7,7 @@ mod film;
 mod light;
 mod obstacle;
 mod place;
+mod rgba;
 mod settings;
 mod sprite;
 mod way;

@@ -8,11 +8,7 @@ use std::{
     sync::{Arc, Mutex, OnceLock},
 };
 
-use super::{
-    equirectangular::{decode, yuv},
-    settings::PhotoError,
-    way::turned,
-};
+use super::{equirectangular::yuv, rgba::Rgba, settings::PhotoError, way::turned};
 use crate::sync::lock;
 
 /// Metres walked in a cycle of the gait, two steps.
@@ -100,12 +96,13 @@ impl Sprites {
 
 impl Sprite {
     fn decode(path: &Path, other: bool) -> Result<Self, PhotoError> {
-        let picture = decode(path)?.to_rgba8();
-        let mut size = (picture.width() as usize, picture.height() as usize);
+        let picture = Rgba::read(path)?;
+        let mut size = (picture.width, picture.height);
         let dyed = if other { dye } else { |colour| colour };
         let mut pixels: Vec<[u8; 4]> = picture
-            .pixels()
-            .map(|&image::Rgba([r, g, b, alpha])| {
+            .pixels
+            .iter()
+            .map(|&[r, g, b, alpha]| {
                 let [y, u, v] = dyed(yuv([r, g, b]));
                 if alpha > 127 { [y, u, v, 1] } else { [0; 4] }
             })

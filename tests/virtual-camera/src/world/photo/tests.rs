@@ -20,6 +20,7 @@ struct Folder(PathBuf);
 impl Folder {
     /// With a panorama of 720 x 360 pixels, grey with a chequered floor, and a man of 60 pixels: a blue-green rectangle.
     fn new(name: &str) -> Self {
+        gst::init().unwrap();
         let folder = std::env::temp_dir().join(format!("virtual-camera-photo-{name}-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let panorama = image::RgbImage::from_fn(720, 360, |x, y| {
