@@ -42,6 +42,7 @@ WORLD ?= footage
 ROOM_TEST ?= 1
 SEED ?= 1
 INPUTS ?= 10000000
+INPUTS_SECONDS ?= 0
 RECONNECTS ?= 0
 BENCH_SIZE ?= 1280x720
 BENCH_SECONDS ?= 16
@@ -171,19 +172,20 @@ deny: packages-build
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
 	$(CARGO) deny check advisories licenses bans sources
 
-## fuzz: feed INPUTS=10000000 inputs to each parser of what others say, under AddressSanitizer (SANITIZER=none: four times as fast)
+## fuzz: feed INPUTS=10000000 inputs to each parser of what others say, under AddressSanitizer; those of earlier runs count
+##       (SANITIZER=none: four times as fast  INPUTS_SECONDS=number, for each parser at most)
 fuzz: packages-build
 	$(CARGO) build --workspace --lib
-	@scripts/fuzz $(INPUTS)
+	@scripts/fuzz $(INPUTS) $(INPUTS_SECONDS)
 
 ## prove: check what this project promises, hours of it, and leave the results in docs/proven.md (CHECKS="death strangers": these
-##       only, scripts/prove --list lists them; DURATION=600 s of soak, INPUTS=10000000 for each parser)
+##       only, scripts/prove --list lists them; DURATION=600 s of soak, INPUTS=10000000 for each parser, INPUTS_SECONDS for each at most)
 prove: export DURATION := 600
 prove: packages-test
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
 	@scripts/install-packages iproute2 systemd
 	$(CARGO) build --workspace --all-targets
-	INPUTS=$(INPUTS) scripts/prove $(CHECKS)
+	INPUTS=$(INPUTS) INPUTS_SECONDS=$(INPUTS_SECONDS) scripts/prove $(CHECKS)
 
 ## install: copy what `make build` has built, the plugins to a GStreamer plugin folder, the watchdog to `libexec` in it
 ##       (PREFIX=/usr/local; without it, root's go to the system's folder, a user's to their own)

@@ -126,30 +126,46 @@ async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin, router: Router, vis
 /// Page and metrics without cameras have less.
 const LONGEST_ANSWER: usize = 1024 * 1024;
 
+/// A page without cameras or password, and what it is answered on. To make them takes longer than most answers.
+struct Empty {
+    router: Router,
+    runtime: tokio::runtime::Runtime,
+}
+
+thread_local! {
+    static EMPTY: Option<Empty> = Empty::new().ok();
+}
+
+impl Empty {
+    fn new() -> std::io::Result<Self> {
+        let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
+        let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), Events::default());
+        Ok(Self { router, runtime: tokio::runtime::Builder::new_current_thread().enable_time().build()? })
+    }
+
+    fn answer_to(&self, said: &[u8]) -> Vec<u8> {
+        let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+        let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
+        self.runtime.block_on(async {
+            let mut connection = pin!(answer(theirs, self.router.clone(), visit));
+            // Nothing in memory fails to be written or read.
+            let _ = ours.write_all(said).await;
+            // All is answered that can be, before it is heard that there is no more.
+            let ended = poll_fn(|context| Poll::Ready(connection.as_mut().poll(context).is_ready())).await;
+            let _ = ours.shutdown().await;
+            if !ended {
+                connection.await;
+            }
+            let mut answered = Vec::new();
+            let _ = ours.read_to_end(&mut answered).await;
+            answered
+        })
+    }
+}
+
 /// All that is answered to somebody who says this and no more, on a page without cameras or password.
 pub fn answer_to(said: &[u8]) -> Vec<u8> {
-    let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
-    let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), Events::default());
-    let visit = Visit { local: http.listen.ip(), welcome: Arc::default() };
-    let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
-    let talk = async {
-        let mut connection = pin!(answer(theirs, router, visit));
-        // Nothing in memory fails to be written or read.
-        let _ = ours.write_all(said).await;
-        // All is answered that can be, before it is heard that there is no more.
-        let ended = poll_fn(|context| Poll::Ready(connection.as_mut().poll(context).is_ready())).await;
-        let _ = ours.shutdown().await;
-        if !ended {
-            connection.await;
-        }
-        let mut answered = Vec::new();
-        let _ = ours.read_to_end(&mut answered).await;
-        answered
-    };
-    match tokio::runtime::Builder::new_current_thread().enable_time().build() {
-        Ok(runtime) => runtime.block_on(talk),
-        Err(_) => Vec::new(),
-    }
+    EMPTY.with(|empty| empty.as_ref().map_or_else(Vec::new, |empty| empty.answer_to(said)))
 }
 
 fn router(http: &Http, fleet: Arc<Fleet>, events: Events) -> Router {
