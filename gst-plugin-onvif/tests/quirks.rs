@@ -93,18 +93,20 @@ fn each_quirk() {
 
 #[test]
 fn all_that_can_be_had_together() {
-    let apart = [
-        Quirk::TimeoutRefused,
-        Quirk::TimeoutTen,
-        Quirk::ClockBehind,
-        Quirk::StopMissing,
-        Quirk::StopCloses,
-        Quirk::StopPanTilt,
-        Quirk::StatusIdle,
-        Quirk::ZoomBreaks,
-    ];
-    let quirks: Vec<_> = Quirk::ALL.iter().copied().filter(|quirk| !apart.contains(quirk)).collect();
-    follows("together", camera(OnvifSettings::with(&quirks), 120.0), 0.25);
+    follows("together", camera(OnvifSettings::with(&Quirk::together()), 120.0), 0.25);
+}
+
+/// Velocities are told in degrees a second where the camera takes them so; what it says of these is believed as far as the picture
+/// bears it out.
+#[test]
+fn cameras_that_take_degrees_a_second() {
+    each(&[(120.0, 0.12), (40.0, 0.2), (360.0, 0.2)], |(announced_deg_s, farthest)| {
+        let onvif = OnvifSettings { degrees_s: Some(announced_deg_s), ..OnvifSettings::default() };
+        let what = format!("{announced_deg_s} degrees a second, which are 120");
+        let stage = follows(&what, camera(onvif, 120.0), farthest);
+        let pan = |sent: &String| sent.split_once("PanTilt=")?.1.split(',').next()?.parse::<f64>().ok();
+        assert!(stage.moves().iter().filter_map(pan).any(|pan| pan.abs() > 1.0), "{:?}", stage.moves());
+    });
 }
 
 #[test]

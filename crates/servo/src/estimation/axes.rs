@@ -14,8 +14,8 @@ pub struct AxisEstimator {
     exchange: AxisSense,
     pan: AxisSense,
     tilt: AxisSense,
-    /// Until it is known whether they are exchanged, one of them is moved at a time: whether it is pan, and since when.
-    alone: Option<(bool, Time)>,
+    /// Until it is known whether they are exchanged, moves are along one of them: whether that is pan, and since when.
+    along: Option<(bool, Time)>,
     /// Pictures in which it rested although it was told to turn as fast as it may, since it last turned.
     rests: u32,
     /// How often that bound was doubled.
@@ -42,8 +42,8 @@ struct AxisSense {
 }
 
 impl AxisSense {
-    /// Pictures that decide: about a third of a second.
-    const DECISIVE: u32 = 6;
+    /// Pictures that decide, in a row.
+    const DECISIVE: u32 = 4;
 
     fn is_known(self) -> bool {
         self.with >= Self::DECISIVE
@@ -66,8 +66,15 @@ impl AxisSense {
 }
 
 impl AxisEstimator {
-    /// Until it is known which way an axis turns the picture, no more degrees per second: who runs away does so slowly.
-    pub const CAUTIOUS_DEG_S: f64 = 10.0;
+    /// Until it is known which way an axis turns the picture, no more degrees per second: a camera that is not late has shown
+    /// it soon ...
+    const QUICK_DEG_S: f64 = 20.0;
+
+    /// ... and once so many degrees were told that no picture may show yet ...
+    const QUICK_DEG: f64 = 7.0;
+
+    /// ... no more than this: one that is late, and turns the wrong way, does so slowly.
+    const CAUTIOUS_DEG_S: f64 = 10.0;
 
     /// What was commanded so long before a picture shows in it, however late the camera is: only what was told the same way
     /// for all that time is compared.
@@ -79,14 +86,17 @@ impl AxisEstimator {
     /// The bound is doubled no more often.
     const MOST_RAISED: u32 = 2;
 
-    /// One axis is moved alone for so long, that a picture may show what it does.
-    const ALONE: Duration = Duration::from_millis(2500);
+    /// Moves are along the same axis for so long, that a picture may show what they do.
+    const ALONG: Duration = Duration::from_millis(2500);
 
     /// No camera takes longer to begin to turn.
     const LATEST: Duration = Duration::from_millis(1600);
 
-    /// A turn is along one axis where it is so many times faster than along the other.
+    /// A turn is along one axis where it is seen to be so many times faster than along the other ...
     const ALONG_ONE: f64 = 2.0;
+
+    /// ... and is told to be.
+    const TOLD_ALONG: f64 = 4.0;
 
     /// What a background at rest seems to turn by in a second, in fields of view.
     const NOISE_FIELDS_S: f64 = 0.02;
@@ -162,23 +172,34 @@ impl AxisEstimator {
         !is_known && self.raised < Self::MOST_RAISED
     }
 
-    /// How fast an axis may be until it is known, degrees per second.
+    /// How fast an axis may be until it is known, degrees per second, however late the camera is.
     fn cautious_deg_s(&self) -> f64 {
         Self::CAUTIOUS_DEG_S * f64::from(1 << self.raised)
     }
 
-    /// A rate bounded by what is known of the axes. Of two that are exchanged and move at once, nobody can tell from the picture
-    /// that they are not both the wrong way round.
-    pub fn cautious(&mut self, mut rate: PanTilt, now: Time) -> PanTilt {
-        if !self.exchange.is_known() {
-            let since = self.alone.filter(|(_, since)| now < *since + Self::ALONE);
-            let (pans, _) = *self.alone.insert(since.unwrap_or((rate.pan.abs() >= rate.tilt.abs(), now)));
-            rate = if pans { PanTilt::new(rate.pan, 0.0) } else { PanTilt::new(0.0, rate.tilt) };
-        }
-        let most = self.cautious_deg_s();
-        let bounded =
-            |axis: AxisSense, rate: f64| if axis.is_known() { rate } else { rate.clamp(-most, most) };
-        PanTilt::new(bounded(self.pan, rate.pan), bounded(self.tilt, rate.tilt))
+    /// A rate bounded by what is known of the axes.
+    pub fn cautious(&mut self, rate: PanTilt, history: &CommandHistory, now: Time) -> PanTilt {
+        let told = history.rotation(now - Self::LATEST, now);
+        let bounded = |axis: AxisSense, rate: f64, told: f64| {
+            let quick = if told.abs() < Self::QUICK_DEG { Self::QUICK_DEG_S } else { 0.0 };
+            let most = self.cautious_deg_s().max(quick);
+            if axis.is_known() { rate } else { rate.clamp(-most, most) }
+        };
+        let rate =
+            PanTilt::new(bounded(self.pan, rate.pan, told.pan), bounded(self.tilt, rate.tilt, told.tilt));
+        if self.exchange.is_known() { rate } else { self.mostly_along_one(rate, now) }
+    }
+
+    /// Of two axes that may be exchanged one is much the faster: of two that move alike nobody can tell from the picture whether
+    /// they are exchanged, or both the wrong way round.
+    fn mostly_along_one(&mut self, PanTilt { pan, tilt }: PanTilt, now: Time) -> PanTilt {
+        let since = self.along.filter(|(_, since)| now < *since + Self::ALONG);
+        let (pans, _) = *self.along.insert(since.unwrap_or((pan.abs() >= tilt.abs(), now)));
+        let aside = |rate: f64, along: f64| {
+            let most = along.abs() / Self::TOLD_ALONG;
+            rate.clamp(-most, most)
+        };
+        if pans { PanTilt::new(pan, aside(tilt, pan)) } else { PanTilt::new(aside(pan, tilt), tilt) }
     }
 }
 
@@ -204,7 +225,9 @@ fn one_way(rates: impl Iterator<Item = f64>) -> Option<f64> {
 mod tests {
     use super::*;
 
+    const QUICK: f64 = AxisEstimator::QUICK_DEG_S;
     const CAUTIOUS: f64 = AxisEstimator::CAUTIOUS_DEG_S;
+    const DECISIVE: u32 = AxisSense::DECISIVE;
 
     fn ms<T: From<Duration>>(ms: u64) -> T {
         Duration::from_millis(ms).into()
@@ -223,10 +246,22 @@ mod tests {
         found
     }
 
+    /// What is left of a rate that is the first to be told.
+    fn first(axes: &mut AxisEstimator, pan: f64, tilt: f64) -> PanTilt {
+        axes.cautious(PanTilt::new(pan, tilt), &CommandHistory::default(), ms(0))
+    }
+
+    /// What is left of any rate of pan once the camera has long been told to turn.
+    fn at_last(axes: &mut AxisEstimator) -> f64 {
+        let mut history = CommandHistory::default();
+        history.push(ms(0), PanTilt::new(CAUTIOUS, 0.0));
+        axes.cautious(PanTilt::new(90.0, 0.0), &history, ms(3000)).pan
+    }
+
     /// Of a camera whose axes are known not to be exchanged.
     fn straight() -> AxisEstimator {
         let mut axes = AxisEstimator::default();
-        axes.exchange.with = AxisSense::DECISIVE;
+        axes.exchange.with = DECISIVE;
         axes
     }
 
@@ -235,37 +270,57 @@ mod tests {
         let mut axes = AxisEstimator::default();
         let slanted = PanTilt::new(5.0, 4.0);
         assert_eq!(watch(&mut axes, slanted, slanted, 100), None, "nothing can be told by that");
-        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(CAUTIOUS, 0.0));
+        assert_eq!(first(&mut axes, 40.0, 0.0), PanTilt::new(QUICK, 0.0));
         let (told, seen) = (PanTilt::new(5.0, 0.5), PanTilt::new(0.3, -4.0));
-        assert_eq!(watch(&mut axes, told, seen, 5), None);
+        assert_eq!(watch(&mut axes, told, seen, DECISIVE - 1), None);
         assert_eq!(watch(&mut axes, told, seen, 1), Some(AxisFinding::Exchanged));
         assert_eq!(axes.exchanged((1, 2)), (2, 1));
         let seen = PanTilt::new(4.0, 0.3);
         assert_eq!(watch(&mut axes, told, seen, 100), None);
-        assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)), PanTilt::new(40.0, 0.0));
+        assert_eq!(first(&mut axes, 40.0, 0.0), PanTilt::new(40.0, 0.0));
     }
 
     #[test]
     fn an_axis_that_turns_as_it_is_told_is_known_so() {
         let mut axes = AxisEstimator::default();
-        let fast = PanTilt::new(40.0, -40.0);
-        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(CAUTIOUS, 0.0), "one at a time");
+        assert_eq!(first(&mut axes, 40.0, -40.0), PanTilt::new(QUICK, -QUICK / 4.0), "mostly along one");
         assert_eq!(watch(&mut axes, PanTilt::new(5.0, 0.0), PanTilt::new(4.0, 1.0), 12), None);
-        assert_eq!(axes.cautious(fast, ms(0)), PanTilt::new(40.0, -CAUTIOUS), "tilt was never told to turn");
+        assert_eq!(first(&mut axes, 40.0, -40.0), PanTilt::new(40.0, -QUICK), "tilt was never told to turn");
         assert_eq!(axes.mounting(Mounting::default()), Mounting::default());
+    }
+
+    /// However late it is, it has not been told to turn far by the time it shows which way that is.
+    #[test]
+    fn the_first_degrees_are_quick_and_no_more() {
+        let (mut axes, mut history) = (AxisEstimator::default(), CommandHistory::default());
+        let mut allowed = Vec::new();
+        for tenth in 0..30 {
+            let now = ms(1000 + 100 * tenth);
+            let rate = axes.cautious(PanTilt::new(90.0, 0.0), &history, now);
+            history.push(now, rate);
+            allowed.push(rate.pan);
+        }
+        assert_eq!(allowed[..4], [QUICK; 4]);
+        assert!(allowed[4..].iter().all(|rate| *rate == CAUTIOUS), "{allowed:?}");
+        history.push(ms(4000), PanTilt::default());
+        assert_eq!(
+            axes.cautious(PanTilt::new(90.0, 0.0), &history, ms(6000)).pan,
+            QUICK,
+            "a picture may show all"
+        );
     }
 
     #[test]
     fn one_that_turns_the_other_way_is_found_and_then_known() {
         let mut axes = straight();
-        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 5), None);
+        assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), DECISIVE - 1), None);
         let found = watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(-4.0, 4.0), 1);
         assert_eq!(found, Some(AxisFinding::Inverted));
         let mirrored = Mounting { invert_pan: true, ..Mounting::default() };
         assert_eq!(axes.mounting(Mounting::default()), mirrored);
         assert_eq!(axes.mounting(mirrored), Mounting::default(), "as it was set");
         assert_eq!(watch(&mut axes, PanTilt::new(5.0, 5.0), PanTilt::new(4.0, 4.0), 100), None);
-        assert_eq!(axes.cautious(PanTilt::new(40.0, 40.0), ms(0)), PanTilt::new(40.0, 40.0));
+        assert_eq!(first(&mut axes, 40.0, 40.0), PanTilt::new(40.0, 40.0));
     }
 
     /// As many pictures as decide, from the first that shows the camera's first move on.
@@ -280,37 +335,36 @@ mod tests {
                 axes.see(&turn, &history, 55.0)
             };
             assert!((0..2).all(|late| see(late, 0.0).is_none()));
-            assert!((2..7).all(|picture| see(picture, seen_deg_s).is_none()));
-            assert_eq!(see(7, seen_deg_s), finding);
-            assert_eq!(axes.cautious(PanTilt::new(40.0, 0.0), ms(0)).pan == 40.0, finding.is_none());
+            let last = 1 + u64::from(DECISIVE);
+            assert!((2..last).all(|picture| see(picture, seen_deg_s).is_none()));
+            assert_eq!(see(last, seen_deg_s), finding);
+            assert_eq!(first(&mut axes, 40.0, 0.0).pan == 40.0, finding.is_none());
         }
     }
 
     #[test]
     fn a_camera_that_does_not_turn_slowly_is_told_to_turn_faster() {
         let mut axes = AxisEstimator::default();
-        let allowed = |axes: &mut AxisEstimator| axes.cautious(PanTilt::new(90.0, 0.0), ms(0)).pan;
         watch(&mut axes, PanTilt::new(3.0, 0.0), PanTilt::default(), 50);
-        assert_eq!(allowed(&mut axes), CAUTIOUS, "so slow it was of itself");
-        for most in [2.0 * CAUTIOUS, 4.0 * CAUTIOUS, 4.0 * CAUTIOUS] {
-            let told = PanTilt::new(allowed(&mut axes), 0.0);
-            assert_eq!(watch(&mut axes, told, PanTilt::default(), 11), None);
-            assert_eq!(allowed(&mut axes), most);
+        assert_eq!(at_last(&mut axes), CAUTIOUS, "so slow it was of itself");
+        for most in [2.0, 4.0, 4.0].map(|times| times * CAUTIOUS) {
+            let told = PanTilt::new(at_last(&mut axes), 0.0);
+            assert_eq!(watch(&mut axes, told, PanTilt::default(), 2 * DECISIVE - 1), None);
+            assert_eq!(at_last(&mut axes), most);
         }
     }
 
     #[test]
     fn rests_add_up_until_it_turns() {
         let mut axes = AxisEstimator::default();
-        let allowed = |axes: &mut AxisEstimator| axes.cautious(PanTilt::new(90.0, 0.0), ms(0)).pan;
         let (fast, slow) = (PanTilt::new(CAUTIOUS, 0.0), PanTilt::new(0.0, 2.0));
-        watch(&mut axes, fast, PanTilt::default(), AxisSense::DECISIVE - 1);
+        watch(&mut axes, fast, PanTilt::default(), DECISIVE - 1);
         watch(&mut axes, slow, PanTilt::new(0.0, 2.0), 1);
-        watch(&mut axes, fast, PanTilt::default(), AxisSense::DECISIVE - 1);
-        assert_eq!(allowed(&mut axes), CAUTIOUS, "it turned in between");
+        watch(&mut axes, fast, PanTilt::default(), DECISIVE - 1);
+        assert_eq!(at_last(&mut axes), CAUTIOUS, "it turned in between");
         watch(&mut axes, slow, PanTilt::default(), 50);
         watch(&mut axes, fast, PanTilt::default(), 1);
-        assert_eq!(allowed(&mut axes), 2.0 * CAUTIOUS);
+        assert_eq!(at_last(&mut axes), 2.0 * CAUTIOUS);
     }
 
     #[test]

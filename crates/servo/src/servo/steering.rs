@@ -31,7 +31,7 @@ impl Servo {
         let offset = self.estimator.offset(now, history, &delays);
         let wanted = self.controller.rate(&offset, history.rate_at(now), &law);
         let position = self.limits.position(history, delays.command, now);
-        let wanted = if self.settings.learn_axes { self.axes.cautious(wanted, now) } else { wanted };
+        let wanted = if self.settings.learn_axes { self.axes.cautious(wanted, history, now) } else { wanted };
         let rate = self.limited(wanted, position, (delays.sum() + actuator.interval).as_secs_f64());
         let (pan, tilt) = self.controller.quantise(rate, &self.camera.speed_map);
         let motion = Motion::Velocity { pan, tilt, zoom: self.zoom_speed(measurement, now) };

@@ -28,6 +28,8 @@ pub struct OnvifSettings {
     pub quirks: Vec<Quirk>,
     /// Whether it tells its position in degrees too.
     pub degrees: bool,
+    /// How many degrees a second it calls its fastest where it takes velocities in these too, rightly or not.
+    pub degrees_s: Option<f64>,
     /// Whether it speaks no VAPIX.
     pub alone: bool,
     /// Whether it answers who asks on the loopback interface which cameras there are (WS-Discovery).

@@ -85,6 +85,21 @@ quirks! {
 }
 
 impl Quirk {
+    /// All that one camera can have at once: of those that exclude each other, or hide another, there is one.
+    pub fn together() -> Vec<Self> {
+        let apart = [
+            Self::TimeoutRefused,
+            Self::TimeoutTen,
+            Self::ClockBehind,
+            Self::StopMissing,
+            Self::StopCloses,
+            Self::StopPanTilt,
+            Self::StatusIdle,
+            Self::ZoomBreaks,
+        ];
+        Self::ALL.iter().copied().filter(|quirk| !apart.contains(quirk)).collect()
+    }
+
     /// [`Self::Late`] is at least so late, ...
     pub(crate) const LEAST_LATE: Duration = Duration::from_millis(100);
     /// ... and up to so much later.

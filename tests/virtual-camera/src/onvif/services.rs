@@ -14,6 +14,7 @@ use crate::kinematics::{Limits, Motion, ZOOM_RANGE};
 
 const GENERIC_POSITION: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/PositionGenericSpace";
 const DEGREES: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/SphericalPositionSpaceDegrees";
+const DEGREES_S: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/VelocitySpaceDegrees";
 const ZOOM_POSITION: &str = "http://www.onvif.org/ver10/tptz/ZoomSpaces/PositionGenericSpace";
 
 /// Why something is not done.
@@ -216,6 +217,9 @@ fn options(onvif: &OnvifSettings, limits: &Limits) -> String {
     }
     let uri = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/VelocityGenericSpace";
     spaces += &plane("ContinuousPanTiltVelocitySpace", uri, one, one);
+    if let Some(most) = onvif.degrees_s {
+        spaces += &plane("ContinuousPanTiltVelocitySpace", DEGREES_S, (-most, most), (-most, most));
+    }
     spaces += &line(
         "ContinuousZoomVelocitySpace",
         "http://www.onvif.org/ver10/tptz/ZoomSpaces/VelocityGenericSpace",
@@ -273,6 +277,8 @@ fn continuous_move(camera: &Camera, onvif: &OnvifSettings, request: Node) -> Ans
         let (Some(x), Some(y)) = (number(axes, "x"), number(axes, "y")) else {
             return refused("InvalidVelocity", "pan and tilt");
         };
+        let fastest = onvif.degrees_s.filter(|_| axes.attribute("space") == Some(DEGREES_S)).unwrap_or(1.0);
+        let (x, y) = (x / fastest, y / fastest);
         if x.abs() > 1.0 || y.abs() > 1.0 {
             return refused("InvalidVelocity", "beyond -1 to 1");
         }
