@@ -5,7 +5,8 @@
 use std::time::{Duration, Instant};
 
 use virtual_camera::{
-    ReceivedCommand, Settings, Status, SyntheticSettings, Video, VirtualCamera, Waypoint, World,
+    Kinematics, OnvifSettings, ProportionalSpeed, ReceivedCommand, Settings, SpeedMap, Status,
+    SyntheticSettings, Video, VirtualCamera, Waypoint, World,
 };
 
 use crate::PATIENCE;
@@ -30,6 +31,14 @@ pub fn walking_person_for(time: Duration) -> Settings {
     }
     path.dedup_by_key(|point| point.time);
     world(path)
+}
+
+/// A camera of any make before the same person: it speaks ONVIF, and is as fast as it is told to be.
+pub fn any_make(onvif: OnvifSettings) -> Settings {
+    let proportional_speed = ProportionalSpeed { enabled: false, ..Kinematics::default().proportional_speed };
+    let speed_map = SpeedMap::Linear { max_deg_s: 120.0 };
+    let kinematics = Kinematics { speed_map, proportional_speed, ..Kinematics::default() };
+    Settings { kinematics, onvif: Some(onvif), ..walking_person() }
 }
 
 /// A camera before a person who walks up and down in its first view.

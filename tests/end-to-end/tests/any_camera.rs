@@ -6,16 +6,11 @@
 use std::process::Command;
 
 use end_to_end::{GstLaunch, PATIENCE, Program, plugin_folder, scene, tool};
-use virtual_camera::{
-    Kinematics, OnvifSettings, ProportionalSpeed, Settings, SpeedMap, Status, VirtualCamera,
-};
+use virtual_camera::{OnvifSettings, Quirk, Status, VirtualCamera};
 
 fn camera() -> VirtualCamera {
-    let proportional_speed = ProportionalSpeed { enabled: false, ..Kinematics::default().proportional_speed };
-    let speed_map = SpeedMap::Linear { max_deg_s: 120.0 };
-    let kinematics = Kinematics { speed_map, proportional_speed, ..Kinematics::default() };
-    let onvif = Some(OnvifSettings { alone: true, discoverable: true, ..OnvifSettings::default() });
-    VirtualCamera::start(Settings { kinematics, onvif, ..scene::walking_person() }).unwrap()
+    let onvif = OnvifSettings { alone: true, discoverable: true, ..OnvifSettings::default() };
+    VirtualCamera::start(scene::any_make(onvif)).unwrap()
 }
 
 fn ptztrack(arguments: &[&str]) -> Command {
@@ -50,7 +45,6 @@ fn its_address_is_enough() {
     launch.signal("TERM");
     let (status, output) = launch.finish();
     assert!(status.success() && output.contains("has stopped"), "{output}");
-    assert!(camera.commands().last().unwrap().query.starts_with("Stop"), "{:?}", camera.commands().last());
     wait_for(&camera, |status| !status.moving);
 }
 
@@ -73,6 +67,21 @@ fn who_may_not_or_is_not_there_is_told_what_to_do() {
     let text = refused(&["follow", &address, "--user", scene::USER, "--protocol", "vapix"]);
     assert!(text.contains("no camera that can be followed with") && text.contains("by VAPIX: "), "{text}");
     assert_eq!(camera.commands().len(), 0);
+}
+
+/// It says yes to `Stop`, turns on, and its moves do not end by themselves. Whether the application ends in order or is killed, no picture
+/// tells any more.
+#[test]
+fn one_that_heeds_neither_stop_nor_timeout_rests_in_the_end() {
+    for signal in ["INT", "KILL"] {
+        let quirks = [Quirk::StopIgnored, Quirk::TimeoutIgnored];
+        let camera = VirtualCamera::start(scene::any_make(OnvifSettings::with(&quirks))).unwrap();
+        let launch = GstLaunch::start(&[], &scene::follow_onvif(&camera));
+        wait_for(&camera, |status| status.pan_rate_deg_s.abs() > 3.0);
+        let ended = camera.now();
+        launch.signal(signal);
+        assert!(scene::rests(&camera, ended).is_some(), "{signal}: {:?}", camera.commands().last());
+    }
 }
 
 /// Page, metrics and hand-over are as for cameras by VAPIX.

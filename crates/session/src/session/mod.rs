@@ -119,8 +119,12 @@ impl Session {
     }
 
     /// It is the end: with the stop, what is ours is given back.
-    pub fn leave(&mut self) {
+    pub fn leave(&mut self, now: Time) {
         self.arbitration.queue.leave();
+        if let Some(confirmation) = &mut self.stop_confirmation {
+            confirmation.leave();
+        }
+        self.repeat_unseen_stop(now);
     }
 
     /// A picture shows the background to move so many fields of view a second, or does not tell: whether a camera that said

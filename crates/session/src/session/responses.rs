@@ -138,6 +138,7 @@ impl Session {
         if let Some(confirmation) = &mut self.stop_confirmation {
             if command.is_stop() { confirmation.stopped(now) } else { confirmation.moved() }
         }
+        self.repeat_unseen_stop(now);
         self.arbitration.commanded();
         self.arbitration.queue.obeyed();
         let actuation = command.actuation();

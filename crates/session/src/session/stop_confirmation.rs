@@ -13,6 +13,8 @@ pub struct StopConfirmation {
     turning: u32,
     /// How often it was told again.
     repeated: u32,
+    /// No more pictures are to come.
+    leaving: bool,
 }
 
 /// What is to be done about a stop.
@@ -51,7 +53,16 @@ impl StopConfirmation {
 
     /// It is being moved.
     pub fn moved(&mut self) {
-        *self = Self::default();
+        self.forget();
+    }
+
+    /// It is the end: what no picture has told by now none will.
+    pub fn leave(&mut self) {
+        self.leaving = true;
+    }
+
+    fn forget(&mut self) {
+        *self = Self { leaving: self.leaving, ..Self::default() };
     }
 
     /// A picture shows the background to move so many fields of view a second, or does not tell.
@@ -61,7 +72,7 @@ impl StopConfirmation {
             return StopFinding::Fine;
         }
         if fields_s <= Self::NOISE_FIELDS_S {
-            *self = Self::default();
+            self.forget();
             return StopFinding::Fine;
         }
         self.turning += 1;
@@ -74,7 +85,8 @@ impl StopConfirmation {
 
     /// When the stop is to be repeated if no picture tells of it by then.
     pub fn unseen_at(&self) -> Option<Time> {
-        self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + Self::UNSEEN_AFTER)
+        let after = if self.leaving { Duration::ZERO } else { Self::UNSEEN_AFTER };
+        self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + after)
     }
 
     /// It is being repeated for that.
@@ -138,6 +150,18 @@ mod tests {
         assert_eq!(confirmation.unseen_at(), Some(ms(4000)));
         confirmation.repeat_unseen();
         confirmation.stopped(ms(4000));
+        assert_eq!(confirmation.unseen_at(), None);
+    }
+
+    #[test]
+    fn at_the_end_it_is_repeated_at_once() {
+        let mut confirmation = StopConfirmation::default();
+        confirmation.leave();
+        confirmation.moved();
+        confirmation.stopped(ms(1000));
+        assert_eq!(confirmation.unseen_at(), Some(ms(1000)));
+        confirmation.repeat_unseen();
+        confirmation.stopped(ms(1100));
         assert_eq!(confirmation.unseen_at(), None);
     }
 }

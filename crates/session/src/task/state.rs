@@ -95,7 +95,7 @@ impl<O: Fn(Event)> TaskState<O> {
         }
         if let Some(within) = finish {
             self.deadline.get_or_insert(now + within);
-            self.control.session_mut().leave();
+            self.control.session_mut().leave(now);
         }
         if quit {
             (self.deadline, self.gave_up) = (Some(now), true);

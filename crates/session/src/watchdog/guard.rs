@@ -111,6 +111,10 @@ async fn stop<C: Client>(order: &StopOrder) {
         };
         let begin = Instant::now();
         until_accepted(&mut client, order.words).await?;
+        if C::PROTOCOL.confirms_stops {
+            // Some say yes and turn on, and no picture tells of it here: they are told again, in other words.
+            until_accepted(&mut client, order.words).await?;
+        }
         if order.in_doubt {
             sleep_until(begin + DOUBT).await;
             until_accepted(&mut client, order.words).await?;

@@ -73,7 +73,7 @@ fn a_stop_that_is_refused_out_of_turn_is_tried_at_each_answer_and_says_nothing_o
     let taken = |report: &LoopEvent| matches!(report, LoopEvent::Session(SessionEvent::TakenOver(_)));
     assert!(reports.iter().all(taken), "{reports:?}");
     // The end: the place is kept until the camera rests.
-    rig.control.session_mut().leave();
+    rig.control.session_mut().leave(rig.now);
     rig.aside(ms(6000), queued(Some(2), false));
     assert!(rig.control.session().is_queued());
     rig.control.release();
@@ -115,7 +115,7 @@ fn the_place_is_kept_for_the_second_stop_of_an_unanswered_move() {
         Request::Query(_) => in_turn(request),
     });
     rig.control.release();
-    rig.control.session_mut().leave();
+    rig.control.session_mut().leave(rig.now);
     rig.now += ms(1000);
     rig.run_jobs(in_turn);
     assert!(rig.control.session().is_at_rest() && rig.control.session().is_queued());
