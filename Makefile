@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eu -o pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build test test-analytics lint check-format demo bench bench-check evaluate evaluate-everybody evaluate-handover soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-demo packages-evaluate packages-test
+.PHONY: help build test test-analytics lint check-format demo bench bench-check evaluate evaluate-everybody evaluate-handover soak deny fuzz prove install deb reproduce test-packages test-container test-fleet packages-bench packages-build packages-deb packages-evaluate packages-test
 
 # Debian's packages, in this one place. GStreamer's analytics are in those called bad, from Debian 13 on; in Debian 12 there are none,
 # and these would bring 68 others along.
@@ -89,14 +89,17 @@ check-format: packages-build
 ## demo: follow a person in real footage and leave video, plot and summary in target/demo
 ##       (CODEC=mjpeg|mpeg4|h264  DURATION=seconds  FOOTAGE=file)
 ##       WORLD=room: in a made-up room instead (ROOM_TEST=1..72, one of the thesis' tests  SEED=number, another room)
-demo: packages-demo
-	$(CARGO) build --release $(SHOWN)
+demo: packages-build
+	@# What is only needed to run it comes while it is built.
+	@trap wait EXIT; scripts/install-packages $(DEMO_PACKAGES) & packages=$$!; \
+	$(CARGO) build --profile quick $(SHOWN); \
+	wait $$packages
 	@case "$(WORLD)" in \
 	footage) footage="$(FOOTAGE)"; world=(--footage "$${footage:-$$(scripts/footage)}");; \
 	room) world=(--room-test "$(ROOM_TEST)" --seed "$(SEED)");; \
 	*) echo "WORLD is footage or room, not $(WORLD)" >&2; exit 2;; \
 	esac; \
-	scripts/with-plugins release python3 pipelines/demo/demo.py --camera target/release/virtual-camera \
+	scripts/with-plugins quick python3 pipelines/demo/demo.py --camera target/quick/virtual-camera \
 		"$${world[@]}" --codec $(CODEC) --duration $(DURATION) --out target/demo
 
 ## bench: measure what following costs, on recordings of the room with one person and with eight, and leave tables and plots in
@@ -249,9 +252,6 @@ packages-build:
 packages-deb: packages-build
 	@scripts/install-packages dpkg-dev
 	@$(CARGO) cyclonedx --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-cyclonedx
-
-packages-demo: packages-build
-	@scripts/install-packages $(DEMO_PACKAGES)
 
 packages-evaluate: packages-build
 	@scripts/install-packages $(EVALUATE_PACKAGES)
