@@ -22,7 +22,7 @@ const KEPT: usize = 8;
 /// A longer way ahead is sought, a shorter one decoded.
 const SEEK_BEYOND: u64 = 100;
 /// For decoders that come from a cold disk, on a busy machine.
-pub(super) const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
+const PATIENCE: gst::ClockTime = gst::ClockTime::from_seconds(60);
 
 /// Why there is nothing to see.
 #[derive(Debug, thiserror::Error)]
@@ -84,7 +84,7 @@ impl Footage {
         let pipeline = decoder(&path, "I420").map_err(|error| undecodable(error.to_string()))?;
         let sink = pipeline.by_name("sink").and_downcast::<gst_app::AppSink>();
         let sink = sink.ok_or_else(|| undecodable("the decoder has no sink".into()))?;
-        let started = pipeline.set_state(gst::State::Paused).is_ok() && pipeline.state(PATIENCE).0.is_ok();
+        let started = starts(&pipeline);
         let info = sink
             .sink_pads()
             .first()
@@ -216,6 +216,11 @@ pub(super) fn decoder(path: &std::path::Path, format: &str) -> Result<gst::Pipel
         source.set_property("location", path);
     }
     Ok(pipeline)
+}
+
+/// Whether it comes to its first picture.
+pub(super) fn starts(pipeline: &gst::Pipeline) -> bool {
+    pipeline.set_state(gst::State::Paused).is_ok() && pipeline.state(PATIENCE).0.is_ok()
 }
 
 /// Why it gives no picture.

@@ -7,7 +7,7 @@ use std::path::Path;
 use gst::prelude::*;
 
 use super::settings::PhotoError;
-use crate::world::footage::{PATIENCE, decoder, reason, stop};
+use crate::world::footage::{decoder, reason, starts, stop};
 
 /// Pixels with their opacity, row by row.
 pub(super) struct Rgba {
@@ -22,10 +22,8 @@ impl Rgba {
         std::fs::File::open(path).map_err(|source| PhotoError::Unreadable { path: path.into(), source })?;
         let undecodable = |reason: String| PhotoError::Undecodable { path: path.into(), reason };
         let pipeline = decoder(path, "RGBA").map_err(|error| undecodable(error.to_string()))?;
-        // Whether it starts is seen by whether there is a picture.
-        let _ = pipeline.set_state(gst::State::Paused);
-        let sink = pipeline.by_name("sink").and_downcast::<gst_app::AppSink>();
-        let sample = sink.and_then(|sink| sink.try_pull_preroll(PATIENCE));
+        let sink = pipeline.by_name("sink").and_downcast::<gst_app::AppSink>().filter(|_| starts(&pipeline));
+        let sample = sink.and_then(|sink| sink.pull_preroll().ok());
         let read = sample.as_ref().and_then(Self::of).ok_or_else(|| undecodable(reason(&pipeline)));
         stop(&pipeline);
         read

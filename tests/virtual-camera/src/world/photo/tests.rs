@@ -197,6 +197,10 @@ fn what_cannot_be_read_is_told_of() {
     };
     let missing = PhotoSettings { panorama: "/nowhere.jpg".into(), ..folder.settings() };
     assert!(told(missing).contains("cannot read /nowhere.jpg"));
+    let noise = folder.0.join("noise.jpg");
+    fs::write(&noise, "no picture").unwrap();
+    let undecodable = PhotoSettings { panorama: noise, ..folder.settings() };
+    assert!(told(undecodable).contains("cannot decode"));
     fs::write(folder.0.join("walker.csv"), "heading,foot_x\n1,2\n").unwrap();
     let other = folder.0.join(".");
     let list = PhotoSettings { person: PhotoPerson::Film(other), ..folder.settings() };
