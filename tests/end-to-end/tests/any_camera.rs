@@ -45,6 +45,9 @@ fn its_address_is_enough() {
     launch.signal("TERM");
     let (status, output) = launch.finish();
     assert!(status.success() && output.contains("has stopped"), "{output}");
+    // It is told in both ways: a move of no velocity may be the last one.
+    let stops = camera.commands().iter().rev().take(2).any(|command| command.query.starts_with("Stop"));
+    assert!(stops, "{:?}", camera.commands().last());
     wait_for(&camera, |status| !status.moving);
 }
 
