@@ -33,6 +33,8 @@ const GATE_IN_A_GROUP: f32 = 6.0;
 const NOVELTY: f32 = 2.0;
 /// Share of a box that lies in another from which it is in it.
 const IN: f32 = 0.5;
+/// Parts of one body are no farther apart: in widths of the narrower one across, in heights of the taller one down.
+const APART: f32 = 0.5;
 /// By how much a part must make the whole more alike to what was expected.
 const BETTER: f32 = 0.05;
 
@@ -84,18 +86,21 @@ impl Association {
         left.sort_unstable_by(|a, b| regions[*b].bounds.area().total_cmp(&regions[*a].bounds.area()));
         for &region in &*left {
             let part = regions[region].bounds;
-            let seen = || (0..tracks.len()).filter(|&track| own[track].is_some());
+            let beside = || {
+                let seen = (0..tracks.len()).filter(|&track| own[track].is_some());
+                seen.filter(|&track| can_be_one_body(whole[track], part))
+            };
             let gain = |track: usize| {
                 let expected = tracks[track].bounds();
                 overlap(whole[track] | part, expected) - overlap(whole[track], expected)
             };
-            let best = seen().map(|track| (track, gain(track))).max_by(|a, b| a.1.total_cmp(&b.1));
+            let best = beside().map(|track| (track, gain(track))).max_by(|a, b| a.1.total_cmp(&b.1));
             part_of[region] = match best {
                 Some((track, gain)) if gain >= BETTER => {
                     whole[track] |= part;
                     Some(track)
                 }
-                _ => seen().find(|&track| share_inside(part, tracks[track].bounds()) >= IN),
+                _ => beside().find(|&track| share_inside(part, tracks[track].bounds()) >= IN),
             };
         }
     }
@@ -105,6 +110,15 @@ impl Association {
         let guests = self.guest_in.iter().enumerate();
         guests.filter(move |(_, within)| **within == Some(region)).map(|(track, _)| track)
     }
+}
+
+/// Whether two parts are near enough to each other. Two people who were seen as one are no parts of somebody once they walk apart.
+fn can_be_one_body(one: Rect2f, other: Rect2f) -> bool {
+    let gap =
+        |near: f32, far: f32, other_near: f32, other_far: f32| near.max(other_near) - far.min(other_far);
+    let across = gap(one.x, one.br().x, other.x, other.br().x);
+    let down = gap(one.y, one.br().y, other.y, other.br().y);
+    across <= APART * one.width.min(other.width) && down <= APART * one.height.max(other.height)
 }
 
 /// The region that most of a box lies in.

@@ -94,6 +94,20 @@ fn trunk_and_legs_are_parts_of_who_was_seen_whole() {
     assert!((track.height() - 120.0).abs() < 6.0, "{track:?}");
 }
 
+/// Two who came in side by side, as one region, and walk apart.
+#[test]
+fn two_who_were_seen_as_one_are_two_once_they_part() {
+    let mut tracks = Tracks::default();
+    for n in 0..80 {
+        let way = 2.0 * (n as f32 - 10.0).max(0.0);
+        let (left, right) = (person(200.0 - way), person(245.0 + way));
+        let regions = if way == 0.0 { vec![left | right] } else { vec![left, right] };
+        seen_in(&mut tracks, &regions, STILL, DT);
+    }
+    let widths: Vec<f32> = tracks.iter().map(|track| track.bounds().width).collect();
+    assert!(widths.len() == 2 && widths.iter().all(|width| (width - 40.0).abs() < 5.0), "{widths:?}");
+}
+
 #[test]
 fn trunk_and_legs_that_were_never_seen_together_become_one() {
     let mut tracks = Tracks::default();
