@@ -37,6 +37,8 @@ pub(super) struct Sampled {
 pub(super) struct Row<'a> {
     /// 8.8 fixed point.
     pub mean: &'a [u16],
+    /// Mean absolute deviation, 8.8.
+    pub spread: &'a [u16],
     /// The mean's range within one pixel.
     pub range: &'a [u8],
     pub likelihood: &'a [u8],
@@ -118,6 +120,7 @@ impl Model {
         let part = y * self.size.0 + columns.start..y * self.size.0 + columns.end;
         Row {
             mean: &self.luma[part.clone()],
+            spread: &self.spread[part.clone()],
             range: &self.range[part.clone()],
             likelihood: &self.likelihood[part],
         }
