@@ -119,12 +119,17 @@ impl TravellingBackground {
             self.compare(how);
         }
         let rests = motion.is_none() || self.rested > REST;
-        self.pooled.raise(&mut self.model, &self.sampled, self.forth.spans(), rests);
+        self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
         let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
+        // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned.
+        if held.is_some() {
+            self.pooled.mark(&mut self.model, held);
+        }
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
+        self.pooled.mark(&mut self.model, None);
         self.show();
         self.forget_burned_in(&picture.luma(), travel);
     }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What cells of the background differ by.
+//! What cells of the background differ by, each alone and together with those around it.
+
+use multiversion::multiversion;
 
 use super::Cells;
 use crate::vision::travelling::noise::PER_MEAN_DEVIATION;
@@ -22,6 +24,13 @@ const NOISE_REACH: f32 = 3.0;
 /// A spread that is so many times that of others tells that somebody was there while the background was learned. What is beyond is by how
 /// much its mean may be wrong, all over a cell alike.
 const UNUSUAL: f32 = 1.25;
+/// What a cell must say by itself, in deviations, for what it says together with those around it to count there: who is seen so is no
+/// broader than they are.
+const BORNE_OUT: f32 = 2.0;
+/// Deviation that is believed of what they say together before any was seen, in deviations of cells that know nothing of each other;
+/// those have 1.
+const START_TOGETHER: f32 = 1.5;
+
 /// Deviations of cells of the background.
 #[derive(Debug)]
 pub(super) struct CellNoise {
@@ -29,12 +38,14 @@ pub(super) struct CellNoise {
     alone: [f32; BINS],
     /// The spread of their pixels, by texture, grey levels.
     spread: [f32; BINS],
+    /// Of what a cell and those around it say together, in deviations of cells that know nothing of each other.
+    together: f32,
 }
 
 impl Default for CellNoise {
     fn default() -> Self {
         let alone = std::array::from_fn(|bin| START + START_OF_TEXTURE * BIN * (bin as f32 + 0.5));
-        Self { alone, spread: [START; BINS] }
+        Self { alone, spread: [START; BINS], together: START_TOGETHER }
     }
 }
 
@@ -65,10 +76,53 @@ impl CellNoise {
             }
         }
     }
+
+    /// Lets cells say what they say together with those around them, where they bear it out and it is more, and learns from that.
+    /// `together` is memory.
+    pub fn weigh_together(&mut self, cells: &mut Cells, together: &mut Vec<f32>, across: usize) {
+        let count = cells.z.len();
+        together.clear();
+        together.resize(count, 0.0);
+        // Beyond the outermost nothing is known.
+        for first in (0..count.saturating_sub(2 * across)).step_by(across.max(1)) {
+            sum_around(&mut together[first + across..][..across], &cells.z[first..][..3 * across]);
+        }
+        self.learn_together(&cells.off, together);
+        let scale = 1.0 / self.together;
+        for (z, together) in cells.z.iter_mut().zip(&*together) {
+            let together = scale * together;
+            let is_more = together * *z > *z * *z;
+            *z = if z.abs() >= BORNE_OUT && is_more { together } else { *z };
+        }
+    }
+
+    fn learn_together(&mut self, off: &[f32], together: &[f32]) {
+        let most = NOISE_REACH * self.together;
+        let known = together.iter().zip(off).filter(|(_, off)| !off.is_nan());
+        let (sum, count) = known.fold((0.0, 0.0_f32), |(sum, count), (together, _)| {
+            (sum + together.abs().min(most), count + 1.0)
+        });
+        if count >= MIN_CELLS {
+            self.together += RATE * ((PER_MEAN_DEVIATION * sum / count).max(1.0) - self.together);
+        }
+    }
+}
+
+/// What the cells of the middle of three `rows` say together with those around them, in deviations of cells that know nothing of each
+/// other. What is not known says nothing.
+#[multiversion(targets("x86_64+avx2"))]
+fn sum_around(out: &mut [f32], rows: &[f32]) {
+    let width = out.len();
+    let [above, here, below] = [0, 1, 2].map(|row| &rows[row * width..][..width]);
+    let column = |x: usize| above[x] + here[x] + below[x];
+    for (x, sum) in out.iter_mut().enumerate().take(width.saturating_sub(1)).skip(1) {
+        *sum = (column(x - 1) + column(x) + column(x + 1)) / 3.0;
+    }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::EVEN;
     use super::*;
 
     /// Cells without texture that differ by these grey levels.
@@ -110,5 +164,37 @@ mod tests {
         seen.spread[1] = 10.0;
         believed.weigh(&mut seen);
         assert!(seen.z[0] > 10.0 && seen.z[1] < 2.0, "{:?}", &seen.z[..3]);
+    }
+
+    /// Noise, and in the middle somebody of 4 x 3 cells who differ by that many deviations: what cells say when those around were asked.
+    fn beside_others(somebody: f32) -> Vec<f32> {
+        let is_theirs = |at: usize| (4..8).contains(&(at / 12)) && (4..7).contains(&(at % 12));
+        let noise_of = |at: usize| if (at + at / 12).is_multiple_of(2) { 0.8 } else { -0.8 };
+        let z: Vec<f32> = (0..144).map(|at| if is_theirs(at) { somebody } else { noise_of(at) }).collect();
+        let mut seen = cells(&z);
+        seen.z = z;
+        CellNoise::default().weigh_together(&mut seen, &mut Vec::new(), 12);
+        seen.z
+    }
+
+    #[test]
+    fn who_says_too_little_in_each_cell_is_seen_in_all_of_them_and_is_no_broader() {
+        let seen = beside_others(4.0);
+        assert!((5..7).all(|y| seen[12 * y + 5] >= EVEN), "{seen:?}");
+        assert!((0..144).filter(|at| seen[*at] >= EVEN).all(|at| (4..7).contains(&(at % 12))), "{seen:?}");
+        assert!(beside_others(2.0).iter().all(|z| z.abs() < EVEN), "two deviations are nobody");
+    }
+
+    #[test]
+    fn cells_that_always_differ_together_are_noise() {
+        let mut noise = CellNoise::default();
+        let mut seen = cells(&[0.0; 144]);
+        let mut tells = (0..200).map(|picture| {
+            let is_lighter = |at: usize| (at / 36 + at % 12 / 3 + picture).is_multiple_of(2);
+            seen.z.iter_mut().enumerate().for_each(|(at, z)| *z = if is_lighter(at) { 3.5 } else { -3.5 });
+            noise.weigh_together(&mut seen, &mut Vec::new(), 12);
+            seen.z.iter().any(|z| z.abs() >= EVEN)
+        });
+        assert_eq!((tells.next(), tells.last()), (Some(true), Some(false)));
     }
 }

@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! Who differs from the wall by less than the noise of a pixel: the signed differences of a cell of pixels are averaged, in which
-//! noise cancels and clothes do not, and held against what cells of the background differ by, which is measured.
+//! noise cancels and clothes do not, and held against what cells of the background differ by, which is measured. Where that is too
+//! little for one cell, it may be enough for those around it together.
 
 mod cell_noise;
 mod columns;
 
 use multiversion::multiversion;
+use ptztrack_contract::{Point, Rect};
 
 use self::cell_noise::CellNoise;
 use self::columns::{Columns, pool};
@@ -16,11 +18,11 @@ use super::model::{Model, Row, Sampled, UNKNOWN};
 const CELL: usize = 4;
 /// Cells of a side of a tile, over which light may have changed.
 const TILE: usize = 8;
-/// Squared deviations at which foreground is as likely as background: there are thousands of cells in a picture.
-const EVEN: f32 = 36.0;
-/// Where so many cells of those that hang together are foreground by themselves, as a share, the pixels know better what is: what is
-/// faint beside them is a shadow.
-const PLAIN: f32 = 0.3;
+/// Deviations at which foreground is as likely as background: there are thousands of cells in a picture.
+const EVEN: f32 = 6.0;
+/// Where so many rows of the cells that hang together have some that are foreground by themselves, as a share, what is faint beside those is
+/// a shadow. It makes nobody taller: below a head that is plain there is a trunk that is not.
+const PLAIN: f32 = 0.5;
 
 /// What the cells of the canvas show, row after row.
 #[derive(Debug, Default)]
@@ -59,22 +61,25 @@ pub(super) struct Pooled {
     known: Vec<f32>,
     tiles: Vec<f32>,
     light: Vec<f32>,
-    /// Cells that hang together, and which have been looked at.
+    /// What cells say together with those around them; cells that hang together, and which have been looked at.
+    together: Vec<f32>,
     component: Vec<usize>,
     looked_at: Vec<bool>,
 }
 
 impl Pooled {
-    /// Raises the likelihood of foreground in the `model`, which the picture was compared with, where cells say so; learns their
-    /// noise, apart for a camera that `rests` and one that turns.
-    pub fn raise(&mut self, model: &mut Model, picture: &Sampled, spans: &[(usize, usize)], rests: bool) {
+    /// Looks where cells of the picture, which the `model` was compared with, tell of somebody; learns their noise, apart for a camera that
+    /// `rests` and one that turns.
+    pub fn look(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)], rests: bool) {
         let (across, down) = (model.size.0 / CELL, model.size.1 / CELL);
         self.gather(model, picture, spans, (across, down));
         self.subtract_light(across, down);
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
         noise.weigh(&mut self.cells);
-        self.forget_shadows(across);
-        self.mark(model, across);
+        noise.weigh_together(&mut self.cells, &mut self.together, across);
+        for sign in [1.0, -1.0] {
+            self.forget_shadows(across, sign);
+        }
     }
 
     /// What each cell shows, where it is known and its pixels say nothing by themselves.
@@ -136,38 +141,43 @@ impl Pooled {
         }
     }
 
-    /// Forgets cells that hang together with plain foreground.
-    fn forget_shadows(&mut self, across: usize) {
+    /// Forgets cells that tell of somebody lighter or darker, as `sign` says, and hang together with plain foreground. What is lighter and
+    /// what is darker never hang together: a shadow beside somebody's light clothes is not theirs.
+    fn forget_shadows(&mut self, across: usize, sign: f32) {
         let Cells { z, is_plain, .. } = &mut self.cells;
         self.looked_at.clear();
         self.looked_at.resize(z.len(), false);
         for first in 0..z.len() {
-            if !tells(z[first]) || self.looked_at[first] {
+            if !tells(sign * z[first]) || self.looked_at[first] {
                 continue;
             }
             self.component.clear();
             self.component.push(first);
             self.looked_at[first] = true;
-            let (mut next, mut plain) = (0, 0);
+            let mut next = 0;
             while let Some(&at) = self.component.get(next) {
                 next += 1;
-                plain += usize::from(is_plain[at]);
                 for near in neighbours(at, across, z.len()) {
-                    if !self.looked_at[near] && (is_plain[near] || tells(z[near])) {
+                    if !self.looked_at[near] && (is_plain[near] || tells(sign * z[near])) {
                         self.looked_at[near] = true;
                         self.component.push(near);
                     }
                 }
             }
-            if plain as f32 >= PLAIN * self.component.len() as f32 {
+            self.component.sort_unstable();
+            let rows = || self.component.chunk_by(|a, b| a / across == b / across);
+            let plain = rows().filter(|row| row.iter().any(|&at| is_plain[at])).count();
+            if plain as f32 >= PLAIN * rows().count() as f32 {
                 self.component.iter().for_each(|&at| z[at] = 0.0);
             }
         }
     }
 
-    /// Raises the likelihood of the pixels, between the middles of four cells each.
-    fn mark(&self, model: &mut Model, across: usize) {
-        let rows = || self.cells.z.chunks_exact(across.max(1));
+    /// Raises the likelihood of foreground in the `model` where cells tell of somebody, between the middles of four cells each: `within` a
+    /// box of the canvas, or everywhere.
+    pub fn mark(&self, model: &mut Model, within: Option<Rect>) {
+        let width = model.size.0;
+        let rows = || self.cells.z.chunks_exact((width / CELL).max(1));
         let mut lower_tells = rows().next().is_some_and(any_tells);
         for (y, (upper, lower)) in rows().zip(rows().skip(1)).enumerate() {
             // Most rows tell of nobody.
@@ -176,9 +186,13 @@ impl Pooled {
                 continue;
             }
             for (x, (upper, lower)) in upper.windows(2).zip(lower.windows(2)).enumerate() {
-                if upper.iter().chain(lower).any(|z| tells(*z)) {
-                    let corners = [upper[0], upper[1], lower[0], lower[1]];
-                    blend(model, corners, (x * CELL + CELL / 2, y * CELL + CELL / 2));
+                let first = (x * CELL + CELL / 2, y * CELL + CELL / 2);
+                let is_within = || {
+                    within
+                        .is_none_or(|within| within.contains(Point { x: first.0 as f64, y: first.1 as f64 }))
+                };
+                if upper.iter().chain(lower).any(|z| tells(z.abs())) && is_within() {
+                    blend(model, [upper[0], upper[1], lower[0], lower[1]], first);
                 }
             }
         }
@@ -188,13 +202,13 @@ impl Pooled {
 /// Whether so many deviations tell of somebody.
 #[inline(always)]
 fn tells(z: f32) -> bool {
-    z * z >= EVEN
+    z >= EVEN
 }
 
 /// Whether any of a row does.
 #[multiversion(targets("x86_64+avx2"))]
 fn any_tells(row: &[f32]) -> bool {
-    row.iter().fold(false, |any, z| any | tells(*z))
+    row.iter().fold(false, |any, z| any | tells(z.abs()))
 }
 
 /// The cells around one of a grid that is so many `across` and holds `count`.
@@ -213,7 +227,7 @@ fn blend(model: &mut Model, corners: [f32; 4], (left, top): (usize, usize)) {
         for column in 0..CELL {
             let z = from + (to - from) * (column as f32 + 0.5) / CELL as f32;
             let likelihood = &mut model.likelihood[(top + row) * model.size.0 + left + column];
-            *likelihood = (*likelihood).max((z * z * (f32::from(UNKNOWN) / EVEN)).min(255.0) as u8);
+            *likelihood = (*likelihood).max((z * z * (f32::from(UNKNOWN) / (EVEN * EVEN))).min(255.0) as u8);
         }
     }
 }
@@ -225,4 +239,46 @@ fn median(values: &mut [f32]) -> Option<f32> {
     }
     let middle = values.len() / 2;
     Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ACROSS: usize = 12;
+
+    /// What is left of six rows of somebody faint, two cells broad, where the first rows of the left one are plain.
+    fn left_of_somebody(plain_rows: usize) -> usize {
+        let mut pooled = Pooled::default();
+        pooled.cells.resize(ACROSS * 8);
+        for row in 1..7 {
+            let at = ACROSS * row + 4;
+            pooled.cells.is_plain[at] = row <= plain_rows;
+            pooled.cells.z[at] = if row <= plain_rows { 0.0 } else { -2.0 * EVEN };
+            pooled.cells.z[at + 1] = -2.0 * EVEN;
+        }
+        pooled.forget_shadows(ACROSS, -1.0);
+        pooled.cells.z.iter().filter(|z| **z != 0.0).count()
+    }
+
+    #[test]
+    fn what_is_faint_beside_somebody_is_their_shadow_and_below_their_head_it_is_they() {
+        assert_eq!(left_of_somebody(6), 0, "a shadow");
+        assert_eq!(left_of_somebody(1), 11, "all but the head, which is plain");
+        assert_eq!(left_of_somebody(0), 12, "nothing of them is plain");
+    }
+
+    #[test]
+    fn what_is_lighter_hangs_together_with_nothing_darker() {
+        let mut pooled = Pooled::default();
+        pooled.cells.resize(ACROSS * 8);
+        for row in 1..7 {
+            let at = ACROSS * row + 4;
+            pooled.cells.is_plain[at] = row < 6;
+            (pooled.cells.z[at + 1], pooled.cells.z[at + 2]) = (-2.0 * EVEN, 2.0 * EVEN);
+        }
+        pooled.forget_shadows(ACROSS, -1.0);
+        let left: Vec<f32> = pooled.cells.z.iter().copied().filter(|z| *z != 0.0).collect();
+        assert_eq!(left, [2.0 * EVEN; 6], "the shadow goes, what is lighter stays");
+    }
 }
