@@ -53,7 +53,7 @@ impl Tracks {
                     track.see_alone(number, bounds, dt_s);
                     track.resize(bounds, dt_s);
                 } else {
-                    track.see_shared(number, sides != [false; 4]);
+                    track.see_shared(number, sides != [false; 4], dt_s);
                 }
             }
             for &index in &members {
@@ -98,6 +98,7 @@ impl Tracks {
         let is_smaller = |share: f32| part.height() < share * whole.height();
         (is_smaller(SMALL) && part.journey.alone_s < SMALL_APART_S)
             || (is_smaller(PART) && is_body && part.journey.alone_s < APART_S)
+            || are_parts_of_a_vehicle(part, whole)
     }
 
     /// What one track was belongs to another from now on, under the number of who was seen alone for longer.
@@ -125,6 +126,14 @@ impl Tracks {
             self.events.push((TrackChange::Merged, given_up, Some(kept)));
         }
     }
+}
+
+/// Whether a pole or a tree parted in two what is one, of those who are seen in one region: neither is upright, as somebody is, and one of
+/// them was not seen alone for as long as together with others.
+fn are_parts_of_a_vehicle(one: &Track, other: &Track) -> bool {
+    let is_broad = |track: &Track| track.bounds().width > BODY_ASPECT * track.height();
+    let is_mostly_shared = |track: &Track| track.journey.alone_s < track.journey.shared_s;
+    [one, other].into_iter().all(is_broad) && [one, other].into_iter().any(is_mostly_shared)
 }
 
 /// Whether two tracks are trunk and legs.

@@ -108,6 +108,36 @@ fn two_who_were_seen_as_one_are_two_once_they_part() {
     assert!(widths.len() == 2 && widths.iter().all(|width| (width - 40.0).abs() < 5.0), "{widths:?}");
 }
 
+/// A van comes in behind a pole, which parts it in two for a moment.
+#[test]
+fn a_van_that_was_seen_in_two_parts_is_one() {
+    let mut tracks = Tracks::default();
+    for n in 0..30 {
+        let x = 40.0 + 6.0 * n as f32;
+        let (rear, front) = (at(x, 100.0, 60.0, 55.0), at(x + 70.0, 104.0, 60.0, 51.0));
+        let regions = match n {
+            0..4 => vec![front],
+            4..8 => vec![rear, front],
+            _ => vec![rear | front],
+        };
+        seen_in(&mut tracks, &regions, STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [1]);
+    assert!(tracks.get(1).is_some_and(|van| (van.bounds().width - 130.0).abs() < 8.0));
+}
+
+#[test]
+fn two_who_walk_side_by_side_are_two_however_short_they_were_seen_apart() {
+    let mut tracks = Tracks::default();
+    for n in 0..60 {
+        let x = 40.0 + 4.0 * n as f32;
+        let (left, right) = (person(x), person(x + 42.0));
+        let regions = if n < 10 { vec![left, right] } else { vec![left | right] };
+        seen_in(&mut tracks, &regions, STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [1, 2]);
+}
+
 #[test]
 fn trunk_and_legs_that_were_never_seen_together_become_one() {
     let mut tracks = Tracks::default();

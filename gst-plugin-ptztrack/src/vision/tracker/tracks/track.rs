@@ -70,8 +70,9 @@ pub(in super::super) struct Journey {
     pub age_s: f64,
     /// Since it was last seen, alone or not.
     pub unseen_s: f64,
-    /// How long it was seen alone.
+    /// How long it was seen alone, and in one region with others.
     pub alone_s: f64,
+    pub shared_s: f64,
     /// Pictures in which it was seen, and those in a row in which it was seen alone.
     pub pictures: u32,
     pub in_a_row: u32,
@@ -126,6 +127,7 @@ impl Track {
                 age_s: 0.0,
                 unseen_s: 0.0,
                 alone_s: 0.0,
+                shared_s: 0.0,
                 pictures: 1,
                 in_a_row: 1,
                 unlike_s: 0.0,
@@ -261,8 +263,9 @@ impl Track {
     }
 
     /// Is in a region with others.
-    pub fn see_shared(&mut self, number: usize, measured: bool) {
+    pub fn see_shared(&mut self, number: usize, measured: bool, dt_s: f64) {
         self.see(Evidence::Shared(number, measured));
+        self.journey.shared_s += dt_s;
         self.journey.in_a_row = 0;
     }
 
