@@ -30,9 +30,13 @@ pub struct Entry {
     pub looks: Option<Looks>,
 }
 
-/// What an [`Entry`] is read from, but for its path, which is longer than all the rest.
+/// What an [`Entry`] is read from, but for its path, which is longer than all the rest. They are asked for by their places: names would
+/// be compared in each row.
 const BRIEF: &str = "id, camera, run_ms, track, from_ms, to_ms, way_deg, file, offset_ms, looks, \
      quality IS NOT NULL AS has_picture";
+
+/// The place of the path, behind those.
+const PATH: usize = 11;
 
 /// All that an [`Entry`] is read from.
 pub(crate) fn columns() -> String {
@@ -136,33 +140,28 @@ pub(crate) fn entry(row: &Row) -> rusqlite::Result<Entry> {
 }
 
 fn path(row: &Row) -> rusqlite::Result<Vec<Step>> {
-    let bytes = row.get_ref("path")?.as_blob()?;
-    postcard::from_bytes(bytes)
-        .map_err(|err| rusqlite::Error::FromSqlConversionFailure(11, rusqlite::types::Type::Blob, err.into()))
+    let bytes = row.get_ref(PATH)?.as_blob()?;
+    postcard::from_bytes(bytes).map_err(|err| {
+        rusqlite::Error::FromSqlConversionFailure(PATH, rusqlite::types::Type::Blob, err.into())
+    })
 }
 
 fn pathless(row: &Row) -> rusqlite::Result<Entry> {
-    let file: Option<String> = row.get("file")?;
+    let file: Option<String> = row.get(7)?;
     let recording = match file {
-        Some(file) => Some(Pointer { file: file.into(), offset_ms: row.get("offset_ms")? }),
+        Some(file) => Some(Pointer { file: file.into(), offset_ms: row.get(8)? }),
         None => None,
     };
     let sighting = Sighting {
-        camera: row.get("camera")?,
-        run_ms: row.get("run_ms")?,
-        track: row.get::<_, i64>("track")?.unsigned_abs(),
-        from_ms: row.get("from_ms")?,
-        to_ms: row.get("to_ms")?,
+        camera: row.get(1)?,
+        run_ms: row.get(2)?,
+        track: row.get::<_, i64>(3)?.unsigned_abs(),
+        from_ms: row.get(4)?,
+        to_ms: row.get(5)?,
         path: Vec::new(),
         picture: None,
         recording,
     };
-    let looks = row.get::<_, Option<Vec<u8>>>("looks")?.map(Looks::from);
-    Ok(Entry {
-        id: row.get("id")?,
-        sighting,
-        way_deg: row.get("way_deg")?,
-        has_picture: row.get("has_picture")?,
-        looks,
-    })
+    let looks = row.get::<_, Option<Vec<u8>>>(9)?.map(Looks::from);
+    Ok(Entry { id: row.get(0)?, sighting, way_deg: row.get(6)?, has_picture: row.get(10)?, looks })
 }

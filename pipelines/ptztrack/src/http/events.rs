@@ -14,8 +14,7 @@ use axum::response::{IntoResponse, Response};
 use axum::routing::{get, post};
 use events::{Area, Entry, Error, Filter, Reader, Sighting, Store};
 use futures_util::{StreamExt, stream};
-use serde::Deserialize;
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 
 use super::html;
 use crate::camera::recording::{self, Clip, Form, NoClip, Purpose};
@@ -109,23 +108,49 @@ impl Wanted {
 async fn list(asked: Asked, Query(wanted): Query<Wanted>) -> Response {
     let zones: Vec<_> = asked.zones.iter().map(|zone| zone.name.clone()).collect();
     let list = move |found: Found, reader: &Reader| {
-        let events: Vec<_> = found.iter().map(|(entry, likeness)| describe(entry, *likeness)).collect();
-        Ok(json!({ "cameras": reader.cameras()?, "zones": zones, "events": events }).to_string())
+        let events = found.iter().map(|(entry, likeness)| Told::of(entry, *likeness)).collect();
+        let list = List { cameras: reader.cameras()?, zones, events };
+        // It has nothing that JSON does not have.
+        Ok(serde_json::to_string(&list).unwrap_or_default())
     };
     find(asked, wanted, list).await.map_or_else(|refusal| refusal, |text| answer("application/json", text))
 }
 
-fn describe(entry: &Entry, likeness: Option<f64>) -> Value {
-    json!({
-        "id": entry.id,
-        "camera": entry.sighting.camera,
-        "from": entry.sighting.from_ms,
-        "to": entry.sighting.to_ms,
-        "way": entry.way_deg,
-        "picture": entry.has_picture,
-        "recorded": entry.sighting.recording.is_some(),
-        "likeness": likeness,
-    })
+/// What the page is told.
+#[derive(Debug, Serialize)]
+struct List<'a> {
+    cameras: Vec<String>,
+    zones: Vec<String>,
+    events: Vec<Told<'a>>,
+}
+
+/// And of one of them.
+#[derive(Debug, Serialize)]
+struct Told<'a> {
+    id: i64,
+    camera: &'a str,
+    from: i64,
+    to: i64,
+    way: f64,
+    picture: bool,
+    recorded: bool,
+    likeness: Option<f64>,
+}
+
+impl<'a> Told<'a> {
+    fn of(entry: &'a Entry, likeness: Option<f64>) -> Self {
+        let sighting = &entry.sighting;
+        Self {
+            id: entry.id,
+            camera: &sighting.camera,
+            from: sighting.from_ms,
+            to: sighting.to_ms,
+            way: entry.way_deg,
+            picture: entry.has_picture,
+            recorded: sighting.recording.is_some(),
+            likeness,
+        }
+    }
 }
 
 async fn csv(asked: Asked, Query(wanted): Query<Wanted>) -> Response {
