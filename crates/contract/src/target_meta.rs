@@ -27,6 +27,9 @@ pub struct TargetMeta {
     pub velocity: Vector,
     /// Motion of the background in the picture, same unit; `None` where it could not be seen.
     pub ego_velocity: Option<Vector>,
+    /// How fast the background grows as the camera zooms in: the logarithm of its magnification, per second of time; `None` where it
+    /// could not be seen.
+    pub ego_zoom: Option<f64>,
     /// For how long the picture has shown the same, camera and people at rest alike; `None` where nobody looked.
     pub unchanged_for: Option<gst::ClockTime>,
     /// 0 (a guess) to 1 (certain).
@@ -49,6 +52,7 @@ impl Default for TargetMeta {
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
+            ego_zoom: None,
             unchanged_for: None,
             confidence: 0.0,
             features: Vec::new(),
@@ -69,6 +73,9 @@ impl BufferMeta for TargetMeta {
         structure.set("velocity", codec::vector(self.velocity));
         if let Some(ego) = self.ego_velocity {
             structure.set("ego-velocity", codec::vector(ego));
+        }
+        if let Some(zoom) = self.ego_zoom {
+            structure.set("ego-zoom", zoom);
         }
         if let Some(time) = self.unchanged_for {
             structure.set("unchanged-for", time);
@@ -100,6 +107,7 @@ impl BufferMeta for TargetMeta {
             centroid: reader.point("centroid")?,
             velocity: reader.vector("velocity")?,
             ego_velocity: reader.vector_optional("ego-velocity")?,
+            ego_zoom: reader.number_optional("ego-zoom")?,
             unchanged_for: reader.get_optional("unchanged-for")?,
             confidence: reader.number("confidence")?,
             features: features.collect(),

@@ -82,6 +82,7 @@ prop_compose! {
         centroid in point(),
         velocity in vector(),
         ego_velocity in prop::option::of(vector()),
+        ego_zoom in prop::option::of(number()),
         unchanged_for in prop::option::of(clock_time()),
         confidence in 0.0..1.0f64,
         features in prop::collection::vec((point(), any::<bool>()), 0..20),
@@ -90,7 +91,7 @@ prop_compose! {
     ) -> TargetMeta {
         let features = features.into_iter().map(|(position, kept)| Feature { position, kept }).collect();
         TargetMeta {
-            state, id, bounds, centroid, velocity, ego_velocity, unchanged_for, confidence, features, aspect, capture_time,
+            state, id, bounds, centroid, velocity, ego_velocity, ego_zoom, unchanged_for, confidence, features, aspect, capture_time,
         }
     }
 }

@@ -63,6 +63,7 @@ pub trait Measuring: PtzSink {
                 bounds: target.bounds,
                 velocity: target.velocity,
                 ego_velocity: target.ego_velocity,
+                ego_zoom: target.ego_zoom,
                 unchanged_for: target.unchanged_for.map(Duration::from),
                 size: picture.size,
                 aspect: picture.aspect,

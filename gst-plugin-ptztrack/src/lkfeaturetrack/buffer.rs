@@ -91,6 +91,7 @@ pub(super) fn attach(
         centroid: tracked.centroid,
         velocity: tracked.velocity,
         ego_velocity: tracked.ego_velocity,
+        ego_zoom: tracked.ego_zoom,
         unchanged_for: tracked.unchanged_for.and_then(|time| time.try_into().ok()),
         confidence: tracked.confidence,
         features: tracked.features,

@@ -43,6 +43,8 @@ pub struct Measurement {
     pub velocity: Vector,
     /// The background's motion in the picture, same unit, where it was seen.
     pub ego_velocity: Option<Vector>,
+    /// The logarithm of the background's magnification per second, where it was seen.
+    pub ego_zoom: Option<f64>,
     /// For how long the picture has shown the same, where that was seen.
     pub unchanged_for: Option<Duration>,
     /// Size of the picture in pixels.
@@ -54,6 +56,14 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// What the background would show had the camera only turned; `None` where it was not seen.
+    pub fn without_zoom(&self) -> Option<Self> {
+        let (turned, zoom) = self.ego_velocity.zip(self.ego_zoom)?;
+        let Point { x, y } = self.centroid;
+        let ego_velocity = Vector { x: turned.x - zoom * (x - 0.5), y: turned.y - zoom * (y - 0.5) };
+        Some(Self { ego_velocity: Some(ego_velocity), ..*self })
+    }
+
     /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.
     pub fn at(x: f64, y: f64, taken_at: Time) -> Self {
         Self {
@@ -63,6 +73,7 @@ impl Measurement {
             bounds: Rect { x: x - 0.05, y: y - 0.1, width: 0.1, height: 0.2 },
             velocity: Vector::default(),
             ego_velocity: None,
+            ego_zoom: None,
             unchanged_for: None,
             size: (640, 480),
             aspect: 4.0 / 3.0,

@@ -50,6 +50,12 @@ impl EgoMotion {
         around(self.apply(centre(bounds)), bounds.width * scale, bounds.height * scale)
     }
 
+    /// How much larger things are shown, whichever way the camera turned: at the middle of the way that `middle`, that of the picture,
+    /// went, where a turn enlarges nothing.
+    pub fn magnification(&self, middle: Point2f) -> f32 {
+        self.scale_at(middle - self.at(middle) / 2.0)
+    }
+
     /// How the size of things changed at `point`: towards the sides of the picture a turning camera enlarges.
     pub fn scale_at(&self, point: Point2f) -> f32 {
         let [[a, b, c], [d, e, f], [g, h, i]] = self.0.0;

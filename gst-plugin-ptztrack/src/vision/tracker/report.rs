@@ -9,6 +9,7 @@ use ptztrack_contract::{
     Feature, Point, Rect, ReleaseReason, TargetChange, TargetState, TrackChange, TrackState, Vector,
 };
 
+use super::ego_motion::EgoMotion;
 use super::geometry::{Frame, centre};
 use super::group::GroupEstimate;
 use super::target::Follow;
@@ -44,6 +45,8 @@ pub struct Tracked {
     pub velocity: Vector,
     /// Motion of the background at its place, where that could be seen.
     pub ego_velocity: Option<Vector>,
+    /// The logarithm of the background's magnification, per second, where that could be seen.
+    pub ego_zoom: Option<f64>,
     /// For how long the picture has shown the same, where that was seen.
     pub unchanged_for: Option<Duration>,
     /// 0 to 1.
@@ -73,6 +76,14 @@ impl Tracked {
         self.velocity = frame.vector(estimate.own_velocity + ego.unwrap_or_default());
         self.ego_velocity = ego.map(|ego| frame.vector(ego));
         self.confidence = f64::from(estimate.confidence);
+    }
+
+    /// Tells how the background moves, `dt_s` after the last picture: without a target in the middle of the picture.
+    pub(super) fn tell_of_background(&mut self, ego: EgoMotion, dt_s: f64, frame: Frame) {
+        let middle = centre(frame.bounds());
+        self.ego_velocity.get_or_insert_with(|| frame.vector(ego.at(middle) / dt_s as f32));
+        self.ego_zoom =
+            Some(f64::from(ego.magnification(middle)).ln() / dt_s).filter(|zoom| zoom.is_finite());
     }
 
     /// Tells of a group in place of the target in it.
@@ -114,6 +125,7 @@ impl Default for Tracked {
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
+            ego_zoom: None,
             unchanged_for: None,
             confidence: 0.0,
             features: Vec::new(),

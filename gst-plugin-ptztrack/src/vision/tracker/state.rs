@@ -162,6 +162,9 @@ impl Tracker {
         self.follow_group(phase.target(), seen, dt_s, frame, &mut tracked);
         self.tell_of_everybody(phase.target().unwrap_or(0), frame, &mut tracked);
         self.phase = phase;
+        if let Some(ego) = EgoMotion::of(seen).filter(|_| same_stream) {
+            tracked.tell_of_background(ego, dt_s, frame);
+        }
         let scene = seen.scene.as_ref();
         tracked.unchanged_for = scene.map(|scene| self.stillness.see(&scene.luma, dt_s));
         Ok(tracked)

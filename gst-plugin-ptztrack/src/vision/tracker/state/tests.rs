@@ -125,6 +125,37 @@ fn the_panning_camera_does_not_drag_the_walker() {
     }
 }
 
+/// Whether anybody is followed or not, and however the camera turns meanwhile.
+#[test]
+fn how_fast_the_background_grows_is_told() {
+    for (growth, pan, is_followed) in
+        [(0.01, 0.0, true), (-0.02, 0.0, false), (0.0, -9.0, false), (0.005, 6.0, true)]
+    {
+        let view = |n: u32, person: bool| {
+            let (scale, shift) = (f32::powf(1.0 + growth, n as f32), pan * n as f32);
+            let middle = (SIZE.0 as f32 / 2.0, SIZE.1 as f32 / 2.0);
+            let mut picture = Scene::new(SIZE.0, SIZE.1).warped(|x, y| {
+                (middle.0 + (x - middle.0) / scale - shift, middle.1 + (y - middle.1) / scale)
+            });
+            if person {
+                picture.paint(Rect2f::new(200.0, 100.0, PERSON.0, PERSON.1), 7);
+            }
+            picture
+        };
+        let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+        let somebody = [detection(Rect2f::new(200.0, 100.0, PERSON.0, PERSON.1))];
+        chain.process(&view(0, is_followed), DT, if is_followed { &somebody } else { &[] });
+        for n in 1..20 {
+            let tracked = step(&mut chain, &view(n, is_followed));
+            assert_eq!(tracked.id > 0, is_followed);
+            let zoom = tracked.ego_zoom.expect("textured");
+            let expected = f64::from(1.0 + growth).ln() / DT;
+            assert!((zoom - expected).abs() < 0.02, "{growth}, {pan}: {zoom} for {expected}");
+            assert!(tracked.ego_velocity.is_some());
+        }
+    }
+}
+
 #[test]
 fn somebody_standing_is_kept_under_a_camera_that_starts_to_pan() {
     let mut tracker = following(Profile::Robust, &street((0.0, 0.0), &[(200.0, 100.0, 7)]), 200.0, 100.0);
