@@ -10,10 +10,13 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use common::stage::{Shown, Stage, mean_distance, pacing};
+use common::stage::{FRAME, Shown, Stage, departing, mean_distance, pacing, seen};
 use common::{Heard, Rig, target};
-use ptztrack_contract::TargetState;
-use virtual_camera::{Auth, Kinematics, OnvifSettings, ProportionalSpeed, Quirk, Settings, SpeedMap};
+use ptztrack_contract::{TargetMeta, TargetState, Vector};
+use virtual_camera::{
+    Auth, Kinematics, OnvifSettings, Pose, ProportionalSpeed, Quirk, Settings, SpeedMap, SyntheticSettings,
+    World,
+};
 
 /// How long somebody is followed: to and fro, and to and fro again.
 const FOLLOWED_S: f64 = 60.0;
@@ -50,7 +53,7 @@ fn each<T: Copy + Sync>(cases: &[T], test: impl Fn(T) + Sync) {
 fn follow(what: &str, settings: Settings) -> (Vec<Shown>, Stage) {
     let mut stage = Stage::new(settings, log_in);
     let shown = stage.follow(FOLLOWED_S);
-    let pictures = (FOLLOWED_S / common::stage::FRAME.as_secs_f64()).round() as usize;
+    let pictures = (FOLLOWED_S / FRAME.as_secs_f64()).round() as usize;
     assert!(shown.len() >= pictures - 5, "{what}: seen in {} of {pictures} pictures", shown.len());
     assert!(stage.heard.iter().all(|heard| !matches!(heard, Heard::Error(_))), "{what}: {:?}", stage.heard);
     stage.run(8.0, &target(TargetState::Searching, 0.5, 0.5));
@@ -143,4 +146,105 @@ fn a_mirrored_pan_is_corrected_within_five_seconds() {
         let told = |heard: &Heard| matches!(heard, Heard::Info(text) if text.contains("invert-pan"));
         assert!(stage.heard.iter().any(told), "{delay_ms} ms late");
     });
+}
+
+/// How tall somebody is to be kept.
+const TARGET_HEIGHT: f64 = 0.5;
+
+/// Before somebody who walks away, with `auto-zoom`.
+fn zooming(settings: Settings) -> Stage {
+    let world = SyntheticSettings { wide_fov_deg: 55.2, ..SyntheticSettings::default() };
+    let settings = Settings { world: World::Synthetic(world), home: Some(Pose::default()), ..settings };
+    Stage::new(settings, |rig| log_in(rig).with("auto-zoom", true).with("target-height", TARGET_HEIGHT))
+}
+
+/// What a tracker says of the next picture: of who walks away, and of the background.
+fn departs(stage: &mut Stage) -> TargetMeta {
+    let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
+    stage.camera.advance_to(stage.now + FRAME);
+    let before = exposure.saturating_sub(FRAME);
+    let meta =
+        seen(stage, exposure, departing(exposure)).unwrap_or_else(|| panic!("lost after {:?}", stage.now));
+    let was = seen(stage, before, departing(before)).unwrap_or_else(|| meta.clone());
+    let turned = seen(stage, exposure, departing(before)).unwrap_or_else(|| meta.clone());
+    let per_s = |to: &TargetMeta| Vector {
+        x: (to.centroid.x - was.centroid.x) / FRAME.as_secs_f64(),
+        y: (to.centroid.y - was.centroid.y) / FRAME.as_secs_f64(),
+    };
+    let ego_zoom = Some(stage.growth(before, exposure));
+    TargetMeta { velocity: per_s(&meta), ego_velocity: Some(per_s(&turned)), ego_zoom, ..meta }
+}
+
+/// Whoever walks away is followed for half a minute; returns the least and the greatest height meanwhile, once it began.
+fn walk_away(stage: &mut Stage) -> (f64, f64) {
+    let (mut least, mut most) = (f64::INFINITY, 0.0f64);
+    while stage.now < Duration::from_secs(30) {
+        let meta = departs(stage);
+        stage.picture(Some(&meta));
+        if stage.now > Duration::from_secs(6) {
+            (least, most) = (least.min(meta.bounds.height), most.max(meta.bounds.height));
+        }
+    }
+    (least, most)
+}
+
+/// Nobody is there, and the background is seen; for so long.
+fn nobody(stage: &mut Stage, seconds: u64) {
+    let end = stage.now + Duration::from_secs(seconds);
+    while stage.now < end {
+        let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
+        stage.camera.advance_to(stage.now + FRAME);
+        let ego_zoom = Some(stage.growth(exposure.saturating_sub(FRAME), exposure));
+        let ego_velocity = Some(Vector::default());
+        stage.picture(Some(&TargetMeta {
+            ego_velocity,
+            ego_zoom,
+            ..target(TargetState::Searching, 0.5, 0.5)
+        }));
+    }
+}
+
+/// By what the picture shows: the camera tells nothing of its lens. Once nobody is there the view is as wide as it goes again.
+#[test]
+fn somebody_who_walks_away_stays_as_tall() {
+    let quirks = Quirk::ALL.iter().copied().filter(|quirk| *quirk != Quirk::ZoomBreaks).map(Some);
+    let cases: Vec<_> = quirks.chain([None]).collect();
+    each(&cases, |quirk| {
+        let what = quirk.map_or("as specified", Quirk::switch);
+        // Half a second late, nobody knows how tall they are by now.
+        let tolerance = if quirk == Some(Quirk::Late) { 0.5 } else { 0.2 };
+        let mut stage = zooming(camera(OnvifSettings::with(quirk.as_slice()), 120.0));
+        let (least, most) = walk_away(&mut stage);
+        let parts = (least / TARGET_HEIGHT, most / TARGET_HEIGHT);
+        assert!(parts.0 > 1.0 - tolerance && parts.1 < 1.0 + tolerance, "{what}: {parts:?}");
+        assert!(stage.camera.status().zoom_step > 500.0, "{what}: {:?}", stage.camera.status());
+        nobody(&mut stage, 30);
+        let status = stage.camera.status();
+        assert!(!status.moving && status.zoom_step < 10.0, "{what}: {status:?}, {:?}", stage.moves());
+    });
+}
+
+/// What it was told it does, whatever it answers.
+#[test]
+fn a_zoom_that_breaks_the_answer_is_stopped_and_left_alone() {
+    for quirks in [
+        &[Quirk::ZoomBreaks][..],
+        &[Quirk::ZoomBreaks, Quirk::StopMissing],
+        &[Quirk::ZoomBreaks, Quirk::TimeoutIgnored],
+    ] {
+        let mut stage = zooming(camera(OnvifSettings::with(quirks), 120.0));
+        walk_away(&mut stage);
+        let zoom_step = stage.camera.status().zoom_step;
+        let told =
+            |heard: &Heard| matches!(heard, Heard::Warning(text) if text.contains("zoom is left alone"));
+        assert_eq!(
+            stage.heard.iter().filter(|heard| told(heard)).count(),
+            1,
+            "{quirks:?}: {:?}",
+            stage.heard
+        );
+        nobody(&mut stage, 10);
+        let status = stage.camera.status();
+        assert!(!status.moving && status.zoom_step == zoom_step, "{quirks:?}: {zoom_step}, then {status:?}");
+    }
 }

@@ -7,9 +7,9 @@ mod common;
 
 use std::time::Duration;
 
-use common::stage::{FRAME, Shown, Stage};
-use common::{Heard, target};
-use ptztrack_contract::{CameraChange, Rect, TargetMeta, TargetState, Vector};
+use common::Heard;
+use common::stage::{FRAME, Shown, Stage, departing, seen};
+use ptztrack_contract::{CameraChange, TargetMeta, Vector};
 use virtual_camera::{Kinematics, Pose, Settings, SyntheticSettings, Waypoint, World};
 
 fn before(path: &[(f64, f64)]) -> Stage {
@@ -51,31 +51,6 @@ fn a_step_in_the_targets_speed_is_met_without_overshoot() {
     let overshoots = (farthest(&walking[10..], -1.0), farthest(&standing, -1.0));
     assert!(overshoots.0 < 0.1 && overshoots.1 < 0.1, "{overshoots:?} of the half-width");
     assert!(farthest(&walking, 1.0) < 0.5, "{}", farthest(&walking, 1.0));
-}
-
-/// Somebody 1.75 m tall who stands 4 m away, walks off to 15 m at 1.2 m/s and somewhat aside, and stands there: how far
-/// away they are at a time, in metres, and to which pan.
-fn departing(time: Duration) -> (f64, f64) {
-    let walked = 1.2 * (time.as_secs_f64() - 8.0).clamp(0.0, 11.0 / 1.2);
-    let (far, aside) = (4.0 + walked, 0.2 * walked);
-    (far.hypot(aside), aside.atan2(far).to_degrees())
-}
-
-/// What a tracker says of somebody 1.75 m tall who is so far away and in that direction, where their middle is in the
-/// picture.
-fn seen(stage: &Stage, exposure: Duration, (distance_m, pan_deg): (f64, f64)) -> Option<TargetMeta> {
-    let pose = stage.camera.pose_at(exposure);
-    if (pan_deg - pose.pan_deg).to_radians().cos() <= 0.0 {
-        return None;
-    }
-    let wide = (stage.camera.optics().fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
-    let (right, down) = ((pan_deg - pose.pan_deg).to_radians().tan(), pose.tilt_deg.to_radians().tan());
-    let tall = wide * 240.0 / 320.0;
-    let (x, y) = (0.5 + right / (2.0 * wide), 0.5 + down / (2.0 * tall));
-    let height = (1.75 / distance_m / (2.0 * tall)).min(1.0);
-    let bounds = Rect { x: x - height / 8.0, y: y - height / 2.0, width: height / 4.0, height };
-    let visible = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
-    visible.then(|| TargetMeta { bounds, ..target(TargetState::Tracking, x, y) })
 }
 
 #[test]

@@ -157,6 +157,7 @@ impl Abilities {
     pub fn parameters(&self) -> Parameters {
         Parameters {
             continuous_pan: Some(self.spaces.is_empty() || self.space(PAN_TILT_VELOCITY, |_| true).is_some()),
+            continuous_zoom: Some(self.spaces.is_empty() || self.space(ZOOM_VELOCITY, |_| true).is_some()),
             absolute_pan: Some(self.limits().pan_deg.is_some()),
             ..Parameters::default()
         }
@@ -262,6 +263,7 @@ mod tests {
         assert_eq!(velocity.pan_tilt, Some((80.0, -10.0)));
         assert!(velocity.space.unwrap().ends_with("VelocitySpaceDegrees"));
         assert_eq!(abilities.attributes().unwrap().speeds[99].value, 80.0);
+        assert_eq!(abilities.parameters().continuous_zoom, Some(false), "of zoom it says nothing");
     }
 
     #[test]

@@ -13,7 +13,7 @@ use crate::answers::{
 };
 use crate::clock::CameraClock;
 use crate::messages;
-use crate::moves::{Moves, StopWords, moves_zoom};
+use crate::moves::{Moves, StopWords};
 use crate::soap::{Answer, Element, envelope, read_answer};
 use crate::streams::{Encoding, StreamAddress, VideoStream, parse_stream_address, parse_streams};
 use crate::token::security;
@@ -316,13 +316,13 @@ impl Client {
             Motion::Velocity { pan, tilt, zoom } => {
                 let zoom = zoom.filter(|_| self.moves.zooms());
                 let moved = self.move_at(&abilities.velocity((pan, tilt), zoom), abilities).await;
-                if moves_zoom(command) && zoom.is_some() {
+                if zoom.is_some() {
                     let broken = moved
                         .as_ref()
                         .is_err_and(|err| matches!(err, Error::Broken(_) | Error::Unexpected(_)));
                     self.moves.zoomed(broken);
                     if !self.moves.zooms() {
-                        self.warn("the camera breaks off where it is told to zoom: the zoom is left alone from here on");
+                        self.leave_zoom(abilities).await;
                     }
                 }
                 moved
@@ -370,6 +370,15 @@ impl Client {
         }
         self.warn_of_no_timeout();
         Ok(())
+    }
+
+    /// A camera that breaks off where it is told to zoom may zoom all the same: it is stopped in both ways, as no word of it tells.
+    async fn leave_zoom(&mut self, abilities: &Abilities) {
+        let still = abilities.velocity((0.0, 0.0), Some(0.0));
+        // What comes of these is seen in the moves that follow.
+        let _ = self.call(Path::Ptz, &messages::stop(self.profile())).await;
+        let _ = self.move_at(&still, abilities).await;
+        self.warn("the camera breaks off where it is told to zoom: the zoom is left alone from here on");
     }
 
     async fn stop(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {

@@ -1,8 +1,5 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use servo::Motion;
-use session::Command;
-
 /// By which words a camera is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopWords {
@@ -87,11 +84,6 @@ impl Moves {
     pub fn zoomed(&mut self, broken: bool) {
         self.broken_zooms = if broken { self.broken_zooms + 1 } else { 0 };
     }
-}
-
-/// Whether a command moves the zoom.
-pub fn moves_zoom(command: &Command) -> bool {
-    matches!(command, Command::Move { motion: Motion::Velocity { zoom: Some(zoom), .. }, .. } if *zoom != 0.0)
 }
 
 #[cfg(test)]

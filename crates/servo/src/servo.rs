@@ -109,7 +109,11 @@ impl Servo {
     /// oscillates.
     pub fn measure(&mut self, measurement: Measurement, actuator: &ActuatorStatus, now: Time) -> Option<f64> {
         let measurement = self.mounting().along_axes(measurement);
-        if self.heed_frozen_picture(&measurement) {
+        let is_frozen = self.heed_frozen_picture(&measurement);
+        if !is_frozen && self.zooms_by_picture() {
+            self.zoom.watch(&measurement, &self.delays());
+        }
+        if is_frozen {
             self.lose();
             self.home.not_alone();
             return None;
@@ -172,7 +176,13 @@ impl Servo {
     /// the picture otherwise.
     fn calibrate(&mut self, measurement: &Measurement, actuator: &ActuatorStatus, now: Time) -> bool {
         let zooms = self.zoom.moves(measurement.taken_at, &self.calibration.delays(), now);
-        if !self.settings.learn || actuator.access != Access::Ours || zooms {
+        let turned = match zooms {
+            false => Some(*measurement),
+            true if self.zooms_by_picture() => measurement.without_zoom(),
+            true => None,
+        };
+        let Some(measurement) = &turned else { return false };
+        if !self.settings.learn || actuator.access != Access::Ours {
             return false;
         }
         let maps = [&self.assumed_speeds(), &self.camera.speed_map];
@@ -247,6 +257,7 @@ impl Servo {
     /// Forgets the target; the camera is to be stopped, whatever it does.
     pub fn release(&mut self) {
         self.lose();
+        self.zoom.leave();
         self.home.interrupt();
     }
 
@@ -337,6 +348,20 @@ impl Servo {
         self.settings.target_height.map(|_| self.zoom.commands())
     }
 
+    /// Whether the zoom is known by what the picture shows only.
+    pub fn zooms_by_picture(&self) -> bool {
+        let ServoSettings { learn, learn_zoom, target_height, .. } = self.settings;
+        let capabilities = &self.camera.capabilities;
+        let zooms = capabilities.continuous_zoom != Some(false);
+        learn && learn_zoom && target_height.is_some() && zooms && capabilities.lens().is_none()
+    }
+
+    /// Whether the camera is to zoom, and cannot, by its own word or as the picture shows.
+    pub fn lacks_zoom(&self) -> bool {
+        let wanted = self.settings.learn_zoom && self.settings.target_height.is_some();
+        wanted && (self.camera.capabilities.continuous_zoom == Some(false) || self.zoom.is_fixed())
+    }
+
     /// Whether the last wish was held back at a limit.
     pub fn at_limit(&self) -> bool {
         self.limits.at_limit()
@@ -385,7 +410,8 @@ impl Servo {
 
     /// The field of view at a part of the zoom's travel, or at the last told one.
     fn fov_deg(&self, zoom: Option<f64>) -> f64 {
-        let assumed = match zoom {
+        let seen = || self.zoom.last_travel().filter(|_| self.zooms_by_picture());
+        let assumed = match zoom.or_else(seen) {
             Some(travel) => self.lens().fov_deg(travel),
             None => self.camera.fov_deg(self.settings.fov_deg),
         };
@@ -393,7 +419,18 @@ impl Servo {
     }
 
     fn lens(&self) -> Lens {
-        self.camera.capabilities.lens_or_fixed(self.settings.fov_deg)
+        let (capabilities, wide_fov_deg) = (&self.camera.capabilities, self.settings.fov_deg);
+        if self.zooms_by_picture() {
+            Capabilities::lens_by_picture(wide_fov_deg)
+        } else {
+            capabilities.lens_or_fixed(wide_fov_deg)
+        }
+    }
+
+    /// The lens to zoom by, where the camera tells of it or the picture does.
+    pub(super) fn zoom_lens(&self) -> Option<Lens> {
+        let by_picture = self.zooms_by_picture();
+        self.camera.capabilities.lens().or_else(|| by_picture.then(|| Capabilities::lens_by_picture(None)))
     }
 
     fn assume_speeds(&mut self) {

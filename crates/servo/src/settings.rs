@@ -41,6 +41,8 @@ pub struct ServoSettings {
     pub learn: bool,
     /// Whether it is learned too which way each axis turns the picture; slow until that is known.
     pub learn_axes: bool,
+    /// Whether the zoom of a camera that tells nothing of its lens is used by what the picture shows of it.
+    pub learn_zoom: bool,
     /// Where the camera waits for a target; `None`: where the last one left it.
     pub home: Option<Home>,
     /// It goes there when nobody was there for this long, ...
@@ -75,6 +77,7 @@ impl Default for ServoSettings {
             target_height: None,
             learn: true,
             learn_axes: false,
+            learn_zoom: false,
             home: None,
             home_timeout: Duration::from_secs(10),
             home_at_start: false,

@@ -19,6 +19,10 @@ pub struct ControlLoop {
     at_limit: bool,
     /// It was told that the limits of pan and tilt cannot be kept.
     limits_unkept: bool,
+    /// It was told that the camera cannot zoom.
+    lacks_zoom: bool,
+    /// It was told that the limits of the zoom cannot be kept.
+    zoom_limits_unkept: bool,
     events: Vec<LoopEvent>,
 }
 
@@ -31,6 +35,10 @@ pub enum LoopEvent {
     AtLimit,
     /// The camera does not tell where it looks: the limits of pan and tilt that are set cannot be kept.
     LimitsUnkept,
+    /// The camera is to zoom, and cannot, by its own word or as the picture shows.
+    NoZoom,
+    /// The camera tells nothing of its lens: the limits of the zoom that are set cannot be kept.
+    ZoomLimitsUnkept,
     /// The camera has no preset of the name that is to be its home.
     NoSuchPreset(String),
     /// An axis turns the picture otherwise than was set: it is steered accordingly from now on.
@@ -76,6 +84,8 @@ impl ControlLoop {
             overtaken: 0,
             at_limit: false,
             limits_unkept: false,
+            lacks_zoom: false,
+            zoom_limits_unkept: false,
             events,
         }
     }
@@ -90,7 +100,9 @@ impl ControlLoop {
 
     /// Takes the newest picture of the target.
     pub fn measure(&mut self, measurement: Measurement, now: Time) {
-        let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y));
+        // A zoom moves the picture's edges by half as much as it grows.
+        let zoom = measurement.ego_zoom.map_or(0.0, |zoom| zoom.abs() / 2.0);
+        let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y).max(zoom));
         self.session.see_background(shown, measurement.taken_at, now);
         let actuator = self.session.actuator(now);
         let overtakes = self.servo.is_behind();
@@ -110,6 +122,7 @@ impl ControlLoop {
             self.session.reorient();
             self.events.push(LoopEvent::Axes(finding));
         }
+        self.judge_zoom();
     }
 
     /// Forgets the target; the camera is to be stopped, whatever it does.
@@ -216,6 +229,19 @@ impl ControlLoop {
         let known = std::mem::replace(&mut self.limits_unkept, unkept);
         if unkept && !known {
             self.events.push(LoopEvent::LimitsUnkept);
+        }
+    }
+
+    fn judge_zoom(&mut self) {
+        let lacks = self.servo.lacks_zoom();
+        let known = std::mem::replace(&mut self.lacks_zoom, lacks);
+        if lacks && !known {
+            self.events.push(LoopEvent::NoZoom);
+        }
+        let unkept = self.servo.zooms_by_picture() && self.servo.settings().limits.bound_zoom();
+        let known = std::mem::replace(&mut self.zoom_limits_unkept, unkept);
+        if unkept && !known {
+            self.events.push(LoopEvent::ZoomLimitsUnkept);
         }
     }
 

@@ -79,6 +79,8 @@ pub struct Parameters {
     pub max_proportional_speed: Option<f64>,
     /// It can be moved by speed.
     pub continuous_pan: Option<bool>,
+    /// It can zoom at a speed.
+    pub continuous_zoom: Option<bool>,
     /// It can be moved to a position.
     pub absolute_pan: Option<bool>,
     /// Only who holds the control queue may move it.

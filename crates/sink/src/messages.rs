@@ -51,6 +51,16 @@ pub trait Telling: PtzSink {
                 gst::ResourceError::Settings,
                 ("the camera does not report its position, so `pan-min`, `pan-max`, `tilt-min` and `tilt-max` cannot be enforced. Set limits in the camera itself")
             ),
+            Event::Loop(LoopEvent::NoZoom) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera does not zoom, by its own word or as its picture shows: `auto-zoom` has no effect")
+            ),
+            Event::Loop(LoopEvent::ZoomLimitsUnkept) => gst::element_imp_warning!(
+                self,
+                gst::ResourceError::Settings,
+                ("the camera does not report what its zoom steps magnify, so `zoom-min` and `zoom-max` cannot be enforced. Set limits in the camera itself")
+            ),
             Event::Loop(LoopEvent::Axes(AxisFinding::Exchanged)) => gst::element_imp_info!(
                 self,
                 gst::ResourceError::Settings,

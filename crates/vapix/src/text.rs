@@ -79,6 +79,8 @@ pub fn parse_parameters(body: &str, camera: &str) -> Result<Parameters, Error> {
             .map(|percent| percent / 100.0)
             .filter(|fields_of_view| *fields_of_view > 0.0),
         continuous_pan: fields.flag(&format!("{support}ContinuousPan")),
+        // What it tells of its lens says as much.
+        continuous_zoom: None,
         absolute_pan: fields.flag(&format!("{support}AbsolutePan")),
         control_queue: fields.flag(&format!("{various}CtlQueueing")),
     })

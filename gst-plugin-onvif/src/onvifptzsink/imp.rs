@@ -71,6 +71,7 @@ fn defaults() -> Settings {
     let mut settings = Settings::new(PARTICULARS.environment);
     settings.servo.camera_speed_deg_s = FULL_SPEED_DEG_S;
     settings.servo.learn_axes = true;
+    settings.servo.learn_zoom = true;
     settings
 }
 

@@ -23,6 +23,8 @@
 //! * The position is used where the camera tells it in degrees. Without it the limits of pan and tilt cannot be kept, and
 //!   an operator is not noticed. A camera that takes too long to tell it is not asked any more.
 //! * How fast the camera turns at full velocity is learned from the picture, beginning at `camera-speed`.
+//! * With `auto-zoom` the camera zooms by what the picture shows, as it tells nothing of its lens: `zoom-min` and `zoom-max`
+//!   cannot be kept. While nobody is there the view is widened.
 //! * There is no control queue, and no mode that centres on a pixel.
 //!
 //! User and password are taken from `user` and `password`, from `location`, or from the environment variables `ONVIF_USER`

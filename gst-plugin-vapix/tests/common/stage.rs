@@ -174,8 +174,15 @@ impl Stage {
             velocity: per_s(from, bounds),
             // Of the place where the person was: what the camera alone did.
             ego_velocity: Some(per_s(from, turned)),
+            ego_zoom: Some(self.growth(before, exposure)),
             ..target(TargetState::Tracking, x, y)
         })
+    }
+
+    /// How fast the picture grows from one moment to the next, as a logarithm per second.
+    pub fn growth(&self, before: Duration, exposure: Duration) -> f64 {
+        let magnification = |time| self.camera.optics().magnification(self.camera.pose_at(time).zoom_step);
+        (magnification(exposure) / magnification(before)).ln() / FRAME.as_secs_f64()
     }
 
     /// The person of a moment as seen from where the camera looked at another, in pixels.
@@ -206,4 +213,29 @@ fn frames(seconds: f64) -> u32 {
 fn middle(bounds: &Bounds) -> (f64, f64) {
     let (x, y) = bounds.centre();
     (x / f64::from(SIZE.0), y / f64::from(SIZE.1))
+}
+
+/// Somebody 1.75 m tall who stands 4 m away, walks off to 15 m at 1.2 m/s and somewhat aside, and stands there: how far
+/// away they are at a time, in metres, and to which pan.
+pub fn departing(time: Duration) -> (f64, f64) {
+    let walked = 1.2 * (time.as_secs_f64() - 8.0).clamp(0.0, 11.0 / 1.2);
+    let (far, aside) = (4.0 + walked, 0.2 * walked);
+    (far.hypot(aside), aside.atan2(far).to_degrees())
+}
+
+/// What a tracker says of somebody 1.75 m tall who is so far away and in that direction, where their middle is in the
+/// picture.
+pub fn seen(stage: &Stage, exposure: Duration, (distance_m, pan_deg): (f64, f64)) -> Option<TargetMeta> {
+    let pose = stage.camera.pose_at(exposure);
+    if (pan_deg - pose.pan_deg).to_radians().cos() <= 0.0 {
+        return None;
+    }
+    let wide = (stage.camera.optics().fov_deg(pose.zoom_step) / 2.0).to_radians().tan();
+    let (right, down) = ((pan_deg - pose.pan_deg).to_radians().tan(), pose.tilt_deg.to_radians().tan());
+    let tall = wide * 240.0 / 320.0;
+    let (x, y) = (0.5 + right / (2.0 * wide), 0.5 + down / (2.0 * tall));
+    let height = (1.75 / distance_m / (2.0 * tall)).min(1.0);
+    let bounds = Rect { x: x - height / 8.0, y: y - height / 2.0, width: height / 4.0, height };
+    let visible = (0.0..1.0).contains(&x) && (0.0..1.0).contains(&y);
+    visible.then(|| TargetMeta { bounds, ..target(TargetState::Tracking, x, y) })
 }

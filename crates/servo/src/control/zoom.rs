@@ -47,7 +47,7 @@ impl ZoomController {
     const FASTEST: f64 = 0.6;
 
     /// ... and that with which the view is widened when the target is not seen well.
-    const WIDENING: f64 = 0.4;
+    pub(super) const WIDENING: f64 = 0.4;
 
     /// A height this much off, as a logarithm, is tolerated while the zoom rests ...
     const START: f64 = 0.09;
@@ -88,6 +88,13 @@ impl ZoomController {
     fn seen_for(&self) -> Duration {
         let pairs = self.sizes.iter().zip(self.sizes.iter().skip(1));
         pairs.map(|((before, _), (after, _))| (*after - *before).min(Self::PAUSE)).sum()
+    }
+
+    /// A magnification of this logarithm is none from now on.
+    pub fn count_from(&mut self, logarithm: f64) {
+        for (_, size) in &mut self.sizes {
+            *size += logarithm;
+        }
     }
 
     /// Forgets the target.

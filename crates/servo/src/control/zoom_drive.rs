@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::zoom::ZoomController;
 use crate::Time;
-use crate::estimation::{Measurement, ZoomEstimator};
+use crate::estimation::{MagnificationEstimator, Measurement, ZoomEstimator};
 use crate::model::{CommandHistory, Delays, Lens, Range, SpeedMap};
 
 /// Turns the wish for a target of some height into zoom speeds and places of one lens.
@@ -12,6 +12,10 @@ use crate::model::{CommandHistory, Delays, Lens, Range, SpeedMap};
 pub struct ZoomDrive {
     controller: ZoomController,
     track: ZoomEstimator,
+    /// Of a lens of which the camera tells nothing.
+    seen: Option<MagnificationEstimator>,
+    /// It zoomed in since it was last as wide as it goes.
+    narrowed: bool,
 }
 
 /// What is wanted of the zoom.
@@ -38,6 +42,46 @@ impl ZoomDrive {
     /// A rate of the magnification is made a zoom speed over this time: where the lens ends, the speed runs out.
     const AHEAD_S: f64 = 0.25;
 
+    /// Takes a picture, with somebody in it or not, of a lens of which the camera tells nothing.
+    pub fn watch(&mut self, measurement: &Measurement, delays: &Delays) {
+        let seen = self.seen.get_or_insert_with(|| {
+            self.track = ZoomEstimator::of_magnification();
+            MagnificationEstimator::default()
+        });
+        if let Some(widest) = seen.see(measurement.ego_zoom, measurement.taken_at, &mut self.track, delays) {
+            self.controller.count_from(widest);
+            self.narrowed = false;
+        }
+    }
+
+    /// How far such a lens goes, as far as that was seen.
+    pub fn ends(&self) -> Range {
+        self.seen.as_ref().map_or(Range { min: 0.0, max: 0.0 }, MagnificationEstimator::ends)
+    }
+
+    /// Whether such a lens was seen to go nowhere.
+    pub fn is_fixed(&self) -> bool {
+        self.seen.as_ref().is_some_and(MagnificationEstimator::is_fixed)
+    }
+
+    /// The zoom speed that widens the view of such a lens, while nobody is there; `None`: it is as wide as it goes, or no picture
+    /// would show that it is.
+    pub fn widening(&self, now: Time) -> Option<f64> {
+        let is_shown = |seen: &MagnificationEstimator| seen.is_seen(now) && !seen.is_fixed();
+        let wanted = self.narrowed && self.seen.as_ref().is_some_and(is_shown);
+        wanted.then(|| self.part(-ZoomController::WIDENING))
+    }
+
+    /// It stays as it is, however narrow the view is.
+    pub fn leave(&mut self) {
+        self.narrowed = false;
+    }
+
+    /// The part of the zoom's travel that the last picture showed, or the camera last told.
+    pub fn last_travel(&self) -> Option<f64> {
+        self.track.last()
+    }
+
     /// Takes a picture.
     pub fn see(&mut self, measurement: &Measurement, lens: &Lens, delays: &Delays) {
         if let Some(travel) = self.travel_shown(measurement.taken_at, delays) {
@@ -53,6 +97,7 @@ impl ZoomDrive {
     /// What holds at any time.
     pub fn check_invariants(&self) {
         self.controller.check_invariants();
+        self.seen.iter().for_each(MagnificationEstimator::check_invariants);
         self.track.commands().check_invariants();
     }
 
@@ -65,6 +110,7 @@ impl ZoomDrive {
 
     /// From then on the zoom moves at a part of its fastest.
     pub fn commanded(&mut self, at: Time, speed: f64) {
+        self.narrowed |= speed > 0.0;
         self.track.commanded(at, speed);
     }
 
@@ -85,7 +131,16 @@ impl ZoomDrive {
 
     /// The part of the zoom's travel that a picture shows.
     pub fn travel_shown(&self, taken_at: Time, delays: &Delays) -> Option<f64> {
-        self.track.travel(delays.sent_by(taken_at), delays)
+        self.travel(delays.sent_by(taken_at), delays)
+    }
+
+    /// The part of the zoom's travel that comes of the commands sent until then.
+    fn travel(&self, sent_until: Time, delays: &Delays) -> Option<f64> {
+        match &self.seen {
+            Some(seen) if seen.is_at_rest() => self.track.last(),
+            Some(seen) => self.track.travel(sent_until, delays).map(|travel| seen.ends().nearest(travel)),
+            None => self.track.travel(sent_until, delays),
+        }
     }
 
     /// The zoom speed for a command sent now, -1 to 1 in hundredths; `None` where the camera does not tell its zoom.
@@ -97,13 +152,19 @@ impl ZoomDrive {
         delays: &Delays,
         now: Time,
     ) -> Option<f64> {
-        let travel = self.track.travel(now, delays)?;
+        let travel = self.travel(now, delays)?;
         let lead = now - measurement.taken_at + delays.sum();
         let rate = self.controller.rate(goal.target_height, lens.magnification(travel), lead);
         let there = lens.travel_magnified(travel, (rate * Self::AHEAD_S).exp())?;
         let per_s = (goal.travel.nearest(there) - travel) / Self::AHEAD_S;
-        let part = (per_s / self.track.fastest_per_s()).clamp(-1.0, 1.0);
-        Some(SpeedMap::part(SpeedMap::level_of(part)))
+        Some(self.part(per_s))
+    }
+
+    /// The part of the fastest, in hundredths, that is so much of the travel per second.
+    fn part(&self, per_s: f64) -> f64 {
+        let boost = self.seen.as_ref().map_or(1.0, |seen| seen.boost(per_s));
+        let part = (boost * per_s / self.track.fastest_per_s()).clamp(-1.0, 1.0);
+        SpeedMap::part(SpeedMap::level_of(part))
     }
 
     /// The zoom to do at once, for the height to be right `lead` after the last picture; `None`: it is well as it is.
@@ -115,7 +176,7 @@ impl ZoomDrive {
         now: Time,
         lead: Duration,
     ) -> Option<Jump> {
-        let travel = self.track.travel(now, delays)?;
+        let travel = self.travel(now, delays)?;
         let (factor, pressing) =
             self.controller.factor(goal.target_height, lens.magnification(travel), lead)?;
         let there = goal.travel.nearest(lens.travel_magnified(travel, factor)?);

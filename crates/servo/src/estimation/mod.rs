@@ -10,6 +10,7 @@
 //!                               ├─ against commands ──────── latency         (when they agree best)
 //!                               ├─ against speeds told ───── speed map       (degrees per second of a step)
 //!                               └─ against signs ─────────── axes            (which way each turns the picture)
+//! growth of the background ──────── against commands ──────── magnification   (of a lens that the camera does not tell)
 //! ```
 //! Each is learned by itself and bounded, and starts from what the camera told or the user set. Only a
 //! position gives degrees: without one the field of view stays as it is, and the speed map fits to it, so
@@ -20,6 +21,7 @@ mod calibration;
 mod field_of_view;
 mod frozen_picture;
 mod latency;
+mod magnification;
 mod measurement;
 mod mounting;
 mod rate;
@@ -34,6 +36,7 @@ pub use calibration::{Estimates, SelfCalibration};
 use field_of_view::FieldOfViewEstimator;
 pub use frozen_picture::FrozenPictureDetector;
 use latency::LatencyEstimator;
+pub use magnification::MagnificationEstimator;
 pub use measurement::{Measurement, Visibility};
 pub use mounting::Mounting;
 pub use rate::{RateAverage, Samples};

@@ -23,11 +23,19 @@ impl ZoomEstimator {
     /// From end to end in four seconds, as domes with a long lens are.
     const ASSUMED_PER_S: f64 = 0.25005;
 
+    /// Quick, as lenses are that magnify a view many times from where it is widest: one that is slower is soon known for it.
+    const ASSUMED_UNSEEN_PER_S: f64 = 4.0;
+
     /// No lens is taken to be slower or faster.
     const PLAUSIBLE_PER_S: (f64, f64) = (0.01, 5.0);
 
     /// Less of the travel tells nothing of the speed.
     const TELLING: f64 = 0.002;
+
+    /// Of a lens whose travel is the logarithm of its magnification.
+    pub fn of_magnification() -> Self {
+        Self { fastest_per_s: Self::ASSUMED_UNSEEN_PER_S, ..Self::default() }
+    }
 
     /// From a time on the zoom moves at a part of its fastest (-1 to 1).
     pub fn commanded(&mut self, at: Time, speed: f64) {
@@ -42,18 +50,37 @@ impl ZoomEstimator {
             let found = (travel - from) / expected;
             if expected.abs() > Self::TELLING && found > 0.0 {
                 // Half way: the delay is not known exactly, and at its ends a lens stands still.
-                let (slowest, fastest) = Self::PLAUSIBLE_PER_S;
-                self.fastest_per_s =
-                    (self.fastest_per_s * found.clamp(0.25, 4.0).sqrt()).clamp(slowest, fastest);
+                self.found_faster(found.clamp(0.25, 4.0).sqrt());
             }
         }
+        self.place(at, travel);
+    }
+
+    /// It was there at a time.
+    pub fn place(&mut self, at: Time, travel: f64) {
         self.told = Some((at, travel));
+    }
+
+    /// It was found to be so many times as fast as it was taken for.
+    pub fn found_faster(&mut self, factor: f64) {
+        self.assume(self.fastest_per_s * factor);
+    }
+
+    /// It is taken to be so fast.
+    pub fn assume(&mut self, fastest_per_s: f64) {
+        let (slowest, fastest) = Self::PLAUSIBLE_PER_S;
+        self.fastest_per_s = fastest_per_s.clamp(slowest, fastest);
     }
 
     /// The part of the travel that has come of the commands sent until then, where the camera has ever told it.
     pub fn travel(&self, sent_until: Time, delays: &Delays) -> Option<f64> {
         let (at, travel) = self.told?;
         Some(travel + self.moved(at - delays.command, sent_until))
+    }
+
+    /// The part of its travel where it last was known to be.
+    pub fn last(&self) -> Option<f64> {
+        self.told.map(|(_, travel)| travel)
     }
 
     /// The speeds it was told, as the pan of a history.
@@ -71,7 +98,13 @@ impl ZoomEstimator {
         self.fastest_per_s
     }
 
-    fn moved(&self, from: Time, to: Time) -> f64 {
+    /// The speeds that it was told between two times, in order.
+    pub fn speeds_between(&self, from: Time, to: Time) -> impl Iterator<Item = f64> {
+        self.commanded.rates_between(from, to).map(|rate| rate.pan)
+    }
+
+    /// The part of the travel that comes of what was told between two times.
+    pub fn moved(&self, from: Time, to: Time) -> f64 {
         self.commanded.rotation(from, to).pan * self.fastest_per_s
     }
 }

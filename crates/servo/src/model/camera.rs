@@ -24,6 +24,8 @@ pub struct Capabilities {
     pub max_optical_magnification: Option<f64>,
     /// Fields of view per second that no speed exceeds, where speeds are proportional to the field of view.
     pub max_fields_s: Option<f64>,
+    /// Whether it can zoom at a speed.
+    pub continuous_zoom: Option<bool>,
     /// The speed of its moves to a position, as a part of the fastest.
     pub move_speed: Option<f64>,
 }
@@ -90,6 +92,11 @@ impl Capabilities {
             (Some(lens), None) => lens,
             (None, wide_deg) => Lens::fixed(wide_deg.unwrap_or(ASSUMED_FOV_DEG)),
         }
+    }
+
+    /// The lens of a camera that tells nothing of it, by what a picture shows: zoomed out as it was met.
+    pub fn lens_by_picture(wide_fov_deg: Option<f64>) -> Lens {
+        Lens::by_magnification(wide_fov_deg.unwrap_or(ASSUMED_FOV_DEG))
     }
 
     /// Horizontal field of view in degrees, zoomed out.

@@ -102,19 +102,32 @@ impl View {
 pub struct Lens {
     /// Horizontal field of view zoomed out, degrees.
     wide_fov_deg: f64,
-    /// Parts of the travel and magnification, growing; straight lines in between.
-    magnifications: Vec<TableRow>,
+    magnifications: Magnifications,
+}
+
+/// How much a lens magnifies.
+#[derive(Debug, Clone, PartialEq)]
+enum Magnifications {
+    /// By parts of the travel, growing; straight lines in between.
+    Told(Vec<TableRow>),
+    /// Nobody says by which part of the travel: what is counted is the logarithm of the magnification.
+    Logarithm,
 }
 
 impl Lens {
     /// A lens that does not zoom, or not that anybody knew.
     pub fn fixed(fov_deg: f64) -> Self {
-        Self { wide_fov_deg: fov_deg, magnifications: Vec::new() }
+        Self::new(fov_deg, Vec::new())
+    }
+
+    /// A lens whose travel is counted by the logarithm of its magnification.
+    pub fn by_magnification(wide_fov_deg: f64) -> Self {
+        Self { wide_fov_deg, magnifications: Magnifications::Logarithm }
     }
 
     /// A lens with a table of its magnification by its travel, rows growing in both.
     pub fn new(wide_fov_deg: f64, magnifications: Vec<TableRow>) -> Self {
-        Self { wide_fov_deg, magnifications }
+        Self { wide_fov_deg, magnifications: Magnifications::Told(magnifications) }
     }
 
     /// Magnification grows linearly with the travel, as in the one table that is documented, up to `max`.
@@ -140,7 +153,12 @@ impl Lens {
 
     /// Magnification at a part of the travel.
     pub fn magnification(&self, travel: f64) -> f64 {
-        interpolate(&self.magnifications, travel, |row| (row.setting, row.value)).unwrap_or(1.0)
+        match &self.magnifications {
+            Magnifications::Told(rows) => {
+                interpolate(rows, travel, |row| (row.setting, row.value)).unwrap_or(1.0)
+            }
+            Magnifications::Logarithm => travel.exp(),
+        }
     }
 
     /// The part of the travel that magnifies so much more than another; `None` where it does not zoom.
@@ -151,7 +169,10 @@ impl Lens {
     /// The part of the travel with a horizontal field of view nearest to this, in degrees; `None` where it does not zoom.
     pub fn travel(&self, fov_deg: f64) -> Option<f64> {
         let wanted = Self::magnification_between(self.wide_fov_deg, fov_deg);
-        interpolate(&self.magnifications, wanted, |row| (row.value, row.setting))
+        match &self.magnifications {
+            Magnifications::Told(rows) => interpolate(rows, wanted, |row| (row.value, row.setting)),
+            Magnifications::Logarithm => Some(wanted.ln()),
+        }
     }
 }
 

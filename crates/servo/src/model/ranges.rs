@@ -91,6 +91,11 @@ impl SoftLimits {
         (self.pan_deg, self.tilt_deg) != (none.pan_deg, none.tilt_deg)
     }
 
+    /// Whether the zoom has a limit.
+    pub fn bound_zoom(&self) -> bool {
+        self.zoom != Self::default().zoom
+    }
+
     /// A direction, or the nearest to it that is within.
     pub fn nearest(&self, position: PanTilt) -> PanTilt {
         let Range { min, max } = self.pan_deg;

@@ -33,7 +33,10 @@ impl Servo {
             self.controller.levels = (0, 0);
         }
         match actuation {
-            Actuation::Move(motion) if self.leads_home(motion) => self.home.settled(),
+            Actuation::Move(motion) if self.leads_home(motion) => {
+                self.home.settled();
+                self.zoom.leave();
+            }
             _ if !actuation.is_rest() => self.home.strayed(),
             _ => {}
         }
@@ -61,7 +64,7 @@ impl Servo {
         }
         let delays = self.delays();
         let arrived = self.moves.position(position, now, &delays);
-        if !self.moves.under_way() {
+        if !self.moves.under_way() && !self.zooms_by_picture() {
             self.zoom.told(at, position.and_then(|position| position.zoom), &delays);
         }
         // It came before this was known.

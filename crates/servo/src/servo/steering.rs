@@ -41,16 +41,19 @@ impl Servo {
     /// What the zoom is to do; `None` leaves it alone.
     fn zoom_speed(&mut self, measurement: &Measurement, now: Time) -> Option<f64> {
         let delays = self.delays();
-        let lens = self.camera.capabilities.lens();
         let wanted = self
             .zoom_goal()
-            .zip(lens)
+            .zip(self.zoom_lens())
             .and_then(|(goal, lens)| self.zoom.speed(&goal, &lens, measurement, &delays, now));
         wanted.or(self.zoom.is_moving(now).then_some(0.0))
     }
 
     fn zoom_goal(&self) -> Option<ZoomGoal> {
-        let travel = narrower(self.camera.capabilities.limits.zoom, self.settings.limits.zoom);
+        let travel = if self.zooms_by_picture() {
+            self.zoom.ends()
+        } else {
+            narrower(self.camera.capabilities.limits.zoom, self.settings.limits.zoom)
+        };
         Some(ZoomGoal { target_height: self.settings.target_height?, travel })
     }
 
@@ -168,7 +171,16 @@ impl Servo {
         if self.moves.under_way() && self.home.is_settled() {
             return Actuation::Continue;
         }
-        self.way_home(actuator, now).unwrap_or(Actuation::Rest)
+        self.way_home(actuator, now).or_else(|| self.widen(actuator, now)).unwrap_or(Actuation::Rest)
+    }
+
+    /// A view that was narrowed for somebody is widened where nobody is, unless the camera is to go home.
+    fn widen(&self, actuator: &ActuatorStatus, now: Time) -> Option<Actuation> {
+        let is_free = actuator.access == Access::Ours && actuator.mode == Mode::Velocity;
+        let is_to_stay = is_free && self.home.due(now, self.move_speed()).is_none();
+        let wanted = is_to_stay && self.zooms_by_picture() && !self.frozen_picture.is_frozen();
+        let zoom = self.zoom.widening(now).filter(|_| wanted)?;
+        Some(Actuation::Move(Motion::Velocity { pan: 0.0, tilt: 0.0, zoom: Some(zoom) }))
     }
 
     /// Whether this takes the camera home.

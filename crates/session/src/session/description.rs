@@ -30,6 +30,7 @@ impl Description {
             zooms: self.attributes.zooms.clone(),
             max_optical_magnification: self.attributes.max_optical_magnification,
             max_fields_s: self.max_fields_s(),
+            continuous_zoom: self.parameters.continuous_zoom,
             move_speed: self.move_speed,
         }
     }

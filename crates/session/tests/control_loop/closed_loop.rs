@@ -46,6 +46,8 @@ pub struct Setup {
     pub ground_jitter: f64,
     /// Whether the camera tells where it looks.
     pub tells_position: bool,
+    /// Whether the camera tells how it zooms, and where its zoom is.
+    pub tells_lens: bool,
     /// Whether the target is seen though it has left the picture.
     pub sees_beyond: bool,
     /// Where the noise begins.
@@ -82,6 +84,7 @@ impl Setup {
             sees_ground: true,
             ground_jitter: 0.0,
             tells_position: true,
+            tells_lens: true,
             sees_beyond: true,
             seed: 1,
             visible: |_| Visibility::Seen,
@@ -155,6 +158,8 @@ struct Shot {
     place: Point,
     ego: Vector,
     velocity: Vector,
+    /// How the background grows.
+    zoom: f64,
     bounds: Rect,
     at: Time,
 }
@@ -227,17 +232,22 @@ impl Simulation {
         let below = point(direction - PanTilt::new(0.0, height_deg / 2.0));
         let jitter = self.setup.jitter;
         let noisy = Point { x: place.x + self.noise(jitter), y: place.y + self.noise(jitter) };
-        let (mut ego, mut velocity) = (Vector::default(), Vector::default());
+        let (mut ego, mut velocity, mut zoom) = (Vector::default(), Vector::default(), 0.0);
         if let Some((at, last_pose, last_view, last_direction, last_noisy)) = self.last_shot {
             let dt = (self.now - at).as_secs_f64();
             let per_s = |to: Point, from: Point| Vector { x: (to.x - from.x) / dt, y: (to.y - from.y) / dt };
             let before = last_view.point(last_direction - last_pose);
             ego = per_s(point(last_direction), before);
+            let half_tangent = |view: &View| (view.horizontal_fov_deg / 2.0).to_radians().tan();
+            zoom = (half_tangent(&last_view) / half_tangent(&view)).ln() / dt;
             velocity =
                 if self.setup.noisy_velocity { per_s(noisy, last_noisy) } else { per_s(place, before) };
         }
         let shaken = self.setup.ground_jitter;
         ego = Vector { x: ego.x + self.noise(shaken), y: ego.y + self.noise(shaken) };
+        if !self.setup.tells_lens {
+            zoom += self.noise(2.0 * shaken);
+        }
         self.last_shot = Some((self.now, pose, view, direction, noisy));
         let frame = Frame {
             time_s: time_s - Self::START_S,
@@ -248,7 +258,7 @@ impl Simulation {
         };
         let height = (frame.height + self.noise(jitter)).max(0.0);
         let bounds = box_about(noisy, height);
-        self.shots.push_back(Shot { frame, place: noisy, ego, velocity, bounds, at: self.now });
+        self.shots.push_back(Shot { frame, place: noisy, ego, velocity, zoom, bounds, at: self.now });
     }
 
     fn show(&mut self, shot: &Shot, run: &mut Run) {
@@ -265,6 +275,7 @@ impl Simulation {
             bounds: shot.bounds,
             velocity: shot.velocity,
             ego_velocity: Some(shot.ego).filter(|_| self.setup.sees_ground),
+            ego_zoom: Some(shot.zoom).filter(|_| self.setup.sees_ground),
             unchanged_for: None,
             size: (640, 480),
             aspect: ASPECT,
@@ -305,7 +316,8 @@ impl Simulation {
             Request::Query(Query::Position) if self.setup.tells_position => Response::Position(Position {
                 pan_deg: Some(around_deg(0.0, self.pose().pan)),
                 tilt_deg: Some(self.pose().tilt),
-                zoom: Some(ZoomStep(self.head.now().pose.zoom_step.round()).travel()),
+                zoom: Some(ZoomStep(self.head.now().pose.zoom_step.round()).travel())
+                    .filter(|_| self.setup.tells_lens),
             }),
             Request::Query(Query::Limits) => Response::Limits(HardLimits {
                 pan_deg: Some(range(self.setup.pan_limits_deg())),
@@ -314,7 +326,8 @@ impl Simulation {
                     min: ZoomStep(ZOOM_RANGE.0).travel(),
                     max: ZoomStep(ZOOM_RANGE.1).travel(),
                 }),
-                field_angle_deg: Some(range((OPTICS.fov_deg(ZOOM_RANGE.1), WIDE_FOV_DEG))),
+                field_angle_deg: Some(range((OPTICS.fov_deg(ZOOM_RANGE.1), WIDE_FOV_DEG)))
+                    .filter(|_| self.setup.tells_lens),
             }),
             Request::Query(_) => return Err(Error::Camera("none".to_owned())),
         })

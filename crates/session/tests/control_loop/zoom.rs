@@ -4,10 +4,10 @@
 
 use std::time::Duration;
 
-use super::closed_loop::{Run, Setup};
+use super::closed_loop::{Run, Setup, WIDE_FOV_DEG};
 use super::{HALT, STOP};
 use servo::{Mode, Motion, PanTilt, Range, Visibility};
-use session::Command;
+use session::{Command, LoopEvent};
 
 const MODES: [Mode; 3] = [Mode::Velocity, Mode::Absolute, Mode::Centre];
 
@@ -117,6 +117,85 @@ fn a_hidden_target_widens_the_view() {
     let height = |time_s| heights(&run, time_s, time_s + 0.5).1;
     assert!((height(9.0) / TARGET_HEIGHT - 1.0).abs() < 0.15);
     assert!(height(12.0) < 0.7 * height(9.0), "{} of {}", height(12.0), height(9.0));
+}
+
+/// The same before a camera that tells nothing of its lens: what is known of it the picture shows.
+fn zooming_by_picture(delay_ms: u64, magnification: f64) -> Setup {
+    let mut setup = Setup { tells_lens: false, ground_jitter: 0.01, ..zooming(delay_ms, magnification) };
+    setup.settings.learn_zoom = true;
+    setup
+}
+
+#[test]
+fn by_the_picture_alone_somebody_stays_as_tall() {
+    let ways: [fn(f64) -> (PanTilt, f64); 2] = [departing, returning];
+    for (delay, seed, target) in [100, 300, 800]
+        .into_iter()
+        .flat_map(|delay| (1..=3u64).map(move |seed| (delay, seed)))
+        .flat_map(|(delay, seed)| ways.map(|way| (delay, seed, way)))
+    {
+        let run = Setup { seed, ..zooming_by_picture(delay, 1.0) }.run(25.0, target);
+        let (least, most) = heights(&run, 6.0, 25.0);
+        // So late one that tells all of its lens is as far off.
+        let tolerance = if delay > 300 { 0.3 } else { 0.2 };
+        let range = (1.0 - tolerance) * TARGET_HEIGHT..(1.0 + tolerance) * TARGET_HEIGHT;
+        let case = format!("{delay} ms, {seed}");
+        assert!(range.contains(&least) && range.contains(&most), "{case}: {least} to {most}");
+        assert!(in_view(&run), "{case}");
+    }
+}
+
+#[test]
+fn by_the_picture_alone_the_zoom_comes_to_rest_and_the_field_of_view_is_known() {
+    for (delay, magnification) in [(100, 1.0), (300, 1.0), (300, 3.0)] {
+        let run = zooming_by_picture(delay, magnification).run(60.0, |_| (PanTilt::new(3.0, 1.0), 7.0));
+        let case = format!("{delay} ms, {magnification} times");
+        assert_eq!(run.commands_between(20.0, 60.0), 0, "{case}: {:?}", run.commands);
+        let (least, most) = heights(&run, 20.0, 60.0);
+        let range = 0.85 * TARGET_HEIGHT..1.15 * TARGET_HEIGHT;
+        assert!(range.contains(&least) && range.contains(&most), "{case}: {least} to {most}");
+        // Where it was met the picture is taken for as wide as it goes.
+        let zoomed = run.frames.last().unwrap().height / run.frames[0].height;
+        let seen = (WIDE_FOV_DEG / 2.0).to_radians().tan()
+            / (run.estimates.unwrap().fov_deg / 2.0).to_radians().tan();
+        assert!((seen / zoomed).ln().abs() < 0.1, "{case}: {seen} times of {zoomed}");
+    }
+}
+
+/// Until the picture does not grow smaller any more.
+#[test]
+fn when_nobody_is_there_the_view_is_widened_to_the_end() {
+    for delay in [100, 300] {
+        let mut setup = zooming_by_picture(delay, 1.0);
+        setup.visible = |time| if time < 20.0 { Visibility::Seen } else { Visibility::Gone };
+        let run = setup.run(50.0, |_| (PanTilt::default(), 3.0));
+        let height = |time_s| heights(&run, time_s, time_s + 0.5).1;
+        assert!((height(19.0) / TARGET_HEIGHT - 1.0).abs() < 0.15, "{delay} ms: {}", height(19.0));
+        let widest = run.frames[0].height;
+        assert!((height(49.0) / widest - 1.0).abs() < 0.01, "{delay} ms: {}", height(49.0));
+        assert_eq!(run.commands_between(40.0, 50.0), 0, "{delay} ms: {:?}", run.commands);
+    }
+}
+
+#[test]
+fn limits_that_nobody_can_tell_are_not_kept_in_words() {
+    let mut setup = zooming_by_picture(200, 1.0);
+    setup.settings.limits.zoom = Range { min: 0.0, max: 0.5 };
+    let run = setup.run(2.0, |_| (PanTilt::default(), 20.0));
+    assert_eq!(run.reports.iter().filter(|report| **report == LoopEvent::ZoomLimitsUnkept).count(), 1);
+}
+
+#[test]
+fn a_camera_that_does_not_zoom_is_left_alone_in_words() {
+    let mut setup = zooming_by_picture(200, 1.0);
+    setup.kinematics.zoom_speed_step_s = 0.0;
+    let visible: fn(f64) -> Visibility = |time| match time % 20.0 {
+        time if time < 10.0 => Visibility::Seen,
+        _ => Visibility::Gone,
+    };
+    let run = Setup { visible, ..setup }.run(80.0, |_| (PanTilt::default(), 5.0));
+    assert_eq!(run.commands_between(60.0, 80.0), 0, "{:?}", run.commands);
+    assert_eq!(run.reports.iter().filter(|report| **report == LoopEvent::NoZoom).count(), 1);
 }
 
 #[test]
