@@ -191,6 +191,9 @@ impl Servo {
         let fov_deg = view.horizontal_fov_deg;
         let turn = turn.filter(|_| self.settings.learn_axes);
         let finding = turn.and_then(|turn| self.axes.see(&turn, &self.camera.history, fov_deg));
+        if finding == Some(AxisFinding::Exchanged) {
+            self.camera.history.exchange();
+        }
         if finding.is_some() {
             self.axis_finding = finding;
             self.calibration = SelfCalibration::new(self.settings.latency);

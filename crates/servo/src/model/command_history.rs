@@ -58,6 +58,15 @@ impl CommandHistory {
         }
     }
 
+    /// Pan turned out to tilt, and tilt to pan, all along.
+    pub fn exchange(&mut self) {
+        let exchanged = |PanTilt { pan, tilt }: PanTilt| PanTilt::new(tilt, pan);
+        for entry in &mut self.entries {
+            (entry.start, entry.rate) = (exchanged(entry.start), exchanged(entry.rate));
+            entry.levels = entry.levels.map(|(pan, tilt)| (tilt, pan));
+        }
+    }
+
     fn add(&mut self, at: Time, rate: PanTilt, levels: Option<(i8, i8)>) {
         let before = self.entries.back();
         let start = before.map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2));
