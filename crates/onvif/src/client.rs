@@ -320,8 +320,7 @@ impl Client {
                     let broken = moved
                         .as_ref()
                         .is_err_and(|err| matches!(err, Error::Broken(_) | Error::Unexpected(_)));
-                    self.moves.zoomed(broken);
-                    if !self.moves.zooms() {
+                    if self.moves.zoomed(broken) {
                         self.leave_zoom(abilities).await;
                     }
                 }
@@ -372,12 +371,13 @@ impl Client {
         Ok(())
     }
 
-    /// A camera that breaks off where it is told to zoom may zoom all the same: it is stopped in both ways, as no word of it tells.
+    /// A camera that breaks off where it is told to zoom may zoom all the same: it is stopped twice, which is in both ways.
     async fn leave_zoom(&mut self, abilities: &Abilities) {
-        let still = abilities.velocity((0.0, 0.0), Some(0.0));
-        // What comes of these is seen in the moves that follow.
-        let _ = self.call(Path::Ptz, &messages::stop(self.profile())).await;
-        let _ = self.move_at(&still, abilities).await;
+        for _ in 0..2 {
+            // What comes of these is seen in the moves that follow.
+            let _ = self.stop(&Command::Stop(Stop::AllAxes), abilities).await;
+        }
+        self.moves.leave_zoom();
         self.warn("the camera breaks off where it is told to zoom: the zoom is left alone from here on");
     }
 

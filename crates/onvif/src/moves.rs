@@ -18,13 +18,21 @@ pub struct Moves {
     stopped: bool,
     /// An answer to a move with zoom that was none, in a row.
     broken_zooms: u32,
+    /// The zoom is left alone.
+    leaves_zoom: bool,
     /// Moves with a timeout, in a row, at which the camera closed the connection.
     broken_timeouts: u32,
 }
 
 impl Default for Moves {
     fn default() -> Self {
-        Self { stop_words: StopWords::Stop, stopped: false, broken_zooms: 0, broken_timeouts: 0 }
+        Self {
+            stop_words: StopWords::Stop,
+            stopped: false,
+            broken_zooms: 0,
+            leaves_zoom: false,
+            broken_timeouts: 0,
+        }
     }
 }
 
@@ -77,12 +85,18 @@ impl Moves {
 
     /// Whether a move may have to do with the zoom.
     pub fn zooms(&self) -> bool {
-        self.broken_zooms < Self::BROKEN_ZOOMS
+        !self.leaves_zoom
     }
 
-    /// What became of a move with zoom.
-    pub fn zoomed(&mut self, broken: bool) {
+    /// What became of a move with zoom; returns whether the zoom is to be left alone for that.
+    pub fn zoomed(&mut self, broken: bool) -> bool {
         self.broken_zooms = if broken { self.broken_zooms + 1 } else { 0 };
+        self.broken_zooms >= Self::BROKEN_ZOOMS
+    }
+
+    /// From now on no move has to do with the zoom.
+    pub fn leave_zoom(&mut self) {
+        self.leaves_zoom = true;
     }
 }
 
@@ -106,9 +120,9 @@ mod tests {
     #[test]
     fn a_zoom_that_breaks_the_answer_is_left_alone() {
         let mut moves = Moves::default();
-        for (broken, zooms) in [(true, true), (false, true), (true, true), (true, false)] {
-            moves.zoomed(broken);
-            assert_eq!(moves.zooms(), zooms);
-        }
+        assert_eq!([true, false, true, true].map(|broken| moves.zoomed(broken)), [false, false, false, true]);
+        assert!(moves.zooms());
+        moves.leave_zoom();
+        assert!(!moves.zooms());
     }
 }

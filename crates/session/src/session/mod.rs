@@ -35,7 +35,8 @@ use discovery::Discovery;
 use mode_support::ModeSupport;
 use scheduler::Scheduler;
 use servo::{Access, ActuatorStatus, Mode, Position, Time};
-use stop_confirmation::{StopConfirmation, StopFinding};
+pub(crate) use stop_confirmation::StopConfirmation;
+use stop_confirmation::StopFinding;
 
 use crate::{Protocol, SessionEvent, SessionSettings, Stop};
 
@@ -144,9 +145,8 @@ impl Session {
     /// A stop that no picture tells of is repeated.
     fn repeat_unseen_stop(&mut self, now: Time) {
         let is_at_rest = self.is_at_rest();
-        let due = |confirmation: &&mut StopConfirmation| confirmation.unseen_at().is_some_and(|at| at <= now);
-        if let Some(confirmation) = self.stop_confirmation.as_mut().filter(due).filter(|_| is_at_rest) {
-            confirmation.repeat_unseen();
+        let confirmation = self.stop_confirmation.as_mut().filter(|_| is_at_rest);
+        if confirmation.is_some_and(|confirmation| confirmation.repeats_unseen(now)) {
             self.scheduler.found_moving(self.scheduler.stop());
         }
     }

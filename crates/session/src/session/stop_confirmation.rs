@@ -56,6 +56,11 @@ impl StopConfirmation {
         self.forget();
     }
 
+    /// Of a camera that no picture is to come from, ever.
+    pub fn without_pictures() -> Self {
+        Self { leaving: true, ..Self::default() }
+    }
+
     /// It is the end: what no picture has told by now none will.
     pub fn leave(&mut self) {
         self.leaving = true;
@@ -89,9 +94,13 @@ impl StopConfirmation {
         self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + after)
     }
 
-    /// It is being repeated for that.
-    pub fn repeat_unseen(&mut self) {
-        (self.since, self.repeated) = (None, 1);
+    /// Whether it is to be repeated for that now; asked once for each time.
+    pub fn repeats_unseen(&mut self, now: Time) -> bool {
+        let is_due = self.unseen_at().is_some_and(|at| at <= now);
+        if is_due {
+            (self.since, self.repeated) = (None, 1);
+        }
+        is_due
     }
 }
 
@@ -147,8 +156,7 @@ mod tests {
         let mut confirmation = StopConfirmation::default();
         confirmation.stopped(ms(1000));
         assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Fine);
-        assert_eq!(confirmation.unseen_at(), Some(ms(4000)));
-        confirmation.repeat_unseen();
+        assert!(!confirmation.repeats_unseen(ms(3999)) && confirmation.repeats_unseen(ms(4000)));
         confirmation.stopped(ms(4000));
         assert_eq!(confirmation.unseen_at(), None);
     }
@@ -158,10 +166,11 @@ mod tests {
         let mut confirmation = StopConfirmation::default();
         confirmation.leave();
         confirmation.moved();
-        confirmation.stopped(ms(1000));
-        assert_eq!(confirmation.unseen_at(), Some(ms(1000)));
-        confirmation.repeat_unseen();
-        confirmation.stopped(ms(1100));
-        assert_eq!(confirmation.unseen_at(), None);
+        for mut confirmation in [confirmation, StopConfirmation::without_pictures()] {
+            confirmation.stopped(ms(1000));
+            assert!(confirmation.repeats_unseen(ms(1000)));
+            confirmation.stopped(ms(1100));
+            assert!(!confirmation.repeats_unseen(ms(9000)));
+        }
     }
 }

@@ -2,13 +2,14 @@
 
 use std::time::Duration;
 
+use servo::Time;
 use tokio::sync::watch;
 use tokio::time::{Instant, sleep, sleep_until, timeout};
 
 use super::camera_lock::CameraLock;
 use super::protocol::StopOrder;
 use super::{Armed, LAST_TRIES};
-use crate::session::DOUBT;
+use crate::session::{DOUBT, StopConfirmation};
 use crate::{Client, Command, Request, Stop};
 
 /// From one try to stop a camera to the next.
@@ -110,10 +111,14 @@ async fn stop<C: Client>(order: &StopOrder) {
             }
         };
         let begin = Instant::now();
-        until_accepted(&mut client, order.words).await?;
-        if C::PROTOCOL.confirms_stops {
-            // Some say yes and turn on, and no picture tells of it here: they are told again, in other words.
+        let mut confirmation = C::PROTOCOL.confirms_stops.then(StopConfirmation::without_pictures);
+        loop {
             until_accepted(&mut client, order.words).await?;
+            let Some(confirmation) = &mut confirmation else { break };
+            confirmation.stopped(Time::ZERO);
+            if !confirmation.repeats_unseen(Time::ZERO) {
+                break;
+            }
         }
         if order.in_doubt {
             sleep_until(begin + DOUBT).await;
