@@ -107,9 +107,38 @@ fn cameras_that_take_degrees_a_second() {
         let onvif = OnvifSettings { degrees_s: Some(announced_deg_s), ..OnvifSettings::default() };
         let what = format!("{announced_deg_s} degrees a second, which are 120");
         let stage = follows(&what, camera(onvif, 120.0), farthest);
-        let pan = |sent: &String| sent.split_once("PanTilt=")?.1.split(',').next()?.parse::<f64>().ok();
-        assert!(stage.moves().iter().filter_map(pan).any(|pan| pan.abs() > 1.0), "{:?}", stage.moves());
+        assert!(stage.moves().iter().any(|sent| sent.contains("VelocitySpaceDegrees")), "{what}");
     });
+}
+
+/// The same in fields of view a second, of which degrees are made by the picture's scale.
+#[test]
+fn cameras_that_take_fields_of_view_a_second() {
+    let really = 120.0 / 55.2;
+    each(&[(really, 0.12), (really / 3.0, 0.2), (3.0 * really, 0.2)], |(announced, farthest)| {
+        let onvif = OnvifSettings { fields_s: Some(announced), ..OnvifSettings::default() };
+        let what = format!("{announced} fields of view a second, which are {really}");
+        let stage = follows(&what, camera(onvif.clone(), 120.0), farthest);
+        assert!(stage.moves().iter().any(|sent| sent.contains("VelocitySpaceFOV")), "{what}");
+        let mut stage = zooming(camera(onvif, 120.0));
+        let (least, most) = walk_away(&mut stage);
+        let parts = (least / TARGET_HEIGHT, most / TARGET_HEIGHT);
+        assert!(parts.0 > 0.8 && parts.1 < 1.2, "{what}: {parts:?}");
+    });
+}
+
+#[test]
+fn a_camera_that_refuses_the_units_that_it_announces() {
+    let onvif = OnvifSettings {
+        fields_s: Some(2.0),
+        degrees_s: Some(120.0),
+        refuses_units: true,
+        ..OnvifSettings::default()
+    };
+    let stage = follows("refused units", camera(onvif, 120.0), 0.12);
+    assert!(!stage.heard.iter().any(Heard::is_warning), "{:?}", stage.heard);
+    let refused = stage.moves().iter().filter(|sent| sent.contains("VelocitySpace")).count();
+    assert!((1..=4).contains(&refused), "each is tried once, with a `Timeout` and without: {refused}");
 }
 
 #[test]

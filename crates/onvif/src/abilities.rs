@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::{HardLimits, Motion, Range, TableRow};
+use servo::{HardLimits, Motion, Range, SpeedUnit, TableRow};
 use session::{Attributes, Parameters};
 
 use crate::soap::{Element, number};
@@ -115,6 +115,11 @@ fn is_degrees_per_second(uri: &str) -> bool {
     uri.ends_with("VelocitySpaceDegrees") || uri.ends_with("VelocityDegreesPerSecond")
 }
 
+/// Speeds that are told in fields of view per second.
+fn is_fields_per_second(uri: &str) -> bool {
+    uri.ends_with("VelocitySpaceFOV")
+}
+
 /// Positions that are told in degrees.
 fn is_degrees(uri: &str) -> bool {
     uri.ends_with("SphericalPositionSpaceDegrees")
@@ -125,16 +130,23 @@ impl Abilities {
         self.spaces.iter().find(|space| space.kind == kind && is(&space.uri))
     }
 
-    /// Degrees per second that the space of velocities in degrees reaches, and its name.
-    fn degrees_per_second(&self) -> Option<(f64, &str)> {
-        let space = self.space(PAN_TILT_VELOCITY, is_degrees_per_second)?;
+    /// How far a space of velocities in a known unit reaches, in that unit, and its name.
+    fn known_velocities(&self) -> Option<(f64, SpeedUnit, &str)> {
+        let degrees = self.space(PAN_TILT_VELOCITY, is_degrees_per_second).map(|it| (it, SpeedUnit::Degrees));
+        let fields = || Some((self.space(PAN_TILT_VELOCITY, is_fields_per_second)?, SpeedUnit::Fields));
+        let (space, unit) = degrees.or_else(fields)?;
         let most = space.y.map_or(space.x.max, |y| y.max.min(space.x.max));
-        (most > 0.0).then_some((most, space.uri.as_str()))
+        (most > 0.0).then_some((most, unit, space.uri.as_str()))
+    }
+
+    /// A space of velocities turned out not to be taken: from now on there is none of this name.
+    pub fn forget_space(&mut self, uri: &str) {
+        self.spaces.retain(|space| space.uri != uri);
     }
 
     /// The velocity of these parts of the fastest. The camera's own is in proportion to the cube of the part: fine where it is slow.
     pub fn velocity(&self, (pan, tilt): (f64, f64), zoom: Option<f64>) -> Velocity {
-        let (most, space) = self.degrees_per_second().unzip();
+        let (most, space) = self.known_velocities().map(|(most, _, space)| (most, space)).unzip();
         let most = most.unwrap_or(1.0);
         Velocity {
             pan_tilt: Some((pan.powi(3) * most, tilt.powi(3) * most)),
@@ -143,14 +155,14 @@ impl Abilities {
         }
     }
 
-    /// What parts of the fastest mean, where the camera takes velocities in degrees per second.
+    /// What parts of the fastest mean, where the camera takes velocities in a known unit.
     pub fn attributes(&self) -> Option<Attributes> {
-        let (most, _) = self.degrees_per_second()?;
+        let (most, speed_unit, _) = self.known_velocities()?;
         let speeds = (1..=100).map(|hundredths| {
             let part = f64::from(hundredths) / 100.0;
             TableRow { setting: part, value: part.powi(3) * most }
         });
-        Some(Attributes { speeds: speeds.collect(), ..Attributes::default() })
+        Some(Attributes { speeds: speeds.collect(), speed_unit, ..Attributes::default() })
     }
 
     /// How it can be moved.
@@ -264,6 +276,23 @@ mod tests {
         assert!(velocity.space.unwrap().ends_with("VelocitySpaceDegrees"));
         assert_eq!(abilities.attributes().unwrap().speeds[99].value, 80.0);
         assert_eq!(abilities.parameters().continuous_zoom, Some(false), "of zoom it says nothing");
+    }
+
+    #[test]
+    fn velocities_in_fields_of_view_are_taken_where_there_are_none_in_degrees() {
+        let generic = space(PAN_TILT_VELOCITY, "VelocityGenericSpace", (-1.0, 1.0), (-1.0, 1.0));
+        let fields = space(PAN_TILT_VELOCITY, "VelocitySpaceFOV", (-7.0, 7.0), (-5.0, 5.0));
+        let degrees = space(PAN_TILT_VELOCITY, "VelocitySpaceDegrees", (-120.0, 120.0), (-80.0, 80.0));
+        let unit = |spaces: &str| abilities(spaces, ("", "")).attributes().map(|told| told.speed_unit);
+        assert_eq!(unit(&generic), None);
+        assert_eq!(unit(&(generic.clone() + &fields + &degrees)), Some(SpeedUnit::Degrees));
+        let mut some = abilities(&(generic + &fields), ("", ""));
+        let told = some.attributes().unwrap();
+        assert_eq!((told.speed_unit, told.speeds[99].value), (SpeedUnit::Fields, 5.0));
+        let velocity = some.velocity((1.0, -0.5), None);
+        assert_eq!(velocity.pan_tilt, Some((5.0, -0.625)));
+        some.forget_space(&velocity.space.unwrap());
+        assert_eq!(some.velocity((1.0, -0.5), None).pan_tilt, Some((1.0, -0.125)));
     }
 
     #[test]

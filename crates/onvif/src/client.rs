@@ -315,7 +315,7 @@ impl Client {
         match motion {
             Motion::Velocity { pan, tilt, zoom } => {
                 let zoom = zoom.filter(|_| self.moves.zooms());
-                let moved = self.move_at(&abilities.velocity((pan, tilt), zoom), abilities).await;
+                let moved = self.turn((pan, tilt), zoom, abilities).await;
                 if zoom.is_some() {
                     let broken = moved
                         .as_ref()
@@ -343,6 +343,28 @@ impl Client {
             }
             Motion::Centre { .. } => Err(Error::Camera("ONVIF has no words for pixels".to_owned())),
         }
+    }
+
+    /// Where the camera does not take velocities in a unit that it told, it is moved in another from then on.
+    async fn turn(
+        &mut self,
+        parts: (f64, f64),
+        zoom: Option<f64>,
+        abilities: &Abilities,
+    ) -> Result<(), Error> {
+        let velocity = abilities.velocity(parts, zoom);
+        let moved = self.move_at(&velocity, abilities).await;
+        let (Err(Error::Camera(_)), Some(space)) = (&moved, &velocity.space) else { return moved };
+        let mut others = abilities.clone();
+        others.forget_space(space);
+        if Box::pin(self.turn(parts, zoom, &others)).await.is_err() {
+            // It was not for the unit.
+            return moved;
+        }
+        if let Some(abilities) = &mut self.abilities {
+            abilities.forget_space(space);
+        }
+        Ok(())
     }
 
     /// Where the camera does not take a timeout, it is moved without.

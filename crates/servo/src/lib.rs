@@ -24,7 +24,7 @@ pub use control::{Access, Actuation, ActuatorStatus, Home, Mode, Motion};
 pub use estimation::{AxisFinding, Estimates, Measurement, Mounting, Prediction, Visibility};
 pub use model::{
     CameraModel, Capabilities, CommandHistory, Delays, HardLimits, Lens, PanTilt, Position, Presets, Range,
-    SoftLimits, SpeedCurve, SpeedMap, TableRow, View, around_deg, is_endless, magnified, narrower,
+    SoftLimits, SpeedCurve, SpeedMap, SpeedUnit, TableRow, View, around_deg, is_endless, magnified, narrower,
 };
 pub use servo::Servo;
 pub use settings::ServoSettings;

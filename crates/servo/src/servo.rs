@@ -437,12 +437,14 @@ impl Servo {
     }
 
     fn assume_speeds(&mut self) {
-        self.calibration.assume_speeds(self.camera.capabilities.told_speeds().is_some());
+        let told = self.camera.capabilities.told_speeds(self.fov_deg(None));
+        self.calibration.assume_speeds(told.is_some());
     }
 
     /// The speed map before anything is learned.
     fn assumed_speeds(&self) -> SpeedMap {
-        self.camera.capabilities.told_speeds().unwrap_or_else(|| self.settings.speed_map())
+        let told = self.camera.capabilities.told_speeds(self.fov_deg(None));
+        told.unwrap_or_else(|| self.settings.speed_map())
     }
 
     /// Brings the speed map up to what is known by now.

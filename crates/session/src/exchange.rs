@@ -5,7 +5,7 @@
 use std::fmt;
 use std::time::Duration;
 
-use servo::{HardLimits, Mode, Position, Presets, TableRow, Time};
+use servo::{HardLimits, Mode, Position, Presets, SpeedUnit, TableRow, Time};
 
 use crate::session::{ConnectionChange, ControlOwner};
 use crate::{Command, Error};
@@ -90,8 +90,10 @@ pub struct Parameters {
 /// What a camera's speeds and zoom mean, as far as it tells.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Attributes {
-    /// Degrees per second of parts of the fastest, growing.
+    /// What parts of the fastest are per second, growing ...
     pub speeds: Vec<TableRow>,
+    /// ... in this unit.
+    pub speed_unit: SpeedUnit,
     /// Magnification by the zoom's travel, growing.
     pub zooms: Vec<TableRow>,
     /// Magnification at the end of the optical zoom.

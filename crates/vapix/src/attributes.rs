@@ -2,7 +2,7 @@
 
 //! The answer to `query=attributes`: what a camera's steps mean.
 
-use servo::TableRow;
+use servo::{SpeedUnit, TableRow};
 use session::http::unexpected;
 use session::{Attributes, Error};
 
@@ -20,6 +20,7 @@ pub fn parse_attributes(body: &str) -> Result<Attributes, Error> {
     let fields = Fields::of(body);
     let attributes = Attributes {
         speeds: table(fields.text("speeds"), part_of_fastest),
+        speed_unit: SpeedUnit::Degrees,
         zooms: table(fields.text("zooms").or(fields.text("zoom")), travel),
         max_optical_magnification: fields
             .number("maxOpticalZoomMag")

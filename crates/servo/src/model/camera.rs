@@ -16,8 +16,10 @@ const SHORTEST_TRAVEL: f64 = 1e-4;
 pub struct Capabilities {
     /// How far it can look and zoom.
     pub limits: HardLimits,
-    /// Degrees per second of parts of the fastest, growing.
+    /// What parts of the fastest are per second, growing ...
     pub speeds: Vec<TableRow>,
+    /// ... in this unit.
+    pub speed_unit: SpeedUnit,
     /// Magnification by the zoom's travel, growing.
     pub zooms: Vec<TableRow>,
     /// Magnification at the end of the optical zoom.
@@ -28,6 +30,16 @@ pub struct Capabilities {
     pub continuous_zoom: Option<bool>,
     /// The speed of its moves to a position, as a part of the fastest.
     pub move_speed: Option<f64>,
+}
+
+/// In what speeds are told.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum SpeedUnit {
+    /// Degrees per second.
+    #[default]
+    Degrees,
+    /// Horizontal fields of view per second: the narrower the view, the slower.
+    Fields,
 }
 
 /// The camera as it is known.
@@ -109,9 +121,15 @@ impl Capabilities {
         self.limits.field_angle_deg.is_some()
     }
 
-    /// The speed map it told, as it is without proportional speed.
-    pub fn told_speeds(&self) -> Option<SpeedMap> {
-        SpeedMap::through(&self.speeds)
+    /// The speed map it told, as it is without proportional speed, at a field of view.
+    pub fn told_speeds(&self, fov_deg: f64) -> Option<SpeedMap> {
+        let unit_deg = match self.speed_unit {
+            SpeedUnit::Degrees => 1.0,
+            SpeedUnit::Fields => fov_deg,
+        };
+        let speeds: Vec<_> =
+            self.speeds.iter().map(|row| TableRow { value: row.value * unit_deg, ..*row }).collect();
+        SpeedMap::through(&speeds)
     }
 
     /// The most degrees per second that proportional speed leaves at a field of view.

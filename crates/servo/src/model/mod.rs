@@ -10,7 +10,7 @@ mod projection;
 mod ranges;
 mod speed_map;
 
-pub use camera::{CameraModel, Capabilities};
+pub use camera::{CameraModel, Capabilities, SpeedUnit};
 pub use command_history::CommandHistory;
 pub use delays::Delays;
 pub use pan_tilt::{PanTilt, around_deg};

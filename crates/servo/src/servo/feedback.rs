@@ -96,7 +96,7 @@ impl Servo {
         let now = &self.camera.capabilities;
         let wide_deg = self.settings.fov_deg;
         let other_field = now.fov_zoomed_out_deg(wide_deg) != before.fov_zoomed_out_deg(wide_deg);
-        if now.told_speeds() != before.told_speeds() {
+        if (&now.speeds, now.speed_unit) != (&before.speeds, before.speed_unit) {
             self.assume_speeds();
         }
         if other_field {

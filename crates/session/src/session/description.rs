@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-use servo::{Capabilities, HardLimits, Range, SpeedMap, is_endless};
+use servo::{Capabilities, HardLimits, Range, SpeedUnit, is_endless};
 
 use crate::{Attributes, Parameters};
 
@@ -27,6 +27,7 @@ impl Description {
         Capabilities {
             limits: self.limits(),
             speeds: self.attributes.speeds.clone(),
+            speed_unit: self.attributes.speed_unit,
             zooms: self.attributes.zooms.clone(),
             max_optical_magnification: self.attributes.max_optical_magnification,
             max_fields_s: self.max_fields_s(),
@@ -73,9 +74,12 @@ impl fmt::Display for Description {
             None => f.write_str("zoom not told; ")?,
         }
         write!(f, "field of view {}; ", range(limits.field_angle_deg, "°"))?;
-        match SpeedMap::through(&self.attributes.speeds) {
-            Some(map) => write!(f, "speeds to {:.0}°/s; ", map.deg_s(100))?,
-            None => f.write_str("speeds not told; ")?,
+        match (self.attributes.speeds.last(), self.attributes.speed_unit) {
+            (Some(fastest), SpeedUnit::Degrees) => write!(f, "speeds to {:.0}°/s; ", fastest.value)?,
+            (Some(fastest), SpeedUnit::Fields) => {
+                write!(f, "speeds to {:.1} fields of view/s; ", fastest.value)?;
+            }
+            (None, _) => f.write_str("speeds not told; ")?,
         }
         let proportional = match self.parameters.proportional_speed {
             Some(true) if self.takes_free_moves() => "proportional, left out",

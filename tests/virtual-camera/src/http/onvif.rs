@@ -118,7 +118,9 @@ pub(super) async fn service(
 /// Name of a move and what it is about, on one line.
 fn summary(name: &str, message: &Message) -> String {
     let parts = message.body.descendants().filter(|node| node.is_element()).skip(1).filter_map(|node| {
-        let attributes: Vec<_> = ["x", "y"].iter().filter_map(|name| node.attribute(*name)).collect();
+        let attributes = ["x", "y", "space"].iter().filter_map(|name| node.attribute(*name));
+        // Of a space its own name.
+        let attributes: Vec<_> = attributes.filter_map(|text| text.rsplit('/').next()).collect();
         let said = if attributes.is_empty() { node.text()?.trim().to_owned() } else { attributes.join(",") };
         let name = node.tag_name().name();
         (!said.is_empty() && name != "ProfileToken").then(|| format!(" {name}={said}"))

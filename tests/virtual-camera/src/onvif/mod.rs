@@ -30,6 +30,10 @@ pub struct OnvifSettings {
     pub degrees: bool,
     /// How many degrees a second it calls its fastest where it takes velocities in these too, rightly or not.
     pub degrees_s: Option<f64>,
+    /// The same in fields of view a second: the narrower the view, the slower. At its widest it is as fast as in other units.
+    pub fields_s: Option<f64>,
+    /// Whether it refuses velocities in any of these units, though it says that it takes them.
+    pub refuses_units: bool,
     /// Whether it speaks no VAPIX.
     pub alone: bool,
     /// Whether it answers who asks on the loopback interface which cameras there are (WS-Discovery).

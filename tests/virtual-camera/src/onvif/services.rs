@@ -15,6 +15,7 @@ use crate::kinematics::{Limits, Motion, ZOOM_RANGE};
 const GENERIC_POSITION: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/PositionGenericSpace";
 const DEGREES: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/SphericalPositionSpaceDegrees";
 const DEGREES_S: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/VelocitySpaceDegrees";
+const FIELDS_S: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/VelocitySpaceFOV";
 const ZOOM_POSITION: &str = "http://www.onvif.org/ver10/tptz/ZoomSpaces/PositionGenericSpace";
 
 /// Why something is not done.
@@ -220,6 +221,9 @@ fn options(onvif: &OnvifSettings, limits: &Limits) -> String {
     if let Some(most) = onvif.degrees_s {
         spaces += &plane("ContinuousPanTiltVelocitySpace", DEGREES_S, (-most, most), (-most, most));
     }
+    if let Some(most) = onvif.fields_s {
+        spaces += &plane("ContinuousPanTiltVelocitySpace", FIELDS_S, (-most, most), (-most, most));
+    }
     spaces += &line(
         "ContinuousZoomVelocitySpace",
         "http://www.onvif.org/ver10/tptz/ZoomSpaces/VelocityGenericSpace",
@@ -277,8 +281,22 @@ fn continuous_move(camera: &Camera, onvif: &OnvifSettings, request: Node) -> Ans
         let (Some(x), Some(y)) = (number(axes, "x"), number(axes, "y")) else {
             return refused("InvalidVelocity", "pan and tilt");
         };
-        let fastest = onvif.degrees_s.filter(|_| axes.attribute("space") == Some(DEGREES_S)).unwrap_or(1.0);
-        let (x, y) = (x / fastest, y / fastest);
+        let space = axes.attribute("space");
+        let fastest = match space {
+            Some(DEGREES_S) => onvif.degrees_s,
+            Some(FIELDS_S) => onvif.fields_s,
+            _ => None,
+        };
+        if fastest.is_some() && onvif.refuses_units {
+            return refused("SpaceNotSupported", "generic velocities only");
+        }
+        let optics = camera.world.optics();
+        let narrowed = match space {
+            Some(FIELDS_S) => optics.fov_deg(camera.status().zoom_step) / optics.fov_deg(ZOOM_RANGE.0),
+            _ => 1.0,
+        };
+        let fastest = fastest.unwrap_or(1.0);
+        let (x, y) = (x / fastest * narrowed, y / fastest * narrowed);
         if x.abs() > 1.0 || y.abs() > 1.0 {
             return refused("InvalidVelocity", "beyond -1 to 1");
         }
