@@ -241,6 +241,7 @@ impl Args {
             first_box: self.first_box.unwrap_or(usual),
             servo: self.servo.clone(),
             films: self.record.then(|| self.out.join("films")),
+            elements: self.strata.elements.clone(),
             ..Experiment::new(scene, tracker, seed)
         }
     }
@@ -314,6 +315,20 @@ mod tests {
         assert_eq!(args.tests(), [1, 2, 3, 7].map(TestId));
         assert_eq!(args.trackers().0, [TrackerName::Thesis, TrackerName::Oracle]);
         assert_eq!(args.experiments(&args.trackers().0).unwrap().len(), 8);
+    }
+
+    #[test]
+    fn elements_are_those_of_every_run() {
+        for line in ["--test 1 --elements identity", "--closed-loop --stratum alone --elements identity"] {
+            let args = parse(line).unwrap();
+            let all = match args.strata.suite() {
+                Some(suite) => args.strata.experiments(suite, &[1], &[TrackerName::Ptztrack]),
+                None => Vec::new(),
+            };
+            let scenes = all.into_iter().map(|(_, scene)| scene);
+            let tests = args.experiments(&[TrackerName::Ptztrack]).unwrap();
+            assert!(scenes.chain(tests).all(|one| one.elements.as_deref() == Some("identity")), "{line}");
+        }
     }
 
     #[test]

@@ -53,7 +53,7 @@ fn evaluate(args: &Args) -> Result<bool, Box<dyn std::error::Error>> {
     if let (Some(recording), Some(truth), Some(folder)) =
         (&args.still_recording, &args.truth, &args.strata.motchallenge)
     {
-        motchallenge::write_recording(recording, truth, folder)?;
+        motchallenge::write_recording(recording, truth, args.strata.elements.as_deref(), folder)?;
         return Ok(true);
     }
     let gallery = args.gallery()?;

@@ -172,7 +172,7 @@ fn it_ends_with_the_persons_last_box() {
 fn everybody_in_a_recording_is_written_as_the_motchallenge_has_it() {
     let (file, truth) = recording("everybody");
     let out = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("everybody");
-    write_recording(&file, &truth, &out).unwrap();
+    write_recording(&file, &truth, None, &out).unwrap();
     let read = |name: &str| fs::read_to_string(out.join(name)).unwrap();
     let boxes = |text: &str| -> Vec<Vec<f64>> {
         text.lines().map(|line| line.split(',').map(|field| field.parse().unwrap()).collect()).collect()
@@ -191,7 +191,9 @@ fn everybody_in_a_recording_is_written_as_the_motchallenge_has_it() {
         assert!(on_them.count() > PICTURES / 3, "person {}: {regions:?}", walk.id);
     }
     assert!(boxes(&read("ptztrack/data/everybody.txt")).iter().all(|track| track[1] >= 1.0));
-    let nowhere = write_recording(&out, &file.with_extension("csv"), &out).unwrap_err().to_string();
+    write_recording(&file, &truth, Some("identity name=tracker"), &out).unwrap();
+    assert_eq!(read("gt/everybody/det/det.txt"), "", "other elements see nobody");
+    let nowhere = write_recording(&out, &file.with_extension("csv"), None, &out).unwrap_err().to_string();
     assert!(nowhere.starts_with(&out.display().to_string()), "{nowhere}");
 }
 

@@ -43,13 +43,18 @@ pub enum RecordingError {
     },
 }
 
-/// Shows `recording` to detector and tracker, and writes what they say into `folder`, beside the `truth`.
+/// Shows `recording` to detector and tracker, or to these `elements`, and writes what they say into `folder`, beside the `truth`.
 ///
 /// # Errors
 /// Where recording or truth cannot be used, or nothing can be written.
-pub fn write_recording(recording: &Path, truth: &Path, folder: &Path) -> Result<(), RecordingError> {
+pub fn write_recording(
+    recording: &Path,
+    truth: &Path,
+    elements: Option<&str>,
+    folder: &Path,
+) -> Result<(), RecordingError> {
     let truth = people::read(truth)?;
-    let (sequence, frame_rate) = show(recording, &truth)
+    let (sequence, frame_rate) = show(recording, &truth, elements)
         .map_err(|error| RecordingError::Recording { file: recording.into(), reason: error.to_string() })?;
     let name = recording.file_stem().unwrap_or_default().to_string_lossy();
     let written = sequence.write(folder, &name, TrackerName::Ptztrack.name(), frame_rate);
@@ -57,7 +62,7 @@ pub fn write_recording(recording: &Path, truth: &Path, folder: &Path) -> Result<
 }
 
 /// What was said of it, and how many pictures a second it has.
-fn show(recording: &Path, truth: &People) -> Result<(Sequence, f64), RunError> {
+fn show(recording: &Path, truth: &People, elements: Option<&str>) -> Result<(Sequence, f64), RunError> {
     let projector = Projector::open(recording)?;
     let mut samples = projector.samples();
     let first = samples.next().unwrap_or_else(|| Err(projector.fault()))?;
@@ -65,7 +70,8 @@ fn show(recording: &Path, truth: &People) -> Result<(Sequence, f64), RunError> {
     let size = (info.width(), info.height());
     let rate = f64::from(info.fps().numer()) / f64::from(info.fps().denom().max(1));
     let frame_rate = if rate > 0.0 { rate } else { UNKNOWN_RATE };
-    let elements = Tracker::new(TrackerName::Ptztrack, FirstBox::Detected, size).description();
+    let ours = || Tracker::new(TrackerName::Ptztrack, FirstBox::Detected, size).description();
+    let elements = elements.map_or_else(ours, str::to_owned);
     let description =
         format!("appsrc name={SOURCE} ! {elements} ! fakesink name={SINK} sync=false async=false");
     let pipeline = Pipeline::new(&description, &info)?;
