@@ -28,6 +28,9 @@ const UNSHARP: f64 = 0.4;
 
 /// Less of the difference than this ends at the contour of light that changed: a cloud's shadow has no outline, somebody has.
 const SOFT: f64 = 0.3;
+/// Light makes all that it falls on lighter, or all darker: so much of the differences, as a share, is left of their sum. In rain and in the
+/// noise of little light somebody of other colours differs as much inside of their outline as what is outside.
+const ONE_WAY: f64 = 0.5;
 
 /// Finds regions in which nobody is; kept as memory for the next one.
 #[derive(Debug, Default)]
@@ -78,21 +81,23 @@ fn is_ghost(scene: &SceneView, region: &Region) -> bool {
     places >= LEAST_PLACES && background >= LEAST_EDGE * f64::from(places) && background > STRONGER * picture
 }
 
-/// Whether picture and background go on differing beyond the contour of `region`: light has changed there, as it fades out
-/// over more pixels than the outline of anybody.
+/// Whether picture and background go on differing beyond the contour of `region`, all in one direction: light has changed there, as it
+/// fades out over more pixels than the outline of anybody.
 pub fn is_light(scene: &SceneView, region: &Region) -> bool {
-    let (mut inside_sum, mut outside_sum, mut places) = (0.0, 0.0, 0_u32);
+    let (mut lighter, mut inside_sum, mut outside_sum, mut places) = (0.0_f64, 0.0, 0.0, 0_u32);
     let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
     across(&region.contour, grid, |inside, outside| {
         let off = |place| {
             let is_known = level(&scene.foreground, place)? != f64::from(UNKNOWN);
-            is_known.then_some((level(&scene.luma, place)? - level(&scene.background, place)?).abs())
+            is_known.then_some(level(&scene.luma, place)? - level(&scene.background, place)?)
         };
         if let (Some(inside), Some(outside)) = (off(inside), off(outside)) {
-            (inside_sum, outside_sum, places) = (inside_sum + inside, outside_sum + outside, places + 1);
+            (lighter, places) = (lighter + inside, places + 1);
+            (inside_sum, outside_sum) = (inside_sum + inside.abs(), outside_sum + outside.abs());
         }
     });
-    places >= LEAST_PLACES && inside_sum - outside_sum < SOFT * inside_sum
+    let is_soft = inside_sum - outside_sum < SOFT * inside_sum;
+    places >= LEAST_PLACES && is_soft && lighter.abs() >= ONE_WAY * inside_sum
 }
 
 /// Calls `compare` with a place inside and one outside of a closed contour (normalised), at each pixel along it.
@@ -209,6 +214,20 @@ mod tests {
         assert!(!is_cloud(&lit(room(0.5), 1.0)), "somebody's shadow");
         assert!(!is_cloud(&with_person(room(0.5))), "somebody");
         assert!(!is_cloud(&with_person(room(0.5)).blurred(5)), "somebody who moves");
+    }
+
+    /// Rain differs everywhere, and somebody in colours of the same grey as the wall no more than that.
+    #[test]
+    fn somebody_whose_colours_alone_differ_is_no_light_in_rain() {
+        let rain = |mut picture: Canvas| {
+            for (index, pixel) in picture.pixels.iter_mut().enumerate() {
+                *pixel = pixel.saturating_add_signed([-12, 9, 3][(index % 7 + index / SIZE.0 % 5) % 3]);
+            }
+            picture
+        };
+        let in_rain = |picture: Canvas| is_light(&scene(&rain(picture), &room(0.5)), &region());
+        assert!(!in_rain(room(0.5)), "somebody");
+        assert!(in_rain(lit(room(0.5), 30.0)), "a cloud");
     }
 
     #[test]
