@@ -179,7 +179,7 @@ fn everybody_in_a_recording_is_written_as_the_motchallenge_has_it() {
     };
     assert!(read("gt/everybody/seqinfo.ini").contains("\nframeRate=25.000\nseqLength=50\nimWidth=480\n"));
     let (written, given) =
-        (boxes(&read("gt/everybody/gt/gt.txt")), boxes(&fs::read_to_string(truth).unwrap()));
+        (boxes(&read("gt/everybody/gt/gt.txt")), boxes(&fs::read_to_string(&truth).unwrap()));
     assert_eq!(written, given);
     // Both walk before a background that has to be learned first.
     let regions = boxes(&read("gt/everybody/det/det.txt"));
