@@ -33,10 +33,15 @@ pub(super) fn grown(bounds: Rect2f, margin: f32) -> Rect2f {
     around(centre(bounds), bounds.width + 2.0 * margin, bounds.height + 2.0 * margin)
 }
 
+/// Width and height that two boxes share; less than nothing by how far they are apart.
+pub(super) fn shared_sides(a: Rect2f, b: Rect2f) -> (f32, f32) {
+    let (a_end, b_end) = (a.br(), b.br());
+    (a_end.x.min(b_end.x) - a.x.max(b.x), a_end.y.min(b_end.y) - a.y.max(b.y))
+}
+
 /// The area that two boxes share.
 fn shared(a: Rect2f, b: Rect2f) -> f32 {
-    let width = (a.x + a.width).min(b.x + b.width) - a.x.max(b.x);
-    let height = (a.y + a.height).min(b.y + b.height) - a.y.max(b.y);
+    let (width, height) = shared_sides(a, b);
     width.max(0.0) * height.max(0.0)
 }
 

@@ -7,7 +7,7 @@ use std::sync::Arc;
 use opencv::core::{Point2f, Rect2f};
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, breadth, centre, grown, length, overlap};
+use super::geometry::{Frame, breadth, centre, grown, length, overlap, shared_sides};
 use super::tracks::{Track, Tracks};
 
 /// A track at the edge may be half a person: how long it may take to walk in, seconds.
@@ -187,9 +187,8 @@ pub(super) fn tell_apart(tracks: &mut Tracks, target: u64, bounds: Rect2f, dt_s:
 /// Whether two boxes stand one above the other, so near that they may be parts of one body: where clothes look like the wall
 /// behind them, legs and trunk are seen apart.
 fn may_be_one(a: Rect2f, b: Rect2f) -> bool {
-    let across = a.br().x.min(b.br().x) - a.x.max(b.x);
-    let between = a.y.max(b.y) - a.br().y.min(b.br().y);
-    across > 0.5 * a.width.min(b.width) && between < a.height.max(b.height)
+    let (across, down) = shared_sides(a, b);
+    across > 0.5 * a.width.min(b.width) && -down < a.height.max(b.height)
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use opencv::core::Rect2f;
 use super::assignment::Assigner;
 use super::region::Region;
 use super::track::Track;
-use crate::vision::tracker::geometry::{centre, overlap, share_inside};
+use crate::vision::tracker::geometry::{centre, overlap, share_inside, shared_sides};
 
 /// Deviation of a region from its track, in heights of the track, beside the track's own doubt.
 const PLACE_NOISE: f32 = 0.12;
@@ -114,11 +114,8 @@ impl Association {
 
 /// Whether two parts are near enough to each other. Two people who were seen as one are no parts of somebody once they walk apart.
 fn can_be_one_body(one: Rect2f, other: Rect2f) -> bool {
-    let gap =
-        |near: f32, far: f32, other_near: f32, other_far: f32| near.max(other_near) - far.min(other_far);
-    let across = gap(one.x, one.br().x, other.x, other.br().x);
-    let down = gap(one.y, one.br().y, other.y, other.br().y);
-    across <= APART * one.width.min(other.width) && down <= APART * one.height.max(other.height)
+    let (across, down) = shared_sides(one, other);
+    -across <= APART * one.width.min(other.width) && -down <= APART * one.height.max(other.height)
 }
 
 /// The region that most of a box lies in.

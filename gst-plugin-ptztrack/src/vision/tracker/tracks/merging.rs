@@ -9,7 +9,7 @@ use super::Tracks;
 use super::association::Association;
 use super::groups::owners_of_sides;
 use super::track::Track;
-use crate::vision::tracker::geometry::{Frame, length};
+use crate::vision::tracker::geometry::{Frame, length, shared_sides};
 
 /// Who is taller than this part of another is no part of them, nor who was seen alone for so long, seconds; where they are still
 /// smaller, that takes longer.
@@ -142,7 +142,7 @@ fn is_body(upper: &Track, lower: &Track) -> bool {
     let is_piece = |track: &Track, bounds: Rect2f| {
         track.is_alone() && track.journey.alone_s >= PIECE_S && bounds.width >= PIECE_ASPECT * bounds.height
     };
-    let across = above.br().x.min(below.br().x) - above.x.max(below.x);
+    let (across, _) = shared_sides(above, below);
     let gap = below.y - above.br().y;
     let whole = above | below;
     let apart = length(upper.velocity() - lower.velocity());
