@@ -149,11 +149,9 @@ impl ControlLoop {
     }
 
     fn tell_limit(&mut self) {
-        let at_limit = self.servo.at_limit();
-        if at_limit && !self.at_limit {
+        if begins(&mut self.at_limit, self.servo.at_limit()) {
             self.events.push(LoopEvent::AtLimit);
         }
-        self.at_limit = at_limit;
     }
 
     /// Something is being sent.
@@ -226,21 +224,17 @@ impl ControlLoop {
             return;
         }
         let unkept = !self.session.tells_position() && self.servo.settings().limits.bound_turns();
-        let known = std::mem::replace(&mut self.limits_unkept, unkept);
-        if unkept && !known {
+        if begins(&mut self.limits_unkept, unkept) {
             self.events.push(LoopEvent::LimitsUnkept);
         }
     }
 
     fn judge_zoom(&mut self) {
-        let lacks = self.servo.lacks_zoom();
-        let known = std::mem::replace(&mut self.lacks_zoom, lacks);
-        if lacks && !known {
+        if begins(&mut self.lacks_zoom, self.servo.lacks_zoom()) {
             self.events.push(LoopEvent::NoZoom);
         }
         let unkept = self.servo.zooms_by_picture() && self.servo.settings().limits.bound_zoom();
-        let known = std::mem::replace(&mut self.zoom_limits_unkept, unkept);
-        if unkept && !known {
+        if begins(&mut self.zoom_limits_unkept, unkept) {
             self.events.push(LoopEvent::ZoomLimitsUnkept);
         }
     }
@@ -334,4 +328,9 @@ fn steering<'a>(servo: &'a Servo, answered: Option<&Request>, now: Time) -> Stee
         }),
         presets_due: servo.presets_due(),
     }
+}
+
+/// Takes note of whether something is so now; returns whether it was not before.
+fn begins(known: &mut bool, now: bool) -> bool {
+    !std::mem::replace(known, now) && now
 }
