@@ -216,8 +216,10 @@ impl<O: Fn(Event)> TaskState<O> {
 
     /// What holds whenever everything was told; asked then where debug assertions are on.
     pub fn check_invariants(&self) {
-        let rests = self.control.session().is_at_rest();
-        assert!(self.waiting.is_empty() || !rests, "somebody waits for a rest that has come");
+        assert!(
+            self.waiting.is_empty() || !self.has_come_to_rest(),
+            "somebody waits for a rest that has come"
+        );
         assert!(!self.gave_up || self.deadline.is_some(), "given up before the end was asked for");
     }
 
@@ -228,8 +230,16 @@ impl<O: Fn(Event)> TaskState<O> {
         }
     }
 
+    /// Whether the camera rests, and at the end its queue has been left, too: whoever comes next, in this process or
+    /// another, would stand in line behind us until the camera forgets us.
+    fn has_come_to_rest(&self) -> bool {
+        let session = self.control.session();
+        let takes_leave = self.deadline.is_some() && session.stays_at_rest() && session.is_queued();
+        session.is_at_rest() && !takes_leave
+    }
+
     fn tell_rest(&mut self) {
-        if self.control.session().is_at_rest() {
+        if self.has_come_to_rest() {
             // Who waits no longer is not there to be told.
             for waiting in self.waiting.drain(..) {
                 let _ = waiting.try_send(());
@@ -295,22 +305,26 @@ mod tests {
             self.mailbox.hold_at(at.since_zero());
             self.take_mail();
             self.check_deadline();
-            let mut sent = Vec::new();
-            let now = self.mailbox.now();
-            while let Next::Do(request) = self.control.next_request(now) {
-                let answer = match &request {
-                    Request::Command(command) => {
-                        sent.push(*command);
-                        answer(command)
-                    }
-                    Request::Query(Query::Position) => Ok(Response::Position(Position::default())),
-                    Request::Query(_) => Err(Error::Camera("none".to_owned())),
-                };
-                self.control.sending(&request, now);
-                self.answered(&request, answer, now);
-            }
+            let exchanges = std::iter::from_fn(|| self.exchange(&answer)).collect::<Vec<_>>();
             self.publish();
-            sent
+            let command =
+                |request| if let Request::Command(command) = request { Some(command) } else { None };
+            exchanges.into_iter().filter_map(command).collect()
+        }
+
+        /// Does the next of what is due now; returns what that was.
+        fn exchange(&mut self, answer: impl Fn(&Command) -> Result<Response, Error>) -> Option<Request> {
+            let now = self.mailbox.now();
+            let Next::Do(request) = self.control.next_request(now) else { return None };
+            let answer = match &request {
+                Request::Command(command) => answer(command),
+                Request::Query(Query::Position) => Ok(Response::Position(Position::default())),
+                Request::Query(Query::Queue(_)) => Ok(Response::Place(None)),
+                Request::Query(_) => Err(Error::Camera("none".to_owned())),
+            };
+            self.control.sending(&request, now);
+            self.answered(&request, answer, now);
+            Some(request)
         }
 
         /// A move goes unanswered, the end comes, and with it a stop; returns who waits for that.
@@ -339,6 +353,27 @@ mod tests {
         assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [HALT]);
         assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
         assert!(!gave_up(&told));
+    }
+
+    /// Else whoever comes next would find us still in its way.
+    #[test]
+    fn at_the_end_the_queue_is_left_before_whoever_waits_hears_of_it() {
+        let (mut state, _told) = state();
+        state.see(Visibility::Seen);
+        let yes = |_: &Command| Ok(Response::Accepted);
+        state.serve_at(ms(1000), |_| Err(Error::Camera("not in control".to_owned())));
+        state.serve_at(ms(1200), yes);
+        assert!(state.control.session().is_queued() && !state.control.session().is_at_rest());
+        let rest = state.mailbox.finish(FINISH_BUDGET);
+        state.take_mail();
+        while !state.control.session().stays_at_rest() {
+            assert!(state.exchange(yes).is_some());
+            state.publish();
+            assert_eq!(rest.try_recv(), Err(TryRecvError::Empty));
+        }
+        state.serve_at(ms(1200), yes);
+        assert_eq!(rest.try_recv(), Ok(()));
+        assert!(state.is_over());
     }
 
     #[test]
