@@ -10,7 +10,7 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Duration;
 
-use common::stage::{FRAME, Shown, Stage, departing, mean_distance, pacing, seen};
+use common::stage::{FRAME, Shown, Stage, departing, in_part, mean_distance, pacing, seen};
 use common::{Heard, Rig, target};
 use ptztrack_contract::{TargetMeta, TargetState, Vector};
 use virtual_camera::{
@@ -187,15 +187,14 @@ fn zooming(settings: Settings) -> Stage {
     Stage::new(settings, |rig| log_in(rig).with("auto-zoom", true).with("target-height", TARGET_HEIGHT))
 }
 
-/// What a tracker says of the next picture: of who walks away, and of the background.
-fn departs(stage: &mut Stage) -> TargetMeta {
+/// What a tracker says of the next picture: of who goes this way, and of the background.
+fn next(stage: &mut Stage, way: impl Fn(Duration) -> (f64, f64)) -> TargetMeta {
     let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
     stage.camera.advance_to(stage.now + FRAME);
     let before = exposure.saturating_sub(FRAME);
-    let meta =
-        seen(stage, exposure, departing(exposure)).unwrap_or_else(|| panic!("lost after {:?}", stage.now));
-    let was = seen(stage, before, departing(before)).unwrap_or_else(|| meta.clone());
-    let turned = seen(stage, exposure, departing(before)).unwrap_or_else(|| meta.clone());
+    let meta = seen(stage, exposure, way(exposure)).unwrap_or_else(|| panic!("lost after {:?}", stage.now));
+    let was = seen(stage, before, way(before)).unwrap_or_else(|| meta.clone());
+    let turned = seen(stage, exposure, way(before)).unwrap_or_else(|| meta.clone());
     let per_s = |to: &TargetMeta| Vector {
         x: (to.centroid.x - was.centroid.x) / FRAME.as_secs_f64(),
         y: (to.centroid.y - was.centroid.y) / FRAME.as_secs_f64(),
@@ -208,7 +207,7 @@ fn departs(stage: &mut Stage) -> TargetMeta {
 fn walk_away(stage: &mut Stage) -> (f64, f64) {
     let (mut least, mut most) = (f64::INFINITY, 0.0f64);
     while stage.now < Duration::from_secs(30) {
-        let meta = departs(stage);
+        let meta = next(stage, departing);
         stage.picture(Some(&meta));
         if stage.now > Duration::from_secs(6) {
             (least, most) = (least.min(meta.bounds.height), most.max(meta.bounds.height));
@@ -251,6 +250,23 @@ fn somebody_who_walks_away_stays_as_tall() {
         let status = stage.camera.status();
         assert!(!status.moving && status.zoom_step < 10.0, "{what}: {status:?}, {:?}", stage.moves());
     });
+}
+
+#[test]
+fn somebody_seen_in_part_for_a_while_is_not_zoomed_in_on() {
+    let mut stage = zooming(camera(OnvifSettings::default(), 120.0));
+    let mut narrowest = 0.0f64;
+    while stage.now < Duration::from_secs(12) {
+        let whole = next(&mut stage, |_| (8.0, 0.0));
+        let is_part = stage.now > Duration::from_secs(8);
+        stage.picture(Some(&if is_part { in_part(&whole) } else { whole }));
+        let zoom_step = stage.camera.status().zoom_step;
+        if !is_part {
+            narrowest = narrowest.max(zoom_step);
+        }
+        assert!(zoom_step <= narrowest, "{zoom_step} after {narrowest}");
+    }
+    assert!(narrowest > 100.0, "it zoomed to {narrowest}");
 }
 
 /// What it was told it does, whatever it answers.

@@ -8,7 +8,7 @@ mod common;
 use std::time::Duration;
 
 use common::Heard;
-use common::stage::{FRAME, Shown, Stage, departing, seen};
+use common::stage::{FRAME, Shown, Stage, departing, in_part, seen};
 use ptztrack_contract::{CameraChange, TargetMeta, Vector};
 use virtual_camera::{Kinematics, Pose, Settings, SyntheticSettings, Waypoint, World};
 
@@ -78,6 +78,29 @@ fn somebody_who_walks_away_stays_as_tall_by_auto_zoom() {
         assert!(parts.0 > 0.8 && parts.1 < 1.2, "{mode}: {parts:?}");
         assert!((0.02..0.45).contains(&farthest), "{mode}: {farthest}");
         assert!(!stage.heard.iter().any(Heard::is_warning), "{mode}: {:?}", stage.heard);
+    }
+}
+
+#[test]
+fn somebody_seen_in_part_for_a_while_is_not_zoomed_in_on() {
+    for mode in ["velocity", "absolute", "centre"] {
+        let world = SyntheticSettings { wide_fov_deg: 55.2, ..SyntheticSettings::default() };
+        let settings = Settings { world: World::Synthetic(world), ..Settings::default() };
+        let mut stage = Stage::new(settings, |rig| rig.with_str("mode", mode).with("auto-zoom", true));
+        let mut narrowest = 0.0f64;
+        while stage.now < Duration::from_secs(12) {
+            let exposure = (stage.now + FRAME).saturating_sub(stage.camera.video_delay());
+            stage.camera.advance_to(stage.now + FRAME);
+            let whole = seen(&stage, exposure, (8.0, 0.0)).unwrap();
+            let is_part = stage.now > Duration::from_secs(8);
+            stage.picture(Some(&if is_part { in_part(&whole) } else { whole }));
+            let zoom_step = stage.camera.status().zoom_step;
+            if !is_part {
+                narrowest = narrowest.max(zoom_step);
+            }
+            assert!(zoom_step <= narrowest, "{mode}: {zoom_step} after {narrowest}");
+        }
+        assert!(narrowest > 100.0, "{mode}: it zoomed to {narrowest}");
     }
 }
 

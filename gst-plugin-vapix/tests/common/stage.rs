@@ -223,6 +223,13 @@ pub fn departing(time: Duration) -> (f64, f64) {
     (far.hypot(aside), aside.atan2(far).to_degrees())
 }
 
+/// The same of somebody of whom the tracker holds the middle only.
+pub fn in_part(meta: &TargetMeta) -> TargetMeta {
+    let Rect { y, height, .. } = meta.bounds;
+    let bounds = Rect { y: y + 0.375 * height, height: height / 4.0, ..meta.bounds };
+    TargetMeta { bounds, ..meta.clone() }
+}
+
 /// What a tracker says of somebody 1.75 m tall who is so far away and in that direction, where their middle is in the
 /// picture.
 pub fn seen(stage: &Stage, exposure: Duration, (distance_m, pan_deg): (f64, f64)) -> Option<TargetMeta> {

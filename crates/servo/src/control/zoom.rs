@@ -18,6 +18,8 @@ pub struct ZoomController {
     id: u64,
     zooming: bool,
     view: Outlook,
+    /// Since when it is much shorter than it was.
+    shrunk_at: Option<Time>,
 }
 
 /// What the last picture allows.
@@ -26,8 +28,8 @@ enum Outlook {
     /// Either way.
     #[default]
     Clear,
-    /// The target is far from the middle: no nearer.
-    OffCentre,
+    /// The target is far from the middle, or what is seen may be a part of it: no nearer.
+    NoNearer,
     /// It is hidden, or cut off by the picture's edge: wider.
     Uncertain,
 }
@@ -64,6 +66,13 @@ impl ZoomController {
     /// A box that comes this near to the picture's edge may be cut off by it.
     const EDGE: f64 = 0.005;
 
+    /// Nobody who walks away becomes shorter by so much, as a logarithm, from one picture to the next: what is seen is a part of
+    /// them ...
+    const PART: f64 = 0.3;
+
+    /// ... unless that lasts.
+    const PART_FOR: Duration = Duration::from_secs(5);
+
     /// Takes a picture; `magnification`: of the picture against the zoomed-out one.
     pub fn see(&mut self, measurement: &Measurement, magnification: f64) {
         if measurement.id != self.id {
@@ -72,15 +81,36 @@ impl ZoomController {
         }
         self.view = outlook(measurement);
         let size = (measurement.bounds.height / magnification).ln();
-        if self.view != Outlook::Uncertain && size.is_finite() {
-            if self.sizes.back().is_some_and(|(last, _)| *last >= measurement.taken_at) {
-                self.sizes.clear();
-            }
-            self.sizes.push_back((measurement.taken_at, size));
-            while self.seen_for() > Self::WINDOW {
-                self.sizes.pop_front();
-            }
+        if self.view == Outlook::Uncertain || !size.is_finite() {
+            return;
         }
+        let taken_at = measurement.taken_at;
+        if self.sizes.back().is_some_and(|(last, _)| *last >= taken_at) {
+            self.sizes.clear();
+        }
+        if self.is_part(size, taken_at) {
+            self.view = Outlook::NoNearer;
+            return;
+        }
+        self.sizes.push_back((taken_at, size));
+        while self.seen_for() > Self::WINDOW {
+            self.sizes.pop_front();
+        }
+    }
+
+    /// Whether this is the size of a part of the target; what stays so for long is the target.
+    fn is_part(&mut self, size: f64, taken_at: Time) -> bool {
+        if self.size(Duration::ZERO).is_none_or(|whole| size > whole.expected - Self::PART) {
+            self.shrunk_at = None;
+            return false;
+        }
+        let lasts = taken_at - *self.shrunk_at.get_or_insert(taken_at);
+        if lasts >= Self::PART_FOR {
+            self.shrunk_at = None;
+            self.sizes.clear();
+            return false;
+        }
+        true
     }
 
     /// How long the heights were watched, of each pause between two pictures a little only: during a move from rest to
@@ -102,6 +132,7 @@ impl ZoomController {
         self.sizes.clear();
         self.zooming = false;
         self.view = Outlook::Clear;
+        self.shrunk_at = None;
     }
 
     /// The wanted change of the magnification's logarithm per second, for a command that acts `lead` after the
@@ -124,7 +155,7 @@ impl ZoomController {
             return 0.0;
         }
         let rate = (Self::GAIN * error - growth).clamp(-Self::FASTEST, Self::FASTEST);
-        if self.view == Outlook::OffCentre { rate.min(0.0) } else { rate }
+        if self.view == Outlook::NoNearer { rate.min(0.0) } else { rate }
     }
 
     /// By what factor to magnify at once, for a zoom from rest to rest that is to be right `lead` after the last
@@ -134,7 +165,7 @@ impl ZoomController {
             Outlook::Uncertain => -Self::WIDENING,
             _ => target_height.ln() - magnification.ln() - self.size(lead)?.expected,
         };
-        let allowed = if self.view == Outlook::OffCentre { error.min(0.0) } else { error };
+        let allowed = if self.view == Outlook::NoNearer { error.min(0.0) } else { error };
         let factor = allowed.clamp(-Self::FASTEST, Self::FASTEST).exp();
         (allowed.abs() > Self::REST).then_some((factor, allowed.abs() > Self::START))
     }
@@ -172,7 +203,7 @@ fn outlook(measurement: &Measurement) -> Outlook {
     let off = (middle.x - 0.5).abs().max((middle.y - 0.5).abs());
     match measurement.visibility {
         Visibility::Seen if whole && off <= ZoomController::OFF_CENTRE => Outlook::Clear,
-        Visibility::Seen if whole => Outlook::OffCentre,
+        Visibility::Seen if whole => Outlook::NoNearer,
         _ => Outlook::Uncertain,
     }
 }
@@ -238,6 +269,28 @@ mod tests {
         zoom.see(&target(0.2, 2120), 1.0);
         assert!(zoom.rate(0.3, 1.0, lead) > 0.0);
         assert!((zoom.factor(0.3, 1.0, lead).unwrap().0 - 1.5).abs() < 0.05);
+    }
+
+    /// A tracker that holds their legs only says that somebody is a quarter as tall: the camera would zoom until these fill the
+    /// picture.
+    #[test]
+    fn what_is_suddenly_much_shorter_is_a_part_of_the_target_unless_that_lasts() {
+        let rate_after = |heights: &[(f64, u64)]| {
+            let (mut zoom, mut now) = (seen(|_| 0.4), 1000);
+            for (height, pictures) in heights {
+                for _ in 0..*pictures {
+                    now += 40;
+                    zoom.see(&target(*height, now), 1.0);
+                    zoom.check_invariants();
+                }
+            }
+            zoom.rate(0.4, 1.0, Duration::ZERO)
+        };
+        assert_eq!(rate_after(&[(0.1, 1)]), 0.0);
+        assert_eq!(rate_after(&[(0.1, 120)]), 0.0);
+        assert_eq!(rate_after(&[(0.1, 120), (0.4, 1), (0.1, 120)]), 0.0, "it was seen whole in between");
+        assert!(rate_after(&[(0.1, 130)]) > 0.0);
+        assert!(rate_after(&[(0.1, 1), (0.6, 25)]) < 0.0, "nearer than before");
     }
 
     #[test]
