@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use serde::{Deserialize, Serialize};
 use servo::{HardLimits, Motion, Range, SpeedUnit, TableRow};
 use session::{Attributes, Parameters};
 
@@ -24,7 +25,7 @@ pub struct Abilities {
 }
 
 /// How long moves are to go on by themselves.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub enum MoveTimeout {
     /// So long.
     After(Duration),
@@ -126,6 +127,11 @@ fn is_degrees(uri: &str) -> bool {
 }
 
 impl Abilities {
+    /// Of a camera of which only this is known.
+    pub fn with_timeout(timeout: MoveTimeout) -> Self {
+        Self { timeout, ..Self::default() }
+    }
+
     fn space(&self, kind: &str, is: impl Fn(&str) -> bool) -> Option<&Space> {
         self.spaces.iter().find(|space| space.kind == kind && is(&space.uri))
     }

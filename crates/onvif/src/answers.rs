@@ -3,6 +3,7 @@
 //! What a camera tells, without the envelope.
 
 use chrono::NaiveDate;
+use serde::{Deserialize, Serialize};
 use servo::{Position, Presets};
 
 use crate::abilities::Abilities;
@@ -13,7 +14,7 @@ const MOST: usize = 1024;
 
 /// Paths of the services that matter here, on the camera's own host: the addresses that cameras tell are often not those by
 /// which they are reached, and a password is for its own host only.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Services {
     /// Media.
     pub media: String,
@@ -24,7 +25,7 @@ pub struct Services {
 }
 
 /// A media profile that has a PTZ configuration.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Profile {
     /// By which it is asked for.
     pub token: String,

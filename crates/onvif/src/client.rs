@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::mem;
 use std::time::Duration;
 
 use servo::{Motion, Position, Presets};
@@ -12,6 +13,7 @@ use crate::answers::{
     Profile, Services, parse_date, parse_position, parse_presets, parse_profiles, parse_services,
 };
 use crate::clock::CameraClock;
+use crate::findings::Findings;
 use crate::messages;
 use crate::moves::{Moves, StopWords};
 use crate::soap::{Answer, Element, envelope, read_answer};
@@ -46,6 +48,8 @@ pub struct Client {
     /// Questions for its position, in a row, that were not answered in time.
     late_statuses: u32,
     warning: Option<String>,
+    /// What is known of it somebody else found out, and nothing was said by it yet.
+    inherits: bool,
 }
 
 /// What became of our user and password.
@@ -76,9 +80,8 @@ impl session::Client for Client {
         let device = device.to_owned();
         let mut own = identity.clone();
         own.settings.location = identity.settings.location.origin();
-        Ok(Self {
+        let mut client = Self {
             http: HttpClient::in_place_of(own)?,
-            identity,
             device,
             clock: None,
             services: None,
@@ -89,11 +92,20 @@ impl session::Client for Client {
             login: Login::Open,
             late_statuses: 0,
             warning: None,
-        })
+            inherits: false,
+            identity,
+        };
+        // Of a camera that nothing is known of it is asked.
+        if let Ok(findings) = serde_json::from_value(client.identity.findings.clone()) {
+            client.know(findings);
+        }
+        Ok(client)
     }
 
     fn identity(&self) -> Identity {
-        self.identity.clone()
+        let mut identity = self.identity.clone();
+        identity.findings = serde_json::to_value(self.findings()).unwrap_or_default();
+        identity
     }
 
     fn set_credentials(&mut self, credentials: Option<Credentials>) {
@@ -103,6 +115,21 @@ impl session::Client for Client {
     }
 
     async fn exchange(&mut self, request: &Request) -> Result<Response, Error> {
+        let answer = self.answer(request).await;
+        if mem::take(&mut self.inherits) && answer.is_err() {
+            // It may be otherwise than it was then.
+            (self.clock, self.services, self.profile, self.abilities) = (None, None, None, None);
+        }
+        answer
+    }
+
+    fn take_warning(&mut self) -> Option<String> {
+        self.warning.take()
+    }
+}
+
+impl Client {
+    async fn answer(&mut self, request: &Request) -> Result<Response, Error> {
         let abilities = self.connected().await?;
         match request {
             Request::Command(command) => self.send(command, &abilities).await.map(|()| Response::Accepted),
@@ -122,12 +149,25 @@ impl session::Client for Client {
         }
     }
 
-    fn take_warning(&mut self) -> Option<String> {
-        self.warning.take()
+    /// `None`: not everything is known yet.
+    fn findings(&self) -> Option<Findings> {
+        Some(Findings {
+            services: self.services.clone()?,
+            profile: self.profile.clone()?,
+            timeout: self.abilities.as_ref()?.timeout,
+            clock_ahead_s: self.clock?.ahead_s(),
+            moves: self.moves.clone(),
+        })
     }
-}
 
-impl Client {
+    fn know(&mut self, findings: Findings) {
+        let Findings { services, profile, timeout, clock_ahead_s, moves } = findings;
+        (self.services, self.profile, self.moves) = (Some(services), Some(profile), moves);
+        self.abilities = Some(Abilities::with_timeout(timeout));
+        self.clock = Some(CameraClock::ahead_by(clock_ahead_s));
+        self.inherits = true;
+    }
+
     /// Whether the camera turns, by its own word.
     ///
     /// # Errors

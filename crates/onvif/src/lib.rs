@@ -14,6 +14,7 @@ mod abilities;
 mod answers;
 mod client;
 mod clock;
+mod findings;
 mod messages;
 pub mod metadata;
 mod moves;

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use serde::{Deserialize, Serialize};
+
 /// By which words a camera is stopped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum StopWords {
     /// `Stop`.
     Stop,
@@ -11,7 +13,7 @@ pub enum StopWords {
 }
 
 /// What a camera turned out to understand: learned from what it refuses, as what it tells of itself is no witness.
-#[derive(Debug)]
+#[derive(Debug, Clone, Serialize, Deserialize)]
 pub struct Moves {
     stop_words: StopWords,
     /// The last that was sent was a stop: where it has to be sent again, that one did not do.

@@ -20,6 +20,8 @@ const RIGHT: Request = Request::Command(Command::Move {
     free: false,
 });
 
+const STOP: Request = Request::Command(Command::Stop(Stop::PanTilt));
+
 fn camera(quirks: &[Quirk]) -> VirtualCamera {
     let onvif = Some(OnvifSettings::with(quirks));
     VirtualCamera::start(Settings { auth: Auth::Digest { qop: true }, onvif, ..Settings::default() }).unwrap()
@@ -83,6 +85,26 @@ async fn presets_are_gone_to_by_their_numbers() {
     let go = Request::Command(Command::Move { motion: Motion::Preset { number }, free: false });
     assert_eq!(client.exchange(&go).await, Ok(Response::Accepted));
     assert!(camera.commands().iter().any(|command| command.query.contains("GotoPreset")));
+}
+
+/// Each question takes a slow camera most of a second, while it turns.
+#[tokio::test]
+async fn who_stops_a_camera_in_somebodys_place_asks_nothing() {
+    for quirk in [Quirk::ClockAhead, Quirk::SecondProfile, Quirk::StopMissing] {
+        let camera = camera(&[quirk]);
+        let mut first = client(&camera, "pass");
+        assert_eq!(first.exchange(&RIGHT).await, Ok(Response::Accepted));
+        if quirk == Quirk::StopMissing {
+            // It was found to take no `Stop`.
+            assert_eq!(first.exchange(&STOP).await, Ok(Response::Accepted));
+            assert_eq!(first.exchange(&RIGHT).await, Ok(Response::Accepted));
+        }
+        let mut second = Client::in_place_of(first.identity()).unwrap();
+        let before = camera.status().requests;
+        assert_eq!(second.exchange(&STOP).await, Ok(Response::Accepted), "{quirk:?}");
+        assert_eq!(camera.status().requests, before + 1, "{quirk:?}");
+        assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{quirk:?}");
+    }
 }
 
 /// What the application cannot do any more, for a camera that heeds neither timeout nor `Stop`.

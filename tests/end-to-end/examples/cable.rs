@@ -96,7 +96,7 @@ impl Case {
         let cable = Cable::lay(number).unwrap();
         let front = Front::at((cable.camera_side(), 0), camera.http_address());
         let follow = match camera.onvif_url() {
-            Some(_) => scene::follow_onvif(&camera),
+            Some(_) => scene::follow_onvif(&camera, ""),
             None => scene::follow(&camera),
         };
         let follow = follow.replace(&camera.http_address().to_string(), &front.address().to_string());

@@ -102,10 +102,10 @@ pub fn follow(camera: &VirtualCamera) -> String {
     format!("{} ! bgavgdetect ! lkfeaturetrack ! {}", mjpeg(camera), servo(camera))
 }
 
-/// The same by ONVIF.
-pub fn follow_onvif(camera: &VirtualCamera) -> String {
+/// The same by ONVIF, with these properties of the servo besides.
+pub fn follow_onvif(camera: &VirtualCamera, properties: &str) -> String {
     let location = camera.onvif_url().unwrap_or_else(|| camera.url());
-    let servo = format!("onvifptzsink location={location} user={USER} password={PASSWORD}");
+    let servo = format!("onvifptzsink location={location} user={USER} password={PASSWORD} {properties}");
     format!("{} ! bgavgdetect ! lkfeaturetrack ! {servo}", mjpeg(camera))
 }
 

@@ -79,7 +79,7 @@ fn one_that_heeds_neither_stop_nor_timeout_rests_in_the_end() {
     for signal in ["INT", "KILL"] {
         let quirks = [Quirk::StopIgnored, Quirk::TimeoutIgnored];
         let camera = VirtualCamera::start(scene::any_make(OnvifSettings::with(&quirks))).unwrap();
-        let launch = GstLaunch::start(&[], &scene::follow_onvif(&camera));
+        let launch = GstLaunch::start(&[], &scene::follow_onvif(&camera, ""));
         wait_for(&camera, |status| status.pan_rate_deg_s.abs() > 3.0);
         let ended = camera.now();
         launch.signal(signal);

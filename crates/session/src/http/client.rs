@@ -45,11 +45,14 @@ pub struct Identity {
     /// As they are by now: redirects followed, user and password those of the last request.
     pub settings: ClientSettings,
     cookies: Cookies,
+    /// What the camera has told, in the protocol's own form: whoever has it need not ask again.
+    #[serde(default)]
+    pub findings: serde_json::Value,
 }
 
 impl From<ClientSettings> for Identity {
     fn from(settings: ClientSettings) -> Self {
-        Self { settings, cookies: Cookies::default() }
+        Self { settings, cookies: Cookies::default(), findings: serde_json::Value::Null }
     }
 }
 
@@ -95,7 +98,7 @@ impl HttpClient {
     /// # Errors
     /// [`Error::Tls`] where `trust` cannot be used.
     pub fn in_place_of(identity: Identity) -> Result<Self, Error> {
-        let Identity { settings, cookies } = identity;
+        let Identity { settings, cookies, .. } = identity;
         Ok(Self {
             http: http_client(&settings, 1)?,
             http_once: http_client(&settings, 0)?,
@@ -110,7 +113,7 @@ impl HttpClient {
 
     /// Who this client is to the camera.
     pub fn identity(&self) -> Identity {
-        Identity { settings: self.settings.clone(), cookies: self.cookies.clone() }
+        Identity { cookies: self.cookies.clone(), ..self.settings.clone().into() }
     }
 
     /// Takes another user or password, and asks again even where the last were refused.
