@@ -85,8 +85,6 @@ fn each_quirk() {
         let warnings: Vec<_> = stage.heard.into_iter().filter_map(Heard::into_warning).collect();
         let expected = match quirk {
             Quirk::TimeoutRefused => &["refuses to be told how long a move may last"][..],
-            // What a broken connection is for the camera does not say.
-            Quirk::StopCloses => &["connection to the camera failed"],
             _ => &[],
         };
         let told = warnings.iter().zip(expected).all(|(warning, expected)| warning.contains(expected));

@@ -446,7 +446,8 @@ impl Client {
     async fn stop(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {
         let words = self.moves.next_stop();
         match self.stop_by(words, command, abilities).await {
-            Err(Error::Camera(_)) => {
+            // Some close the connection at it.
+            Err(Error::Camera(_) | Error::Broken(_)) => {
                 self.moves.stop_refused();
                 let other = self.moves.stop_words();
                 self.stop_by(other, command, abilities).await
