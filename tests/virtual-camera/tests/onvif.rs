@@ -49,6 +49,45 @@ fn move_right(camera: &VirtualCamera, timeout: &str) -> String {
 
 const STOP: &str = "<t:Stop><t:ProfileToken>profile_1</t:ProfileToken></t:Stop>";
 
+fn options(camera: &VirtualCamera) -> String {
+    let body = "<t:GetConfigurationOptions><t:ConfigurationToken>ptz_1</t:ConfigurationToken></t:GetConfigurationOptions>";
+    ask(camera, "ptz_service", body)
+}
+
+/// PTZ-2-1-3
+#[test]
+fn it_tells_its_spaces_and_how_long_moves_may_last() {
+    let options = options(&camera(Auth::None, &[]));
+    assert!(options.contains("<tt:Spaces><tt:"), "{options}");
+    assert!(options.contains("<tt:Min>PT1S</tt:Min><tt:Max>PT10M</tt:Max></tt:PTZTimeout>"), "{options}");
+}
+
+/// PTZ-7-3-3 and PTZ-7-3-4
+#[test]
+fn it_moves_at_both_ends_of_the_generic_velocities() {
+    for (space, axis) in [("PanTiltSpaces", "PanTilt x='{}' y='{}'"), ("ZoomSpaces", "Zoom x='{}'")] {
+        let camera = camera(Auth::None, &[]);
+        let uri = format!("http://www.onvif.org/ver10/tptz/{space}/VelocityGenericSpace");
+        assert!(options(&camera).contains(&uri), "{uri}");
+        for end in ["1", "-1"] {
+            let axis = axis.replace("{}", end);
+            let body = format!(
+                "<t:ContinuousMove><t:ProfileToken>profile_1</t:ProfileToken><t:Velocity><tt:{axis} space='{uri}'/></t:Velocity></t:ContinuousMove>"
+            );
+            let answer = ask(&camera, "ptz_service", &body);
+            assert!(answer.contains("ContinuousMoveResponse"), "{axis}: {answer}");
+            assert!(camera.wait_for(PATIENCE, |status| status.moving), "{axis}");
+        }
+    }
+}
+
+/// PTZ-8-1-1
+#[test]
+fn it_tells_what_its_ptz_service_is_capable_of() {
+    let answer = ask(&camera(Auth::None, &[]), "ptz_service", "<t:GetServiceCapabilities/>");
+    assert!(answer.contains("MoveStatus=\"true\" StatusPosition=\"true\""), "{answer}");
+}
+
 /// PTZ-3-1-4
 #[test]
 fn a_move_with_a_timeout_ends_by_itself() {

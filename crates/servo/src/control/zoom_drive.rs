@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use super::zoom::ZoomController;
 use crate::Time;
-use crate::estimation::{MagnificationEstimator, Measurement, ZoomEstimator};
+use crate::estimation::{LensFinding, MagnificationEstimator, Measurement, ZoomEstimator};
 use crate::model::{CommandHistory, Delays, Lens, Range, SpeedMap};
 
 /// Turns the wish for a target of some height into zoom speeds and places of one lens.
@@ -14,6 +14,8 @@ pub struct ZoomDrive {
     track: ZoomEstimator,
     /// Of a lens of which the camera tells nothing.
     seen: Option<MagnificationEstimator>,
+    /// Such a lens goes in where it is told to go out.
+    reversed: bool,
     /// It zoomed in since it was last as wide as it goes.
     narrowed: bool,
 }
@@ -48,9 +50,17 @@ impl ZoomDrive {
             self.track = ZoomEstimator::of_magnification();
             MagnificationEstimator::default()
         });
-        if let Some(widest) = seen.see(measurement.ego_zoom, measurement.taken_at, &mut self.track, delays) {
-            self.controller.count_from(widest);
-            self.narrowed = false;
+        match seen.see(measurement.ego_zoom, measurement.taken_at, &mut self.track, delays) {
+            Some(LensFinding::Widest(widest)) => {
+                self.controller.count_from(widest);
+                self.narrowed = false;
+            }
+            Some(LensFinding::Reversed) => {
+                self.reversed = !self.reversed;
+                self.track.reverse();
+                self.narrowed = true;
+            }
+            None => {}
         }
     }
 
@@ -108,8 +118,9 @@ impl ZoomDrive {
         }
     }
 
-    /// From then on the zoom moves at a part of its fastest.
-    pub fn commanded(&mut self, at: Time, speed: f64) {
+    /// From then on the zoom moves at what is called a part of its fastest.
+    pub fn commanded(&mut self, at: Time, told: f64) {
+        let speed = self.sense() * told;
         self.narrowed |= speed > 0.0;
         self.track.commanded(at, speed);
     }
@@ -164,7 +175,12 @@ impl ZoomDrive {
     fn part(&self, per_s: f64) -> f64 {
         let boost = self.seen.as_ref().map_or(1.0, |seen| seen.boost(per_s));
         let part = (boost * per_s / self.track.fastest_per_s()).clamp(-1.0, 1.0);
-        SpeedMap::part(SpeedMap::level_of(part))
+        SpeedMap::part(SpeedMap::level_of(self.sense() * part))
+    }
+
+    /// -1 of a lens that goes in where it is told to go out.
+    fn sense(&self) -> f64 {
+        if self.reversed { -1.0 } else { 1.0 }
     }
 
     /// The zoom to do at once, for the height to be right `lead` after the last picture; `None`: it is well as it is.

@@ -21,6 +21,24 @@ pub struct MagnificationEstimator {
     span: Option<(Time, f64)>,
     rest: Option<Rest>,
     ends: Range,
+    sense: Sense,
+}
+
+/// Which way the lens goes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sense {
+    /// Comparisons in a row that showed it to go as it was told, or the other way.
+    with: u32,
+    against: u32,
+}
+
+/// What a picture shows of the lens that is not as it was taken to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LensFinding {
+    /// It is as wide as it goes: this travel is none from now on.
+    Widest(f64),
+    /// It goes in where it is told to go out, and the other way round.
+    Reversed,
 }
 
 /// The lens rests though it is told to move.
@@ -35,7 +53,8 @@ struct Rest {
 
 impl Default for MagnificationEstimator {
     fn default() -> Self {
-        Self { travel: 0.0, before: None, seen_at: None, span: None, rest: None, ends: Self::UNKNOWN }
+        let sense = Sense::default();
+        Self { travel: 0.0, before: None, seen_at: None, span: None, rest: None, ends: Self::UNKNOWN, sense }
     }
 }
 
@@ -74,18 +93,21 @@ impl MagnificationEstimator {
     /// No lens magnifies more, nor what was met less: e^4.6 is 100.
     const MOST: f64 = 4.6;
 
+    /// So many comparisons in a row tell which way a lens goes.
+    const DECISIVE: u32 = 2;
+
     /// A lens that goes no farther does not zoom.
     const SHORTEST: f64 = 0.05;
 
     /// Takes a picture, in which the background grows at this rate, where that is seen: the logarithm of its magnification per
-    /// second. Where this shows the lens to be as wide as it goes, returns the travel that is none from now on.
+    /// second.
     pub fn see(
         &mut self,
         growth: Option<f64>,
         taken_at: Time,
         track: &mut ZoomEstimator,
         delays: &Delays,
-    ) -> Option<f64> {
+    ) -> Option<LensFinding> {
         let lasted = self.before.replace(taken_at).map_or(Duration::ZERO, |before| taken_at - before);
         let growth = growth.filter(|_| !lasted.is_zero() && lasted <= Self::LONGEST);
         match growth.map(|growth| growth * lasted.as_secs_f64()) {
@@ -109,7 +131,7 @@ impl MagnificationEstimator {
     }
 
     /// Compares how far the lens went with how far it should have gone.
-    fn compare(&mut self, taken_at: Time, track: &mut ZoomEstimator, delays: &Delays) -> Option<f64> {
+    fn compare(&mut self, taken_at: Time, track: &mut ZoomEstimator, delays: &Delays) -> Option<LensFinding> {
         let sent = delays.sent_by(taken_at);
         let Some(told) = steady(track.speeds_between(sent - Self::SETTLING, sent + Self::EARLY)) else {
             (self.span, self.rest) = (None, None);
@@ -122,6 +144,14 @@ impl MagnificationEstimator {
         }
         self.span = Some((taken_at, self.travel));
         let moved = (self.travel - from) * expected.signum();
+        // However late it is, it was told nothing else.
+        let told_so_only = {
+            let mut lately = track.speeds_between(taken_at - Self::LATEST, sent + Self::EARLY);
+            lately.all(|speed| speed * told >= 0.0)
+        };
+        if told_so_only && self.sense.is_against(moved) {
+            return Some(self.reverse());
+        }
         if moved >= Self::RESTS {
             self.rest = None;
             track.found_faster((moved / expected.abs()).clamp(0.25, 4.0));
@@ -129,7 +159,13 @@ impl MagnificationEstimator {
         }
         let widest = self.rests(told, (since, taken_at))?;
         track.place(taken_at - delays.video, self.travel);
-        Some(widest)
+        Some(LensFinding::Widest(widest))
+    }
+
+    fn reverse(&mut self) -> LensFinding {
+        // An end was where it could not go the way that it was told.
+        (self.span, self.rest, self.ends) = (None, None, Self::UNKNOWN);
+        LensFinding::Reversed
     }
 
     /// It was seen to rest for a while. Where it has done so for long enough to be as wide as it goes, returns the travel that is
@@ -195,6 +231,24 @@ impl MagnificationEstimator {
     }
 }
 
+impl Sense {
+    /// Takes how far the lens went the way that it was told; returns whether this decides that it goes the other way.
+    fn is_against(&mut self, moved: f64) -> bool {
+        if moved.abs() < MagnificationEstimator::RESTS || self.with >= MagnificationEstimator::DECISIVE {
+            return false;
+        }
+        *self = match moved > 0.0 {
+            true => Self { with: self.with + 1, against: 0 },
+            false => Self { with: 0, against: self.against + 1 },
+        };
+        let decides = self.against >= MagnificationEstimator::DECISIVE;
+        if decides {
+            *self = Self::default();
+        }
+        decides
+    }
+}
+
 /// The slowest of speeds that have one sign and do not differ much; `None` of others.
 fn steady(speeds: impl Iterator<Item = f64>) -> Option<f64> {
     let (least, most) = speeds
@@ -222,12 +276,15 @@ mod tests {
         per_s: f64,
         /// It rests where it is told to be slower than this.
         slowest: f64,
+        /// -1 where it goes the other way than it is told, as far as nobody has found that out.
+        sense: f64,
     }
 
     impl Watched {
         fn new(per_s: f64) -> Self {
             let (seen, track) = (MagnificationEstimator::default(), ZoomEstimator::of_magnification());
-            Self { seen, track, now: Time::from_millis(5000), lens: 0.0, longest: 3.0, per_s, slowest: 0.0 }
+            let now = Time::from_millis(5000);
+            Self { seen, track, now, lens: 0.0, longest: 3.0, per_s, slowest: 0.0, sense: 1.0 }
         }
 
         fn delays() -> Delays {
@@ -242,12 +299,20 @@ mod tests {
                 self.now += PICTURE;
                 let told = self.track.speeds_between(self.now - LATE, self.now - LATE).last().unwrap_or(0.0);
                 let boosted = (told * self.seen.boost(told)).clamp(-1.0, 1.0);
-                let moves = if boosted.abs() < self.slowest { 0.0 } else { boosted };
+                let moves = if boosted.abs() < self.slowest { 0.0 } else { self.sense * boosted };
                 let before = self.lens;
                 self.lens = (before + moves * self.per_s * PICTURE.as_secs_f64()).clamp(0.0, self.longest);
                 let growth = (self.lens - before) / PICTURE.as_secs_f64();
-                let widest = self.seen.see(Some(growth), self.now, &mut self.track, &Self::delays());
-                found += usize::from(widest.is_some());
+                match self.seen.see(Some(growth), self.now, &mut self.track, &Self::delays()) {
+                    Some(LensFinding::Widest(_)) => found += 1,
+                    Some(LensFinding::Reversed) => {
+                        self.sense = -self.sense;
+                        self.track.reverse();
+                        // What it is told by whoever knows.
+                        self.track.commanded(self.now, speed);
+                    }
+                    None => {}
+                }
                 self.seen.check_invariants();
             }
             found
@@ -298,6 +363,22 @@ mod tests {
         assert!(!fixed.seen.is_fixed());
         fixed.zoom(1.0, 3.0);
         assert!(fixed.seen.is_fixed());
+    }
+
+    #[test]
+    fn a_lens_that_goes_the_other_way_is_found_out_soon_and_one_that_does_not_never() {
+        for (speed, sense) in [(0.2, -1.0), (-0.2, -1.0), (0.2, 1.0), (-0.2, 1.0)] {
+            let mut watched = Watched { lens: 1.5, sense, ..Watched::new(1.0) };
+            watched.zoom(speed, 1.5);
+            let farthest = watched.lens;
+            assert!((farthest - 1.5).abs() < 0.3, "{speed}, {sense}: {farthest}");
+            watched.zoom(speed, 3.0);
+            assert_eq!(watched.sense, 1.0, "{speed}, {sense}");
+            assert!((watched.lens - farthest) * speed > 0.04, "{speed}, {sense}: {}", watched.lens);
+            // It is told otherwise, and shows that late.
+            watched.zoom(-speed, 2.0);
+            assert_eq!(watched.sense, 1.0, "{speed}, {sense}");
+        }
     }
 
     #[test]

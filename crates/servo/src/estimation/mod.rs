@@ -36,7 +36,7 @@ pub use calibration::{Estimates, SelfCalibration};
 use field_of_view::FieldOfViewEstimator;
 pub use frozen_picture::FrozenPictureDetector;
 use latency::LatencyEstimator;
-pub use magnification::MagnificationEstimator;
+pub use magnification::{LensFinding, MagnificationEstimator};
 pub use measurement::{Measurement, Visibility};
 pub use mounting::Mounting;
 pub use rate::{RateAverage, Samples};

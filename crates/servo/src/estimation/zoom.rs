@@ -66,6 +66,11 @@ impl ZoomEstimator {
         self.assume(self.fastest_per_s * factor);
     }
 
+    /// It was found to go the other way than it was told.
+    pub fn reverse(&mut self) {
+        self.commanded.reverse();
+    }
+
     /// It is taken to be so fast.
     pub fn assume(&mut self, fastest_per_s: f64) {
         let (slowest, fastest) = Self::PLAUSIBLE_PER_S;

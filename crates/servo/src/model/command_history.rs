@@ -67,6 +67,14 @@ impl CommandHistory {
         }
     }
 
+    /// What was told to go one way went the other all along.
+    pub fn reverse(&mut self) {
+        for entry in &mut self.entries {
+            (entry.start, entry.rate) = (entry.start * -1.0, entry.rate * -1.0);
+            entry.levels = entry.levels.map(|(pan, tilt)| (-pan, -tilt));
+        }
+    }
+
     fn add(&mut self, at: Time, rate: PanTilt, levels: Option<(i8, i8)>) {
         let before = self.entries.back();
         let start = before.map_or(PanTilt::default(), |entry| entry.reached(at, self.acceleration_deg_s2));

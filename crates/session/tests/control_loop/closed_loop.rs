@@ -53,6 +53,8 @@ pub struct Setup {
     /// Where the noise begins.
     pub seed: u64,
     pub visible: fn(f64) -> Visibility,
+    /// How fast the lens moves where it is told a speed, both in parts of its fastest.
+    pub lens: fn(f64) -> f64,
     /// Commands that this camera does not know.
     pub refuses: fn(&Command) -> bool,
 }
@@ -88,6 +90,7 @@ impl Setup {
             sees_beyond: true,
             seed: 1,
             visible: |_| Visibility::Seen,
+            lens: |told| told,
             refuses: |_| false,
         }
     }
@@ -299,7 +302,7 @@ impl Simulation {
             if let Request::Command(command) = request {
                 run.commands.push((self.now.since_zero().as_secs_f64() - Self::START_S, command));
                 if !(self.setup.refuses)(&command) {
-                    for motion in motions(&command) {
+                    for motion in motions(&command, self.setup.lens) {
                         self.head.command(self.now.since_zero(), motion);
                     }
                 }
@@ -346,7 +349,7 @@ fn range((min, max): (f64, f64)) -> Range {
 }
 
 /// What the head is to do, which counts in steps.
-fn motions(command: &Command) -> Vec<Motion> {
+fn motions(command: &Command, lens: fn(f64) -> f64) -> Vec<Motion> {
     let motion = match command {
         Command::Move { motion, .. } => motion,
         Command::Stop(Stop::AllAxes) => &servo::Motion::STILL,
@@ -356,7 +359,7 @@ fn motions(command: &Command) -> Vec<Motion> {
     match *motion {
         servo::Motion::Velocity { pan, tilt, zoom } => {
             let turn = Motion::PanTilt { pan: step(pan), tilt: step(tilt) };
-            iter::once(turn).chain(zoom.map(|zoom| Motion::Zoom(step(zoom)))).collect()
+            iter::once(turn).chain(zoom.map(|zoom| Motion::Zoom(step(lens(zoom))))).collect()
         }
         servo::Motion::Absolute { pan_deg, tilt_deg, speed, zoom } => vec![
             Motion::Speed(step(speed)),

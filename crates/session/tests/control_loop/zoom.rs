@@ -162,6 +162,42 @@ fn by_the_picture_alone_the_zoom_comes_to_rest_and_the_field_of_view_is_known() 
     }
 }
 
+/// It zooms out at first, slowly, as nobody knows how fast it is.
+#[test]
+fn a_lens_that_goes_the_other_way_is_found_out_and_runs_away_nowhere() {
+    for delay in [100, 300, 800] {
+        let setup = Setup { lens: |told| -told, ..zooming_by_picture(delay, 3.0) };
+        let run = setup.run(40.0, |_| (PanTilt::new(3.0, 1.0), 3.5));
+        let first = run.frames[0].height;
+        let (least, most) = heights(&run, 0.0, 40.0);
+        assert!(
+            least > 0.6 * first && most < 1.3 * TARGET_HEIGHT,
+            "{delay} ms: {least} to {most} of {first}"
+        );
+        let (least, most) = heights(&run, 20.0, 40.0);
+        let range = 0.8 * TARGET_HEIGHT..1.2 * TARGET_HEIGHT;
+        assert!(range.contains(&least) && range.contains(&most), "{delay} ms: {least} to {most}");
+        assert_eq!(run.commands_between(25.0, 40.0), 0, "{delay} ms: {:?}", run.commands);
+    }
+}
+
+#[test]
+fn a_lens_of_one_speed_runs_away_nowhere() {
+    for (delay, lens) in [100, 300].into_iter().flat_map(|delay| {
+        let slow: fn(f64) -> f64 = |told| if told == 0.0 { 0.0 } else { 0.1f64.copysign(told) };
+        let fast: fn(f64) -> f64 = |told| if told == 0.0 { 0.0 } else { 0.4f64.copysign(told) };
+        [slow, fast].map(|lens| (delay, lens))
+    }) {
+        let case = format!("{delay} ms, {}", lens(1.0));
+        let run =
+            Setup { lens, ..zooming_by_picture(delay, 3.0) }.run(60.0, |_| (PanTilt::new(3.0, 1.0), 3.5));
+        let (least, most) = heights(&run, 10.0, 60.0);
+        let range = 0.8 * TARGET_HEIGHT..1.2 * TARGET_HEIGHT;
+        assert!(range.contains(&least) && range.contains(&most), "{case}: {least} to {most}");
+        assert_eq!(run.commands_between(20.0, 60.0), 0, "{case}: {:?}", run.commands);
+    }
+}
+
 /// Until the picture does not grow smaller any more.
 #[test]
 fn when_nobody_is_there_the_view_is_widened_to_the_end() {

@@ -43,7 +43,7 @@ quirks! {
     /// A `Timeout` is refused
     TimeoutRefused = "timeout-refused", "Bosch: Jazea/Onvif.Core issue 30";
     /// A `Timeout` is taken and has no effect
-    TimeoutIgnored = "timeout-ignored", "supposed: no report is at hand";
+    TimeoutIgnored = "timeout-ignored", "ONVIF_ICAMERA JM800S5_AF: scrypted pull request 2124";
     /// Only a `Timeout` of 1 to 10 s is taken
     TimeoutTen = "timeout-ten", "Dahua: frigate issue 9056";
     /// `Stop` is refused
@@ -62,6 +62,10 @@ quirks! {
     ClockBehind = "clock-behind", "OpenIPC: majestic-webui issue 292";
     /// A move that zooms is answered by what is no HTTP
     ZoomBreaks = "zoom-breaks", "TP-Link TL-IPC652P-A4: onvifsim";
+    /// Zooming goes the other way
+    ZoomReversed = "zoom-reversed", "supposed: no report is at hand";
+    /// The lens has one speed
+    ZoomOneSpeed = "zoom-one-speed", "node-red-contrib-onvif-nodes issue 7";
     /// The connection is closed in place of a fault
     FaultCloses = "fault-closes", "Xiongmai: onvif-tt, expected failures";
     /// Commands are acted on, and answered, 100 to 800 ms late
@@ -100,6 +104,8 @@ impl Quirk {
         Self::ALL.iter().copied().filter(|quirk| !apart.contains(quirk)).collect()
     }
 
+    /// The speed of [`Self::ZoomOneSpeed`], as a part of the fastest.
+    pub(crate) const ONE_SPEED: f64 = 0.3;
     /// [`Self::Late`] is at least so late, ...
     pub(crate) const LEAST_LATE: Duration = Duration::from_millis(100);
     /// ... and up to so much later.

@@ -12,6 +12,7 @@ use super::{DEVICE_SERVICE, MEDIA_SERVICE, MEDIA2_SERVICE, OnvifSettings, PTZ_SE
 use crate::camera::Camera;
 use crate::kinematics::{Limits, Motion, ZOOM_RANGE};
 
+const PTZ_NAMESPACE: &str = "http://www.onvif.org/ver20/ptz/wsdl";
 const GENERIC_POSITION: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/PositionGenericSpace";
 const DEGREES: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/SphericalPositionSpaceDegrees";
 const DEGREES_S: &str = "http://www.onvif.org/ver10/tptz/PanTiltSpaces/VelocitySpaceDegrees";
@@ -62,6 +63,9 @@ pub(crate) fn answer(camera: &Camera, onvif: &OnvifSettings, request: Node, host
             Ok("<tptz:GetConfigurationOptionsResponse><tptz:PTZConfigurationOptions><tt:Spaces/></tptz:PTZConfigurationOptions></tptz:GetConfigurationOptionsResponse>".into())
         }
         "GetConfigurationOptions" => Ok(options(onvif, &camera.limits())),
+        "GetServiceCapabilities" if request.tag_name().namespace() == Some(PTZ_NAMESPACE) => {
+            Ok("<tptz:GetServiceCapabilitiesResponse><tptz:Capabilities EFlip=\"false\" Reverse=\"false\" MoveStatus=\"true\" StatusPosition=\"true\"/></tptz:GetServiceCapabilitiesResponse>".into())
+        }
         "GetStatus" => known_profile().map(|()| status(camera, onvif)),
         "GetPresets" => known_profile().map(|()| presets(camera)),
         "ContinuousMove" => known_profile().and_then(|()| continuous_move(camera, onvif, request)),
@@ -98,7 +102,7 @@ fn services(host: &str) -> String {
         ("http://www.onvif.org/ver10/device/wsdl", DEVICE_SERVICE),
         ("http://www.onvif.org/ver10/media/wsdl", MEDIA_SERVICE),
         ("http://www.onvif.org/ver20/media/wsdl", MEDIA2_SERVICE),
-        ("http://www.onvif.org/ver20/ptz/wsdl", PTZ_SERVICE),
+        (PTZ_NAMESPACE, PTZ_SERVICE),
     ];
     let mut text = String::new();
     for (namespace, path) in all {
@@ -305,7 +309,11 @@ fn continuous_move(camera: &Camera, onvif: &OnvifSettings, request: Node) -> Ans
         motions.push(Motion::PanTilt { pan: stepped(x) * 100.0, tilt: stepped(y) * 100.0 });
     }
     let zoom = child(velocity, "Zoom").and_then(|zoom| number(zoom, "x"));
-    motions.extend(zoom.map(|zoom| Motion::Zoom(zoom.clamp(-1.0, 1.0) * 100.0)));
+    let lens = |zoom: f64| match sign(Quirk::ZoomReversed) * zoom.clamp(-1.0, 1.0) {
+        zoom if zoom != 0.0 && onvif.has(Quirk::ZoomOneSpeed) => Quirk::ONE_SPEED.copysign(zoom),
+        zoom => zoom,
+    };
+    motions.extend(zoom.map(|zoom| Motion::Zoom(lens(zoom) * 100.0)));
     let lasts = timeout.filter(|_| !onvif.has(Quirk::TimeoutIgnored)).map(Duration::from_secs_f64);
     camera.drive(&motions, lasts);
     if onvif.has(Quirk::ZoomBreaks) && zoom.is_some_and(|zoom| zoom != 0.0) {
