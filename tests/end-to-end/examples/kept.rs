@@ -8,28 +8,29 @@
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+mod store;
+
 use std::fs;
 use std::path::Path;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use end_to_end::{Chance, Program, scene, scratch};
-use events::{Crop, Filter, Reader, Sighting, Step, Store};
+use events::{Filter, Reader, Store};
+use store::{CAMERAS, EVENTS};
 use virtual_camera::VirtualCamera;
 
 const KILLS: usize = 100;
-const EVENTS: i64 = 10_000;
-const CAMERAS: i64 = 20;
 const QUESTIONS: usize = 20;
 
 fn main() {
     println!("| what | how often | figure |\n|---|---|---|");
     println!("| SIGKILL | {KILLS} | {} |", killed());
     let folder = scratch("kept-asked");
-    fill(&folder);
+    store::fill(&folder);
     let program = program("asked", "http://127.0.0.1:1", &folder);
     for (what, query) in [("", ""), (" that went through a zone", "?left=-10&right=30&bottom=-10&top=0")] {
-        let (slowest, bytes) = asked(&program, query);
+        let (slowest, bytes) = (0..QUESTIONS).map(|_| store::asked(&program, query)).max().unwrap();
         println!(
             "| the page's list of {EVENTS} events of {CAMERAS} cameras{what}, {bytes} bytes | {QUESTIONS} | {slowest} ms at most |"
         );
@@ -69,51 +70,10 @@ fn killed() -> String {
     format!("{said} events were said to be kept, {} of them lost, no file broken", said.saturating_sub(kept))
 }
 
-/// The longest that the page took, in milliseconds, and how long its answer is.
-fn asked(program: &Program, query: &str) -> (u128, usize) {
-    let ask = |_| {
-        let begin = Instant::now();
-        let (status, list) = program.ask("GET", &format!("/events/list{query}"));
-        assert_eq!((status, list.matches("\"id\":").count()), (200, EVENTS as usize));
-        (begin.elapsed().as_millis(), list.len())
-    };
-    (0..QUESTIONS).map(ask).max().unwrap()
-}
-
 fn program(test: &str, address: &str, events: &Path) -> Program {
     let file = |own: &Path| {
         Program::entry("door", address, &own.join("password"))
             + &format!("[events]\nfolder = {events:?}\nkeep = \"10000d\"\n")
     };
     Program::start(&format!("kept-{test}"), file, &[])
-}
-
-/// Each of a minute, with a picture.
-fn fill(folder: &Path) {
-    let (mut store, _) = Store::open(folder).unwrap();
-    let picture = |n: i64| {
-        let (width, height) = (160, 240);
-        let rgb = (0..width * height * 3).map(|at| (i64::from(at) * (n + 7) / 97 % 251) as u8).collect();
-        Crop { width, height, rgb, person: [40, 40, 80, 160] }.into_picture(1.0, false)
-    };
-    let pictures: Vec<_> = (0..50).map(picture).collect();
-    for n in 0..EVENTS {
-        let from_ms = 1_768_000_000_000 + n * 30_000;
-        let step = |second: i64| Step {
-            at_ms: from_ms + second * 1000,
-            pan_deg: (second % 90) as f64,
-            tilt_deg: -5.0,
-        };
-        let sighting = Sighting {
-            camera: format!("camera-{}", n % CAMERAS),
-            run_ms: 0,
-            track: n.unsigned_abs(),
-            from_ms,
-            to_ms: from_ms + 60_000,
-            path: (0..60).map(step).collect(),
-            picture: pictures[n as usize % pictures.len()].clone(),
-            recording: None,
-        };
-        store.keep(&sighting).unwrap();
-    }
 }

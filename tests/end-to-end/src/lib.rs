@@ -16,6 +16,8 @@ mod pipeline;
 mod program;
 mod recording;
 pub mod scene;
+mod trend;
+mod usage;
 mod viewer;
 mod watchdog;
 
@@ -29,6 +31,7 @@ pub use launch::{GstLaunch, children_of, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::{Program, ask_page};
 pub use recording::pictures_in;
+pub use usage::{Growth, Usage, growths};
 pub use viewer::{Times, Viewer};
 pub use watchdog::Watchdog;
 

@@ -7,9 +7,10 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Duration;
 
+use end_to_end::growths;
+
 use crate::known::Known;
-use crate::sample::{Sample, Samples};
-use crate::trend::Trend;
+use crate::sample::Samples;
 
 /// What was counted of one camera.
 pub struct Account {
@@ -71,15 +72,6 @@ impl Account {
     }
 }
 
-/// What may not grow, and by how much it may differ: by this share, and this much.
-type Quantity = (&'static str, fn(&Sample) -> f64, f64, f64);
-const QUANTITIES: [Quantity; 4] = [
-    ("memory, MB", |sample| sample.memory_mb, 0.1, 4.0),
-    ("threads", |sample| sample.threads, 0.0, 2.0),
-    ("open files", |sample| sample.files, 0.0, 4.0),
-    ("processor cores", |sample| sample.cores, 0.1, 0.1),
-];
-
 /// Prints it and writes it down; whether all is well.
 pub fn tell(accounts: &[Account], samples: &Samples, out: &Path) -> bool {
     let mut text = "| what happened | times | followed again after, at most |\n|---|---:|---:|\n".to_owned();
@@ -95,20 +87,9 @@ pub fn tell(accounts: &[Account], samples: &Samples, out: &Path) -> bool {
     let mut faults: Vec<_> = accounts.iter().flat_map(|account| &account.faults).cloned().collect();
     // Odd ones are killed.
     for camera in accounts.iter().map(|account| account.camera).filter(|camera| camera % 2 == 0) {
-        let samples = samples.of(camera);
-        let settled = &samples[samples.len() / 3..];
-        for (name, value, share, more) in QUANTITIES {
-            let points: Vec<_> = settled.iter().map(|sample| (sample.time_s, value(sample))).collect();
-            let Some(trend) = Trend::of(&points) else {
-                faults.push(format!("camera {camera}: too short to tell whether {name} grew"));
-                continue;
-            };
-            let grown = trend.least_growth() > trend.mean * share + more;
-            let verdict = if grown { "**grown**" } else { "not grown" };
-            writeln!(text, "| camera {camera}: {name} | {trend} | {verdict} |").unwrap();
-            if grown {
-                faults.push(format!("camera {camera}: {name} grew: {trend}"));
-            }
+        for growth in growths(&samples.usages(camera)) {
+            writeln!(text, "| camera {camera}: {growth} |").unwrap();
+            faults.extend(growth.fault().map(|fault| format!("camera {camera}: {fault}")));
         }
     }
     text.push_str(&known_complaints(accounts));

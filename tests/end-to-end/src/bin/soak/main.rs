@@ -15,7 +15,6 @@ mod camera;
 mod fault;
 mod known;
 mod sample;
-mod trend;
 
 use std::path::PathBuf;
 use std::process::ExitCode;
