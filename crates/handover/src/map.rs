@@ -44,6 +44,8 @@ pub enum Learned {
 pub struct Map {
     pairs: Pairs,
     homography: Option<Homography>,
+    /// All pairs that were taken, kept or not.
+    taken: usize,
     /// Pairs since the homography was last made.
     unused: usize,
     moved: MovedDetector,
@@ -89,6 +91,8 @@ impl Map {
     const WELL_KNOWN_DEG: f64 = 3.0;
     /// Whoever sees the feet of somebody sees those of others beside them: a step away, ten metres from the camera.
     const NEAR_DEG: f64 = 3.0;
+    /// Half a minute of somebody's walk, at five pairs a second.
+    const ENOUGH: usize = 150;
     /// The homography is made anew when there is this part more to go by.
     const MORE: f64 = 0.1;
 
@@ -109,6 +113,7 @@ impl Map {
             }
         }
         self.pairs.add(pair);
+        self.taken += 1;
         self.unused += 1;
         if self.unused as f64 > Self::MORE * self.pairs.len() as f64 {
             self.refine();
@@ -154,6 +159,12 @@ impl Map {
         Some((ray, doubt.hypot(misfit)))
     }
 
+    /// Whether enough was learned to be right elsewhere than where somebody was just seen, too: before, it is surer of itself than it
+    /// can be.
+    pub fn knows_enough(&self) -> bool {
+        self.taken >= Self::ENOUGH
+    }
+
     /// Whether the camera that calls has seen somebody there, in that direction from the one that is called.
     pub fn covers(&self, direction: Direction) -> bool {
         self.pairs.iter().any(|pair| pair.direction.angle_to_deg(direction) < Self::NEAR_DEG)
@@ -189,6 +200,7 @@ impl Map {
         let kept: Kept = serde_json::from_str(text).map_err(nonsense)?;
         let mut map = Self::default();
         kept.pairs.into_iter().filter(Pair::is_sound).for_each(|pair| map.pairs.add(pair));
+        map.taken = map.pairs.len();
         map.refine();
         Ok(map)
     }

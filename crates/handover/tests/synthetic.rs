@@ -41,6 +41,20 @@ fn who_was_seen_on_one_line_only_is_doubted_beside_it() {
     assert!(doubt(8.0) < 2.5 && doubt(5.0) > 2.0 * doubt(8.0), "{} {}", doubt(8.0), doubt(5.0));
 }
 
+/// What is known of the rest after a few steps is wrong by more than is doubted.
+#[test]
+fn enough_is_learned_in_half_a_minute_of_a_walk() {
+    for ground in [PLANE, STEP] {
+        let knows = |seconds, seed| {
+            let mut map = Map::default();
+            learn(&mut map, &site(ground), seconds, 0.0, seed);
+            map.knows_enough()
+        };
+        let rooms = |seconds| (0..10).filter(|seed| knows(seconds, *seed)).count();
+        assert_eq!([5, 20, 60].map(rooms), [0, 0, 10]);
+    }
+}
+
 /// An error beyond three times what the map doubts is rare, and of the places that it is sure of, more so with what it has learned.
 #[test]
 fn the_error_is_no_larger_than_the_doubt_says() {

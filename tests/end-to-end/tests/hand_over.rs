@@ -205,9 +205,9 @@ fn a_place_is_clicked_in_both_pictures() {
 #[test]
 fn of_two_cameras_that_turn_one_follows_somebody_unless_both_are_to() {
     let mut map = Map::default();
-    for n in 0..40 {
+    for n in 0..160 {
         let direction =
-            Direction { pan_deg: f64::from(n % 8) * 6.0 - 20.0, tilt_deg: f64::from(n / 8) * 3.0 - 14.0 };
+            Direction { pan_deg: f64::from(n % 16) * 3.0 - 20.0, tilt_deg: f64::from(n / 16) * 1.5 - 14.0 };
         map.learn(Pair { place: Place::towards(direction), direction, height_deg: Some(9.0), person: 1 });
     }
     for together in [false, true] {

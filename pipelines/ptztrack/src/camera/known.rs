@@ -118,6 +118,8 @@ pub enum Steering {
     GoHome(Instant),
     /// Another camera sees somebody there; since then.
     LookAt(Gaze, Instant),
+    /// Nobody was found there: it turns to where it looked before; since then.
+    TurnBack(Gaze, Instant),
     /// It is somebody else's, who asked for it.
     HandedOver,
     /// Somebody at the page has it look there; until then it is left alone.
@@ -332,6 +334,7 @@ impl Known {
             (Steering::HandedOver, _) => "the camera is handed over",
             (Steering::GoHome(_), _) => "the camera goes home",
             (Steering::LookAt(..), _) => "the camera turns to whom another one sees",
+            (Steering::TurnBack(..), _) => "the camera turns back",
             (Steering::Operator(_) | Steering::Turned(..), _) => "an operator has the camera",
             (_, Some("at-rest")) => "the camera rests",
             (_, Some("moving")) => "the camera turns",

@@ -266,7 +266,7 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
     running.look(known.looking.load(Ordering::Relaxed) > 0);
     let steering = *lock(&known.steering);
     let over = match steering {
-        Steering::GoHome(since) => {
+        Steering::GoHome(since) | Steering::TurnBack(_, since) => {
             let there = since.elapsed() > SETS_OUT && known.is_at_rest();
             there || since.elapsed() > LONGEST_WAY_HOME
         }

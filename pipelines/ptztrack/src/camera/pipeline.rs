@@ -348,7 +348,7 @@ impl Running for Elements {
         let to = match steering {
             Steering::Follow => "follow",
             Steering::GoHome(_) => "home",
-            Steering::LookAt(gaze, _) | Steering::Turned(gaze, _) => {
+            Steering::LookAt(gaze, _) | Steering::TurnBack(gaze, _) | Steering::Turned(gaze, _) => {
                 servo.set_property("look-at", gaze.to_string());
                 "look-at"
             }

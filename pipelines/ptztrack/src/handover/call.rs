@@ -36,6 +36,8 @@ pub struct Call {
     pub errand: Errand,
     begun: Instant,
     ordered: Option<(Instant, Gaze)>,
+    /// Where the camera looked before it was told to turn.
+    before: Option<Gaze>,
     /// How often the camera had refused to be sent anywhere before it was told to turn.
     refusals: u64,
     likely: Likely,
@@ -71,6 +73,7 @@ impl Call {
             errand: Errand { from: wish.from.clone(), id, precedence: wish.precedence },
             begun: Instant::now(),
             ordered: None,
+            before: None,
             refusals: 0,
             likely: Likely::default(),
             followed: None,
@@ -99,7 +102,7 @@ impl Call {
                 Progress::Failed
             }
             (None, _) if self.was_refused(called) => {
-                self.cancel(&called.known);
+                self.end(&called.known, Steering::Follow);
                 Progress::Refused
             }
             (None, _) => {
@@ -113,10 +116,15 @@ impl Call {
         self.followed.is_some()
     }
 
-    /// Has the camera follow again, where it was sent somewhere.
+    /// Has the camera turn back, where it was sent somewhere: what it sees there may be a wall.
     pub fn cancel(&self, called: &Known) {
+        let back = |before| Steering::TurnBack(before, Instant::now());
+        self.end(called, self.before.map_or(Steering::Follow, back));
+    }
+
+    fn end(&self, called: &Known, steering: Steering) {
         if self.followed.is_none() && matches!(*lock(&called.steering), Steering::LookAt(..)) {
-            called.steer(Steering::Follow);
+            called.steer(steering);
         }
     }
 
@@ -175,6 +183,7 @@ impl Call {
             let now = Instant::now();
             if self.ordered.replace((now, gaze)).is_none() {
                 self.refusals = lock(&called.known.state).refused_moves;
+                self.before = self.before.or(called.gaze());
             }
             called.known.steer(Steering::LookAt(gaze, now));
         }
@@ -337,6 +346,17 @@ mod tests {
         lock(&bench.door.state).refused_moves = 3;
         assert_eq!(bench.see(&[]), Progress::Refused);
         assert_eq!(*lock(&bench.door.steering), Steering::Follow);
+    }
+
+    #[test]
+    fn a_camera_that_finds_nobody_there_turns_back() {
+        let mut bench = Bench::new();
+        assert_eq!(bench.see(&[]), Progress::Going);
+        bench.call.begun -= LONGEST + Duration::from_secs(1);
+        assert_eq!(bench.see(&[]), Progress::Failed);
+        let before = Gaze { pan_deg: 0.0, tilt_deg: -10.0, fov_deg: Some(60.0) };
+        let steering = *lock(&bench.door.steering);
+        assert!(matches!(steering, Steering::TurnBack(gaze, _) if gaze == before), "{steering:?}");
     }
 
     #[test]

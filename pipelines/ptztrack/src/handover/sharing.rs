@@ -105,10 +105,11 @@ impl Sharing {
     }
 }
 
-/// Whom another camera sees where this person has to be, where that is well known.
+/// Whom another camera sees where this person has to be, where that is well known. There is more to learn while both
+/// follow them, for as long as it is known nowhere else.
 fn same<'a>(link: &Link, from: &View, person: &Person, to: &'a View) -> Option<&'a Person> {
     let expected = link.expect(from, Some(person).filter(|person| person.stands_in_picture())?, to)?;
-    nearest(&expected, to, None).filter(|_| expected.doubt_deg < WELL_KNOWN_DEG)
+    nearest(&expected, to, None).filter(|_| expected.doubt_deg < WELL_KNOWN_DEG && link.map.knows_enough())
 }
 
 impl View {
@@ -139,7 +140,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::handover::stage::{person, target, turning_link, view as seeing};
+    use crate::handover::stage::{new_turning_link, person, target, turning_link, view as seeing};
 
     /// A camera that sees one person, and follows them or not.
     fn view(name: &str, id: u64, is_target: bool) -> View {
@@ -220,6 +221,16 @@ mod tests {
         assert_eq!(sharing.left_by("door"), [7].into());
         sharing.pass(&views(view("gate", 3, false), view("door", 7, false)));
         assert_eq!(sharing.left_by("door"), BTreeSet::new());
+    }
+
+    #[test]
+    fn while_where_they_are_is_all_that_is_known_both_follow() {
+        let mut bench = Bench { link: new_turning_link(), ..Bench::new(true, true) };
+        let expected = bench.link.expect(&bench.gate, &bench.gate.people()[0], &bench.door).unwrap();
+        assert!(expected.doubt_deg < WELL_KNOWN_DEG, "{expected:?}");
+        assert_eq!(bench.leaves(), None);
+        bench.link = turning_link();
+        assert_eq!(bench.leaves(), track("door", 7));
     }
 
     #[test]

@@ -35,11 +35,21 @@ pub fn link() -> Link {
     Link::new(map)
 }
 
+/// Of two that turn, while somebody has come only a few steps.
+pub fn new_turning_link() -> Link {
+    let mut map = Map::default();
+    for n in 0..10 {
+        let direction = Direction { pan_deg: f64::from(n) * 0.5 - 2.5, tilt_deg: -20.0 };
+        map.learn(Pair { place: Place::towards(direction), direction, height_deg: Some(9.0), person: 1 });
+    }
+    Link::new(map)
+}
+
 /// Of two that turn.
 pub fn turning_link() -> Link {
     let mut map = Map::default();
-    for n in 0..60 {
-        let (pan_deg, tilt_deg) = (f64::from(n % 10) * 5.0 - 25.0, f64::from(n / 10) * 4.0 - 26.0);
+    for n in 0..150 {
+        let (pan_deg, tilt_deg) = (f64::from(n % 15) * 4.0 - 28.0, f64::from(n / 15) * 2.4 - 26.0);
         let direction = Direction { pan_deg, tilt_deg };
         map.learn(Pair { place: Place::towards(direction), direction, height_deg: Some(9.0), person: 1 });
     }

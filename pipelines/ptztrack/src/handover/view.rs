@@ -10,7 +10,7 @@ use ptztrack_contract::lock::lock;
 
 use super::exchange::Errand;
 use super::motion::Motion;
-use crate::camera::{Known, Person, Pose, Sight, Steering};
+use crate::camera::{Gaze, Known, Person, Pose, Sight, Steering};
 
 /// What was seen longer ago says nothing of where somebody is.
 const FRESH: Duration = Duration::from_millis(500);
@@ -81,6 +81,12 @@ impl View {
     /// Horizontal, now.
     pub fn fov_deg(&self) -> Option<f64> {
         self.seen.1.poses.last().map(|pose| pose.horizontal_fov_deg)
+    }
+
+    /// Where it looks now.
+    pub fn gaze(&self) -> Option<Gaze> {
+        let pose = self.seen.1.poses.last()?;
+        Some(Gaze { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, fov_deg: Some(pose.horizontal_fov_deg) })
     }
 
     /// In which direction that is which its last picture shows there; `None` where it is not known where it looked.
