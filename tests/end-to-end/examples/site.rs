@@ -51,7 +51,9 @@ fn main() -> ExitCode {
     while begin.elapsed() < duration {
         thread::sleep(EVERY);
         moments.extend(Usage::of(program.launch.id(), begin.elapsed(), moments.last()));
-        took_ms.push(store::asked(&program, "").0);
+        let (took, events, _) = store::asked(&program, "");
+        assert!(events >= store::EVENTS as usize, "{events}");
+        took_ms.push(took);
         // Whoever is let go has been there, and is found again.
         let one = store::name(moments.len() as i64 % options.cameras);
         program.ask("POST", &format!("/cameras/{one}/release"));
