@@ -11,7 +11,7 @@ use std::process::Command;
 use std::time::{Duration, Instant};
 
 use chrono::DateTime;
-use end_to_end::{GstLaunch, PATIENCE, Program, Viewer, scene, scratch};
+use end_to_end::{GstLaunch, PATIENCE, Program, Times, Viewer, scene, scratch};
 use gst_rtsp_server::gio::TlsFileDatabase;
 use gst_rtsp_server::prelude::*;
 use serde_json::Value;
@@ -82,7 +82,8 @@ fn others_play_the_picture_and_list_the_metadata_in_whatever_form_it_comes() {
     }
 }
 
-/// Both streams have the same clock, and by the sender's reports, which are as exact as the machine is idle, the same calendar.
+/// Both streams have the same clock, and by the sender's reports the same calendar. A report is as exact as the machine is idle while
+/// it is made, every few seconds, so that one is enough.
 #[test]
 fn a_document_tells_of_the_picture_of_its_time() {
     for isolation in ["none", "process"] {
@@ -92,23 +93,32 @@ fn a_document_tells_of_the_picture_of_its_time() {
         let viewer = Viewer::start(&address(&mut program), |_| {});
         let mut picture =
             std::iter::repeat_with(|| viewer.picture()).find(|times| times.taken.is_some()).unwrap();
-        let mut apart = None;
-        for _ in 0..60 {
+        let near = |taken: Option<Duration>, told: Duration| {
+            taken.is_some_and(|taken| taken.abs_diff(told) < INTERVAL / 2)
+        };
+        let begin = Instant::now();
+        // From a picture to the document of it, by RTP.
+        let apart = loop {
+            assert!(begin.elapsed() < PATIENCE, "{isolation}: no document is of a picture: {picture:?}");
             let (text, times) = viewer.document();
             let told = told(&text);
             while picture.taken.unwrap() + INTERVAL / 2 < told {
                 picture = viewer.picture();
             }
-            // Those before the first report are not compared.
-            let Some(taken) = times.taken.filter(|_| told + INTERVAL / 2 > picture.taken.unwrap()) else {
-                continue;
-            };
-            assert!(told.abs_diff(taken) < INTERVAL / 2, "{isolation}: {told:?}, by its reports {taken:?}");
-            let ticks = times.rtp.wrapping_sub(picture.rtp);
-            let off = ticks.wrapping_sub(*apart.get_or_insert(ticks)).cast_signed();
-            assert!(off.abs() <= 1, "{isolation}: {told:?} is {off} ticks off the picture {picture:?}");
+            if near(times.taken, told) && near(picture.taken, told) {
+                break times.rtp.wrapping_sub(picture.rtp);
+            }
+        };
+        for _ in 0..60 {
+            let (_, times) = viewer.document();
+            let ahead =
+                |picture: Times| times.rtp.wrapping_sub(apart).wrapping_sub(picture.rtp).cast_signed();
+            while ahead(picture) > 1 {
+                picture = viewer.picture();
+            }
+            let off = ahead(picture);
+            assert!(off.abs() <= 1, "{isolation}: {times:?} is {off} ticks off the picture {picture:?}");
         }
-        assert!(apart.is_some(), "{isolation}: no document is of a picture");
         program.end("TERM");
     }
 }
@@ -183,9 +193,9 @@ fn a_library_from_pypi_reads_who_is_where() {
 #[track_caller]
 fn install(python: &Path, requirements: &Path) {
     let output = Command::new("timeout")
-        .arg("120")
+        .arg("240")
         .arg(python)
-        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries", "2"])
+        .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "--retries", "6"])
         .args(["--timeout", "15", "--requirement"])
         .arg(requirements)
         .output()

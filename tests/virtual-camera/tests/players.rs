@@ -86,7 +86,7 @@ fn libraries_from_pypi_read_and_steer() {
         "PyPI",
         limited(&python)
             .args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"])
-            .args(["--retries", "2", "--timeout", "15", "--requirement"])
+            .args(["--retries", "6", "--timeout", "15", "--requirement"])
             .arg(clients.join("requirements.txt")),
     );
     for client in ["steer_with_axis.py", "steer_with_sensecam.py", "steer_with_onvif_zeep.py"] {
