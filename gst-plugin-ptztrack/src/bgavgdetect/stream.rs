@@ -9,7 +9,9 @@ use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
-use crate::vision::{CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel};
+use crate::vision::{
+    Cadence, CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel,
+};
 
 /// Distance of pictures whose timestamps and caps tell none.
 const NOMINAL_DISTANCE: Duration = Duration::from_millis(40);
@@ -62,6 +64,7 @@ pub(super) struct Stream {
     presence: Presence,
     converter: Option<VideoConverter>,
     last_pts: Option<gst::ClockTime>,
+    cadence: Cadence,
     /// Something is missing before the next picture.
     interrupted: bool,
     /// Whether a fault of this stream was already reported, so that one fault is not a flood.
@@ -81,6 +84,7 @@ impl Stream {
             presence: Presence::default(),
             converter: None,
             last_pts: None,
+            cadence: Cadence::default(),
             interrupted: false,
             warned: false,
         }
@@ -117,7 +121,7 @@ impl Stream {
         let (relearn, elapsed) = match since {
             Some(Some(since)) => {
                 let since = Duration::from_nanos(since);
-                (interrupted && since > max_gap, since)
+                (interrupted && since > max_gap, self.cadence.elapsed(since))
             }
             // Time runs backwards: another stream.
             Some(None) => (true, self.nominal_distance()),

@@ -124,6 +124,7 @@ struct Stream {
     state: TargetState,
     /// Running time of the last frame.
     last_time: Option<gst::ClockTime>,
+    cadence: vision::Cadence,
     since_message: gst::ClockTime,
     /// Whether a fault of this stream was already reported, so that one fault is not a flood.
     warned: bool,
@@ -141,6 +142,7 @@ impl Stream {
             analytics: Analytics::default(),
             state: TargetState::Searching,
             last_time: None,
+            cadence: vision::Cadence::default(),
             since_message: gst::ClockTime::ZERO,
             warned: false,
         }
@@ -150,7 +152,8 @@ impl Stream {
     fn step(&mut self, now: Option<gst::ClockTime>) -> gst::ClockTime {
         let last = std::mem::replace(&mut self.last_time, now);
         let measured = now.zip(last).and_then(|(now, last)| now.checked_sub(last));
-        measured.filter(|step| !step.is_zero()).unwrap_or_else(|| self.frame_duration())
+        let Some(measured) = measured.filter(|step| !step.is_zero()) else { return self.frame_duration() };
+        self.cadence.elapsed(measured.into()).try_into().unwrap_or(measured)
     }
 
     fn frame_duration(&self) -> gst::ClockTime {
@@ -416,7 +419,9 @@ impl LkFeatureTrack {
         ) {
             self.warn_once(stream, &format!("no object can be attached: {err}"));
         }
-        match buffer::attach(buffer, &stream.info, tracked, times.running_time) {
+        let held_back = gst::ClockTime::try_from(stream.cadence.held_back()).unwrap_or_default();
+        let captured = times.running_time.map(|time| time.saturating_sub(held_back));
+        match buffer::attach(buffer, &stream.info, tracked, captured) {
             Ok((features, tracks)) => stream.tracker.recycle(features, tracks),
             Err(err) => self.warn_once(stream, &format!("no meta can be attached: {err}")),
         }

@@ -38,6 +38,7 @@
 mod background;
 mod bits;
 mod blur;
+mod cadence;
 mod camera_motion;
 mod camera_moves;
 mod carried_zones;
@@ -69,6 +70,7 @@ mod travelling;
 mod zones;
 
 pub use background::{Background, ForegroundTest};
+pub use cadence::Cadence;
 pub use camera_motion::CameraMotionEstimator;
 pub use camera_moves::CameraMoves;
 pub use carried_zones::CarriedZones;

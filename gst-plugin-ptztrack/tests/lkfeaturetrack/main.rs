@@ -309,6 +309,25 @@ fn frames_without_timestamps_are_followed_too() {
     assert!((last.velocity.x - 2.0 / 320.0 / 0.04).abs() < 0.06, "{:?}", last.velocity);
 }
 
+/// A network holds every third picture back until the next two are there.
+#[test]
+fn who_walks_does_not_run_where_pictures_come_bunched() {
+    let mut bench = Bench::new(|_| ());
+    bench.acquire((60, 80));
+    (1..=20).for_each(|step| drop(bench.push(picture(Some((60 + 2 * step, 80)), None), &[])));
+    let begin = bench.frames * FRAME_MS;
+    for step in 21..=80 {
+        let (bunch, place) = ((step - 21) / 3, (step - 21) % 3);
+        let arrived = begin + (3 * bunch + 2) as u64 * FRAME_MS + place as u64;
+        let mut buffer = gst::Buffer::from_mut_slice(street(step - 20, [(80 + step as i32, 80)]));
+        buffer.get_mut().unwrap().set_pts(gst::ClockTime::from_mseconds(arrived));
+        let seen = TargetMeta::of(&bench.harness.push_and_pull(buffer).unwrap()).unwrap().unwrap();
+        let fastest = seen.ego_velocity.map(|ego| ego.x.abs().max(seen.velocity.x.abs()));
+        // A pixel in 40 ms.
+        assert!(fastest.is_some_and(|fastest| fastest < 2.0 / 320.0 / 0.04), "step {step}: {seen:?}");
+    }
+}
+
 #[test]
 fn pixels_pass_untouched_and_uncopied() {
     let mut bench = Bench::new(|_| ());
