@@ -58,6 +58,19 @@ fn pictures_that_are_too_old_are_not_steered_by() {
     assert!(!rig.heard().iter().any(Heard::is_warning), "once is enough");
 }
 
+/// As where a full queue in the network holds them back, and all that follow.
+#[test]
+fn pictures_that_do_not_come_for_long_are_told_of() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::ready(&camera.url()).with("stale-timeout", 500_000_000u64).play();
+    rig.set_going(&camera);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "nobody was seen for longer than that");
+    let aside = target(TargetState::Tracking, 0.9, 0.4);
+    let is_told = |heard: &Heard| matches!(heard, Heard::Info(text) if text.contains("no picture came for"));
+    let heard = rig.push_until_message(&aside, is_told);
+    assert!(!heard.iter().any(Heard::is_warning), "{heard:?}");
+}
+
 #[test]
 fn a_picture_of_another_shape_is_not_steered_by() {
     let camera = camera(Auth::None);

@@ -18,6 +18,7 @@ use crate::stream::Fault;
 pub trait Measuring: PtzSink {
     /// Leaves a measurement of the target that a buffer brings for the camera task.
     fn measure(&self, buffer: &gst::BufferRef) {
+        self.miss_pictures();
         let target = TargetMeta::of(buffer);
         self.miss_meta(target.is_some());
         match target {
@@ -84,6 +85,26 @@ pub trait Measuring: PtzSink {
         let nanoseconds = |time: gst::ClockTime| i64::try_from(time.nseconds()).unwrap_or(i64::MAX);
         let arrived = self.time();
         lock(&self.core().stream).age.of(nanoseconds(captured), nanoseconds(now), arrived)
+    }
+
+    /// Tells where no picture came for so long that nobody was followed. That may have been all; but where a network fills a
+    /// queue, what comes then is as late, and pictures without timestamps of their own do not tell. No warning: where the camera
+    /// does not answer either, there is one already.
+    fn miss_pictures(&self) {
+        let stale_timeout = lock(&self.core().settings).servo.stale_timeout;
+        let now = self.time();
+        let missed = {
+            let mut stream = lock(&self.core().stream);
+            let pause = stream.pause(now).filter(|pause| *pause > stale_timeout);
+            pause.filter(|_| stream.is_news(Fault::NoPicture))
+        };
+        if let Some(pause) = missed {
+            gst::element_imp_info!(
+                self,
+                gst::StreamError::Failed,
+                ("no picture came for {pause:.1?}, which is more than `stale-timeout` ({stale_timeout:?}): nobody was followed meanwhile. Where the network held the pictures back, those that come now may be as late, and nobody is followed well by them: lower the bit rate of the camera's stream, or whatever else fills the line")
+            );
+        }
     }
 
     /// Warns where no buffer has had a target meta for long.

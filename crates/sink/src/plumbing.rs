@@ -133,6 +133,7 @@ pub trait Plumbing: PtzSink {
             self.start_task()?;
         }
         if transition == gst::StateChange::PausedToPlaying {
+            lock(&self.core().stream).resume();
             self.with_task(CameraTask::play);
         }
         let result = self.parent_change_state(transition);

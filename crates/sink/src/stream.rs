@@ -19,6 +19,8 @@ pub struct Stream {
     pub lockstep: bool,
     /// How old pictures are.
     pub age: PictureAge,
+    /// When the last picture came, unless the pipeline was paused since.
+    last_came: Option<Time>,
     meta_wait: MetaWait,
     warned: Vec<Fault>,
 }
@@ -34,6 +36,8 @@ pub enum Fault {
     OtherPicture,
     /// Pictures are older than `stale-timeout`.
     OldPictures,
+    /// None came for longer than that.
+    NoPicture,
 }
 
 /// Whether a target meta is waited for.
@@ -62,6 +66,17 @@ impl Stream {
             self.warned.push(fault);
         }
         !known
+    }
+
+    /// A picture comes. Returns how long none did, where time is nobody else's.
+    pub fn pause(&mut self, now: Time) -> Option<Duration> {
+        let before = self.last_came.replace(now).filter(|_| !self.lockstep);
+        before.map(|before| now - before)
+    }
+
+    /// The pipeline was paused: that nothing came meanwhile is as it should be.
+    pub fn resume(&mut self) {
+        self.last_came = None;
     }
 
     /// A buffer came, with a target meta or without. Returns whether none has had one for long.
@@ -200,6 +215,20 @@ mod tests {
             let (now, captured) = (second * 1000, second * 1000 - second / 10);
             assert!(age(&mut pictures, [now, now, captured]) < 10, "after {second} s");
         }
+    }
+
+    #[test]
+    fn a_pause_is_told_unless_the_pipeline_was_paused_or_goes_by_the_streams_time() {
+        let ms = Time::from_millis;
+        let mut stream = Stream::default();
+        assert_eq!(
+            [40, 80, 2080].map(|at| stream.pause(ms(at))),
+            [None, Some(40), Some(2000)].map(|pause: Option<u64>| pause.map(Duration::from_millis))
+        );
+        stream.resume();
+        assert_eq!(stream.pause(ms(9000)), None);
+        let mut stream = Stream::new(true);
+        assert_eq!([40, 2080].map(|at| stream.pause(ms(at))), [None; 2]);
     }
 
     #[test]
