@@ -26,7 +26,7 @@ const PACKETS: u64 = 1000;
 
 fn main() {
     println!(
-        "| network | in view | out of view for at most | turns at most | warnings |\n|---|---|---|---|---|"
+        "| network | in view | out of view for at most | turns at most | what the user is told |\n|---|---|---|---|---|"
     );
     let only = std::env::args().nth(1).unwrap_or_default();
     let is_wanted = |network: &str| network.contains(&only);
@@ -96,11 +96,12 @@ fn print(what: &str, camera: &VirtualCamera, running: &mut Running, time: Durati
 }
 
 fn row(what: &str, seen: InView, running: &mut Running) -> String {
+    let told = [running.complaints(), running.infos().to_vec()].concat();
     format!(
         "| {what} | {:.1} % | {:.1} s | {:.0}°/s | {} |",
         100.0 * seen.share,
         seen.longest_out.as_secs_f64(),
         seen.fastest_deg_s,
-        running.complaints().join("; ")
+        told.join("; ")
     )
 }

@@ -22,6 +22,7 @@ pub fn init() {
 pub struct Running {
     pipeline: gst::Pipeline,
     warnings: Vec<String>,
+    infos: Vec<String>,
 }
 
 impl Running {
@@ -38,7 +39,7 @@ impl Running {
     pub fn parse(description: &str) -> Self {
         init();
         let pipeline = gst::parse::launch(description).unwrap().downcast::<gst::Pipeline>().unwrap();
-        Self { pipeline, warnings: Vec::new() }
+        Self { pipeline, warnings: Vec::new(), infos: Vec::new() }
     }
 
     /// The pipeline.
@@ -92,13 +93,25 @@ impl Running {
 
     /// The warnings posted so far, those still waiting on the bus included.
     pub fn warnings(&mut self) -> &[String] {
+        self.listen();
+        &self.warnings
+    }
+
+    /// The infos posted so far, alike.
+    pub fn infos(&mut self) -> &[String] {
+        self.listen();
+        &self.infos
+    }
+
+    fn listen(&mut self) {
         let bus = self.pipeline.bus().unwrap();
-        while let Some(message) = bus.pop_filtered(&[gst::MessageType::Warning]) {
-            if let gst::MessageView::Warning(warning) = message.view() {
-                self.warnings.push(warning.error().to_string());
+        while let Some(message) = bus.pop_filtered(&[gst::MessageType::Warning, gst::MessageType::Info]) {
+            match message.view() {
+                gst::MessageView::Warning(warning) => self.warnings.push(warning.error().to_string()),
+                gst::MessageView::Info(info) => self.infos.push(info.error().to_string()),
+                _ => {}
             }
         }
-        &self.warnings
     }
 
     /// The same, of what is amiss with others: where a busy machine is late, the loop itself may swing and say so.
