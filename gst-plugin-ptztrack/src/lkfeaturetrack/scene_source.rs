@@ -72,8 +72,8 @@ impl SceneSource {
 
 fn between(from: &Plane, to: &Plane, expected: Option<Homography>) -> opencv::Result<Option<CameraMotion>> {
     let mut estimator = CameraMotionEstimator::default();
-    estimator.update(&luma(from), None, None)?;
-    estimator.update(&luma(to), None, expected)
+    estimator.update(&luma(from), None, None, Duration::ZERO)?;
+    estimator.update(&luma(to), None, expected, Duration::ZERO)
 }
 
 fn luma(plane: &Plane) -> Luma<'_> {

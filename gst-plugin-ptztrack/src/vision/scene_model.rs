@@ -59,8 +59,10 @@ impl SceneModel {
         }
         self.picture.fill(picture, size);
         let foreground = self.background.foreground();
-        self.camera_motion = self.motion.update(&self.picture.luma(), foreground.as_ref(), expected)?;
-        self.background.update(&self.picture, self.camera_motion.as_ref(), elapsed);
+        self.camera_motion =
+            self.motion.update(&self.picture.luma(), foreground.as_ref(), expected, elapsed)?;
+        let motion = self.camera_motion.map(|motion| motion.homography).or_else(|| self.motion.coasted());
+        self.background.update(&self.picture, motion.as_ref(), self.motion.may_be_elsewhere(), elapsed);
         Ok(self.view())
     }
 

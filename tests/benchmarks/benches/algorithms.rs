@@ -77,7 +77,7 @@ fn camera_motion(bencher: Bencher, size: (usize, usize)) {
             film.reduce(&mut reduced);
             std::mem::take(&mut reduced)
         })
-        .bench_local_refs(|reduced| motion.update(&reduced.luma(), None, None).map(|_| ()));
+        .bench_local_refs(|reduced| motion.update(&reduced.luma(), None, None, PERIOD).map(|_| ()));
 }
 
 fn travelling(bencher: Bencher, size: (usize, usize), camera: Camera) {
@@ -86,11 +86,11 @@ fn travelling(bencher: Bencher, size: (usize, usize), camera: Camera) {
     bencher
         .with_inputs(|| {
             film.reduce(&mut reduced);
-            let moved = motion.update(&reduced.luma(), None, None).ok().flatten();
+            let moved = motion.update(&reduced.luma(), None, None, PERIOD).ok().flatten();
             (std::mem::take(&mut reduced), moved)
         })
         .bench_local_refs(|(reduced, moved): &mut (Reduced, Option<CameraMotion>)| {
-            background.update(reduced, moved.as_ref(), PERIOD);
+            background.update(reduced, moved.as_ref().map(|moved| &moved.homography), false, PERIOD);
         });
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::time::Duration;
+
 use opencv::core::Point2f;
 use ptztrack_contract::{CameraMotion, Homography, Point};
 
@@ -16,6 +18,8 @@ const MAX_TRAVEL: f64 = 4.0;
 const TOP_UP: usize = 12;
 /// When a smaller share of the key picture's points agrees, the next picture becomes the key picture.
 const MIN_AGREEING: f64 = 0.6;
+/// How long the camera is taken to go on as it did, where nothing is seen of how it moves.
+const COAST: Duration = Duration::from_millis(300);
 /// Background that was seen as such counts fully; points of unknown standing, and points on what was
 /// foreground in the picture before, count less.
 const NEW_WEIGHT: f64 = 0.5;
@@ -78,6 +82,12 @@ struct Comparison {
 #[derive(Debug, Default)]
 pub struct CameraMotionEstimator {
     key: Option<Key>,
+    /// The last picture, where it did not fit the key picture: it may show another view.
+    another: Option<Key>,
+    /// For how long no picture has fitted.
+    coasted: Duration,
+    /// Whether the last picture became the key picture as it fitted no other.
+    may_be_elsewhere: bool,
     /// Of the last picture; memory for the next.
     pyramid: Pyramid,
     /// Motion of the last picture, pixels: the camera goes on as it did.
@@ -93,15 +103,18 @@ impl CameraMotionEstimator {
 
     /// How the camera moved since the last picture. `foreground` (of the last picture, in its size) says where
     /// points are not to be believed, `expected` (normalised) where the picture may have gone: a guess
-    /// that is tried where it does not go on as it did. `None`: the first picture, or nothing to hold on to.
+    /// that is tried where it does not go on as it did. `None`: the first picture, or nothing to hold on to. After that the motion is
+    /// from where the camera was taken to have gone on to ([`Self::coasted`]).
     pub fn update(
         &mut self,
         luma: &Luma,
         foreground: Option<&Luma>,
         expected: Option<Homography>,
+        elapsed: Duration,
     ) -> opencv::Result<Option<CameraMotion>> {
         let size = (luma.width() as f64, luma.height() as f64);
         flow::fill(&mut self.pyramid, luma);
+        self.may_be_elsewhere = true;
         let pyramid = &self.pyramid;
         let grid = Grid::of(luma);
         let Some(mut key) = self.key.take().filter(|key| key.grid == grid) else {
@@ -115,11 +128,20 @@ impl CameraMotionEstimator {
         let told = expected.map(|motion| to_pixels(&motion, size));
         let guesses = [Some(self.last), told, Some(Homography::IDENTITY)].into_iter().flatten();
         let comparison = &mut self.comparison;
-        let Some(fit) = key.compare(pyramid, guesses, Centred::of(size.0, size.1), comparison) else {
-            self.last = Homography::IDENTITY;
-            self.key = Some(Key::first(luma, pyramid, grid)?);
+        let centred = Centred::of(size.0, size.1);
+        let mut fit = key.compare(pyramid, guesses.clone(), centred, comparison);
+        self.may_be_elsewhere = fit.is_none();
+        if let Some(another) = self.another.take().filter(|_| fit.is_none()) {
+            fit = another.compare(pyramid, guesses, centred, comparison);
+            if fit.is_some() {
+                key = another;
+            }
+        }
+        let Some(fit) = fit else {
+            self.coast(key, Key::first(luma, pyramid, grid)?, elapsed);
             return Ok(None);
         };
+        self.coasted = Duration::ZERO;
         let Some(back) = key.to_last.inverse() else {
             self.key = Some(Key::first(luma, pyramid, grid)?);
             return Ok(None);
@@ -137,6 +159,33 @@ impl CameraMotionEstimator {
         };
         self.key = Some(key.next(luma, pyramid, &fit, comparison)?);
         Ok(Some(motion))
+    }
+
+    /// How the camera was taken to have moved in the last picture, as it did before, normalised; `None` where its motion was seen, or has
+    /// not been seen for too long.
+    pub fn coasted(&self) -> Option<Homography> {
+        let another = self.another.as_ref()?;
+        Some(to_frame(&self.last, another.grid.size()))
+    }
+
+    /// Whether the last picture may show another view, which nothing that was seen before leads to.
+    pub fn may_be_elsewhere(&self) -> bool {
+        self.may_be_elsewhere
+    }
+
+    /// Goes on from the key picture as if the camera had moved on as it did: where the next picture fits, nothing is lost of the way. After
+    /// a while, and where it shows `another` view, that is the key picture.
+    fn coast(&mut self, mut key: Key, another: Key, elapsed: Duration) {
+        self.coasted = self.coasted.saturating_add(elapsed);
+        if self.coasted > COAST {
+            self.last = Homography::IDENTITY;
+            self.key = Some(another);
+        } else {
+            self.may_be_elsewhere = false;
+            key.to_last = key.to_last.then(&self.last);
+            self.key = Some(key);
+            self.another = Some(another);
+        }
     }
 }
 

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::time::Duration;
+
 use proptest::prelude::*;
 use ptztrack_contract::{CameraMotion, Homography, Point};
 
@@ -8,6 +10,7 @@ use super::estimator::to_pixels;
 use crate::vision::synthetic::{Canvas, texture};
 
 const SIZE: (usize, usize) = (320, 180);
+const STEP: Duration = Duration::from_millis(40);
 
 /// The motion of a camera that turns by so many pixels and zooms: `perspective` is that of a picture 60
 /// degrees wide.
@@ -29,7 +32,7 @@ fn seen(motion: &Homography, seed: u32) -> Canvas {
 }
 
 fn measure(estimator: &mut CameraMotionEstimator, picture: &Canvas) -> Option<CameraMotion> {
-    estimator.update(&picture.luma(), None, None).expect("OpenCV")
+    estimator.update(&picture.luma(), None, None, STEP).expect("OpenCV")
 }
 
 /// How far the measured motion is off at most, pixels, nine places over.
@@ -111,7 +114,7 @@ fn what_the_camera_was_told_helps_over_a_jump() {
     let motion = |expected| {
         let mut estimator = CameraMotionEstimator::default();
         measure(&mut estimator, &seen(&Homography::IDENTITY, 1));
-        estimator.update(&seen(&jump, 2).luma(), None, expected).expect("OpenCV")
+        estimator.update(&seen(&jump, 2).luma(), None, expected, STEP).expect("OpenCV")
     };
     assert!(motion(None).is_none_or(|motion| error(&motion, &jump) > 10.0));
     let told = Homography::translation(66.0 / SIZE.0 as f64, 0.0);
@@ -120,13 +123,70 @@ fn what_the_camera_was_told_helps_over_a_jump() {
 
 #[test]
 fn a_blank_wall_and_a_cut_tell_nothing() {
-    let wall = |seed| Canvas::seen(SIZE, &Homography::IDENTITY, |_, _| 120.0).noisy(2.0, seed);
     let mut estimator = CameraMotionEstimator::default();
     for seed in 0..5 {
-        assert_eq!(measure(&mut estimator, &wall(seed)), None);
+        assert_eq!(measure(&mut estimator, &blank(seed)), None);
     }
     measure(&mut estimator, &seen(&Homography::IDENTITY, 1));
     let other = Canvas::seen(SIZE, &Homography::IDENTITY, |x, y| texture(77, x, y));
     assert_eq!(measure(&mut estimator, &other), None);
     assert!(measure(&mut estimator, &other).is_some(), "and goes on from there");
+}
+
+/// A wall without texture, as a flash or fog shows it.
+fn blank(seed: u32) -> Canvas {
+    Canvas::seen(SIZE, &Homography::IDENTITY, |_, _| 120.0).noisy(2.0, seed)
+}
+
+/// One that has seen ten pictures of a pan of 3 pixels each.
+fn panning() -> CameraMotionEstimator {
+    let mut estimator = CameraMotionEstimator::default();
+    for step in 0..10 {
+        measure(&mut estimator, &seen(&Homography::translation(-3.0 * f64::from(step), 0.0), step));
+    }
+    estimator
+}
+
+#[test]
+fn where_a_picture_tells_nothing_the_camera_goes_on_and_nothing_of_its_way_is_lost() {
+    let mut estimator = panning();
+    assert_eq!(estimator.coasted(), None, "its motion was seen");
+    let mut total = Homography::IDENTITY;
+    for seed in 0..4 {
+        assert_eq!(measure(&mut estimator, &blank(seed)), None);
+        total = total.then(&estimator.coasted().expect("it goes on"));
+    }
+    // Meanwhile it has stopped: from picture 9 on it has come 6 pixels farther, not 15.
+    let motion = measure(&mut estimator, &seen(&Homography::translation(-33.0, 0.0), 20)).expect("textured");
+    assert_eq!(estimator.coasted(), None);
+    let whole = CameraMotion { homography: total.then(&motion.homography), ..CameraMotion::default() };
+    let truth = Homography::translation(-6.0, 0.0);
+    assert!(error(&whole, &truth) < 0.4, "{} pixels off", error(&whole, &truth));
+}
+
+#[test]
+fn a_camera_that_is_not_seen_to_move_for_long_is_taken_to_rest() {
+    let mut estimator = panning();
+    let coasted = (0..20).map(|seed| {
+        assert_eq!(measure(&mut estimator, &blank(seed)), None);
+        estimator.coasted().is_some()
+    });
+    let coasted: Vec<bool> = coasted.collect();
+    assert!(coasted[..7].iter().all(|coasted| *coasted), "{coasted:?}");
+    assert!(!coasted[7..].contains(&true), "{coasted:?}");
+}
+
+#[test]
+fn a_cut_while_it_turns_is_gone_on_from_with_the_second_picture() {
+    let mut estimator = panning();
+    let other = |step: u32| {
+        let at = f64::from(step);
+        Canvas::seen(SIZE, &Homography::translation(-3.0 * at, 0.0), |x, y| texture(77, x, y))
+            .noisy(2.0, step)
+    };
+    assert_eq!(measure(&mut estimator, &other(0)), None);
+    assert!(!estimator.may_be_elsewhere(), "it may be a picture that tells nothing");
+    let motion = measure(&mut estimator, &other(1)).expect("textured");
+    assert!(estimator.may_be_elsewhere());
+    assert!(error(&motion, &Homography::translation(-3.0, 0.0)) < 0.4);
 }

@@ -18,7 +18,7 @@ mod warp;
 use std::time::Duration;
 
 use opencv::core::{Point as Pixel, Vector};
-use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
+use ptztrack_contract::{Homography, Point, Rect};
 
 use self::burned_in::BurnedIn;
 pub use self::model::UNKNOWN;
@@ -94,9 +94,15 @@ impl TravellingBackground {
         self.held = bounds;
     }
 
-    /// Tells foreground from background in the next picture, to which the camera moved by `motion`, then learns
-    /// from it. Where `motion` is not known, the camera may still rest, if the picture shows what is known.
-    pub fn update(&mut self, picture: &Reduced, motion: Option<&CameraMotion>, elapsed: Duration) {
+    /// Tells foreground from background in the next picture, to which the camera moved by `motion` (normalised), then learns from it.
+    /// Where that is not known, the camera may still rest. A picture that `may_be_elsewhere` does so if it shows nothing of what is known.
+    pub fn update(
+        &mut self,
+        picture: &Reduced,
+        motion: Option<&Homography>,
+        may_be_elsewhere: bool,
+        elapsed: Duration,
+    ) {
         if picture.size() != self.size {
             *self = Self { size: picture.size(), ..Self::default() };
         }
@@ -106,19 +112,19 @@ impl TravellingBackground {
         if self.model.size == (0, 0) {
             self.start();
         }
-        let travel = motion.map_or(0.0, |motion| self.move_by(&motion.homography, elapsed));
+        let travel = motion.map_or(0.0, |motion| self.move_by(motion, elapsed));
+        let rests = motion.is_none() || self.rested > REST;
         self.stay_on_canvas();
-        let how = self.comparison(motion, elapsed);
+        let how = comparison(rests, elapsed);
         self.lay(picture);
         self.heed_light();
         self.compare(how);
-        let stale = self.changed() > NEW_PICTURE || motion.is_none() && self.shows_another_view();
+        let stale = self.changed() > NEW_PICTURE || may_be_elsewhere && self.shows_another_view();
         if stale {
             self.start();
             self.lay(picture);
             self.compare(how);
         }
-        let rests = motion.is_none() || self.rested > REST;
         self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
@@ -203,17 +209,6 @@ impl TravellingBackground {
         self.to_picture = to_picture;
     }
 
-    fn comparison(&self, motion: Option<&CameraMotion>, elapsed: Duration) -> Comparison {
-        let rests = motion.is_none() || self.rested > REST;
-        let ticks = |time: Duration| (time.as_secs_f64() * TICKS).round().clamp(1.0, 255.0) as u8;
-        Comparison {
-            misplaced: if rests { MISPLACED_AT_REST } else { MISPLACED },
-            min_weight: (elapsed.as_secs_f64() / MEMORY.as_secs_f64()).min(1.0) as f32,
-            ticks: ticks(elapsed),
-            patience: ticks(PATIENCE),
-        }
-    }
-
     /// Lays the picture on the canvas.
     fn lay(&mut self, picture: &Reduced) {
         self.forth.prepare(self.model.size, self.size, &self.to_picture);
@@ -275,6 +270,17 @@ impl TravellingBackground {
         self.back.prepare(self.size, self.model.size, &back);
         self.back.sample(&self.model.likelihood, UNKNOWN, &mut self.foreground);
         self.back.sample(&self.model.shown, 0, &mut self.shown);
+    }
+}
+
+/// How a picture is held against what is known, `elapsed` after the last, by a camera that `rests` or turns.
+fn comparison(rests: bool, elapsed: Duration) -> Comparison {
+    let ticks = |time: Duration| (time.as_secs_f64() * TICKS).round().clamp(1.0, 255.0) as u8;
+    Comparison {
+        misplaced: if rests { MISPLACED_AT_REST } else { MISPLACED },
+        min_weight: (elapsed.as_secs_f64() / MEMORY.as_secs_f64()).min(1.0) as f32,
+        ticks: ticks(elapsed),
+        patience: ticks(PATIENCE),
     }
 }
 

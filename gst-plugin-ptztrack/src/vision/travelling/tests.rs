@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography, Point, Rect};
+use ptztrack_contract::{Homography, Point, Rect};
 
 use super::TravellingBackground;
 use crate::vision::picture::{Picture, Reduced};
@@ -35,11 +35,8 @@ fn normalised((x, y, width, height): (f64, f64, f64, f64)) -> Rect {
 fn look(background: &mut TravellingBackground, picture: &Canvas, shift: Option<(f64, f64)>) {
     let mut reduced = Reduced::default();
     reduced.fill(&Picture { luma: picture.luma(), chroma: None }, SIZE);
-    let motion = shift.map(|(x, y)| CameraMotion {
-        homography: Homography::translation(x / SIZE.0 as f64, y / SIZE.1 as f64),
-        ..CameraMotion::default()
-    });
-    background.update(&reduced, motion.as_ref(), STEP);
+    let motion = shift.map(|(x, y)| Homography::translation(x / SIZE.0 as f64, y / SIZE.1 as f64));
+    background.update(&reduced, motion.as_ref(), motion.is_none(), STEP);
 }
 
 /// One that has seen the empty room for a second.

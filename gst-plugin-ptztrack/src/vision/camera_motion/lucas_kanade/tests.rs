@@ -81,7 +81,11 @@ proptest! {
         dx in -9.0..9.0, dy in -9.0..9.0, side in (4_usize..13).prop_map(|half| 2 * half + 1), seed in any::<u32>(),
     ) {
         let (from, to) = (picture((0.0, 0.0), seed), picture((dx, dy), seed ^ 1));
+        // Of the gradient in the last pixels OpenCV knows less.
+        let is_inside = |place: &Point2f| place.x < SIZE.0 as f32 - 2.0 && place.y < SIZE.1 as f32 - 2.0;
+        let inside: Vec<bool> = places().iter().map(is_inside).collect();
         let pairs = followed(&from, &to, side).into_iter().zip(by_opencv(&from, &to, side));
+        let pairs = pairs.zip(inside).filter_map(|(pair, inside)| inside.then_some(pair));
         let well: Vec<_> = pairs.filter(|(_, theirs)| theirs.is_some_and(|found| found.residual < 3.0)).collect();
         prop_assert!(well.len() > 80, "{}", well.len());
         let same = |(ours, theirs): &&(Option<Found>, Option<Found>)| {
@@ -90,7 +94,6 @@ proptest! {
             })
         };
         let agreeing = well.iter().filter(same).count();
-        // In the border OpenCV knows less of the gradient.
         prop_assert!(agreeing * 100 >= well.len() * 95, "{agreeing} of {}", well.len());
     }
 }
