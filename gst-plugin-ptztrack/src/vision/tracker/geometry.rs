@@ -8,6 +8,14 @@ use ptztrack_contract::{Point, Rect, Vector};
 /// Width of an upright person as a share of their height.
 pub(super) const ASPECT: f32 = 0.4;
 
+/// Width of one body as a share of its height, at most: arms and strides included.
+const BODY_ASPECT: f32 = 0.6;
+
+/// Whether a box is no broader than one body that stands or walks.
+pub(super) fn is_upright(bounds: Rect2f) -> bool {
+    bounds.width <= BODY_ASPECT * bounds.height
+}
+
 /// How broad somebody of this box is: of a body half hidden, or of a door that begins to open, a strip is all that shows.
 pub(in super::super) fn breadth(bounds: Rect2f) -> f32 {
     bounds.width.max(ASPECT * bounds.height)

@@ -9,7 +9,7 @@ use super::Tracks;
 use super::association::Association;
 use super::groups::owners_of_sides;
 use super::track::Track;
-use crate::vision::tracker::geometry::{Frame, length, shared_sides};
+use crate::vision::tracker::geometry::{Frame, is_upright, length, shared_sides};
 
 /// Who is taller than this part of another is no part of them, nor who was seen alone for so long, seconds; where they are still
 /// smaller, that takes longer.
@@ -17,10 +17,9 @@ const PART: f32 = 0.8;
 const APART_S: f64 = 0.3;
 const SMALL: f32 = 0.6;
 const SMALL_APART_S: f64 = 2.0;
-/// Trunk and legs seen apart are each at least this broad beside their height, both together at most so broad; for so long, seconds,
-/// they were seen, and by so many heights per second they part at most.
+/// Trunk and legs seen apart are each at least this broad beside their height; for so long, seconds, they were seen, and by so many
+/// heights per second they part at most.
 const PIECE_ASPECT: f32 = 0.5;
-const BODY_ASPECT: f32 = 0.6;
 const PIECE_S: f64 = 0.3;
 const TOGETHER: f32 = 0.3;
 
@@ -51,7 +50,7 @@ impl Tracks {
                 track.measure(bounds, sides);
                 if alone {
                     track.see_alone(number, bounds, dt_s);
-                    track.resize(bounds, dt_s);
+                    track.resize(bounds, cut[0] || cut[2], dt_s);
                 } else {
                     track.see_shared(number, sides != [false; 4], dt_s);
                 }
@@ -94,10 +93,9 @@ impl Tracks {
     /// Whether who is seen inside of another is a part of them: a hand, or legs that were seen first.
     fn is_part(&self, part: usize, whole: usize, region: Rect2f) -> bool {
         let (part, whole) = (&self.tracks[part], &self.tracks[whole]);
-        let is_body = region.width <= BODY_ASPECT * region.height;
         let is_smaller = |share: f32| part.height() < share * whole.height();
         (is_smaller(SMALL) && part.journey.alone_s < SMALL_APART_S)
-            || (is_smaller(PART) && is_body && part.journey.alone_s < APART_S)
+            || (is_smaller(PART) && is_upright(region) && part.journey.alone_s < APART_S)
             || are_parts_of_a_vehicle(part, whole)
     }
 
@@ -131,7 +129,7 @@ impl Tracks {
 /// Whether a pole or a tree parted in two what is one, of those who are seen in one region: neither is upright, as somebody is, and one of
 /// them was not seen alone for as long as together with others.
 fn are_parts_of_a_vehicle(one: &Track, other: &Track) -> bool {
-    let is_broad = |track: &Track| track.bounds().width > BODY_ASPECT * track.height();
+    let is_broad = |track: &Track| !is_upright(track.bounds());
     let is_mostly_shared = |track: &Track| track.journey.alone_s < track.journey.shared_s;
     [one, other].into_iter().all(is_broad) && [one, other].into_iter().any(is_mostly_shared)
 }
@@ -150,6 +148,6 @@ fn is_body(upper: &Track, lower: &Track) -> bool {
         && is_piece(lower, below)
         && across > 0.5 * above.width.min(below.width)
         && (-0.2 * whole.height..0.2 * whole.height).contains(&gap)
-        && whole.width <= BODY_ASPECT * whole.height
+        && is_upright(whole)
         && apart <= TOGETHER * whole.height
 }

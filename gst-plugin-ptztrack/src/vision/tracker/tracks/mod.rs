@@ -265,7 +265,7 @@ impl Tracks {
             let cut = frame.cut_sides(whole);
             track.measure(whole, cut.map(|cut| !cut));
             track.see_alone(number, whole, dt_s);
-            track.resize(whole, dt_s);
+            track.resize(whole, cut[0] || cut[2], dt_s);
             let region = &mut self.regions[number];
             region.is_owned = true;
             if track.is_seen_whole() {

@@ -80,6 +80,32 @@ fn two_who_pass_through_each_other_keep_their_numbers() {
     assert!(place(2).is_some_and(|x| (x - 100.0).abs() < 10.0), "{:?}", place(2));
 }
 
+/// Somebody walks into the light of a car, which is one region with them and is still there for a second and a half after they left it.
+#[test]
+fn who_stands_upright_does_not_become_as_broad_as_what_is_beside_them() {
+    let mut tracks = Tracks::default();
+    for n in 0..15 {
+        seen_in(&mut tracks, &[person(100.0 + 4.0 * n as f32)], STILL, DT);
+    }
+    for n in 15..30 {
+        seen_in(&mut tracks, &[at(100.0 + 4.0 * n as f32, 96.0, 180.0, 94.0)], STILL, DT);
+    }
+    let bounds = tracks.get(1).map(Track::bounds).expect("there");
+    assert!(bounds.width < 60.0, "{bounds:?}");
+}
+
+/// A car comes in from the left and nearer: first there is a strip of it.
+#[test]
+fn what_the_picture_cuts_off_becomes_as_broad_as_it_is() {
+    let mut tracks = Tracks::default();
+    for n in 0..20 {
+        let nearer = n as f32;
+        seen_in(&mut tracks, &[at(0.0, 200.0 - nearer, 20.0 + 12.0 * nearer, 90.0 + nearer)], STILL, DT);
+    }
+    let bounds = tracks.get(1).map(Track::bounds).expect("there");
+    assert!(bounds.width > 200.0, "{bounds:?}");
+}
+
 #[test]
 fn trunk_and_legs_are_parts_of_who_was_seen_whole() {
     let mut tracks = Tracks::default();

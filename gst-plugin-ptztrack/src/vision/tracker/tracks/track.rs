@@ -10,7 +10,7 @@ use super::axis::{Axis, ProcessNoise, Side};
 use super::looks::Views;
 use super::region::Region;
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::geometry::{Frame, breadth, centre, overlap};
+use crate::vision::tracker::geometry::{Frame, breadth, centre, is_upright, overlap};
 
 /// Deviation of a side that was seen, in heights of the track: arms and legs swing, heads hardly.
 const ACROSS_NOISE: f32 = 0.08;
@@ -310,9 +310,14 @@ impl Track {
         self.existence = (self.existence + evidence * dt_s).min(MOST_EXISTENCE);
     }
 
-    /// What is seen of it alone is `whole`: where that is much larger or smaller for long, this is its size.
-    pub fn resize(&mut self, whole: Rect2f, dt_s: f64) {
+    /// What is seen of it alone is `whole`, of which left or right is `cut` off by the picture: where that is much larger or smaller for
+    /// long, this is its size. Somebody who stands upright never gets as broad as two: what is, is somebody and what is beside them.
+    pub fn resize(&mut self, whole: Rect2f, cut: bool, dt_s: f64) {
         let bounds = self.bounds();
+        if is_upright(bounds) && !is_upright(whole) && !cut && whole.width > 2.0 * breadth(bounds) {
+            self.journey.unlike_s = 0.0;
+            return;
+        }
         let (unlike, after_s) = if whole.height > bounds.height { GROWS } else { SHRINKS };
         if overlap(bounds, whole) >= unlike {
             self.journey.unlike_s = 0.0;
