@@ -115,6 +115,7 @@ impl CameraMotionEstimator {
         let size = (luma.width() as f64, luma.height() as f64);
         flow::fill(&mut self.pyramid, luma);
         self.may_be_elsewhere = true;
+        let another = self.another.take();
         let pyramid = &self.pyramid;
         let grid = Grid::of(luma);
         let Some(mut key) = self.key.take().filter(|key| key.grid == grid) else {
@@ -131,7 +132,7 @@ impl CameraMotionEstimator {
         let centred = Centred::of(size.0, size.1);
         let mut fit = key.compare(pyramid, guesses.clone(), centred, comparison);
         self.may_be_elsewhere = fit.is_none();
-        if let Some(another) = self.another.take().filter(|_| fit.is_none()) {
+        if let Some(another) = another.filter(|_| fit.is_none()) {
             fit = another.compare(pyramid, guesses, centred, comparison);
             if fit.is_some() {
                 key = another;

@@ -190,3 +190,16 @@ fn a_cut_while_it_turns_is_gone_on_from_with_the_second_picture() {
     assert!(estimator.may_be_elsewhere());
     assert!(error(&motion, &Homography::translation(-3.0, 0.0)) < 0.4);
 }
+
+#[test]
+fn pictures_of_another_size_are_a_new_beginning() {
+    let mut estimator = panning();
+    assert_eq!(measure(&mut estimator, &blank(0)), None);
+    let smaller = |step: u32| {
+        Canvas::seen((240, 136), &Homography::translation(-3.0 * f64::from(step), 0.0), world)
+            .noisy(2.0, step)
+    };
+    assert_eq!(measure(&mut estimator, &smaller(0)), None);
+    assert!(estimator.coasted().is_none() && estimator.may_be_elsewhere());
+    assert!(measure(&mut estimator, &smaller(1)).is_some());
+}
