@@ -286,6 +286,10 @@ impl Client {
 
     /// The body of the answer to a message.
     async fn call(&mut self, path: Path, message: &str) -> Result<Element, Error> {
+        self.say(path, message, Repeat::WhereBroken).await
+    }
+
+    async fn say(&mut self, path: Path, message: &str, repeat: Repeat) -> Result<Element, Error> {
         if self.login == Login::Refused {
             return Err(self.bad_credentials());
         }
@@ -303,7 +307,7 @@ impl Client {
             let header = token.map_or_else(String::new, |credentials| {
                 security(&credentials, &self.clock.unwrap_or_else(CameraClock::assumed).now())
             });
-            let answer = self.http.post(&path, &envelope(&header, message), Repeat::WhereBroken).await?;
+            let answer = self.http.post(&path, &envelope(&header, message), repeat).await?;
             match read_answer(&answer)? {
                 Answer::Body(body) => {
                     if judged {
@@ -463,7 +467,10 @@ impl Client {
         abilities: &Abilities,
     ) -> Result<(), Error> {
         match words {
-            StopWords::Stop => self.call(Path::Ptz, &messages::stop(self.profile())).await.map(drop),
+            StopWords::Stop => {
+                let message = messages::stop(self.profile());
+                self.say(Path::Ptz, &message, Repeat::UntilHeard).await.map(drop)
+            }
             StopWords::Still => {
                 // A move to a position may have zoomed too.
                 let zoom = *command != Command::Stop(Stop::PanTilt) && self.moves.zooms();

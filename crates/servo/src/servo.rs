@@ -264,7 +264,8 @@ impl Servo {
         self.home.interrupt();
     }
 
-    fn lose(&mut self) {
+    /// Nobody knows where the target is any more.
+    pub fn lose(&mut self) {
         self.target = None;
         self.estimator.clear();
         self.controller.rest();
@@ -285,6 +286,11 @@ impl Servo {
     /// Whether the newest measurement was not steered by.
     pub fn is_behind(&self) -> bool {
         self.target.as_ref().is_some_and(|target| !target.considered)
+    }
+
+    /// When the newest picture was taken that tells of the target, where there is one.
+    pub fn newest_picture(&self) -> Option<Time> {
+        self.target.as_ref().map(|target| target.measurement.taken_at)
     }
 
     /// When the target will not have been seen for too long, where there is one.

@@ -130,6 +130,11 @@ impl ControlLoop {
         self.servo.release();
     }
 
+    /// Neither pictures nor answers come: where the target is, nobody knows.
+    pub fn lose_target(&mut self) {
+        self.servo.lose();
+    }
+
     /// What to send now, if anything.
     pub fn next_request(&mut self, now: Time) -> Next {
         if self.session.halted() {

@@ -67,8 +67,12 @@ impl Client {
     async fn send(&mut self, command: &Command) -> Result<(), Error> {
         let target = format!("/axis-cgi/com/ptz.cgi?camera={}&{}", self.camera(), Words(command));
         // Of these the second would go on from where the first led.
-        let once = matches!(command, Command::Move { motion: Motion::Centre { .. }, .. });
-        let answer = self.http.get(&target, if once { Repeat::Never } else { Repeat::WhereBroken }).await?;
+        let repeat = match command {
+            Command::Stop(_) => Repeat::UntilHeard,
+            Command::Move { motion: Motion::Centre { .. }, .. } => Repeat::Never,
+            Command::Move { .. } => Repeat::WhereBroken,
+        };
+        let answer = self.http.get(&target, repeat).await?;
         match answer.status {
             NO_CONTENT => Ok(()),
             // 200 in answer to a move is a refusal, whatever it says.

@@ -3,14 +3,14 @@
 //! How often a request is sent.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Write};
 use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use servo::Motion;
 use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
-use session::{Client as _, Command, Error, Request};
+use session::{Client as _, Command, Error, Request, Stop};
 use vapix::Client;
 
 const RIGHT: Command =
@@ -166,4 +166,25 @@ fn all_attempts_together_take_no_longer_than_one_answer_may() {
     })
     .unwrap();
     assert_eq!(send(&mut client, &[RIGHT]), [Err(Error::Timeout(2 * pause))]);
+}
+
+/// A camera may forget what it was told by who hangs up before it has answered.
+#[test]
+fn a_stop_that_is_not_answered_is_not_hung_up_on() {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let timeout = Duration::from_millis(300);
+    let mut client =
+        Client::new(ClientSettings { timeout, ..settings(listener.local_addr().unwrap()) }).unwrap();
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(1).enable_all().build().unwrap();
+    let mut tell = |command| {
+        let answer = runtime.block_on(client.exchange(&Request::Command(command)));
+        assert_eq!(answer, Err(Error::Timeout(timeout)));
+        listener.accept().unwrap().0
+    };
+    let mut stop = tell(Command::Stop(Stop::PanTilt));
+    // Until it is hung up on, and so would be what was told before it.
+    let _ = std::io::copy(&mut tell(RIGHT), &mut std::io::sink());
+    stop.set_nonblocking(true).unwrap();
+    let read = std::io::copy(&mut stop, &mut std::io::sink());
+    assert_eq!(read.map_err(|err| err.kind()), Err(ErrorKind::WouldBlock));
 }

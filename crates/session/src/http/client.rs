@@ -73,12 +73,19 @@ pub struct HttpClient {
     connected: bool,
 }
 
+/// A request that nobody waits for any more is hung up on, unless it must be heard; then after so long, as on a connection
+/// that comes about late and a network that holds it back.
+const STAYS_UNDER_WAY: Duration = Duration::from_secs(6);
+
 /// Whether a request is sent again where the connection breaks, as it does where the camera has closed it meanwhile. It
 /// may have arrived all the same.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Repeat {
     /// Twice is as good as once.
     WhereBroken,
+    /// The same, and it must be heard however late: where its answer is waited for no longer it is left under way, as a
+    /// camera may forget what it was told by who hangs up.
+    UntilHeard,
     /// Twice is too much: sent over a connection of its own, that the camera cannot have closed.
     Never,
 }
@@ -212,7 +219,7 @@ impl HttpClient {
         let mut signed_fresh = false;
         for _ in 0..MAX_ATTEMPTS {
             let response = match self.request(target, message, repeat).await {
-                Err(err @ Error::Broken(_)) if self.connected && repeat == Repeat::WhereBroken => {
+                Err(err @ Error::Broken(_)) if self.connected && repeat != Repeat::Never => {
                     self.connected = false;
                     broken.get_or_insert(err);
                     continue;
@@ -263,7 +270,9 @@ impl HttpClient {
         }
         let mut headers = HeaderMap::new();
         self.cookies.put(&mut headers);
-        let response = request.headers(headers).send().await.map_err(|err| self.failure(&err))?;
+        let sending = request.headers(headers).send();
+        let response = if repeat == Repeat::UntilHeard { under_way(sending).await? } else { sending.await };
+        let response = response.map_err(|err| self.failure(&err))?;
         self.cookies.take(response.headers());
         self.connected = true;
         Ok(response)
@@ -322,8 +331,16 @@ impl Stream {
     /// # Errors
     /// [`Error::Timeout`] or [`Error::Broken`].
     pub async fn next(&mut self) -> Result<Option<Bytes>, Error> {
-        self.response.chunk().await.map_err(|err| failure(&err, self.longest))
+        let chunk = tokio::time::timeout(self.longest, self.response.chunk()).await;
+        chunk.map_err(|_| Error::Timeout(self.longest))?.map_err(|err| failure(&err, self.longest))
     }
+}
+
+/// What comes of this, which goes on where nobody waits for it any more.
+async fn under_way<T: Send + 'static>(sending: impl Future<Output = T> + Send + 'static) -> Result<T, Error> {
+    let goes_on = tokio::spawn(tokio::time::timeout(STAYS_UNDER_WAY, sending));
+    let broken = |err: tokio::task::JoinError| Error::Broken(err.to_string());
+    goes_on.await.map_err(broken)?.map_err(|_| Error::Timeout(STAYS_UNDER_WAY))
 }
 
 fn failure(err: &reqwest::Error, longest: Duration) -> Error {
@@ -351,8 +368,6 @@ fn http_client(settings: &ClientSettings, idle: usize) -> Result<reqwest::Client
         .redirect(redirect::Policy::none())
         .http1_only()
         .pool_max_idle_per_host(idle)
-        .connect_timeout(settings.timeout)
-        .read_timeout(settings.timeout)
         .tcp_nodelay(true)
         .build()
         .map_err(|err| Error::Tls(innermost(&err)))

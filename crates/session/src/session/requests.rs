@@ -47,11 +47,14 @@ impl Session {
     fn command(&self, actuation: Actuation, interval: Duration, now: Time) -> (Command, Option<Time>) {
         let retry_at = self.connection.retry_at();
         let stop = Command::Stop(self.stop());
+        let stop_due = || self.scheduler.stop_due(now, interval, retry_at).filter(|_| !self.is_deaf());
         match actuation {
             Actuation::Continue => (stop, None),
-            Actuation::Rest if self.is_deaf() => (stop, None),
-            Actuation::Rest => (stop, self.scheduler.stop_due(now, interval, retry_at)),
+            Actuation::Rest => (stop, stop_due()),
             Actuation::Move(_) if self.is_discovering() => (stop, None),
+            // What became of the last move nobody knows, and the next one may be as late: over a network that holds them
+            // back for seconds no target is followed by moves.
+            Actuation::Move(_) if self.scheduler.is_unsure() => (stop, stop_due()),
             Actuation::Move(motion) => {
                 let command = Command::of(motion, self.description.wants_free_moves());
                 let not_before = retry_at.max(self.modes.not_before(&command));

@@ -182,6 +182,11 @@ impl Scheduler {
         self.may_move
     }
 
+    /// Whether it may be moving, and nobody knows how: its last move went unanswered, or was somebody else's.
+    pub fn is_unsure(&self) -> bool {
+        self.may_move && self.accepted.is_none()
+    }
+
     /// Whether it may yet act on a move that went unanswered, even where it is at rest.
     pub fn in_doubt(&self) -> bool {
         self.doubt_until.is_some()

@@ -36,7 +36,7 @@ use crate::watchdog::{StopOrder, Unavailable, Watchdog};
 use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
 use ptztrack_contract::lock::lock;
 
-/// A request in flight when a stop is due gets this much longer before it is abandoned for the stop.
+/// A request is not abandoned before this for a stop that is due.
 pub const STOP_GRACE: Duration = Duration::from_millis(500);
 
 /// At the end the camera's yes to its stop is waited for this long.
@@ -334,15 +334,18 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             state.keep_dead_man(dead_man);
         }
         let mut exchange = pin!(client.exchange(&request));
-        let mut give_up_at = None;
         loop {
             let now = mailbox.now();
-            give_up_at = state.give_up_at(&request, give_up_at, now);
+            let silent_at = state.silent_at(&request, sent);
+            if silent_at.is_some_and(|at| at <= now) {
+                state.control.lose_target();
+            }
+            let give_up_at = state.give_up_at(&request, sent, now);
             if state.is_in_vain(&request, now) || give_up_at.is_some_and(|at| at <= now) {
                 return state.abandoned(&request, sent);
             }
             let stale_at = state.control.stale_at().filter(|at| *at > now);
-            let until = [give_up_at, stale_at, state.deadline].into_iter().flatten().min();
+            let until = [give_up_at, silent_at, stale_at, state.deadline].into_iter().flatten().min();
             tokio::select! {
                 biased;
                 answer = &mut exchange => return state.answered(&request, answer, sent),

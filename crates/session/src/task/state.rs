@@ -145,19 +145,29 @@ impl<O: Fn(Event)> TaskState<O> {
         }
     }
 
-    /// When to abandon what is in flight for a stop that waits behind it, after what was said of that before: a stop
-    /// that is not due any more hurries nobody.
-    pub fn give_up_at(&self, request: &Request, before: Option<Time>, now: Time) -> Option<Time> {
-        self.stop_waits_behind(request, now).then(|| before.unwrap_or(now + STOP_GRACE))
+    /// When to abandon what was sent then for a stop that waits behind it: a stop that is not due any more hurries nobody.
+    pub fn give_up_at(&self, request: &Request, sent: Time, now: Time) -> Option<Time> {
+        self.stop_waits_behind(request, now).then(|| sent + STOP_GRACE)
+    }
+
+    /// When the target is lost, as for so long neither a picture nor an answer to this has come, while the camera may turn:
+    /// the network holds back both, and the stop will be as late.
+    pub fn silent_at(&self, request: &Request, sent: Time) -> Option<Time> {
+        let newest = self.control.servo().newest_picture()?;
+        self.may_turn(request).then(|| newest.max(sent) + STOP_GRACE)
     }
 
     /// Whether something else than a stop is in flight while a stop is what the camera needs.
     fn stop_waits_behind(&self, request: &Request, now: Time) -> bool {
-        let may_move = match request {
+        self.may_turn(request) && !self.control.has_errand(now)
+    }
+
+    /// Whether the camera may turn while this is in flight, and is not being stopped by it.
+    fn may_turn(&self, request: &Request) -> bool {
+        match request {
             Request::Command(command) => !command.is_stop(),
             Request::Query(_) => !self.control.session().is_at_rest(),
-        };
-        may_move && !self.control.has_errand(now)
+        }
     }
 
     pub fn answered(&mut self, request: &Request, answer: Result<Response, Error>, sent: Time) {
@@ -435,13 +445,27 @@ mod tests {
     fn only_a_stop_that_still_waits_has_a_move_abandoned() {
         let (mut state, _) = state();
         state.see(Visibility::Seen);
-        assert_eq!(state.give_up_at(&MOVE, None, ms(1000)), None);
+        let sent = ms(1000);
+        assert_eq!(state.give_up_at(&MOVE, sent, ms(1000)), None);
         state.see(Visibility::Gone);
-        let at = state.give_up_at(&MOVE, None, ms(1000));
-        assert_eq!(at, Some(Time::from_millis(1000) + STOP_GRACE));
-        assert_eq!(state.give_up_at(&MOVE, at, ms(1400)), at);
+        assert_eq!(state.give_up_at(&MOVE, sent, ms(1400)), Some(sent + STOP_GRACE));
         state.see(Visibility::Seen);
-        assert_eq!(state.give_up_at(&MOVE, at, ms(1450)), None);
-        assert_eq!(state.give_up_at(&Request::Command(HALT), None, ms(1450)), None);
+        assert_eq!(state.give_up_at(&MOVE, sent, ms(1450)), None);
+        assert_eq!(state.give_up_at(&Request::Command(HALT), sent, ms(1450)), None);
+    }
+
+    #[test]
+    fn a_target_is_lost_for_silence_where_neither_pictures_nor_answers_come() {
+        let (mut state, _) = state();
+        assert_eq!(state.silent_at(&MOVE, ms(900)), None, "nobody is followed");
+        state.see(Visibility::Seen);
+        assert_eq!(state.silent_at(&MOVE, ms(900)), Some(ms(1500)), "the picture is of 1000 ms");
+        assert_eq!(state.silent_at(&MOVE, ms(1200)), Some(ms(1700)));
+        let ask = Request::Query(Query::Position);
+        assert_eq!([Request::Command(HALT), ask].map(|it| state.silent_at(&it, ms(900))), [None; 2]);
+        assert_eq!(state.serve_at(ms(1000), |_| Ok(Response::Accepted)).len(), 1, "it turns");
+        assert_eq!(state.silent_at(&ask, ms(900)), Some(ms(1500)));
+        state.control.lose_target();
+        assert_eq!(state.give_up_at(&ask, ms(900), ms(1500)), Some(ms(1400)), "a stop is due");
     }
 }

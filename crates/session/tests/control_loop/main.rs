@@ -283,6 +283,26 @@ fn a_failed_stop_is_repeated() {
     assert_eq!(disconnected, 1);
 }
 
+/// Over a network that holds them back for seconds nobody is followed by moves.
+#[test]
+fn what_a_move_that_went_unanswered_does_is_ended_before_the_next() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.see(0.9, 0.5);
+    rig.run(|_| Err(Error::Timeout(ms(1))));
+    rig.sent.clear();
+    for _ in 0..20 {
+        rig.now += ms(250);
+        rig.see(0.9, 0.5);
+        rig.run(|_| Err(Error::Timeout(ms(1))));
+    }
+    assert!(!rig.sent.is_empty() && rig.sent.iter().all(Command::is_stop), "{:?}", rig.sent);
+    rig.sent.clear();
+    rig.see(0.9, 0.5);
+    assert_eq!(rig.after(ms(1000)), [HALT]);
+    rig.see(0.9, 0.5);
+    assert!(matches!(rig.after(ms(100))[..], [Command::Move { .. }]), "it hears again");
+}
+
 #[test]
 fn what_a_predecessor_left_is_stopped_twice() {
     let mut rig = Rig::new(ServoSettings::default());
