@@ -49,7 +49,7 @@ pub(super) struct DwellTime {
     offset: Point2f,
     /// From its average size, as a logarithm.
     growth: f32,
-    /// The way of a target that has yet to go somewhere.
+    /// The way of a target that was chosen because it moves.
     trial: Option<Way>,
 }
 
@@ -88,13 +88,18 @@ impl Way {
 }
 
 impl DwellTime {
-    /// Of a target that has yet to go somewhere.
+    /// Of a target that was chosen because it moves, and has yet to go somewhere.
     pub fn on_trial() -> Self {
         Self { trial: Some(Way::default()), ..Self::default() }
     }
 
     /// Whether it has yet to go somewhere: a screen may have been chosen as well as a person.
     pub fn is_on_trial(&self) -> bool {
+        self.trial.is_some_and(|way| way.length() <= TRIAL_REACH)
+    }
+
+    /// Whether it was chosen because it moves, and not by somebody's word.
+    pub fn is_of_motion(&self) -> bool {
         self.trial.is_some()
     }
 
@@ -119,18 +124,18 @@ impl DwellTime {
         let growth = if across * down > 0.0 { across.abs().min(down.abs()).copysign(down) } else { 0.0 };
         self.growth = (self.growth + growth) * keep;
         let (stays, grows) = match &mut self.trial {
-            Some(way) => {
+            Some(way) if way.length() <= TRIAL_REACH => {
                 // A young box is still finding the size of what it lies on.
                 way.go(step, if self.tracked_s > f64::from(YOUNG_S) { growth } else { 0.0 });
                 (way.length() <= TRIAL_REACH, way.grows())
             }
-            None => (length(self.offset) <= REACH && self.growth.abs() <= GROWTH, false),
+            _ => (length(self.offset) <= REACH && self.growth.abs() <= GROWTH, false),
         };
         // What is not a number fails as well, and is forgotten.
         *self = if stays {
             Self { still_s: if grows { 0.0 } else { self.still_s + dt_s }, ..*self }
         } else {
-            Self { tracked_s: self.tracked_s, ..Self::default() }
+            Self { tracked_s: self.tracked_s, trial: self.trial, ..Self::default() }
         };
     }
 

@@ -15,7 +15,7 @@ use super::group::Group;
 use super::policy::{Choice, Policy, tell_apart};
 use super::report::{Detection, Tracked, reported};
 use super::target::{Follow, Sight};
-use super::tracks::{Region, Rules, Tracks};
+use super::tracks::{Region, Rules, Track, Tracks};
 use crate::vision::Observation;
 use crate::vision::stillness::Stillness;
 
@@ -301,16 +301,26 @@ impl Tracker {
         }
     }
 
-    /// Whether a target that has yet to go somewhere does not, while somebody else does.
+    /// Whether a target that was chosen because it moves stays where it is, while somebody else goes somewhere: at first anybody whom
+    /// the policy would choose, and later who has gone as far as they are tall, where the target never has. What a screen shows goes
+    /// to and fro for ever and never farther than its edge.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
-        let track = self.tracks.get(target.id);
-        target.dwell.is_on_trial()
-            && track.is_none_or(|track| track.region().is_none() || track.goes_nowhere())
-            && self
-                .policy
-                .choose(&self.tracks, choice, None, must_travel, frame)
-                .is_some_and(|track| track.id != target.id)
+        let seen = self.tracks.get(target.id).filter(|track| track.region().is_some());
+        if target.dwell.is_on_trial() && seen.is_none_or(Track::goes_nowhere) {
+            let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
+            return chosen.is_some_and(|track| track.id != target.id);
+        }
+        let farthest = self.tracks.get(target.id).map_or(0.0, |track| track.journey.farthest);
+        let height = target.follow.estimate().bounds.height;
+        let goes_farther = |other: &Track| {
+            let tall = other.height();
+            other.id != target.id && tall > height && other.journey.farthest >= tall && farthest < tall
+        };
+        choice != Choice::Manual
+            && target.dwell.is_of_motion()
+            && seen.is_none_or(|track| !track.travels())
+            && self.policy.ready(&self.tracks, must_travel, frame).any(goes_farther)
     }
 }
 

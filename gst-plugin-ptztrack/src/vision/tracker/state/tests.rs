@@ -484,3 +484,50 @@ fn nobody_is_tracked_three_seconds_after_a_poster_flickered() {
     }
     assert!(taken);
 }
+
+/// Something goes to and fro on a screen, farther than it is broad, and is taken; then somebody walks in.
+#[test]
+fn what_a_screen_shows_is_given_up_for_who_has_gone_as_far_as_they_are_tall() {
+    let mut chain = watching(Config { must_travel: true, ..config() });
+    let mut since = None;
+    for n in 0..70 {
+        // It rests at either edge for a moment.
+        let along = (1.3 * (0.14 * n as f32).sin()).clamp(-1.0, 1.0);
+        let shown = Rect2f::new(300.0 + 30.0 * along, 60.0, 30.0, 24.0);
+        let person = Rect2f::new(10.0 * (n as f32 - 30.0), 100.0, 60.0, 150.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(shown, 50);
+        let mut detections = vec![detection(shown)];
+        if n >= 30 {
+            picture.paint(person, 7);
+            detections.push(detection(person));
+        }
+        let last = chain.process(&picture, DT, &detections);
+        assert!(!(15..30).contains(&n) || is_on(&last, shown) > 0.3, "the film is taken, {n}: {last:?}");
+        let is_person = last.state == TargetState::Tracking && is_on(&last, person) > 0.6;
+        since = since.or(is_person.then_some(n));
+        assert!(since.is_none() || is_person, "picture {n}: {:?} {:?}", last.state, last.bounds);
+    }
+    assert!(since.is_some_and(|since| (45..=65).contains(&since)), "{since:?}");
+}
+
+/// Who walked in stands and looks about while somebody taller walks past.
+#[test]
+fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
+    let mut chain = watching(Config { must_travel: true, ..config() });
+    for n in 0..60 {
+        let first = Rect2f::new(460.0 - 10.0 * n.min(25) as f32, 90.0, 50.0, 130.0);
+        let other = Rect2f::new(10.0 * (n as f32 - 35.0) - 40.0, 90.0, 60.0, 150.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(first, 7);
+        let mut detections = vec![detection(first)];
+        if n >= 35 {
+            picture.paint(other, 50);
+            detections.push(detection(other));
+        }
+        let last = chain.process(&picture, DT, &detections);
+        if n >= 20 {
+            assert!(is_on(&last, first) > 0.5, "picture {n}: {:?} {:?}", last.state, last.bounds);
+        }
+    }
+}

@@ -8,7 +8,7 @@ use ptztrack_contract::TrackChange;
 use super::Tracks;
 use super::association::Association;
 use super::groups::owners_of_sides;
-use super::track::Track;
+use super::track::{Journey, Track};
 use crate::vision::tracker::geometry::{Frame, is_upright, length, shared_sides};
 
 /// Who is taller than this part of another is no part of them, nor who was seen alone for so long, seconds; where they are still
@@ -109,10 +109,11 @@ impl Tracks {
     pub(super) fn merge(&mut self, part: usize, whole: usize, keeps_number: bool) {
         let (part_id, whole_id) = (self.tracks[part].id, self.tracks[whole].id);
         self.tracks[part].end();
-        let (age_s, pictures) = (self.tracks[part].journey.age_s, self.tracks[part].journey.pictures);
+        let &Journey { age_s, pictures, farthest, .. } = &self.tracks[part].journey;
         let journey = &mut self.tracks[whole].journey;
         journey.age_s = journey.age_s.max(age_s);
         journey.pictures = journey.pictures.max(pictures);
+        journey.farthest = journey.farthest.max(farthest);
         if part_id == 0 {
             return;
         }

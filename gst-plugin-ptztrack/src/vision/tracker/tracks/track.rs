@@ -10,7 +10,7 @@ use super::axis::{Axis, ProcessNoise, Side};
 use super::looks::Views;
 use super::region::Region;
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::geometry::{Frame, breadth, centre, is_upright, overlap};
+use crate::vision::tracker::geometry::{Frame, breadth, centre, is_upright, length, overlap};
 
 /// Deviation of a side that was seen, in heights of the track: arms and legs swing, heads hardly.
 const ACROSS_NOISE: f32 = 0.08;
@@ -80,6 +80,8 @@ pub(in super::super) struct Journey {
     unlike_s: f64,
     /// Where its middle was first, carried along with the background.
     origin: Point2f,
+    /// The farthest from there that it was seen alone, pixels.
+    pub farthest: f32,
     /// Regions of its own in the last second, carried along with the background, and how old they are in seconds.
     way: VecDeque<(Rect2f, f64)>,
 }
@@ -132,6 +134,7 @@ impl Track {
                 in_a_row: 1,
                 unlike_s: 0.0,
                 origin: middle,
+                farthest: 0.0,
                 way: VecDeque::from([(bounds, 0.0)]),
             },
             views: Views::default(),
@@ -224,6 +227,7 @@ impl Track {
             self.across.carry(to.x, scale);
             self.down.carry(to.y, scale);
             self.journey.origin = ego.apply(self.journey.origin);
+            self.journey.farthest *= scale;
             for (bounds, age_s) in &mut self.journey.way {
                 *bounds = ego.apply_to(*bounds);
                 *age_s += dt_s;
@@ -259,6 +263,8 @@ impl Track {
         self.journey.pictures += 1;
         self.journey.in_a_row += 1;
         self.journey.way.push_back((bounds, 0.0));
+        let away = length(centre(self.bounds()) - self.journey.origin);
+        self.journey.farthest = self.journey.farthest.max(away);
         self.existence = (self.existence + SEEN_PER_S * dt_s as f32).min(MOST_EXISTENCE);
     }
 
