@@ -485,13 +485,12 @@ fn nobody_is_tracked_three_seconds_after_a_poster_flickered() {
     assert!(taken);
 }
 
-/// Something goes to and fro on a screen, farther than it is broad, and is taken; then somebody walks in.
-#[test]
-fn what_a_screen_shows_is_given_up_for_who_has_gone_as_far_as_they_are_tall() {
+/// What a screen shows goes to and fro, farther than it is broad, and rests at either edge for a moment; after three seconds somebody
+/// walks in. Since which picture they are followed, where what is shown was selected by hand or not.
+fn since_they_are_followed(by_hand: bool) -> Option<usize> {
     let mut chain = watching(Config { must_travel: true, ..config() });
     let mut since = None;
     for n in 0..70 {
-        // It rests at either edge for a moment.
         let along = (1.3 * (0.14 * n as f32).sin()).clamp(-1.0, 1.0);
         let shown = Rect2f::new(300.0 + 30.0 * along, 60.0, 30.0, 24.0);
         let person = Rect2f::new(10.0 * (n as f32 - 30.0), 100.0, 60.0, 150.0);
@@ -502,13 +501,28 @@ fn what_a_screen_shows_is_given_up_for_who_has_gone_as_far_as_they_are_tall() {
             picture.paint(person, 7);
             detections.push(detection(person));
         }
+        if by_hand && n == 20 {
+            let frame = Frame { width: SIZE.0 as f32, height: SIZE.1 as f32 };
+            chain.tracker.request(TargetRequest::Select(frame.rect(shown).centre()));
+        }
         let last = chain.process(&picture, DT, &detections);
         assert!(!(15..30).contains(&n) || is_on(&last, shown) > 0.3, "the film is taken, {n}: {last:?}");
         let is_person = last.state == TargetState::Tracking && is_on(&last, person) > 0.6;
         since = since.or(is_person.then_some(n));
         assert!(since.is_none() || is_person, "picture {n}: {:?} {:?}", last.state, last.bounds);
     }
+    since
+}
+
+#[test]
+fn what_a_screen_shows_is_given_up_for_who_has_gone_as_far_as_they_are_tall() {
+    let since = since_they_are_followed(false);
     assert!(since.is_some_and(|since| (45..=65).contains(&since)), "{since:?}");
+}
+
+#[test]
+fn what_was_selected_by_hand_is_kept() {
+    assert_eq!(since_they_are_followed(true), None);
 }
 
 /// Who walked in stands and looks about while somebody taller walks past.
