@@ -77,6 +77,11 @@ impl Way {
         along.map(|along| along * along).sum::<f32>().sqrt()
     }
 
+    /// Whether it is yet to get somewhere.
+    fn is_short(&self) -> bool {
+        self.length() <= TRIAL_REACH
+    }
+
     /// Whether it has grown by another step.
     fn grows(&mut self) -> bool {
         let grows = self.length() >= self.grown + TRIAL_STEP;
@@ -95,7 +100,7 @@ impl DwellTime {
 
     /// Whether it has yet to go somewhere: a screen may have been chosen as well as a person.
     pub fn is_on_trial(&self) -> bool {
-        self.trial.is_some_and(|way| way.length() <= TRIAL_REACH)
+        self.trial.is_some_and(|way| way.is_short())
     }
 
     /// Whether it was chosen because it moves, and not by somebody's word.
@@ -124,10 +129,10 @@ impl DwellTime {
         let growth = if across * down > 0.0 { across.abs().min(down.abs()).copysign(down) } else { 0.0 };
         self.growth = (self.growth + growth) * keep;
         let (stays, grows) = match &mut self.trial {
-            Some(way) if way.length() <= TRIAL_REACH => {
+            Some(way) if way.is_short() => {
                 // A young box is still finding the size of what it lies on.
                 way.go(step, if self.tracked_s > f64::from(YOUNG_S) { growth } else { 0.0 });
-                (way.length() <= TRIAL_REACH, way.grows())
+                (way.is_short(), way.grows())
             }
             _ => (length(self.offset) <= REACH && self.growth.abs() <= GROWTH, false),
         };

@@ -306,12 +306,13 @@ impl Tracker {
     /// to and fro for ever and never farther than its edge.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
-        let seen = self.tracks.get(target.id).filter(|track| track.region().is_some());
+        let track = self.tracks.get(target.id);
+        let seen = track.filter(|track| track.region().is_some());
         if target.dwell.is_on_trial() && seen.is_none_or(Track::goes_nowhere) {
             let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
             return chosen.is_some_and(|track| track.id != target.id);
         }
-        let farthest = self.tracks.get(target.id).map_or(0.0, |track| track.journey.farthest);
+        let farthest = track.map_or(0.0, |track| track.journey.farthest);
         let height = target.follow.estimate().bounds.height;
         let goes_farther = |other: &Track| {
             let tall = other.height();

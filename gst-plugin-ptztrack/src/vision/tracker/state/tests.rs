@@ -502,8 +502,7 @@ fn since_they_are_followed(by_hand: bool) -> Option<usize> {
             detections.push(detection(person));
         }
         if by_hand && n == 20 {
-            let frame = Frame { width: SIZE.0 as f32, height: SIZE.1 as f32 };
-            chain.tracker.request(TargetRequest::Select(frame.rect(shown).centre()));
+            chain.tracker.request(TargetRequest::Select(detection(shown).bounds.centre()));
         }
         let last = chain.process(&picture, DT, &detections);
         assert!(!(15..30).contains(&n) || is_on(&last, shown) > 0.3, "the film is taken, {n}: {last:?}");
