@@ -5,7 +5,7 @@
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-use opencv::core::{Mat, Point, Scalar};
+use opencv::core::{Mat, Point, Rect, Scalar};
 use opencv::imgproc;
 
 use super::Spot;
@@ -80,15 +80,18 @@ impl Glyph {
         let origin = Point::new(margin, margin + rise);
         let white = Scalar::all(255.0);
         imgproc::put_text(&mut picture, &text, origin, FACE, scale, white, stroke, imgproc::LINE_AA, false)?;
+        // Of what is empty around it nothing need be drawn.
+        let Rect { x, y, width: across, height: down } = imgproc::bounding_rect(&picture)?;
         drop(picture);
-        Ok(Self { mask, width: width as usize, offset: (-margin, -margin - rise), advance })
+        let rows = mask.chunks_exact(width as usize).skip(y as usize).take(down as usize);
+        let mask = rows.flat_map(|row| &row[x as usize..][..across as usize]).copied().collect();
+        Ok(Self { mask, width: across as usize, offset: (x - margin, y - margin - rise), advance })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use opencv::core::Rect;
 
     #[test]
     fn text_grows_with_its_height() {
