@@ -231,13 +231,14 @@ impl Stroke {
 /// `strength` (0 to 1) of it. What is covered already stays covered as much: strokes that meet in a corner do not show there twice.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn add_stroke(
-    [rim, inner]: &mut [Coverage; 2],
+    layers: &mut [Coverage; 2],
     (from, to): (Spot, Spot),
     radii: [f64; 2],
     strength: f64,
 ) {
-    let (area, width, height) = (rim.area, rim.width(), rim.height());
-    let [reach, inner_reach] = radii.map(|radius| radius + 0.5);
+    let (area, width, height) = (layers[0].area, layers[0].width(), layers[0].height());
+    let reaches = radii.map(|radius| radius + 0.5);
+    let [reach, _] = reaches;
     let (dx, dy) = (to.x - from.x, to.y - from.y);
     let stroke = Stroke::new((dx, dy), strength);
     let (left, right) = limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, area.x, width);
@@ -256,10 +257,13 @@ pub(super) fn add_stroke(
             let mut distances = stroke.distances((origin + first as f64) as f32, down as f32);
             // Nothing is covered beyond the area.
             distances[TOGETHER.min(width - first)..].fill(f32::INFINITY);
-            rim.cover(Place { y, block }, &stroke.covered(&distances, reach as f32));
-            let covered = stroke.covered(&distances, inner_reach as f32);
-            if covered.iter().fold(0, |any, covered| any | covered) > 0 {
-                inner.cover(Place { y, block }, &covered);
+            for (layer, reach) in layers.iter_mut().zip(reaches) {
+                let covered = stroke.covered(&distances, reach as f32);
+                // What reaches less far covers nothing either.
+                if covered.iter().fold(0, |any, covered| any | covered) == 0 {
+                    break;
+                }
+                layer.cover(Place { y, block }, &covered);
             }
         }
     }
