@@ -113,10 +113,13 @@ impl CellNoise {
 #[multiversion(targets("x86_64+avx2"))]
 fn sum_around(out: &mut [f32], rows: &[f32]) {
     let width = out.len();
-    let [above, here, below] = [0, 1, 2].map(|row| &rows[row * width..][..width]);
-    let column = |x: usize| above[x] + here[x] + below[x];
-    for (x, sum) in out.iter_mut().enumerate().take(width.saturating_sub(1)).skip(1) {
-        *sum = (column(x - 1) + column(x) + column(x + 1)) / 3.0;
+    let Some(inner) = width.checked_sub(2) else { return };
+    let rows = [0, 1, 2].map(|row| &rows[row * width..][..width]);
+    // All of one length, which the compiler needs to know for vector code.
+    let [left, middle, right] = [0, 1, 2].map(|first| rows.map(|row| &row[first..][..inner]));
+    let column = |[above, here, below]: [&[f32]; 3], x: usize| above[x] + here[x] + below[x];
+    for (x, sum) in out[1..=inner].iter_mut().enumerate() {
+        *sum = (column(left, x) + column(middle, x) + column(right, x)) / 3.0;
     }
 }
 
