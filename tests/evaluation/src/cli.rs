@@ -43,7 +43,8 @@ pub struct Args {
     /// From a command's arrival to the first movement, in milliseconds
     #[arg(long, value_name = "MS", default_value_t = 60)]
     pub command_delay: u64,
-    /// Who draws the first box: detected (by those that can) or given (the truth, to every tracker). Detected in tests and given
+    /// Who draws the first box: detected (by those that can) or given (the truth, to every tracker; ours is
+    /// told its middle alone, as by a click). Detected in tests and given
     /// in recordings, unless said otherwise
     #[arg(long)]
     pub first_box: Option<FirstBox>,

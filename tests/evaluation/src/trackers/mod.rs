@@ -147,7 +147,7 @@ impl Tracker {
     /// Puts up its probes.
     pub fn attach(&self, pipeline: &gst::Pipeline) -> Result<(), PipelineError> {
         match perception(self.name) {
-            Perception::Ours => ours::attach(pipeline, self.first_box, &self.cue),
+            Perception::Ours => ours::attach(pipeline, self.first_box),
             Perception::Stock => stock::attach(pipeline, &self.cue),
             Perception::Truth => bounds::attach(pipeline, self.name, &self.cue),
         }

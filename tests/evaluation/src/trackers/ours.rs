@@ -2,16 +2,15 @@
 
 //! Detector and feature point tracker, with their defaults or as the thesis has them.
 //!
-//! Until the first box the tracker is told to wait for an operator, while the detector learns the background. The first
-//! box is given in the place of what the detector saw in that picture, and a click into its middle takes it. From
-//! the next picture on the tracker chooses for itself, so that it can find the person again after a loss.
+//! Until the first box the tracker is told to wait for an operator, while the detector learns the background. Of that box it is
+//! told the middle alone, as by a click: what is there the detector has to have seen. From the next picture on the tracker
+//! chooses for itself, so that it can find the person again after a loss.
 
 use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, MotionMeta, Region};
 
-use super::{Cue, CurrentCue, Phase, normalised};
+use super::{Cue, Phase, normalised};
 use crate::{
-    pipeline::{Elements, PipelineError, lock},
+    pipeline::{Elements, PipelineError},
     record::FirstBox,
 };
 
@@ -25,27 +24,10 @@ pub(super) const THESIS: &str =
 /// How the tracker chooses by itself: its default.
 const CHOICE: &str = "largest";
 
-pub(super) fn attach(
-    pipeline: &gst::Pipeline,
-    first_box: FirstBox,
-    cue: &CurrentCue,
-) -> Result<(), PipelineError> {
-    if first_box == FirstBox::Detected {
-        return Ok(());
+pub(super) fn attach(pipeline: &gst::Pipeline, first_box: FirstBox) -> Result<(), PipelineError> {
+    if first_box == FirstBox::Given {
+        pipeline.element("tracker")?.set_property_from_str("selection", "manual");
     }
-    pipeline.element("tracker")?.set_property_from_str("selection", "manual");
-    let cue = cue.clone();
-    pipeline.pad("tracker", "sink")?.add_probe(gst::PadProbeType::BUFFER, move |_, info| {
-        let cue = lock(&cue);
-        if let Some((bounds, buffer)) = cue.given().zip(info.buffer_mut().map(gst::Buffer::make_mut)) {
-            let region = Region { bounds: normalised(bounds, cue.size), ..Region::default() };
-            if let Err(error) = (MotionMeta { regions: vec![region], ..MotionMeta::default() }).attach(buffer)
-            {
-                gst::error!(gst::CAT_DEFAULT, "no first box: {error}");
-            }
-        }
-        gst::PadProbeReturn::Ok
-    });
     Ok(())
 }
 
