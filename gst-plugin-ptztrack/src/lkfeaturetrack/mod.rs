@@ -36,7 +36,9 @@
 //!
 //! ## Operator
 //! A left click in any video sink (`GstNavigation`) selects the track there, or else a box of `manual-size`
-//! around it; a right click releases the target. The key `n` selects the track of the next number, a digit the track of that number.
+//! around it. Of several who are seen as one it means the body that it is in the middle of, which is told apart from the
+//! others when they part. A right click releases the target. The key `n` selects the track of the next number, a digit the
+//! track of that number.
 //! Applications emit `select-target` (x and y in frame sizes, 0 to 1), `select-track` (a number), `next-target` and
 //! `release-target` instead. A number that nobody has is a warning, and the target stays. What was released is not chosen again for
 //! three seconds. The tracks in `ignored-tracks` are not chosen at all: they become the target where they are selected.

@@ -2,12 +2,12 @@
 
 //! The two ways to follow a target, and all in which they differ: nobody else asks which of them it is.
 
-use opencv::core::Rect2f;
+use opencv::core::{Point2f, Rect2f};
 
 use super::geometry::Frame;
 use super::report::Detection;
 use super::target::{Follow, Robust, Thesis};
-use super::tracks::{Region, Track, people};
+use super::tracks::{Region, Track, body_at, people};
 use crate::vision::Observation;
 
 /// How a target is followed.
@@ -49,6 +49,14 @@ impl Profile {
                 let each = memory.iter().map(|bounds| Region::new(*bounds, Vec::new(), detection.outside));
                 regions.extend(each);
             }
+        }
+    }
+
+    /// The box of whom a click at `point` means in a region, which the thesis takes as it is.
+    pub(super) fn body_at(self, point: Point2f, region: Rect2f) -> Rect2f {
+        match self {
+            Self::Thesis => region,
+            Self::Robust => body_at(point, region),
         }
     }
 

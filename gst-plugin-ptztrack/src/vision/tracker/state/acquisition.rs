@@ -24,7 +24,7 @@ impl Tracker {
         if let TargetRequest::Release = request {
             return Ok(self.let_go(phase, ReleaseReason::Request, frame, tracked));
         }
-        let Some(id) = self.requested(request, &phase, frame) else { return Ok(phase) };
+        let Some(id) = self.requested(request, &phase, seen, frame) else { return Ok(phase) };
         let free = self.let_go(phase, ReleaseReason::Request, frame, tracked);
         let target = self.acquire(seen, id)?;
         Ok(target.map_or(free, |target| self.begin(target, frame, tracked)))

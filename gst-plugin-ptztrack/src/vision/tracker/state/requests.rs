@@ -5,6 +5,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::{Phase, Tracker};
+use crate::vision::Observation;
 use crate::vision::tracker::config::TargetRequest;
 use crate::vision::tracker::geometry::{ASPECT, Frame, around};
 use crate::vision::tracker::policy::clicked;
@@ -12,7 +13,13 @@ use crate::vision::tracker::tracks::Track;
 
 impl Tracker {
     /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
-    pub(super) fn requested(&mut self, request: TargetRequest, phase: &Phase, frame: Frame) -> Option<u64> {
+    pub(super) fn requested(
+        &mut self,
+        request: TargetRequest,
+        phase: &Phase,
+        seen: &Observation,
+        frame: Frame,
+    ) -> Option<u64> {
         let numbers = || self.tracks.iter().map(|track| track.id);
         let now = phase.target().unwrap_or(0);
         match request {
@@ -24,9 +31,10 @@ impl Tracker {
             }
             TargetRequest::Select(place) => {
                 let place = frame.point_to_pixels(place);
-                let bounds = clicked(&self.tracks, place).map(Track::seen_bounds);
-                let bounds = bounds.unwrap_or_else(|| self.box_at(place, frame));
-                Some(self.tracks.number_at(bounds, frame))
+                let shown = clicked(&self.tracks, place).map(Track::seen_bounds);
+                let meant = shown.map(|shown| self.config.profile.body_at(place, shown));
+                let bounds = meant.unwrap_or_else(|| self.box_at(place, frame));
+                Some(self.tracks.number_at(seen, bounds, frame))
             }
         }
     }

@@ -544,3 +544,53 @@ fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
         }
     }
 }
+
+/// Two come in as one, side by side, and an operator clicks on the left one's middle; then the other goes on alone. Where the
+/// target is at the end, by how far from whom.
+#[test]
+fn who_was_clicked_of_two_who_came_in_as_one_is_followed_when_they_part() {
+    let mut chain = watching(Config { choice: Choice::Manual, must_travel: true, ..config() });
+    let mut last = Tracked::default();
+    let (mut left, mut right) = (Rect2f::default(), Rect2f::default());
+    for n in 0..40 {
+        let x = 60.0 + 4.0 * n as f32;
+        left = Rect2f::new(x, 100.0, 36.0, 90.0);
+        right = Rect2f::new(x + 34.0 + 8.0 * (n as f32 - 18.0).max(0.0), 104.0, 36.0, 94.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(left, 7);
+        picture.paint(right, 99);
+        picture.darken(right);
+        let seen =
+            if n <= 18 { vec![detection(left | right)] } else { vec![detection(left), detection(right)] };
+        if n == 10 {
+            chain.tracker.request(TargetRequest::Select(detection(left).bounds.centre()));
+        }
+        last = chain.process(&picture, DT, &seen);
+    }
+    assert_eq!(last.state, TargetState::Tracking);
+    assert!(is_on(&last, left) > 0.5 && is_on(&last, right) < 0.2, "{:?}, not {left:?}", last.bounds);
+}
+
+/// Somebody alone is clicked beside their middle: for a while they may be two, and then are one again, who is followed.
+#[test]
+fn who_was_clicked_beside_their_middle_is_one_person() {
+    let mut chain = watching(Config { choice: Choice::Manual, must_travel: true, ..config() });
+    let mut last = Tracked::default();
+    for n in 0..50 {
+        let person = Rect2f::new(20.0 + 6.0 * n as f32, 100.0, PERSON.0, PERSON.1);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(person, 7);
+        if n == 15 {
+            let middle = detection(person).bounds.centre();
+            let place = ptztrack_contract::Point { x: middle.x + 10.0 / SIZE.0 as f64, ..middle };
+            chain.tracker.request(TargetRequest::Select(place));
+        }
+        last = chain.process(&picture, DT, &[detection(person)]);
+        assert!(n < 16 || is_on(&last, person) > 0.4, "picture {n}: {:?}", last.bounds);
+        if n >= 45 {
+            assert_eq!((last.tracks.len(), last.id), (1, 1), "{:?}", last.tracks);
+            assert!(is_on(&last, person) > 0.7, "picture {n}: {:?}", last.bounds);
+        }
+    }
+    assert_eq!(last.state, TargetState::Tracking);
+}

@@ -5,6 +5,8 @@
 
 use opencv::core::{Point2f, Rect2f};
 
+use crate::vision::tracker::geometry::{ASPECT, centre};
+
 /// Columns in which the outline is looked at.
 const COLUMNS: usize = 32;
 /// A region narrower than this beside its height shows one body.
@@ -15,6 +17,21 @@ const APART: f32 = 0.22;
 const DIP: f32 = 0.1;
 /// ... and the lower of them is no lower than this: what is lower are arms and bags.
 const LOWEST: f32 = 0.4;
+
+/// A click is into the middle of somebody. Farther beside the middle of what is seen than this, in breadths of a body, it means one of
+/// several.
+const BESIDE: f32 = 0.1;
+
+/// The box of whom a click at `point` means in a region: of all that it shows, or of the one body around that place. What is broader
+/// than it is high is a vehicle.
+pub(in super::super) fn body_at(point: Point2f, region: Rect2f) -> Rect2f {
+    let breadth = ASPECT * region.height;
+    let beside = (point.x - centre(region).x).abs();
+    if region.width > region.height || beside < BESIDE * breadth {
+        return region;
+    }
+    Rect2f::new(point.x - breadth / 2.0, region.y, breadth, region.height)
+}
 
 /// The upper and the lower end of an outline in each column.
 struct Profile {
@@ -166,5 +183,16 @@ mod tests {
         assert_eq!(found(&arms).len(), 1);
         assert_eq!(found(&[(0.0, 0.0), (160.0, 0.0), (160.0, 100.0), (0.0, 100.0)]).len(), 1, "a van");
         assert_eq!(found(&[]).len(), 1);
+    }
+
+    #[test]
+    fn a_click_beside_the_middle_means_one_of_several() {
+        let region = Rect2f::new(0.0, 0.0, 80.0, 100.0);
+        let body = |x| body_at(Point2f::new(x, 50.0), region);
+        assert_eq!(body(42.0), region);
+        assert_eq!(body(20.0), Rect2f::new(0.0, 0.0, 40.0, 100.0));
+        assert_eq!(body(65.0), Rect2f::new(45.0, 0.0, 40.0, 100.0));
+        let car = Rect2f::new(0.0, 0.0, 150.0, 100.0);
+        assert_eq!(body_at(Point2f::new(20.0, 50.0), car), car);
     }
 }

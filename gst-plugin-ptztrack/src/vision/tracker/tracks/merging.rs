@@ -9,7 +9,7 @@ use super::Tracks;
 use super::association::Association;
 use super::groups::owners_of_sides;
 use super::track::{Journey, Track};
-use crate::vision::tracker::geometry::{Frame, is_upright, length, shared_sides};
+use crate::vision::tracker::geometry::{Frame, is_upright, length, overlap, shared_sides};
 
 /// Who is taller than this part of another is no part of them, nor who was seen alone for so long, seconds; where they are still
 /// smaller, that takes longer.
@@ -17,6 +17,9 @@ const PART: f32 = 0.8;
 const APART_S: f64 = 0.3;
 const SMALL: f32 = 0.6;
 const SMALL_APART_S: f64 = 2.0;
+/// Who was never seen but in one region with another, for so long, seconds, and is where they are by this intersection over union, is they.
+const NEVER_PARTED_S: f64 = 2.0;
+const SAME: f32 = 0.5;
 /// Trunk and legs seen apart are each at least this broad beside their height; for so long, seconds, they were seen, and by so many
 /// heights per second they part at most.
 const PIECE_ASPECT: f32 = 0.5;
@@ -97,6 +100,7 @@ impl Tracks {
         (is_smaller(SMALL) && part.journey.alone_s < SMALL_APART_S)
             || (is_smaller(PART) && is_upright(region) && part.journey.alone_s < APART_S)
             || are_parts_of_a_vehicle(part, whole)
+            || are_the_same(part, whole)
     }
 
     /// What one track was belongs to another from now on, under the number of who was seen alone for longer.
@@ -133,6 +137,14 @@ fn are_parts_of_a_vehicle(one: &Track, other: &Track) -> bool {
     let is_broad = |track: &Track| !is_upright(track.bounds());
     let is_mostly_shared = |track: &Track| track.journey.alone_s < track.journey.shared_s;
     [one, other].into_iter().all(is_broad) && [one, other].into_iter().any(is_mostly_shared)
+}
+
+/// Whether one of two who are seen in one region was never seen but there, for long, and where the other is: an operator's click was
+/// beside the middle of somebody.
+fn are_the_same(one: &Track, other: &Track) -> bool {
+    let never_parted =
+        |track: &Track| track.journey.alone_s == 0.0 && track.journey.shared_s >= NEVER_PARTED_S;
+    (never_parted(one) || never_parted(other)) && overlap(one.bounds(), other.bounds()) >= SAME
 }
 
 /// Whether two tracks are trunk and legs.

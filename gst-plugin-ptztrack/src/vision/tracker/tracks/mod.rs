@@ -35,12 +35,12 @@ use memory::Memory;
 use places::RestlessPlaces;
 use track::Evidence;
 
-pub(super) use heads::people;
+pub(super) use heads::{body_at, people};
 pub(super) use region::Region;
 pub(super) use track::{Track, motion};
 
 use super::ego_motion::EgoMotion;
-use super::geometry::{Frame, centre, length, overlap, share_inside};
+use super::geometry::{Frame, centre, length, overlap, scaled, share_inside};
 use crate::vision::Observation;
 
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are nobody.
@@ -179,16 +179,12 @@ impl Tracks {
         })
     }
 
-    /// The number of who is seen in exactly `bounds`; where nobody is, of somebody new who is there by an operator's word.
-    pub fn number_at(&mut self, bounds: Rect2f, frame: Frame) -> u64 {
+    /// The number of who is seen in exactly `bounds`; where nobody is, of somebody new who is there by an operator's word, alone or
+    /// among those who are seen there.
+    pub fn number_at(&mut self, seen: &Observation, bounds: Rect2f, frame: Frame) -> u64 {
         let known =
             self.tracks.iter().position(|track| track.region().is_some() && track.seen_bounds() == bounds);
-        let index = known.unwrap_or_else(|| {
-            let region = Region::new(bounds, Vec::new(), false);
-            self.tracks.push(Track::new(self.regions.len(), &region, frame));
-            self.regions.push(region);
-            self.tracks.len() - 1
-        });
+        let index = known.unwrap_or_else(|| self.single_out(seen, bounds, frame));
         let track = &mut self.tracks[index];
         if !track.is_confirmed() {
             self.last_id += 1;
@@ -196,6 +192,20 @@ impl Tracks {
             self.events.push((TrackChange::New, track.id, None));
         }
         track.id
+    }
+
+    /// Begins the track of somebody new in `bounds`, which may be a part of a region in which others are seen.
+    fn single_out(&mut self, seen: &Observation, bounds: Rect2f, frame: Frame) -> usize {
+        let mut region = Region::new(bounds, Vec::new(), false);
+        // The sides of the box may show the others.
+        region.looks = self.viewer.look(seen, scaled(bounds, 0.5, 1.0));
+        let mut track = Track::new(self.regions.len(), &region, frame);
+        track.views.learn(&region.looks, 0.0);
+        let others = self.seen().filter(|other| share_inside(bounds, other.seen_bounds()) > 0.5);
+        track.companions = others.map(|other| other.id).filter(|id| *id > 0).collect();
+        self.regions.push(region);
+        self.tracks.push(track);
+        self.tracks.len() - 1
     }
 
     /// That track is the target from now on: it is there, and the others are yet to be told apart from it.
