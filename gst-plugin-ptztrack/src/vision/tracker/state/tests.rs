@@ -545,8 +545,7 @@ fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
     }
 }
 
-/// Two come in as one, side by side, and an operator clicks on the left one's middle; then the other goes on alone. Where the
-/// target is at the end, by how far from whom.
+/// Two come in as one, side by side, and an operator clicks on the left one's middle; then the other walks ahead.
 #[test]
 fn who_was_clicked_of_two_who_came_in_as_one_is_followed_when_they_part() {
     let mut chain = watching(Config { choice: Choice::Manual, must_travel: true, ..config() });
@@ -571,7 +570,7 @@ fn who_was_clicked_of_two_who_came_in_as_one_is_followed_when_they_part() {
     assert!(is_on(&last, left) > 0.5 && is_on(&last, right) < 0.2, "{:?}, not {left:?}", last.bounds);
 }
 
-/// Somebody alone is clicked beside their middle: for a while they may be two, and then are one again, who is followed.
+/// Somebody alone is clicked beside their middle: they may be two for a while, and are one again then.
 #[test]
 fn who_was_clicked_beside_their_middle_is_one_person() {
     let mut chain = watching(Config { choice: Choice::Manual, must_travel: true, ..config() });
