@@ -200,7 +200,6 @@ impl Tracks {
         // The sides of the box may show the others.
         region.looks = self.viewer.look(seen, scaled(bounds, 0.5, 1.0));
         let mut track = Track::new(self.regions.len(), &region, frame);
-        track.views.learn(&region.looks, 0.0);
         let others = self.seen().filter(|other| share_inside(bounds, other.seen_bounds()) > 0.5);
         track.companions = others.map(|other| other.id).filter(|id| *id > 0).collect();
         self.regions.push(region);
@@ -329,10 +328,8 @@ impl Tracks {
     /// What belongs to nobody is somebody new.
     fn begin(&mut self, frame: Frame) {
         for (number, region) in self.regions.iter_mut().enumerate().filter(|(_, region)| !region.is_owned) {
-            let mut track = Track::new(number, region, frame);
-            track.views.learn(&region.looks, 0.0);
+            self.tracks.push(Track::new(number, region, frame));
             region.is_owned = true;
-            self.tracks.push(track);
         }
     }
 

@@ -119,6 +119,8 @@ impl Track {
         };
         let [left, top, right, bottom] = frame.cut_sides(bounds);
         let middle = centre(bounds);
+        let mut views = Views::default();
+        views.learn(&region.looks, 0.0);
         Self {
             id: 0,
             across: axis(middle.x, bounds.width, left || right),
@@ -137,7 +139,7 @@ impl Track {
                 farthest: 0.0,
                 way: VecDeque::from([(bounds, 0.0)]),
             },
-            views: Views::default(),
+            views,
             companions: Vec::new(),
             beside_target_s: 0.0,
         }
