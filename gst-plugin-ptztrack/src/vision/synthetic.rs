@@ -84,7 +84,7 @@ fn noise(seed: u32, x: f64, y: f64) -> f64 {
 }
 
 /// 0 to 1, the same for the same place.
-fn hash(seed: u32, x: i32, y: i32) -> f64 {
+pub(super) fn hash(seed: u32, x: i32, y: i32) -> f64 {
     let mut hash = seed
         .wrapping_mul(0x9e37_79b1)
         .wrapping_add((x as u32).wrapping_mul(0x85eb_ca6b))

@@ -9,6 +9,7 @@ use super::corners::{self, Corner, Grid};
 use super::fit::{self, Agreement, Centred, Fit, Pair};
 use super::flow;
 use super::lucas_kanade::{Pyramid, Template};
+use super::opening::Opening;
 use crate::vision::Luma;
 
 /// Farther than this many pixels from the key picture, anywhere in the picture, the next picture becomes the
@@ -86,13 +87,14 @@ pub struct CameraMotionEstimator {
     another: Option<Key>,
     /// For how long no picture has fitted.
     coasted: Duration,
-    /// Whether the last picture became the key picture as it fitted no other.
+    /// Whether the last picture fitted no other.
     may_be_elsewhere: bool,
     /// Of the last picture; memory for the next.
     pyramid: Pyramid,
     /// Motion of the last picture, pixels: the camera goes on as it did.
     last: Homography,
     comparison: Comparison,
+    opening: Opening,
 }
 
 impl CameraMotionEstimator {
@@ -106,6 +108,23 @@ impl CameraMotionEstimator {
     /// that is tried where it does not go on as it did. `None`: the first picture, or nothing to hold on to. After that the motion is
     /// from where the camera was taken to have gone on to ([`Self::coasted`]).
     pub fn update(
+        &mut self,
+        luma: &Luma,
+        foreground: Option<&Luma>,
+        expected: Option<Homography>,
+        elapsed: Duration,
+    ) -> opencv::Result<Option<CameraMotion>> {
+        let mut opening = std::mem::take(&mut self.opening);
+        let motion = self.follow(&opening.apply(luma)?, foreground, expected, elapsed);
+        if self.key.is_none() {
+            opening.toggle();
+        }
+        self.opening = opening;
+        motion
+    }
+
+    /// The same of a picture that was opened where that is called for; leaves no key picture where another look may help.
+    fn follow(
         &mut self,
         luma: &Luma,
         foreground: Option<&Luma>,
@@ -139,7 +158,7 @@ impl CameraMotionEstimator {
             }
         }
         let Some(fit) = fit else {
-            self.coast(key, Key::first(luma, pyramid, grid)?, elapsed);
+            self.coast(key, luma, elapsed)?;
             return Ok(None);
         };
         self.coasted = Duration::ZERO;
@@ -174,19 +193,19 @@ impl CameraMotionEstimator {
         self.may_be_elsewhere
     }
 
-    /// Goes on from the key picture as if the camera had moved on as it did: where the next picture fits, nothing is lost of the way. After
-    /// a while, and where it shows `another` view, that is the key picture.
-    fn coast(&mut self, mut key: Key, another: Key, elapsed: Duration) {
+    /// Goes on from the key picture as if the camera had moved on as it did: where the next picture fits, nothing is lost of the way. Where
+    /// it fits this one, that shows another view. After a while there is no key picture any more.
+    fn coast(&mut self, mut key: Key, luma: &Luma, elapsed: Duration) -> opencv::Result<()> {
         self.coasted = self.coasted.saturating_add(elapsed);
         if self.coasted > COAST {
             self.last = Homography::IDENTITY;
-            self.key = Some(another);
-        } else {
-            self.may_be_elsewhere = false;
-            key.to_last = key.to_last.then(&self.last);
-            self.key = Some(key);
-            self.another = Some(another);
+            return Ok(());
         }
+        self.may_be_elsewhere = false;
+        self.another = Some(Key::first(luma, &self.pyramid, key.grid)?);
+        key.to_last = key.to_last.then(&self.last);
+        self.key = Some(key);
+        Ok(())
     }
 }
 

@@ -4,6 +4,7 @@
 //!
 //! | step | file |
 //! |---|---|
+//! | where that shows nothing to hold on to: the picture without rain and snow | `opening` |
 //! | corners, one in each cell of a grid, topped up where they were lost | `corners` |
 //! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow`, `lucas_kanade` |
 //! | the motion that most of them share, and how well it is known | `fit` |
@@ -13,6 +14,7 @@ mod estimator;
 mod fit;
 mod flow;
 mod lucas_kanade;
+mod opening;
 
 pub use estimator::CameraMotionEstimator;
 pub(super) use estimator::{displacement, to_pixels};

@@ -7,7 +7,7 @@ use ptztrack_contract::{CameraMotion, Homography, Point};
 
 use super::CameraMotionEstimator;
 use super::estimator::to_pixels;
-use crate::vision::synthetic::{Canvas, texture};
+use crate::vision::synthetic::{Canvas, hash, texture};
 
 const SIZE: (usize, usize) = (320, 180);
 const STEP: Duration = Duration::from_millis(40);
@@ -174,6 +174,34 @@ fn a_camera_that_is_not_seen_to_move_for_long_is_taken_to_rest() {
     let coasted: Vec<bool> = coasted.collect();
     assert!(coasted[..7].iter().all(|coasted| *coasted), "{coasted:?}");
     assert!(!coasted[7..].contains(&true), "{coasted:?}");
+}
+
+/// The same pan by night, with rain in the camera's light: bright and two pixels wide.
+fn rainy(step: u32) -> Canvas {
+    let pan = Homography::translation(-3.0 * f64::from(step), 0.0);
+    let mut picture = Canvas::seen(SIZE, &pan, |x, y| 20.0 + 0.2 * world(x, y));
+    for drop in 0..250 {
+        let place = |salt: i32, range: usize| hash(step, drop, salt) * range as f64;
+        picture.paint((place(1, SIZE.0), place(2, SIZE.1), 2.0, 14.0), |_, _| 160.0);
+    }
+    picture.noisy(1.0, step)
+}
+
+#[test]
+fn a_pan_is_followed_through_rain_by_night() {
+    let mut estimator = CameraMotionEstimator::default();
+    let truth = Homography::translation(-3.0, 0.0);
+    for step in 0..40 {
+        let motion = measure(&mut estimator, &rainy(step));
+        if step >= 12 {
+            let motion = motion.unwrap_or_else(|| panic!("lost at {step}"));
+            assert!(error(&motion, &truth) < 1.0, "{step}: {}", error(&motion, &truth));
+        }
+    }
+    // The rain stops.
+    let dry = |step: u32| seen(&Homography::translation(-3.0 * f64::from(step), 0.0), step);
+    assert_eq!(measure(&mut estimator, &dry(40)), None, "another view");
+    assert!(error(&measure(&mut estimator, &dry(41)).expect("textured"), &truth) < 0.4);
 }
 
 #[test]
