@@ -17,15 +17,18 @@ use std::time::Duration;
 
 use access::Access;
 pub use access::lets_in;
+use axum::Router;
 use axum::body::{Body, Bytes};
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{Html, IntoResponse, Response};
 use axum::routing::{get, post};
-use axum::{Extension, Router};
 pub use events::Events;
 use futures_util::stream;
+use hyper::Request;
+use hyper::body::Incoming;
 use hyper::server::conn::http1;
+use hyper::service::{Service, service_fn};
 use hyper_util::rt::{TokioIo, TokioTimer};
 use hyper_util::service::TowerToHyperService;
 use serde::Deserialize;
@@ -114,11 +117,16 @@ pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events
 
 /// Whoever is connected, until they go.
 async fn answer(stream: impl AsyncRead + AsyncWrite + Unpin, router: Router, visit: Visit) {
-    let service = router.layer(Extension(visit));
+    let routes = TowerToHyperService::new(router);
+    // Told with each request: a layer of the router's is laid around every route anew for whoever connects.
+    let service = service_fn(move |mut request: Request<Incoming>| {
+        request.extensions_mut().insert(visit.clone());
+        routes.call(request)
+    });
     let connection = http1::Builder::new()
         .timer(TokioTimer::new())
         .header_read_timeout(LONGEST_HEAD)
-        .serve_connection(TokioIo::new(stream), TowerToHyperService::new(service));
+        .serve_connection(TokioIo::new(stream), service);
     // How it ended is a matter of who connected.
     let _ = connection.await;
 }
@@ -143,8 +151,7 @@ impl Empty {
         Ok(Self { router, runtime: tokio::runtime::Builder::new_current_thread().enable_time().build()? })
     }
 
-    fn answer_to(&self, said: &[u8]) -> Vec<u8> {
-        let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+    fn answer_to(&self, said: &[u8], visit: Visit) -> Vec<u8> {
         let (theirs, mut ours) = tokio::io::duplex(said.len() + LONGEST_ANSWER);
         self.runtime.block_on(async {
             let mut connection = pin!(answer(theirs, self.router.clone(), visit));
@@ -165,7 +172,8 @@ impl Empty {
 
 /// All that is answered to somebody who says this and no more, on a page without cameras or password.
 pub fn answer_to(said: &[u8]) -> Vec<u8> {
-    EMPTY.with(|empty| empty.as_ref().map_or_else(Vec::new, |empty| empty.answer_to(said)))
+    let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+    EMPTY.with(|empty| empty.as_ref().map_or_else(Vec::new, |empty| empty.answer_to(said, visit)))
 }
 
 fn router(http: &Http, fleet: Arc<Fleet>, events: Events) -> Router {
@@ -333,5 +341,15 @@ mod tests {
             assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
             assert!(answer.contains("\r\ncontent-security-policy: frame-ancestors 'none'\r\n"), "{answer}");
         }
+    }
+
+    #[test]
+    fn every_request_of_a_visit_may_ask_by_the_address_that_was_connected_to() {
+        let visit = Visit { local: IpAddr::from([192, 0, 2, 1]), welcome: Arc::default() };
+        let request = "GET /cameras HTTP/1.1\r\nHost: 192.0.2.1\r\n\r\n".repeat(2);
+        let answered = Empty::new().unwrap().answer_to(request.as_bytes(), visit.clone());
+        let answered = String::from_utf8(answered).unwrap();
+        assert_eq!(answered.matches("HTTP/1.1 200 OK\r\n").count(), 2, "{answered}");
+        assert!(visit.welcome.load(Ordering::Relaxed));
     }
 }
