@@ -111,9 +111,12 @@ impl Policy {
         })
     }
 
-    /// Whether a track is where somebody stood that was let go.
+    /// Whether a track is where somebody stood that was let go, and may be a part of them: who has come from elsewhere is not.
     pub fn is_parked(&self, track: &Track) -> bool {
-        self.parked.iter().any(|(_, place)| stands_at(*place, track.seen_bounds()))
+        self.parked.iter().any(|(id, place)| {
+            let has_come = *id != track.id && track.has_gone_far();
+            !has_come && stands_at(*place, track.seen_bounds())
+        })
     }
 
     /// The track to follow now, one that is seen, and going somewhere where it `must_travel`: the one of the number `before` all

@@ -313,11 +313,8 @@ impl Tracker {
             return chosen.is_some_and(|track| track.id != target.id);
         }
         let farthest = track.map_or(0.0, |track| track.journey.farthest);
-        let height = target.follow.estimate().bounds.height;
-        let goes_farther = |other: &Track| {
-            let tall = other.height();
-            other.id != target.id && tall > height && other.journey.farthest >= tall && farthest < tall
-        };
+        let goes_farther =
+            |other: &Track| other.id != target.id && other.has_gone_far() && farthest < other.height();
         choice != Choice::Manual
             && target.dwell.is_of_motion()
             && seen.is_none_or(|track| !track.travels())

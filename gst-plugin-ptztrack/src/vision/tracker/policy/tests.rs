@@ -185,6 +185,23 @@ fn who_stood_is_not_chosen_until_they_move_or_come_nearer() {
     }
 }
 
+/// The shadow of a cloud was let go because it stood; then somebody walks over the lawn.
+#[test]
+fn who_has_come_to_where_something_larger_stood_is_chosen() {
+    let still = Some(EgoMotion::default());
+    let shadow = at(100.0, 100.0, 400.0, 300.0);
+    let mut chain = seen(4, &[shadow]);
+    let id = chain.choose(Choice::Largest, false).expect("confirmed").id;
+    chain.policy.park(id, shadow);
+    (0..40).for_each(|_| chain.see(&[], still));
+    let chosen = (0..20).map(|n| {
+        chain.see(&[at(250.0 + 8.0 * n as f32, 200.0, 30.0, 80.0)], still);
+        chain.choose(Choice::Largest, true).is_some()
+    });
+    let since = chosen.collect::<Vec<_>>().iter().position(|chosen| *chosen);
+    assert!(since.is_some_and(|since| (9..14).contains(&since)), "as far as they are tall: {since:?}");
+}
+
 #[test]
 fn a_click_means_the_smallest_track_there() {
     let chain = seen(1, &[at(100.0, 40.0, 240.0, 400.0), at(400.0, 200.0, 30.0, 60.0)]);

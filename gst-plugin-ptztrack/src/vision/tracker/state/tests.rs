@@ -485,14 +485,14 @@ fn nobody_is_tracked_three_seconds_after_a_poster_flickered() {
     assert!(taken);
 }
 
-/// What a screen shows goes to and fro, farther than it is broad, and rests at either edge for a moment; after three seconds somebody
-/// walks in. Since which picture they are followed, where what is shown was selected by hand or not.
-fn since_they_are_followed(by_hand: bool) -> Option<usize> {
+/// What a screen shows, of that width and height, goes to and fro, farther than it is broad, and rests at either edge for a moment; after
+/// three seconds somebody walks in. Since which picture they are followed, where what is shown was selected by hand or not.
+fn since_they_are_followed((width, height): (f32, f32), by_hand: bool) -> Option<usize> {
     let mut chain = watching(Config { must_travel: true, ..config() });
     let mut since = None;
     for n in 0..70 {
         let along = (1.3 * (0.14 * n as f32).sin()).clamp(-1.0, 1.0);
-        let shown = Rect2f::new(300.0 + 30.0 * along, 60.0, 30.0, 24.0);
+        let shown = Rect2f::new(300.0 + width * along, 60.0, width, height);
         let person = Rect2f::new(10.0 * (n as f32 - 30.0), 100.0, 60.0, 150.0);
         let mut picture = street((0.0, 0.0), &[]);
         picture.paint(shown, 50);
@@ -515,13 +515,15 @@ fn since_they_are_followed(by_hand: bool) -> Option<usize> {
 
 #[test]
 fn what_a_screen_shows_is_given_up_for_who_has_gone_as_far_as_they_are_tall() {
-    let since = since_they_are_followed(false);
-    assert!(since.is_some_and(|since| (45..=65).contains(&since)), "{since:?}");
+    for size in [(30.0, 24.0), (40.0, 170.0)] {
+        let since = since_they_are_followed(size, false);
+        assert!(since.is_some_and(|since| (45..=65).contains(&since)), "{size:?} {since:?}");
+    }
 }
 
 #[test]
 fn what_was_selected_by_hand_is_kept() {
-    assert_eq!(since_they_are_followed(true), None);
+    assert_eq!(since_they_are_followed((30.0, 24.0), true), None);
 }
 
 /// Who walked in stands and looks about while somebody taller walks past.

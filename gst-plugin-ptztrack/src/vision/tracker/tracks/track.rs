@@ -366,6 +366,11 @@ impl Track {
             && off.y.abs() < NOWHERE * self.down.size
     }
 
+    /// Whether it was seen as far from where it was first as it is tall: no arm gets there, and hardly anything that a screen shows.
+    pub fn has_gone_far(&self) -> bool {
+        self.journey.farthest >= self.height()
+    }
+
     /// Whether it went somewhere, up to where it is seen now: a screen, a curtain, a door, a lamp change as much as a person does,
     /// but stay.
     pub fn travels(&self) -> bool {
