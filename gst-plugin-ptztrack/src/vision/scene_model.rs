@@ -62,7 +62,15 @@ impl SceneModel {
         self.camera_motion =
             self.motion.update(&self.picture.luma(), foreground.as_ref(), expected, elapsed)?;
         let motion = self.camera_motion.map(|motion| motion.homography).or_else(|| self.motion.coasted());
-        self.background.update(&self.picture, motion.as_ref(), self.motion.may_be_elsewhere(), elapsed);
+        let off = self.background.update(
+            &self.picture,
+            motion.as_ref(),
+            self.motion.may_be_elsewhere(),
+            elapsed,
+        )?;
+        if let Some(motion) = &mut self.camera_motion {
+            motion.homography = motion.homography.then(&off);
+        }
         Ok(self.view())
     }
 

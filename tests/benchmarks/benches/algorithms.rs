@@ -90,7 +90,7 @@ fn travelling(bencher: Bencher, size: (usize, usize), camera: Camera) {
             (std::mem::take(&mut reduced), moved)
         })
         .bench_local_refs(|(reduced, moved): &mut (Reduced, Option<CameraMotion>)| {
-            background.update(reduced, moved.as_ref().map(|moved| &moved.homography), false, PERIOD);
+            background.update(reduced, moved.as_ref().map(|moved| &moved.homography), false, PERIOD).map(|_| ())
         });
 }
 

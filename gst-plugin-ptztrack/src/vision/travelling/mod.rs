@@ -11,6 +11,7 @@ mod gain;
 mod model;
 mod noise;
 mod pooled;
+mod registration;
 mod rows;
 mod samples;
 mod warp;
@@ -25,6 +26,7 @@ pub use self::model::UNKNOWN;
 use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
 use self::pooled::Pooled;
+use self::registration::Registration;
 use self::samples::Sample;
 use self::warp::Warp;
 use super::Luma;
@@ -58,6 +60,7 @@ pub struct TravellingBackground {
     model: Model,
     noise: Noise,
     pooled: Pooled,
+    registration: Registration,
     burned_in: BurnedIn,
     /// From the canvas to the last picture, pixels.
     to_picture: Homography,
@@ -96,18 +99,19 @@ impl TravellingBackground {
 
     /// Tells foreground from background in the next picture, to which the camera moved by `motion` (normalised), then learns from it.
     /// Where that is not known, the camera may still rest. A picture that `may_be_elsewhere` does so if it shows nothing of what is known.
+    /// Gives by how much else it has moved, normalised, where it lies elsewhere than `motion` says.
     pub fn update(
         &mut self,
         picture: &Reduced,
         motion: Option<&Homography>,
         may_be_elsewhere: bool,
         elapsed: Duration,
-    ) {
+    ) -> opencv::Result<Homography> {
         if picture.size() != self.size {
             *self = Self { size: picture.size(), ..Self::default() };
         }
         if self.size.0 == 0 || self.size.1 == 0 {
-            return;
+            return Ok(Homography::IDENTITY);
         }
         if self.model.size == (0, 0) {
             self.start();
@@ -116,15 +120,14 @@ impl TravellingBackground {
         let rests = motion.is_none() || self.rested > REST;
         self.stay_on_canvas();
         let how = comparison(rests, elapsed);
-        self.lay(picture);
-        self.heed_light();
-        self.compare(how);
+        self.lay_at(self.to_picture, picture, how);
         let stale = self.changed() > NEW_PICTURE || may_be_elsewhere && self.shows_another_view();
         if stale {
             self.start();
             self.lay(picture);
             self.compare(how);
         }
+        let off = if may_be_elsewhere { self.register(picture, how)? } else { Homography::IDENTITY };
         self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
@@ -138,6 +141,30 @@ impl TravellingBackground {
         self.pooled.mark(&mut self.model, None);
         self.show();
         self.forget_burned_in(&picture.luma(), travel);
+        Ok(off)
+    }
+
+    /// Lays a picture where it fits what is known best, if less than half as much of it is foreground then; by how much it lay off,
+    /// normalised.
+    fn register(&mut self, picture: &Reduced, how: Comparison) -> opencv::Result<Homography> {
+        let Some(off) = self.registration.offset(&self.model, &self.sampled, self.forth.spans())? else {
+            return Ok(Homography::IDENTITY);
+        };
+        let (thought, changed) = (self.to_picture, self.changed());
+        self.lay_at(off.then(&thought), picture, how);
+        if self.changed() < changed / 2.0 {
+            return Ok(off.scaled(1.0 / self.size.0 as f64, 1.0 / self.size.1 as f64));
+        }
+        self.lay_at(thought, picture, how);
+        Ok(Homography::IDENTITY)
+    }
+
+    /// Lays the picture there on the canvas and holds it against what is known.
+    fn lay_at(&mut self, to_picture: Homography, picture: &Reduced, how: Comparison) {
+        self.to_picture = to_picture;
+        self.lay(picture);
+        self.heed_light();
+        self.compare(how);
     }
 
     /// Makes what has stayed the same for a moment within `contour` (normalised, in the last picture) background, protected

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! Where a picture lies on what is known of the background, where it does not lie where the camera's motion put it: in a blur that
+//! comes all at once nobody sees how a camera turns, and what is lost of its way would be lost for good.
+
+use opencv::core::{self, Mat, Point, Rect, Size};
+use opencv::imgproc;
+use opencv::prelude::*;
+use ptztrack_contract::Homography;
+
+use super::model::{KNOWN, Model, Sampled};
+use crate::vision::Luma;
+
+/// How far beside that place it is looked for, pixels.
+const REACH: usize = 64;
+/// Pixels of either side that are looked at as one.
+const REDUCED: usize = 2;
+/// Part of the background there that must be known.
+const LEAST_KNOWN: f64 = 0.5;
+
+/// Finds by how much a picture lies beside the background: the least sum of squared differences over all displacements.
+#[derive(Debug, Default)]
+pub(super) struct Registration {
+    seen: Vec<u8>,
+    known: Vec<u8>,
+    picture: Mat,
+    mean: Mat,
+    mask: Mat,
+    differences: Mat,
+}
+
+impl Registration {
+    /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that; `None` where too little is known.
+    pub fn offset(
+        &mut self,
+        model: &Model,
+        picture: &Sampled,
+        spans: &[(usize, usize)],
+    ) -> opencv::Result<Option<Homography>> {
+        self.reduce(model, picture, spans)?;
+        let whole = self.mean.size()?;
+        let reach = (REACH / REDUCED) as i32;
+        let (across, down) = (reach.min(whole.width / 4), reach.min(whole.height / 4));
+        let middle = Rect::new(across, down, whole.width - 2 * across, whole.height - 2 * down);
+        let mask = self.mask.roi(middle)?;
+        if f64::from(core::count_non_zero(&mask)?) < LEAST_KNOWN * f64::from(middle.area()) {
+            return Ok(None);
+        }
+        let (mean, differences) = (self.mean.roi(middle)?, &mut self.differences);
+        imgproc::match_template(&self.picture, &mean, differences, imgproc::TM_SQDIFF, &mask)?;
+        let mut best = Point::default();
+        core::min_max_loc(differences, None, None, Some(&mut best), None, &core::no_array())?;
+        let off = |at: i32| (REDUCED as i32 * at) as f64;
+        Ok(Some(Homography::translation(off(best.x - across), off(best.y - down))))
+    }
+
+    /// Takes picture, background and what is known of it as they lie on the canvas.
+    fn reduce(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)]) -> opencv::Result<()> {
+        let (width, height) = model.size;
+        // Beyond the picture is what is known, which speaks for no displacement by much.
+        self.seen.clone_from(&model.shown);
+        let rows = self.seen.chunks_exact_mut(width).zip(picture.luma.chunks_exact(width));
+        for ((row, seen), &(start, end)) in rows.zip(spans).filter(|(_, (start, end))| start < end) {
+            row[start..end].copy_from_slice(&seen[start..end]);
+        }
+        self.known.clear();
+        self.known.extend(model.age.iter().map(|age| if *age >= KNOWN { u8::MAX } else { 0 }));
+        let size = Size::new((width / REDUCED) as i32, (height / REDUCED) as i32);
+        let reduced = |data, out: &mut Mat, way| {
+            Luma::packed(data, width).with_mat(|plane| imgproc::resize(plane, out, size, 0.0, 0.0, way))
+        };
+        reduced(&self.seen, &mut self.picture, imgproc::INTER_AREA)?;
+        reduced(&model.shown, &mut self.mean, imgproc::INTER_AREA)?;
+        reduced(&self.known, &mut self.mask, imgproc::INTER_NEAREST)
+    }
+}
