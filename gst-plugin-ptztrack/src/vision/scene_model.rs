@@ -62,15 +62,7 @@ impl SceneModel {
         self.camera_motion =
             self.motion.update(&self.picture.luma(), foreground.as_ref(), expected, elapsed)?;
         let motion = self.camera_motion.map(|motion| motion.homography).or_else(|| self.motion.coasted());
-        let off = self.background.update(
-            &self.picture,
-            motion.as_ref(),
-            self.motion.may_be_elsewhere(),
-            elapsed,
-        )?;
-        if let Some(motion) = &mut self.camera_motion {
-            motion.homography = motion.homography.then(&off);
-        }
+        self.background.update(&self.picture, motion.as_ref(), self.motion.may_be_elsewhere(), elapsed)?;
         Ok(self.view())
     }
 

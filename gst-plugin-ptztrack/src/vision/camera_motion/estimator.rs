@@ -87,7 +87,7 @@ pub struct CameraMotionEstimator {
     another: Option<Key>,
     /// For how long no picture has fitted.
     coasted: Duration,
-    /// Whether the last picture fitted no other.
+    /// Whether the last picture fitted none that its way is known from.
     may_be_elsewhere: bool,
     /// Of the last picture; memory for the next.
     pyramid: Pyramid,
@@ -115,15 +115,26 @@ impl CameraMotionEstimator {
         elapsed: Duration,
     ) -> opencv::Result<Option<CameraMotion>> {
         let mut opening = std::mem::take(&mut self.opening);
-        let motion = self.follow(&opening.apply(luma)?, foreground, expected, elapsed);
-        if self.key.is_none() {
+        let motion = opening.apply(luma).and_then(|seen| self.follow(&seen, foreground, expected, elapsed));
+        let begun = if motion.is_ok() && self.key.is_none() {
             opening.toggle();
-        }
+            opening.apply(luma).and_then(|seen| self.begin(&seen))
+        } else {
+            Ok(())
+        };
         self.opening = opening;
-        motion
+        begun.and(motion)
     }
 
-    /// The same of a picture that was opened where that is called for; leaves no key picture where another look may help.
+    /// Makes this the key picture.
+    fn begin(&mut self, luma: &Luma) -> opencv::Result<()> {
+        flow::fill(&mut self.pyramid, luma);
+        self.key = Some(Key::first(luma, &self.pyramid, Grid::of(luma))?);
+        Ok(())
+    }
+
+    /// How the camera moved, by a picture that was opened where that is called for. Where nothing was seen of that for longer than it is
+    /// taken to go on, there is no key picture after it.
     fn follow(
         &mut self,
         luma: &Luma,

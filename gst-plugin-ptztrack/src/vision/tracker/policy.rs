@@ -19,6 +19,8 @@ const RELEASE_HOLD_S: f64 = 3.0;
 const RESTLESS: f32 = 0.5;
 /// Most places at which somebody stood that are remembered: the oldest goes.
 const MAX_PARKED: usize = 16;
+/// Nothing of somebody reaches as far as this part of their height.
+const ARM: f32 = 0.5;
 /// Who is so many times as tall as when they stood has come nearer.
 const NEARER: f32 = 1.3;
 /// How far beside somebody a click may be, pixels.
@@ -114,7 +116,7 @@ impl Policy {
     /// Whether a track is where somebody stood that was let go, and may be a part of them: who has come from elsewhere is not.
     pub fn is_parked(&self, track: &Track) -> bool {
         self.parked.iter().any(|(id, place)| {
-            let has_come = *id != track.id && track.has_gone_far();
+            let has_come = *id != track.id && track.has_gone_as_far_as(ARM * place.height);
             !has_come && stands_at(*place, track.seen_bounds())
         })
     }

@@ -313,8 +313,10 @@ impl Tracker {
             return chosen.is_some_and(|track| track.id != target.id);
         }
         let farthest = track.map_or(0.0, |track| track.journey.farthest);
-        let goes_farther =
-            |other: &Track| other.id != target.id && other.has_gone_far() && farthest < other.height();
+        let height = target.follow.estimate().bounds.height;
+        let goes_farther = |other: &Track| {
+            other.id != target.id && other.has_gone_as_far_as(height) && farthest < height.max(other.height())
+        };
         choice != Choice::Manual
             && target.dwell.is_of_motion()
             && seen.is_none_or(|track| !track.travels())

@@ -99,19 +99,19 @@ impl TravellingBackground {
 
     /// Tells foreground from background in the next picture, to which the camera moved by `motion` (normalised), then learns from it.
     /// Where that is not known, the camera may still rest. A picture that `may_be_elsewhere` does so if it shows nothing of what is known.
-    /// Gives by how much else it has moved, normalised, where it lies elsewhere than `motion` says.
+    /// Where its motion is known and its way before is not, it is laid where it fits.
     pub fn update(
         &mut self,
         picture: &Reduced,
         motion: Option<&Homography>,
         may_be_elsewhere: bool,
         elapsed: Duration,
-    ) -> opencv::Result<Homography> {
+    ) -> opencv::Result<()> {
         if picture.size() != self.size {
             *self = Self { size: picture.size(), ..Self::default() };
         }
         if self.size.0 == 0 || self.size.1 == 0 {
-            return Ok(Homography::IDENTITY);
+            return Ok(());
         }
         if self.model.size == (0, 0) {
             self.start();
@@ -120,14 +120,18 @@ impl TravellingBackground {
         let rests = motion.is_none() || self.rested > REST;
         self.stay_on_canvas();
         let how = comparison(rests, elapsed);
-        self.lay_at(self.to_picture, picture, how);
+        self.lay(picture);
+        self.heed_light();
+        self.compare(how);
         let stale = self.changed() > NEW_PICTURE || may_be_elsewhere && self.shows_another_view();
         if stale {
             self.start();
             self.lay(picture);
             self.compare(how);
         }
-        let off = if may_be_elsewhere { self.register(picture, how)? } else { Homography::IDENTITY };
+        if may_be_elsewhere && motion.is_some() && !stale {
+            self.register(picture, how)?;
+        }
         self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
@@ -141,29 +145,27 @@ impl TravellingBackground {
         self.pooled.mark(&mut self.model, None);
         self.show();
         self.forget_burned_in(&picture.luma(), travel);
-        Ok(off)
+        Ok(())
     }
 
-    /// Lays a picture where it fits what is known best, if less than half as much of it is foreground then; by how much it lay off,
-    /// normalised.
-    fn register(&mut self, picture: &Reduced, how: Comparison) -> opencv::Result<Homography> {
-        let Some(off) = self.registration.offset(&self.model, &self.sampled, self.forth.spans())? else {
-            return Ok(Homography::IDENTITY);
-        };
+    /// Lays a picture where it fits what is known best, if less than half as much of it is foreground then.
+    fn register(&mut self, picture: &Reduced, how: Comparison) -> opencv::Result<()> {
+        let off = self.registration.offset(&self.model, &self.sampled, self.forth.spans())?;
+        let Some(off) = off else { return Ok(()) };
         let (thought, changed) = (self.to_picture, self.changed());
         self.lay_at(off.then(&thought), picture, how);
         if self.changed() < changed / 2.0 {
-            return Ok(off.scaled(1.0 / self.size.0 as f64, 1.0 / self.size.1 as f64));
+            self.rested = Duration::ZERO;
+        } else {
+            self.lay_at(thought, picture, how);
         }
-        self.lay_at(thought, picture, how);
-        Ok(Homography::IDENTITY)
+        Ok(())
     }
 
     /// Lays the picture there on the canvas and holds it against what is known.
     fn lay_at(&mut self, to_picture: Homography, picture: &Reduced, how: Comparison) {
         self.to_picture = to_picture;
         self.lay(picture);
-        self.heed_light();
         self.compare(how);
     }
 

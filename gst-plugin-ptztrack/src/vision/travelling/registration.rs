@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Where a picture lies on what is known of the background, where it does not lie where the camera's motion put it: in a blur that
-//! comes all at once nobody sees how a camera turns, and what is lost of its way would be lost for good.
+//! Where a picture lies on what is known of the background, if that is not where the camera's motion put it. While a picture is blurred
+//! nobody can tell how the camera turns, and what is lost of its way then would be lost for good.
 
 use opencv::core::{self, Mat, Point, Rect, Size};
 use opencv::imgproc;
@@ -11,7 +11,7 @@ use ptztrack_contract::Homography;
 use super::model::{KNOWN, Model, Sampled};
 use crate::vision::Luma;
 
-/// How far beside that place it is looked for, pixels.
+/// How far beside that place it is looked for at most, pixels; down less, in a picture that is less high.
 const REACH: usize = 64;
 /// Pixels of either side that are looked at as one.
 const REDUCED: usize = 2;
@@ -30,7 +30,8 @@ pub(super) struct Registration {
 }
 
 impl Registration {
-    /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that; `None` where too little is known.
+    /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that; `None` where it lies there already,
+    /// or too little is known.
     pub fn offset(
         &mut self,
         model: &Model,
@@ -51,17 +52,20 @@ impl Registration {
         let mut best = Point::default();
         core::min_max_loc(differences, None, None, Some(&mut best), None, &core::no_array())?;
         let off = |at: i32| (REDUCED as i32 * at) as f64;
-        Ok(Some(Homography::translation(off(best.x - across), off(best.y - down))))
+        let (x, y) = (off(best.x - across), off(best.y - down));
+        Ok(Some(Homography::translation(x, y)).filter(|_| (x, y) != (0.0, 0.0)))
     }
 
     /// Takes picture, background and what is known of it as they lie on the canvas.
     fn reduce(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)]) -> opencv::Result<()> {
         let (width, height) = model.size;
-        // Beyond the picture is what is known, which speaks for no displacement by much.
         self.seen.clone_from(&model.shown);
         let rows = self.seen.chunks_exact_mut(width).zip(picture.luma.chunks_exact(width));
         for ((row, seen), &(start, end)) in rows.zip(spans).filter(|(_, (start, end))| start < end) {
             row[start..end].copy_from_slice(&seen[start..end]);
+            // What lies beyond the picture is as its edge, which speaks neither for nor against a displacement by much.
+            row[..start].fill(seen[start]);
+            row[end..].fill(seen[end - 1]);
         }
         self.known.clear();
         self.known.extend(model.age.iter().map(|age| if *age >= KNOWN { u8::MAX } else { 0 }));

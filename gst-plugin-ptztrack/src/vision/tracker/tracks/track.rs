@@ -366,9 +366,10 @@ impl Track {
             && off.y.abs() < NOWHERE * self.down.size
     }
 
-    /// Whether it was seen as far from where it was first as it is tall: no arm gets there, and hardly anything that a screen shows.
-    pub fn has_gone_far(&self) -> bool {
-        self.journey.farthest >= self.height()
+    /// Whether it was seen as far from where it was first as it is tall, and as that height: no arm of somebody so tall gets there, and
+    /// hardly anything that a screen shows.
+    pub fn has_gone_as_far_as(&self, height: f32) -> bool {
+        self.journey.farthest >= height.max(self.height())
     }
 
     /// Whether it went somewhere, up to where it is seen now: a screen, a curtain, a door, a lamp change as much as a person does,
