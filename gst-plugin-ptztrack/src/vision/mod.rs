@@ -88,5 +88,5 @@ pub use scene_model::{SceneModel, SceneView};
 pub use surface::{ColourSpace, Component, Surface};
 pub use tracker::{Choice, Config, Detection, Profile, TargetRequest, TimeLimits, Tracked, Tracker};
 pub use trail::Trail;
-pub use travelling::TravellingBackground;
+pub use travelling::{TravellingBackground, Way};
 pub use zones::{ZoneError, Zones, zone_mask};

@@ -9,7 +9,10 @@ use super::camera_motion::CameraMotionEstimator;
 use super::ghosts::Ghosts;
 use super::picture::{Picture, Reduced};
 use super::reduce::divisor;
-use super::travelling::TravellingBackground;
+use super::travelling::{TravellingBackground, Way};
+
+/// From so many points on that agree, they are not all of somebody who goes along before a plain wall.
+const MANY_INLIERS: u32 = 20;
 
 /// What one picture shows: all planes are of one size, the whole picture reduced.
 #[derive(Debug, Clone, Copy)]
@@ -62,8 +65,17 @@ impl SceneModel {
         self.camera_motion =
             self.motion.update(&self.picture.luma(), foreground.as_ref(), expected, elapsed)?;
         let motion = self.camera_motion.map(|motion| motion.homography).or_else(|| self.motion.coasted());
-        self.background.update(&self.picture, motion.as_ref(), self.motion.may_be_elsewhere(), elapsed)?;
+        self.background.update(&self.picture, motion.as_ref(), self.way(), elapsed)?;
         Ok(self.view())
+    }
+
+    /// What is known of how the last picture came to where it is.
+    fn way(&self) -> Way {
+        match self.camera_motion {
+            _ if !self.motion.may_be_elsewhere() => Way::Known,
+            Some(motion) if motion.inliers >= MANY_INLIERS => Way::Lost,
+            _ => Way::Unknown,
+        }
     }
 
     /// What lies in `bounds` (normalised, of the last picture) does not become background: see

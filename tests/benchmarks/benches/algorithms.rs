@@ -6,7 +6,7 @@
 use divan::Bencher;
 use gstptztrack::vision::{
     Background, CameraMotionEstimator, Chroma, ForegroundTest, Luma, Picture, Reduced, Samples, SceneModel,
-    TravellingBackground,
+    TravellingBackground, Way,
 };
 use ptztrack_benchmarks::{Camera, Footage};
 use ptztrack_contract::CameraMotion;
@@ -90,7 +90,7 @@ fn travelling(bencher: Bencher, size: (usize, usize), camera: Camera) {
             (std::mem::take(&mut reduced), moved)
         })
         .bench_local_refs(|(reduced, moved): &mut (Reduced, Option<CameraMotion>)| {
-            background.update(reduced, moved.as_ref().map(|moved| &moved.homography), false, PERIOD).map(|_| ())
+            background.update(reduced, moved.as_ref().map(|moved| &moved.homography), Way::Known, PERIOD).map(|_| ())
         });
 }
 

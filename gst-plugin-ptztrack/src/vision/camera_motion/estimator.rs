@@ -116,14 +116,23 @@ impl CameraMotionEstimator {
     ) -> opencv::Result<Option<CameraMotion>> {
         let mut opening = std::mem::take(&mut self.opening);
         let motion = opening.apply(luma).and_then(|seen| self.follow(&seen, foreground, expected, elapsed));
-        let begun = if motion.is_ok() && self.key.is_none() {
-            opening.toggle();
-            opening.apply(luma).and_then(|seen| self.begin(&seen))
-        } else {
-            Ok(())
-        };
+        let is_lost = motion.is_ok() && self.key.is_none();
+        let begun = if is_lost { self.look_otherwise(luma, &mut opening) } else { Ok(()) };
         self.opening = opening;
         begun.and(motion)
+    }
+
+    /// Begins with this picture, not opened where the last one was, else opened if there are corners almost everywhere, as rain is: a few
+    /// may all be of somebody who goes along before a plain wall.
+    fn look_otherwise(&mut self, luma: &Luma, opening: &mut Opening) -> opencv::Result<()> {
+        let was_opened = opening.is_called_for();
+        opening.call_for(false);
+        self.begin(luma)?;
+        if !was_opened && self.key.as_ref().is_some_and(Key::is_full) {
+            opening.call_for(true);
+            self.begin(&opening.apply(luma)?)?;
+        }
+        Ok(())
     }
 
     /// Makes this the key picture.
@@ -230,6 +239,11 @@ impl Key {
         let good = corners.iter().filter(|corner| corner.stands_out(noise));
         let points = good.map(|corner| Tracked::new(corner, pyramid, Template::default())).collect();
         Ok(Self { grid, points, to_last: Homography::IDENTITY, noise, spare: Vec::new() })
+    }
+
+    /// Whether most cells have a corner.
+    fn is_full(&self) -> bool {
+        2 * self.points.len() >= self.grid.cells()
     }
 
     /// Finds corners in some of the cells that are not `taken`.

@@ -24,9 +24,14 @@ pub(super) struct Opening {
 }
 
 impl Opening {
-    /// Pictures are opened from now on, or no longer.
-    pub fn toggle(&mut self) {
-        self.is_called_for = !self.is_called_for;
+    /// Whether pictures are opened.
+    pub fn is_called_for(&self) -> bool {
+        self.is_called_for
+    }
+
+    /// Says whether pictures are opened from now on.
+    pub fn call_for(&mut self, is_called_for: bool) {
+        self.is_called_for = is_called_for;
     }
 
     /// The picture as it is to be looked at.
@@ -58,10 +63,10 @@ mod tests {
         let picture = Luma::packed(&row, row.len());
         let mut opening = Opening::default();
         assert_eq!(opening.apply(&picture).unwrap().row(0), row);
-        opening.toggle();
+        opening.call_for(true);
         let opened = opening.apply(&picture).unwrap().row(0).to_vec();
         assert_eq!(opened, [20, 20, 20, 20, 20, 20, 20, 90, 90, 90, 90, 90, 20, 20, 5, 20, 25, 20]);
-        opening.toggle();
+        opening.call_for(false);
         assert_eq!(opening.apply(&picture).unwrap().row(0), row);
     }
 }

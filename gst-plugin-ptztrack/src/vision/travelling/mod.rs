@@ -54,6 +54,17 @@ const MISPLACED: f32 = 1.0;
 /// Foreground beyond this fraction of the picture is a new picture: lights, a cut.
 const NEW_PICTURE: f64 = 0.6;
 
+/// What is known of how a picture came to where it is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Way {
+    /// All of it.
+    Known,
+    /// How it moved since the picture before, but not how that came there: it is laid where it fits what is known.
+    Lost,
+    /// Nothing.
+    Unknown,
+}
+
 /// Tells foreground from background, whether the camera turns or not.
 #[derive(Debug, Default)]
 pub struct TravellingBackground {
@@ -98,13 +109,13 @@ impl TravellingBackground {
     }
 
     /// Tells foreground from background in the next picture, to which the camera moved by `motion` (normalised), then learns from it.
-    /// Where that is not known, the camera may still rest. A picture that `may_be_elsewhere` does so if it shows nothing of what is known.
-    /// Where its motion is known and its way before is not, it is laid where it fits.
+    /// Where that is not known, the camera may still rest. A picture whose `way` is not known may show
+    /// another view.
     pub fn update(
         &mut self,
         picture: &Reduced,
         motion: Option<&Homography>,
-        may_be_elsewhere: bool,
+        way: Way,
         elapsed: Duration,
     ) -> opencv::Result<()> {
         if picture.size() != self.size {
@@ -123,13 +134,13 @@ impl TravellingBackground {
         self.lay(picture);
         self.heed_light();
         self.compare(how);
-        let stale = self.changed() > NEW_PICTURE || may_be_elsewhere && self.shows_another_view();
+        let stale = self.changed() > NEW_PICTURE || way != Way::Known && self.shows_another_view();
         if stale {
             self.start();
             self.lay(picture);
             self.compare(how);
         }
-        if may_be_elsewhere && motion.is_some() && !stale {
+        if way == Way::Lost && !stale {
             self.register(picture, how)?;
         }
         self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);

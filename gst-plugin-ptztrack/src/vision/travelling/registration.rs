@@ -26,12 +26,13 @@ pub(super) struct Registration {
     picture: Mat,
     mean: Mat,
     mask: Mat,
+    both: Mat,
     differences: Mat,
 }
 
 impl Registration {
     /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that; `None` where it lies there already,
-    /// or too little is known.
+    /// or what is known does not tell.
     pub fn offset(
         &mut self,
         model: &Model,
@@ -49,8 +50,15 @@ impl Registration {
         }
         let (mean, differences) = (self.mean.roi(middle)?, &mut self.differences);
         imgproc::match_template(&self.picture, &mean, differences, imgproc::TM_SQDIFF, &mask)?;
-        let mut best = Point::default();
-        core::min_max_loc(differences, None, None, Some(&mut best), None, &core::no_array())?;
+        let (mut best, mut least) = (Point::default(), 0.0);
+        core::min_max_loc(differences, Some(&mut least), None, Some(&mut best), None, &core::no_array())?;
+        // Before a plain wall any place fits at which nobody is: it tells only where the wall laid off by as much would be unlike itself.
+        let there = Rect::new(best.x, best.y, middle.width, middle.height);
+        core::bitwise_and(&mask, &self.mask.roi(there)?, &mut self.both, &core::no_array())?;
+        let unlike = core::norm2(&mean, &self.mean.roi(there)?, core::NORM_L2SQR, &self.both)?;
+        if least >= unlike / 2.0 {
+            return Ok(None);
+        }
         let off = |at: i32| (REDUCED as i32 * at) as f64;
         let (x, y) = (off(best.x - across), off(best.y - down));
         Ok(Some(Homography::translation(x, y)).filter(|_| (x, y) != (0.0, 0.0)))

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use ptztrack_contract::{Homography, Point, Rect};
 
-use super::TravellingBackground;
+use super::{TravellingBackground, Way};
 use crate::vision::picture::{Picture, Reduced};
 use crate::vision::synthetic::{Canvas, texture};
 
@@ -36,7 +36,9 @@ fn look(background: &mut TravellingBackground, picture: &Canvas, shift: Option<(
     let mut reduced = Reduced::default();
     reduced.fill(&Picture { luma: picture.luma(), chroma: None }, SIZE);
     let motion = shift.map(|(x, y)| Homography::translation(x / SIZE.0 as f64, y / SIZE.1 as f64));
-    background.update(&reduced, motion.as_ref(), motion.is_none(), STEP).expect("OpenCV");
+    background
+        .update(&reduced, motion.as_ref(), if motion.is_none() { Way::Unknown } else { Way::Known }, STEP)
+        .expect("OpenCV");
 }
 
 /// One that has seen the empty room for a second.
@@ -55,28 +57,28 @@ fn furnished(x: f64, seed: u32) -> Canvas {
 }
 
 /// Which part of `picture` is foreground to one that has seen the furnished room for a second, where 6 pixels of a turn were measured.
-fn changed_by(picture: &Canvas, may_be_elsewhere: bool) -> f64 {
+fn changed_by(picture: &Canvas, way: Way) -> f64 {
     let mut background = TravellingBackground::default();
     (0..25).for_each(|seed| look(&mut background, &furnished(0.0, seed), Some((0.0, 0.0))));
     let mut reduced = Reduced::default();
     reduced.fill(&Picture { luma: picture.luma(), chroma: None }, SIZE);
     let measured = Homography::translation(-6.0 / SIZE.0 as f64, 0.0);
-    background.update(&reduced, Some(&measured), may_be_elsewhere, STEP).expect("OpenCV");
+    background.update(&reduced, Some(&measured), way, STEP).expect("OpenCV");
     foreground(&background, ALL)
 }
 
 #[test]
 fn a_picture_whose_way_was_lost_is_laid_where_it_fits() {
     let lost = furnished(36.0, 30);
-    assert!(changed_by(&lost, true) < 0.05, "30 pixels more");
-    assert!(changed_by(&lost, false) > 0.1, "its motion is known");
+    assert!(changed_by(&lost, Way::Lost) < 0.05, "30 pixels more");
+    assert!(changed_by(&lost, Way::Known) > 0.1, "its motion is known");
 }
 
 #[test]
 fn somebody_large_moves_no_picture() {
     let picture = with_person(furnished(6.0, 30), (100.0, 10.0, 40.0, 100.0));
-    assert!((changed_by(&picture, true) - changed_by(&picture, false)).abs() < 0.01);
-    assert!(changed_by(&picture, true) > 0.1);
+    assert!((changed_by(&picture, Way::Lost) - changed_by(&picture, Way::Known)).abs() < 0.01);
+    assert!(changed_by(&picture, Way::Lost) > 0.1);
 }
 
 /// Which part of a box is more likely foreground than not.
