@@ -4,7 +4,7 @@
 //!
 //! | step | file |
 //! |---|---|
-//! | where that shows nothing to hold on to: the picture without rain and snow | `opening` |
+//! | where the picture shows nothing to hold on to, it without rain and snow | `opening` |
 //! | corners, one in each cell of a grid, topped up where they were lost | `corners` |
 //! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow`, `lucas_kanade` |
 //! | the motion that most of them share, and how well it is known | `fit` |

@@ -109,8 +109,8 @@ impl TravellingBackground {
     }
 
     /// Tells foreground from background in the next picture, to which the camera moved by `motion` (normalised), then learns from it.
-    /// Where that is not known, the camera may still rest. A picture whose `way` is not known may show
-    /// another view.
+    /// Where that is not known, the camera may still rest. A picture whose `way` is not
+    /// known may show another view.
     pub fn update(
         &mut self,
         picture: &Reduced,
