@@ -11,9 +11,6 @@ use super::picture::{Picture, Reduced};
 use super::reduce::divisor;
 use super::travelling::{TravellingBackground, Way};
 
-/// From so many points on that agree, they are not all of somebody who goes along before a plain wall.
-const MANY_INLIERS: u32 = 20;
-
 /// What one picture shows: all planes are of one size, the whole picture reduced.
 #[derive(Debug, Clone, Copy)]
 pub struct SceneView<'a> {
@@ -73,7 +70,7 @@ impl SceneModel {
     fn way(&self) -> Way {
         match self.camera_motion {
             _ if !self.motion.may_be_elsewhere() => Way::Known,
-            Some(motion) if motion.inliers >= MANY_INLIERS => Way::Lost,
+            Some(_) => Way::Lost,
             _ => Way::Unknown,
         }
     }

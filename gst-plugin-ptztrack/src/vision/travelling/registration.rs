@@ -17,6 +17,9 @@ const REACH: usize = 64;
 const REDUCED: usize = 2;
 /// Part of the background there that must be known.
 const LEAST_KNOWN: f64 = 0.5;
+/// Columns of the picture, and over how many of them those must reach that tell: somebody and the place that they left reach over fewer.
+const COLUMNS: i32 = 8;
+const LEAST_REACH: i32 = 6;
 
 /// Finds by how much a picture lies beside the background: the least sum of squared differences over all displacements.
 #[derive(Debug, Default)]
@@ -50,18 +53,34 @@ impl Registration {
         }
         let (mean, differences) = (self.mean.roi(middle)?, &mut self.differences);
         imgproc::match_template(&self.picture, &mean, differences, imgproc::TM_SQDIFF, &mask)?;
-        let (mut best, mut least) = (Point::default(), 0.0);
-        core::min_max_loc(differences, Some(&mut least), None, Some(&mut best), None, &core::no_array())?;
-        // Before a plain wall any place fits at which nobody is: it tells only where the wall laid off by as much would be unlike itself.
-        let there = Rect::new(best.x, best.y, middle.width, middle.height);
-        core::bitwise_and(&mask, &self.mask.roi(there)?, &mut self.both, &core::no_array())?;
-        let unlike = core::norm2(&mean, &self.mean.roi(there)?, core::NORM_L2SQR, &self.both)?;
-        if least >= unlike / 2.0 {
+        let mut best = Point::default();
+        core::min_max_loc(differences, None, None, Some(&mut best), None, &core::no_array())?;
+        if self.reach_of_telling(middle, best)? < LEAST_REACH {
             return Ok(None);
         }
         let off = |at: i32| (REDUCED as i32 * at) as f64;
         let (x, y) = (off(best.x - across), off(best.y - down));
         Ok(Some(Homography::translation(x, y)).filter(|_| (x, y) != (0.0, 0.0)))
+    }
+
+    /// Over how many columns those reach in which the background of `middle` is twice as unlike itself as it is unlike the picture, both
+    /// laid off to `best`. Before a plain wall any place fits at which nobody is, and it is only somebody who tells.
+    fn reach_of_telling(&mut self, middle: Rect, best: Point) -> opencv::Result<i32> {
+        let edge = |column: i32| column * middle.width / COLUMNS;
+        let mut telling: Option<(i32, i32)> = None;
+        for column in 0..COLUMNS {
+            let width = edge(column + 1) - edge(column);
+            let here = Rect::new(middle.x + edge(column), middle.y, width, middle.height);
+            let there = Rect::new(best.x + edge(column), best.y, width, middle.height);
+            let known = self.mask.roi(here)?;
+            core::bitwise_and(&known, &self.mask.roi(there)?, &mut self.both, &core::no_array())?;
+            let mean = self.mean.roi(here)?;
+            let unlike = |other: &Mat| core::norm2(&mean, &other.roi(there)?, core::NORM_L2SQR, &self.both);
+            if unlike(&self.picture)? < unlike(&self.mean)? / 2.0 {
+                telling = Some((telling.map_or(column, |(first, _)| first), column));
+            }
+        }
+        Ok(telling.map_or(0, |(first, last)| last - first + 1))
     }
 
     /// Takes picture, background and what is known of it as they lie on the canvas.
