@@ -25,6 +25,8 @@ const MIN_DT_S: f64 = 1e-3;
 const MAX_DT_S: f64 = 2.0;
 /// After so long without anything that speaks for them, nobody is there, seconds; or after the time that a hidden target is coasted.
 const DECAY_S: f64 = 3.0;
+/// Who was just taken up and is not seen for so long, seconds, is given up for somebody who goes somewhere.
+const MISSED_S: f64 = 0.2;
 /// For how long somebody who is not seen is told of, seconds.
 const TOLD_S: f64 = 0.5;
 
@@ -308,7 +310,9 @@ impl Tracker {
         let Config { choice, must_travel, .. } = self.config;
         let track = self.tracks.get(target.id);
         let seen = track.filter(|track| track.region().is_some());
-        if target.dwell.is_on_trial() && seen.is_none_or(Track::goes_nowhere) {
+        if target.dwell.is_on_trial()
+            && track.is_none_or(|track| track.goes_nowhere() || track.journey.unseen_s > MISSED_S)
+        {
             let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
             return chosen.is_some_and(|track| track.id != target.id);
         }

@@ -467,6 +467,35 @@ fn a_rack_that_was_taken_first_is_given_up_for_the_person_within_half_a_second()
     assert!(since.is_some_and(|since| since <= 10 + 5), "{since:?}");
 }
 
+/// Two walk in from either side. In the picture after the taller one was taken up there is no region of them.
+#[test]
+fn who_was_just_taken_up_is_kept_through_a_picture_without_a_region() {
+    let mut chain = watching(Config { must_travel: true, ..config() });
+    let mut taken = None;
+    for n in 0..30 {
+        let person = Rect2f::new(9.0 * n as f32, 90.0, 60.0, 150.0);
+        let other = Rect2f::new(430.0 - 5.0 * n as f32, 120.0, 40.0, 90.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(person, 7);
+        picture.paint(other, 50);
+        let mut detections = vec![detection(other)];
+        if taken.is_none_or(|taken| n != taken + 1) {
+            detections.push(detection(person));
+        }
+        let last = chain.process(&picture, DT, &detections);
+        if last.changes == [TargetChange::Acquired] {
+            taken = Some(n);
+        }
+        assert!(
+            taken.is_none() || is_on(&last, person) > 0.6,
+            "picture {n}: {:?} {:?}",
+            last.state,
+            last.bounds
+        );
+    }
+    assert!(taken.is_some_and(|taken| taken < 20), "{taken:?}");
+}
+
 /// A poster flickers for a second: its points and its looks are there for ever, and nobody is.
 #[test]
 fn nobody_is_tracked_three_seconds_after_a_poster_flickered() {
