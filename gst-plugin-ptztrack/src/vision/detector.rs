@@ -19,8 +19,6 @@ use super::segmentation::Segmentation;
 use super::zones::{Zones, zone_mask};
 use super::{Luma, LumaError};
 
-/// Side of the opening, pixels of the reduced picture: specks of one or two pixels are noise.
-const AUTO_OPEN: usize = 3;
 /// The closing's width and height are these parts of the picture's height. Upright, as people are: head,
 /// body and legs are joined, neighbours are not.
 const AUTO_CLOSE: (usize, usize) = (64, 16);
@@ -46,7 +44,7 @@ pub struct DetectorConfig {
     pub alpha: f64,
     /// What makes a pixel foreground.
     pub test: ForegroundTest,
-    /// Side of the opening's square in pixels of the whole picture; `None` chooses.
+    /// Side of the opening's square in pixels of the whole picture; `None` leaves it out.
     pub open_size: Option<usize>,
     /// Side of the closing's square in pixels of the whole picture; `None` chooses an upright rectangle.
     pub close_size: Option<usize>,
@@ -305,7 +303,7 @@ impl Detector {
         let height = self.frame.1 / self.divisor;
         let upright = ((height / AUTO_CLOSE.0).max(3), (height / AUTO_CLOSE.1).max(3));
         (
-            config.open_size.map_or(AUTO_OPEN, reduced),
+            config.open_size.map_or(0, reduced),
             config.close_size.map(reduced).map_or(upright, |side| (side, side)),
         )
     }

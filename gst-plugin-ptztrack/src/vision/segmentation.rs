@@ -10,7 +10,7 @@ use super::components::{Components, Run};
 use super::morphology::clean;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
-/// unknown ...
+/// unknown. The average has removed specks; an opening would take narrow limbs, too ...
 const WEAK: u16 = 137;
 /// ... and from which it makes one by itself.
 const STRONG: u16 = 241;
@@ -30,8 +30,8 @@ pub struct Segmentation {
 }
 
 impl Segmentation {
-    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by opening and closing
-    /// (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
+    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by closing, and by opening where that
+    /// is asked for (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
     pub fn segment(
         &mut self,
         likelihood: &Luma,
