@@ -71,7 +71,7 @@ impl SceneModel {
         match self.camera_motion {
             _ if !self.motion.may_be_elsewhere() => Way::Known,
             Some(_) => Way::Lost,
-            _ => Way::Unknown,
+            None => Way::Unknown,
         }
     }
 

@@ -10,7 +10,7 @@ use super::components::{Components, Run};
 use super::morphology::clean;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
-/// unknown. The average has removed specks; an opening would take narrow limbs, too ...
+/// unknown ...
 const WEAK: u16 = 137;
 /// ... and from which it makes one by itself.
 const STRONG: u16 = 241;
@@ -31,7 +31,8 @@ pub struct Segmentation {
 
 impl Segmentation {
     /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by closing, and by opening where that
-    /// is asked for (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
+    /// is asked for (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it). Average and hysteresis leave few
+    /// specks; an opening takes narrow limbs with them.
     pub fn segment(
         &mut self,
         likelihood: &Luma,
@@ -162,6 +163,11 @@ mod tests {
 
     /// Likelihoods of 20 with boxes of others; how many pixels are segmented.
     fn segmented(boxes: &[(Pixels, u8)]) -> i32 {
+        opened(boxes, 0)
+    }
+
+    /// The same with an opening of that size.
+    fn opened(boxes: &[(Pixels, u8)], open_size: usize) -> i32 {
         let mut likelihood = vec![20; SIZE.0 * SIZE.1];
         for ((x, y, width, height), value) in boxes {
             for row in likelihood.chunks_exact_mut(SIZE.0).skip(*y).take(*height) {
@@ -170,7 +176,7 @@ mod tests {
         }
         let mut mask = vec![0; SIZE.0 * SIZE.1];
         let luma = Luma::packed(&likelihood, SIZE.0);
-        Segmentation::default().segment(&luma, 3, (3, 7), &mut mask);
+        Segmentation::default().segment(&luma, open_size, (3, 7), &mut mask);
         mask.iter().map(|pixel| i32::from(*pixel > 0)).sum()
     }
 
@@ -181,6 +187,13 @@ mod tests {
         let alone = segmented(&[(head, 255)]);
         let both = segmented(&[(body, 180), (head, 255)]);
         assert!(alone > 40 && both > 400, "{alone} {both}");
+    }
+
+    #[test]
+    fn opening_takes_narrow_limbs_and_is_left_out_unless_asked_for() {
+        let boxes = [((50, 40, 12, 30), 255), ((54, 70, 2, 20), 255)];
+        let (opened, whole) = (opened(&boxes, 5), opened(&boxes, 0));
+        assert!(whole >= opened + 30, "{whole} {opened}");
     }
 
     #[test]

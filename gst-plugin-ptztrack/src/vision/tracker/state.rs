@@ -25,7 +25,7 @@ const MIN_DT_S: f64 = 1e-3;
 const MAX_DT_S: f64 = 2.0;
 /// After so long without anything that speaks for them, nobody is there, seconds; or after the time that a hidden target is coasted.
 const DECAY_S: f64 = 3.0;
-/// Who was just taken up and is not seen for so long, seconds, is given up for somebody who goes somewhere.
+/// Who is followed because they move and is not seen for so long, seconds, may be given up for somebody who goes somewhere.
 const MISSED_S: f64 = 0.2;
 /// For how long somebody who is not seen is told of, seconds.
 const TOLD_S: f64 = 0.5;
@@ -305,14 +305,12 @@ impl Tracker {
 
     /// Whether a target that was chosen because it moves stays where it is, while somebody else goes somewhere: at first anybody whom
     /// the policy would choose, and later who has gone as far as they are tall, where the target never has. What a screen shows goes
-    /// to and fro for ever and never farther than its edge.
+    /// to and fro for ever and never farther than its edge. A target that is missed for a moment stays nowhere.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
         let track = self.tracks.get(target.id);
-        let seen = track.filter(|track| track.region().is_some());
-        if target.dwell.is_on_trial()
-            && track.is_none_or(|track| track.goes_nowhere() || track.journey.unseen_s > MISSED_S)
-        {
+        let is_missed = track.is_none_or(|track| track.journey.unseen_s > MISSED_S);
+        if target.dwell.is_on_trial() && (is_missed || track.is_some_and(Track::goes_nowhere)) {
             let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
             return chosen.is_some_and(|track| track.id != target.id);
         }
@@ -323,7 +321,7 @@ impl Tracker {
         };
         choice != Choice::Manual
             && target.dwell.is_of_motion()
-            && seen.is_none_or(|track| !track.travels())
+            && (is_missed || track.is_some_and(|track| !track.travels()))
             && self.policy.ready(&self.tracks, must_travel, frame).any(goes_farther)
     }
 }

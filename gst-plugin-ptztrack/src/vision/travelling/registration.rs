@@ -17,8 +17,10 @@ const REACH: usize = 64;
 const REDUCED: usize = 2;
 /// Part of the background there that must be known.
 const LEAST_KNOWN: f64 = 0.5;
-/// Columns of the picture, and over how many of them those must reach that tell: somebody and the place that they left reach over fewer.
+/// Columns that are looked at, how many of them must tell, and from the first to the last that does: somebody and the place that they left
+/// take fewer.
 const COLUMNS: i32 = 8;
+const LEAST_TELLING: usize = 3;
 const LEAST_REACH: i32 = 6;
 
 /// Finds by how much a picture lies beside the background: the least sum of squared differences over all displacements.
@@ -55,19 +57,20 @@ impl Registration {
         imgproc::match_template(&self.picture, &mean, differences, imgproc::TM_SQDIFF, &mask)?;
         let mut best = Point::default();
         core::min_max_loc(differences, None, None, Some(&mut best), None, &core::no_array())?;
-        if self.reach_of_telling(middle, best)? < LEAST_REACH {
+        if !self.is_told(middle, best)? {
             return Ok(None);
         }
         let off = |at: i32| (REDUCED as i32 * at) as f64;
         let (x, y) = (off(best.x - across), off(best.y - down));
-        Ok(Some(Homography::translation(x, y)).filter(|_| (x, y) != (0.0, 0.0)))
+        Ok(Some(Homography::translation(x, y)))
     }
 
-    /// Over how many columns those reach in which the background of `middle` is twice as unlike itself as it is unlike the picture, both
-    /// laid off to `best`. Before a plain wall any place fits at which nobody is, and it is only somebody who tells.
-    fn reach_of_telling(&mut self, middle: Rect, best: Point) -> opencv::Result<i32> {
+    /// Whether most of the picture tells that it lies at `best` and not in the `middle`. A column tells where picture and background, laid
+    /// off so, are less than half as unlike as the background is to itself. Before a plain wall any place fits at which nobody is, and only
+    /// they tell; where it lies in the middle nothing does.
+    fn is_told(&mut self, middle: Rect, best: Point) -> opencv::Result<bool> {
         let edge = |column: i32| column * middle.width / COLUMNS;
-        let mut telling: Option<(i32, i32)> = None;
+        let (mut sums, mut telling) = ((0.0, 0.0), Vec::new());
         for column in 0..COLUMNS {
             let width = edge(column + 1) - edge(column);
             let here = Rect::new(middle.x + edge(column), middle.y, width, middle.height);
@@ -76,11 +79,14 @@ impl Registration {
             core::bitwise_and(&known, &self.mask.roi(there)?, &mut self.both, &core::no_array())?;
             let mean = self.mean.roi(here)?;
             let unlike = |other: &Mat| core::norm2(&mean, &other.roi(there)?, core::NORM_L2SQR, &self.both);
-            if unlike(&self.picture)? < unlike(&self.mean)? / 2.0 {
-                telling = Some((telling.map_or(column, |(first, _)| first), column));
+            let (picture, background) = (unlike(&self.picture)?, unlike(&self.mean)?);
+            sums = (sums.0 + picture, sums.1 + background);
+            if picture < background / 2.0 {
+                telling.push(column);
             }
         }
-        Ok(telling.map_or(0, |(first, last)| last - first + 1))
+        let reach = telling.first().zip(telling.last()).map_or(0, |(first, last)| last - first + 1);
+        Ok(sums.0 < sums.1 / 2.0 && telling.len() >= LEAST_TELLING && reach >= LEAST_REACH)
     }
 
     /// Takes picture, background and what is known of it as they lie on the canvas.

@@ -81,6 +81,29 @@ fn somebody_large_moves_no_picture() {
     assert!(changed_by(&picture, Way::Lost) > 0.1);
 }
 
+/// Where people were learned before a plain wall and have gone, they alone tell of a place: it is where they were.
+#[test]
+fn who_walks_before_a_plain_wall_moves_no_picture() {
+    for people in [&[(20.0, 25.0)][..], &[(20.0, 45.0)]] {
+        let seen = |off: f64, seed: u32| {
+            people.iter().fold(
+                Canvas::seen(SIZE, &Homography::IDENTITY, |_, _| 120.0).noisy(2.0, seed),
+                |wall, (x, width)| with_person(wall, (x + off, 30.0, *width, 60.0)),
+            )
+        };
+        let told = |way: Way| {
+            let mut background = TravellingBackground::default();
+            (0..25).for_each(|seed| look(&mut background, &seen(0.0, seed), Some((0.0, 0.0))));
+            let mut reduced = Reduced::default();
+            reduced.fill(&Picture { luma: seen(24.0, 30).luma(), chroma: None }, SIZE);
+            background.update(&reduced, Some(&Homography::IDENTITY), way, STEP).expect("OpenCV");
+            foreground(&background, ALL)
+        };
+        assert_eq!(told(Way::Lost), told(Way::Known), "{people:?}");
+        assert!(told(Way::Lost) > 0.05, "{people:?}");
+    }
+}
+
 /// Which part of a box is more likely foreground than not.
 fn foreground(background: &TravellingBackground, (x, y, width, height): (f64, f64, f64, f64)) -> f64 {
     let likelihood = background.foreground().expect("seen");

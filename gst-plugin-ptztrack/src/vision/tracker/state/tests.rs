@@ -467,23 +467,30 @@ fn a_rack_that_was_taken_first_is_given_up_for_the_person_within_half_a_second()
     assert!(since.is_some_and(|since| since <= 10 + 5), "{since:?}");
 }
 
-/// Two walk in from either side. In the picture after the taller one was taken up there is no region of them.
+/// Of three who walk the first leaves, and the tallest of the others is taken up, who has just come in. In the picture after that there is
+/// no region of them. The other has gone farther than either is tall.
 #[test]
 fn who_was_just_taken_up_is_kept_through_a_picture_without_a_region() {
     let mut chain = watching(Config { must_travel: true, ..config() });
     let mut taken = None;
-    for n in 0..30 {
-        let person = Rect2f::new(9.0 * n as f32, 90.0, 60.0, 150.0);
-        let other = Rect2f::new(430.0 - 5.0 * n as f32, 120.0, 40.0, 90.0);
+    for n in 0..45 {
+        let along = n as f32;
+        let first = Rect2f::new(150.0 - 10.0 * along, 80.0, 60.0, 170.0);
+        let person = Rect2f::new(600.0 - 12.0 * along, 90.0, 60.0, 150.0);
+        let other = Rect2f::new(20.0 + 8.0 * along, 230.0, 36.0, 80.0);
         let mut picture = street((0.0, 0.0), &[]);
-        picture.paint(person, 7);
-        picture.paint(other, 50);
-        let mut detections = vec![detection(other)];
-        if taken.is_none_or(|taken| n != taken + 1) {
-            detections.push(detection(person));
+        let mut detections = vec![];
+        for (texture, bounds) in [(7, first), (50, other), (21, person)] {
+            let is_missed = bounds == person && taken.is_some_and(|taken| n == taken + 1);
+            if bounds.x > 0.0 && bounds.br().x < SIZE.0 as f32 {
+                picture.paint(bounds, texture);
+                if !is_missed {
+                    detections.push(detection(bounds));
+                }
+            }
         }
         let last = chain.process(&picture, DT, &detections);
-        if last.changes == [TargetChange::Acquired] {
+        if n > 15 && last.changes.contains(&TargetChange::Acquired) {
             taken = Some(n);
         }
         assert!(
@@ -493,7 +500,7 @@ fn who_was_just_taken_up_is_kept_through_a_picture_without_a_region() {
             last.bounds
         );
     }
-    assert!(taken.is_some_and(|taken| taken < 20), "{taken:?}");
+    assert!(taken.is_some_and(|taken| taken < 40), "{taken:?}");
 }
 
 /// A poster flickers for a second: its points and its looks are there for ever, and nobody is.
