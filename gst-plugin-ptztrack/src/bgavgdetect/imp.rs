@@ -73,7 +73,7 @@ pub struct BgAvgDetect {
     #[property(
         name = "open-size", get, set, type = i32, member = open_size, mutable_playing,
         default = Settings::default().open_size, minimum = -1, maximum = 999,
-        blurb = "Side of the square for opening, in pixels of the frame: smaller specks vanish (0 or 1 = none, -1 = none, or 3 with profile=thesis)"
+        blurb = "Side of the square for opening, in pixels of the frame: smaller specks vanish (0 or 1 = none, -1 = chosen: one that leaves narrow limbs, or 3 with profile=thesis)"
     )]
     #[property(
         name = "close-size", get, set, type = i32, member = close_size, mutable_playing,

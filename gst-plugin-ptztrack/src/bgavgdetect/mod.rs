@@ -3,7 +3,7 @@
 //! SECTION:element-bgavgdetect
 //!
 //! Finds what moves, whether the camera rests or turns, by background subtraction (thesis 3.2 to 3.4): running mean
-//! and spread of every pixel, foreground by their difference, closing, contours. Attaches to every frame a
+//! and spread of every pixel, foreground by their difference, opening, closing, contours. Attaches to every frame a
 //! `PtzMotionMeta` (no regions: nothing moved), a region of interest named `motion` for each region, and a
 //! `PtzSceneMeta` with the motion of the camera, the reduced picture, the likelihood of foreground and the mean of the
 //! background. Pixels pass untouched and uncopied.
@@ -83,7 +83,7 @@ pub enum Output {
     #[enum_value(name = "The frames, untouched", nick = "frame")]
     Frame,
     /// The cleaned foreground mask.
-    #[enum_value(name = "The foreground, cleaned, 255 on 0 (GRAY8)", nick = "mask")]
+    #[enum_value(name = "The foreground after opening and closing, 255 on 0 (GRAY8)", nick = "mask")]
     Mask,
     /// The frames with the reported regions in alpha (thesis 3.4.2).
     #[enum_value(name = "The frames, opaque only within the reported regions (RGBA)", nick = "foreground")]

@@ -19,6 +19,8 @@ use super::segmentation::Segmentation;
 use super::zones::{Zones, zone_mask};
 use super::{Luma, LumaError};
 
+/// Width and height of the opening, pixels of the reduced picture: limbs are narrow and upright, noise and the edges of shadows are low.
+const AUTO_OPEN: (usize, usize) = (1, 3);
 /// The closing's width and height are these parts of the picture's height. Upright, as people are: head,
 /// body and legs are joined, neighbours are not.
 const AUTO_CLOSE: (usize, usize) = (64, 16);
@@ -44,7 +46,7 @@ pub struct DetectorConfig {
     pub alpha: f64,
     /// What makes a pixel foreground.
     pub test: ForegroundTest,
-    /// Side of the opening's square in pixels of the whole picture; `None` leaves it out.
+    /// Side of the opening's square in pixels of the whole picture; `None` chooses an upright rectangle.
     pub open_size: Option<usize>,
     /// Side of the closing's square in pixels of the whole picture; `None` chooses an upright rectangle.
     pub close_size: Option<usize>,
@@ -181,7 +183,7 @@ impl Detector {
             self.mask = Mat::default();
             return Ok(None);
         }
-        let (open_size, close_size) = self.sizes(config);
+        let [open_size, close_size] = self.sizes(config);
         self.fit_mask(foreground.width(), foreground.height())?;
         self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?);
         let MotionMeta { regions: mut found, mut outside } = std::mem::take(&mut self.told);
@@ -244,7 +246,7 @@ impl Detector {
     /// The regions of the foreground in `mask`.
     fn find(&mut self, config: &DetectorConfig) -> Result<Vec<Region>, DetectorError> {
         self.look_in_zones(config)?;
-        let (open_size, close_size) = self.sizes(config);
+        let [open_size, close_size] = self.sizes(config);
         let width = self.mask.cols() as usize;
         clean(self.mask.data_bytes_mut()?, width, open_size, close_size, &mut self.bits);
         let mut found = Vec::new();
@@ -297,15 +299,13 @@ impl Detector {
         Ok(())
     }
 
-    /// Side of the opening, width and height of the closing, in pixels of the mask.
-    fn sizes(&self, config: &DetectorConfig) -> (usize, (usize, usize)) {
+    /// Width and height of the opening and of the closing, in pixels of the mask.
+    fn sizes(&self, config: &DetectorConfig) -> [(usize, usize); 2] {
         let reduced = |size: usize| (size + self.divisor / 2) / self.divisor;
         let height = self.frame.1 / self.divisor;
         let upright = ((height / AUTO_CLOSE.0).max(3), (height / AUTO_CLOSE.1).max(3));
-        (
-            config.open_size.map_or(0, reduced),
-            config.close_size.map(reduced).map_or(upright, |side| (side, side)),
-        )
+        let chosen = |size: Option<usize>, auto| size.map(reduced).map_or(auto, |side| (side, side));
+        [chosen(config.open_size, AUTO_OPEN), chosen(config.close_size, upright)]
     }
 
     fn grid(&self) -> Grid {

@@ -2,14 +2,20 @@
 
 use super::bits::Bits;
 
-/// Opening with a square of that many pixels a side, then closing with a rectangle of that width and height
+/// Opening, then closing, each with a rectangle of that width and height
 /// (thesis 3.3.1) of the binary `mask`, whose rows are `width` pixels; 0 and 1 leave it out. An even side counts as the next odd
 /// one: only those have a middle, without which the picture would move.
-pub fn clean(mask: &mut [u8], width: usize, open_size: usize, close_size: (usize, usize), bits: &mut Bits) {
+pub fn clean(
+    mask: &mut [u8],
+    width: usize,
+    open_size: (usize, usize),
+    close_size: (usize, usize),
+    bits: &mut Bits,
+) {
     // A rectangle as large as the picture does all that a larger one could, which would only cost memory.
     let largest = mask.len().checked_div(width).unwrap_or(0).max(width);
     let odd = |side: usize| side.clamp(1, largest.max(1)) | 1;
-    let (open, close) = ((odd(open_size), odd(open_size)), (odd(close_size.0), odd(close_size.1)));
+    let [open, close] = [open_size, close_size].map(|(width, height)| (odd(width), odd(height)));
     if (open, close) == ((1, 1), (1, 1)) {
         return;
     }
@@ -27,7 +33,7 @@ mod tests {
     fn cleaned(rows: &[&str], open_size: usize, close_size: (usize, usize)) -> Vec<String> {
         let bytes: Vec<u8> = rows.concat().bytes().map(|pixel| if pixel == b'#' { 255 } else { 0 }).collect();
         let mut mask = bytes;
-        clean(&mut mask, rows[0].len(), open_size, close_size, &mut Bits::default());
+        clean(&mut mask, rows[0].len(), (open_size, open_size), close_size, &mut Bits::default());
         let row = |row: &[u8]| row.iter().map(|pixel| if *pixel == 255 { '#' } else { '.' }).collect();
         mask.chunks_exact(rows[0].len()).map(row).collect()
     }

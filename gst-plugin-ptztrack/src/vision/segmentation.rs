@@ -30,13 +30,12 @@ pub struct Segmentation {
 }
 
 impl Segmentation {
-    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by closing, and by opening where that
-    /// is asked for (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it). Average and hysteresis leave few
-    /// specks; an opening takes narrow limbs with them.
+    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by opening and closing
+    /// (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
     pub fn segment(
         &mut self,
         likelihood: &Luma,
-        open_size: usize,
+        open_size: (usize, usize),
         close_size: (usize, usize),
         mask: &mut [u8],
     ) {
@@ -163,11 +162,11 @@ mod tests {
 
     /// Likelihoods of 20 with boxes of others; how many pixels are segmented.
     fn segmented(boxes: &[(Pixels, u8)]) -> i32 {
-        opened(boxes, 0)
+        opened(boxes, (1, 3))
     }
 
     /// The same with an opening of that size.
-    fn opened(boxes: &[(Pixels, u8)], open_size: usize) -> i32 {
+    fn opened(boxes: &[(Pixels, u8)], open_size: (usize, usize)) -> i32 {
         let mut likelihood = vec![20; SIZE.0 * SIZE.1];
         for ((x, y, width, height), value) in boxes {
             for row in likelihood.chunks_exact_mut(SIZE.0).skip(*y).take(*height) {
@@ -190,10 +189,12 @@ mod tests {
     }
 
     #[test]
-    fn opening_takes_narrow_limbs_and_is_left_out_unless_asked_for() {
-        let boxes = [((50, 40, 12, 30), 255), ((54, 70, 2, 20), 255)];
-        let (opened, whole) = (opened(&boxes, 5), opened(&boxes, 0));
-        assert!(whole >= opened + 30, "{whole} {opened}");
+    fn an_upright_opening_leaves_narrow_limbs_and_takes_what_is_low() {
+        let (body, limb, edge) = (((50, 20, 12, 30), 255), ((54, 50, 2, 20), 255), ((62, 40, 10, 2), 255));
+        let both = segmented(&[body, limb]);
+        assert!(both >= opened(&[body, limb], (5, 5)) + 30, "a limb");
+        assert!(segmented(&[body, limb, edge]) < both + 6, "an edge");
+        assert!(opened(&[body, limb, edge], (1, 1)) > both + 12, "an edge, without opening");
     }
 
     #[test]
