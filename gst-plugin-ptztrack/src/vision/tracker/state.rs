@@ -305,12 +305,12 @@ impl Tracker {
 
     /// Whether a target that was chosen because it moves stays where it is, while somebody else goes somewhere: at first anybody whom
     /// the policy would choose, and later who has gone as far as they are tall, where the target never has. What a screen shows goes
-    /// to and fro for ever and never farther than its edge. A target that is missed for a moment stays nowhere.
+    /// to and fro for ever and never farther than its edge. Who is missed for a moment is judged by their way so far.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
         let track = self.tracks.get(target.id);
-        let is_missed = track.is_none_or(|track| track.journey.unseen_s > MISSED_S);
-        if target.dwell.is_on_trial() && (is_missed || track.is_some_and(Track::goes_nowhere)) {
+        let seen = track.filter(|track| track.journey.unseen_s <= MISSED_S);
+        if target.dwell.is_on_trial() && seen.is_none_or(Track::goes_nowhere) {
             let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
             return chosen.is_some_and(|track| track.id != target.id);
         }
@@ -321,7 +321,7 @@ impl Tracker {
         };
         choice != Choice::Manual
             && target.dwell.is_of_motion()
-            && (is_missed || track.is_some_and(|track| !track.travels()))
+            && seen.is_none_or(|track| !track.travels())
             && self.policy.ready(&self.tracks, must_travel, frame).any(goes_farther)
     }
 }
