@@ -68,7 +68,7 @@
 //!
 //! ## Profiles
 //! `profile=thesis` takes the steps of the thesis alone; `robust` adds the motion of the background, the
-//! forward-backward test, new points for lost ones, and a correlation filter that knows the target's looks.
+//! forward-backward test, new points for lost ones, and the target's silhouette, colours and greys.
 //!
 //! ## Pipelines
 //!

@@ -15,8 +15,8 @@
 //! | Aharon et al., "BoT-SORT", 2022 | prediction by the camera's motion | `tracker/tracks/track` |
 //! | McKenna et al., "Tracking groups of people", CVIU 2000 | who merge keep their tracks; colours tell who is who after | `tracker/tracks/groups` |
 //! | Senior et al., "Appearance models for occlusion handling", IVC 2006 | the nearer feet are in front | `tracker/tracks/groups` |
-//! | Bolme et al., "Visual object tracking using adaptive correlation filters", CVPR 2010 | the target's looks | `tracker/correlation_filter` |
 //! | Bertinetto et al., "Staple", CVPR 2016 | colours of figure and ground | `tracker/colour` |
+//! | Lewis, "Fast normalized cross-correlation", Vision Interface 1995 | the target's greys | `tracker/figure/grey_template` |
 //!
 //! ## Equations of the thesis
 //!

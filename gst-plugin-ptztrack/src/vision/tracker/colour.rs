@@ -143,21 +143,14 @@ impl ColourModel {
         self.anyone.log_odds(&self.figure, colour, lower)
     }
 
-    /// Learns what is figure (upper and lower body) and ground now; what was not seen stays as it is.
-    pub fn learn(
-        &mut self,
-        figure: [Option<Histogram>; 2],
-        figure_rate: f32,
-        ground: Option<Histogram>,
-        ground_rate: f32,
-    ) {
-        for (old, new) in self.figure.iter_mut().zip(&figure) {
+    /// Learns what is figure (upper and lower body) and ground now, at that rate from 0 to 1; what was not seen stays as it is.
+    pub fn learn(&mut self, figure: [Option<Histogram>; 2], ground: Option<Histogram>, rate: f32) {
+        let [upper, lower] = &mut self.figure;
+        let known = [upper, lower, &mut self.ground.colours];
+        for (old, new) in known.into_iter().zip(figure.iter().chain([&ground])) {
             if let Some(new) = new {
-                old.blend(new, figure_rate);
+                old.blend(new, rate);
             }
-        }
-        if let Some(new) = ground {
-            self.ground.colours.blend(&new, ground_rate);
         }
         self.ground.odds.take();
         self.anyone.odds.take();
@@ -274,7 +267,7 @@ mod tests {
     fn a_grey_picture_leaves_the_tints_as_they_were() {
         let mut model = model();
         for _ in 0..30 {
-            model.learn([Some(of((90, None))), None], 0.2, Some(of((150, None))), 0.2);
+            model.learn([Some(of((90, None))), None], Some(of((150, None))), 0.2);
         }
         assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(WALL, 0.0) < -1.0);
         assert!(model.log_odds((90, None), 0.0) > 1.0, "brightness still counts");
@@ -284,7 +277,7 @@ mod tests {
     fn what_is_learned_takes_over_and_what_is_hidden_stays() {
         let mut model = model();
         for _ in 0..30 {
-            model.learn([Some(of(WALL)), None], 0.2, Some(of(RED)), 0.2);
+            model.learn([Some(of(WALL)), None], Some(of(RED)), 0.2);
         }
         assert!(model.log_odds(WALL, 0.0) > 1.0 && model.log_odds(RED, 0.0) < -1.0);
         assert!(model.log_odds(DARK, 1.0) > 1.0, "the lower half was not seen");

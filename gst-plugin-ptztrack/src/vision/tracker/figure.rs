@@ -3,13 +3,15 @@
 //! Figure and ground: which cells around the target are person, and which are wall.
 //!
 //! Motion against the background and colour each give the odds of every cell; the silhouette that the target had until
-//! now says where to expect it. The map that comes of it tells where corners are taken, what the correlation filter
-//! learns, where box and centre of mass lie, and whether the target is there at all.
+//! now says where to expect it. The map that comes of it tells where corners are taken, where box and centre of mass lie, and
+//! whether the target is there at all.
 
+mod grey_template;
 mod silhouette;
 
 use opencv::core::{Point2f, Rect2f};
 
+pub(super) use grey_template::GreyTemplate;
 pub(super) use silhouette::{Halves, Shape, Template};
 
 use super::colour::{Colour, ColourModel, Histogram};
@@ -161,7 +163,6 @@ impl Cells {
         evidence.grid = self.lattice.grid;
         evidence.odds.clear();
         evidence.odds.extend(odds);
-        evidence.motion.clone_from(&self.motion);
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -199,8 +200,6 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 pub(super) struct Evidence {
     grid: Grid,
     odds: Vec<f32>,
-    /// The same by motion alone; 0 where nothing is known of the background.
-    motion: Vec<f32>,
 }
 
 impl Evidence {
@@ -249,24 +248,6 @@ impl FigureMap {
         let (x, y) = (offset.x / area.width * columns as f32, offset.y / area.height * rows as f32);
         let inside = x >= 0.0 && y >= 0.0 && x < columns as f32 && y < rows as f32;
         if inside { self.probability[y as usize * columns + x as usize] } else { 0.0 }
-    }
-
-    /// Leaves the mean over blocks of `side` x `side` cells, row after row, in `means`.
-    pub fn reduce(&self, side: usize, means: &mut Vec<f32>) {
-        let whole = self.lattice.grid;
-        let (columns, rows) = (whole.columns / side, whole.rows / side);
-        let mean = |x: usize, y: usize| {
-            let rows = y * side..(y + 1) * side;
-            let sum: f32 = rows
-                .map(|row| {
-                    let start = row * whole.columns + x * side;
-                    self.probability[start..start + side].iter().sum::<f32>()
-                })
-                .sum();
-            sum / (side * side) as f32
-        };
-        means.clear();
-        means.extend((0..rows).flat_map(|y| (0..columns).map(move |x| (x, y))).map(|(x, y)| mean(x, y)));
     }
 
     /// The centre of mass (3.13 to 3.15) of the figure inside `bounds`; `None` where there is none.

@@ -11,7 +11,7 @@
 //! | corners on the figure, outliers rejected | 3.5.1 | `corners` |
 //! | Lucas-Kanade in a patch around it | 3.5.2 | `patch`, `flow` |
 //! | points that leave and join; those on the wall do not count | beyond | `points` |
-//! | what it looks like, the wall left out | beyond | `correlation_filter` |
+//! | where it is by its looks: silhouette, and greys by normalised cross-correlation | beyond | `target/appearance`, `figure/` |
 //! | centre of mass | 3.5.3 | `figure`; `grey_histogram` by mean-shift, as the thesis has it |
 //! | how long it is followed and stands | beyond | `dwell_time` |
 //!
@@ -21,7 +21,6 @@
 mod colour;
 mod config;
 mod corners;
-mod correlation_filter;
 mod dwell_time;
 mod ego_motion;
 mod figure;

@@ -15,14 +15,9 @@ pub(in super::super) struct Halves {
 }
 
 impl Halves {
-    /// Both together.
-    pub fn sum(self) -> f32 {
-        self.upper + self.lower
-    }
-
-    /// Their mean.
+    /// Mean of both.
     pub fn mean(self) -> f32 {
-        0.5 * self.sum()
+        0.5 * (self.upper + self.lower)
     }
 
     /// Each by itself with that of `other`.

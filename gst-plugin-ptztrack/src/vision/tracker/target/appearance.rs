@@ -1,27 +1,35 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What a target looks like: silhouette, colours of figure and ground, and the correlation filter; and where, by all of them, it is.
+//! What a target looks like: silhouette, colours of figure and ground, and greys; and where, by all of them, it is.
 
 use opencv::core::{Point2f, Rect2f};
 
-use super::usual::Usual;
 use crate::vision::Observation;
 use crate::vision::tracker::colour::ColourModel;
-use crate::vision::tracker::correlation_filter::{CorrelationFilter, Response, vertex};
-use crate::vision::tracker::figure::{Cells, Evidence, FigureMap, Grid, Halves, Looks, Shape, Template};
+use crate::vision::tracker::figure::{
+    CONTEXT, Cells, Evidence, FigureMap, GreyTemplate, Grid, Halves, Looks, Shape, Template,
+};
 
-/// Cells of the map of figure and ground in one of the filter's, across and down.
-const FINER: usize = 2;
-/// How far around its expected place the target is looked for in one picture, cells of the filter.
-const REACH: i32 = 4;
-/// More than a silhouette ever fits, which is 1 but for rounding.
-const BEST_FIT: f32 = 1.001;
+/// Cells of the grid around a target, more or less, whatever its size.
+const CELLS: f32 = 2048.0;
+/// How far around its expected place the target is looked for in one picture, and in which steps, cells.
+const REACH: i32 = 8;
+const STEP: usize = 2;
+/// What is taken for a usual fit and a usual correlation at least.
+const LEAST_FIT: f32 = 0.02;
+const LEAST_CORRELATION: f32 = 0.1;
+/// Share of a usual correlation that is left where there is none: even clothes correlate with nothing.
+const LEAST_LOOKS: f32 = 0.02;
+/// Correlation with anybody, as a share of the usual one.
+const ANYBODY: f32 = 0.35;
+/// What a usual correlation of 1 weighs beside the usual fit of the silhouette where it is asked whether the target is there; and what it
+/// counts where it is asked for the best place.
+const CORRELATION_WEIGHT: f32 = 0.1;
+const PLACE_WEIGHT: f32 = 0.5;
 /// How fast what the target looks like is learned, per second, and never more at once; how often, seconds.
 const LEARNING_PER_S: f32 = 0.8;
 const MAX_LEARNING: f32 = 0.15;
 const LEARNING_EVERY_S: f32 = 0.07;
-/// The ground beside the target changes as fast as the camera turns.
-const GROUND_LEARNING_PER_S: f32 = 4.0;
 /// Logarithm of the odds that what moves beside other people is the target, and the seconds in which their going adds 1 to it.
 const ALONE_BESIDE_OTHERS: f32 = 0.5;
 const OTHERS_TIME_S: f32 = 2.0;
@@ -30,29 +38,32 @@ const OTHERS_TIME_S: f32 = 2.0;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub bounds: Rect2f,
+    /// How well the silhouette fits there, and the greys correlate.
     fit: Halves,
-    response: Halves,
-    /// Share of what is usually seen of the target.
+    correlation: f32,
+    /// Both as a share of what is usual, from 0 to about 1.
     pub share: f32,
 }
 
 /// What a target looks like.
 pub(super) struct Appearance {
-    filter: CorrelationFilter,
     grid: Grid,
     shape: Shape,
     colours: Option<ColourModel>,
+    greys: GreyTemplate,
     /// Figure and ground in the last picture.
     map: FigureMap,
-    usual: Usual,
+    /// How well the silhouette usually fits, and the greys correlate: only beside that does what is seen now say whether the target is
+    /// there.
+    usual_fit: Halves,
+    usual_correlation: f32,
     /// Since somebody else was near.
     alone_s: f32,
     /// Since something was learned.
     learned_s: f32,
-    /// Where the cells of `memory`, and what the filter has a description of, lie, if that is in the picture that is looked at: the
-    /// target is mostly where it was expected, and nothing there is worked out twice.
+    /// Where the cells of `memory` lie, if that is in the picture that is looked at: the target is mostly where it was expected, and
+    /// nothing there is worked out twice.
     looked_at: Option<Rect2f>,
-    described: Option<Rect2f>,
     memory: Memory,
 }
 
@@ -62,16 +73,12 @@ struct Memory {
     cells: Cells,
     evidence: Evidence,
     template: Template,
-    response: Response,
-    /// The map of figure and ground in the filter's cells.
-    figure: Vec<f32>,
 }
 
 impl Appearance {
     /// Of a target in `bounds`.
-    pub fn new(seen: &Observation, bounds: Rect2f) -> opencv::Result<Self> {
-        let filter = CorrelationFilter::new(bounds)?;
-        let grid = Grid { columns: filter.grid().columns * FINER, rows: filter.grid().rows * FINER };
+    pub fn new(seen: &Observation, bounds: Rect2f) -> Self {
+        let grid = grid_for(bounds);
         let shape = Shape::upright(grid);
         let cells = Cells::observe(seen, bounds, grid);
         let map = FigureMap::new(&cells, &cells.evidence(None), &shape);
@@ -80,23 +87,23 @@ impl Appearance {
             colours = Some(ColourModel::new([upper, lower], ground));
         }
         let mut appearance = Self {
-            filter,
             grid,
             shape,
             colours,
             map,
-            usual: Usual::at_first(Halves::default()),
+            greys: GreyTemplate::default(),
+            usual_fit: Halves::default(),
+            usual_correlation: 1.0,
             alone_s: f32::INFINITY,
             learned_s: 0.0,
             looked_at: None,
-            described: None,
             memory: Memory::default(),
         };
         appearance.look_closely(seen, bounds);
         let fit = appearance.shape.template().fit(&appearance.memory.evidence, (0, 0));
-        appearance.usual = Usual::at_first(fit);
-        appearance.learn_filter(seen, bounds, 1.0)?;
-        Ok(appearance)
+        appearance.usual_fit = fit.with(fit, |fit, _| fit.max(LEAST_FIT));
+        appearance.greys.learn(&appearance.memory.cells, &appearance.map, 1.0);
+        appearance
     }
 
     /// Figure and ground as they were when it was last looked at closely.
@@ -106,9 +113,9 @@ impl Appearance {
 
     /// Goes on to the next picture, in which somebody else may be near: one who was seen beside the target may be behind it, or it
     /// behind them, a moment later.
-    pub fn watch_others(&mut self, near: bool, dt_s: f32) {
-        (self.looked_at, self.described) = (None, None);
-        self.alone_s = if near { 0.0 } else { self.alone_s + dt_s };
+    pub fn pass(&mut self, is_another_near: bool, dt_s: f32) {
+        self.looked_at = None;
+        self.alone_s = if is_another_near { 0.0 } else { self.alone_s + dt_s };
         self.learned_s += dt_s;
     }
 
@@ -131,89 +138,83 @@ impl Appearance {
     }
 
     /// The best place near `bounds`, expected in its middle with a deviation of `spread` times its sides.
-    pub fn locate(&mut self, seen: &Observation, bounds: Rect2f, spread: f32) -> opencv::Result<Place> {
+    pub fn locate(&mut self, seen: &Observation, bounds: Rect2f, spread: f32) -> Place {
         self.look_at(seen, bounds);
-        self.describe(seen, bounds)?;
-        self.filter.respond(&mut self.memory.response)?;
         self.shape.cut(&mut self.memory.template);
-        let Memory { cells, evidence, template, response, .. } = &self.memory;
-        let cell = cells.cell() * FINER as f32;
+        let Memory { cells, evidence, template } = &self.memory;
+        let cell = cells.cell();
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
-        let chance = |(x, y): (i32, i32)| {
+        let score = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            (-0.5 * (u * u + v * v)).exp()
+            let looks = PLACE_WEIGHT * self.greys.correlation(cells, (x, y)) / self.usual_correlation;
+            let silhouette = template.fit(evidence, (x, y)).mean();
+            (looks.max(0.0) + silhouette.max(0.0)) * (-0.5 * (u * u + v * v)).exp()
         };
-        let score =
-            |place| (self.looks(response, place) + silhouette(template, evidence, place)) * chance(place);
-        // Where even a silhouette that fits could not make up for the looks, it need not be held against what is seen.
-        let least = score((0, 0));
-        let is_possible =
-            |place: &(i32, i32)| (self.looks(response, *place) + BEST_FIT) * chance(*place) >= least;
-        let places = (-REACH..=REACH).flat_map(|y| (-REACH..=REACH).map(move |x| (x, y)));
-        let (mut best, mut height) = ((0, 0), f32::NEG_INFINITY);
-        for place in places.filter(is_possible) {
+        let steps = || (-REACH..=REACH).step_by(STEP);
+        let (mut best, mut height) = ((0, 0), score((0, 0)));
+        for place in steps().flat_map(|y| steps().map(move |x| (x, y))) {
             let value = score(place);
             if value > height {
                 (best, height) = (place, value);
             }
         }
-        let (x, y) = best;
+        let ((x, y), step) = (best, STEP as i32);
         let finer = Point2f::new(
-            vertex(score((x - 1, y)), height, score((x + 1, y))),
-            vertex(score((x, y - 1)), height, score((x, y + 1))),
-        );
+            vertex(score((x - step, y)), height, score((x + step, y))),
+            vertex(score((x, y - step)), height, score((x, y + step))),
+        ) * STEP as f32;
         let offset = Point2f::new((x as f32 + finer.x) * cell.x, (y as f32 + finer.y) * cell.y);
-        let moved = (x * FINER as i32, y * FINER as i32);
-        let fit = template.fit(evidence, moved);
-        let answer = response.at(best);
-        let share = self.usual.share(fit, answer);
-        Ok(Place { bounds: bounds + offset, fit, response: answer, share })
+        let fit = template.fit(evidence, best);
+        let correlation = self.greys.correlation(cells, best);
+        Place { bounds: bounds + offset, fit, correlation, share: self.share(fit, correlation) }
     }
 
-    /// What the filter says of a displacement in cells of it.
-    fn looks(&self, response: &Response, place: (i32, i32)) -> f32 {
-        (0.5 * response.at(place).sum() / self.usual.response()).max(0.0)
+    /// Share of what is usual. Both must speak for it: somebody else stands out as well, and the wall may look like anybody. The one that
+    /// usually says more counts for more.
+    fn share(&self, fit: Halves, correlation: f32) -> f32 {
+        // A table may hide one half: it is no evidence against the other.
+        let silhouette = fit.with(self.usual_fit, |fit, usual| (fit / usual).clamp(0.0, 1.2)).mean();
+        let looks =
+            ((correlation / self.usual_correlation - ANYBODY) / (1.0 - ANYBODY)).clamp(LEAST_LOOKS, 1.2);
+        let usual = self.usual_fit.mean();
+        let weight = usual / (usual + CORRELATION_WEIGHT * self.usual_correlation);
+        silhouette.powf(weight) * looks.powf(1.0 - weight)
     }
 
-    /// Has the filter describe what is in `bounds`.
-    fn describe(&mut self, seen: &Observation, bounds: Rect2f) -> opencv::Result<()> {
-        if self.described != Some(bounds) {
-            self.filter.describe(&seen.luma, bounds)?;
-            self.described = Some(bounds);
-        }
-        Ok(())
-    }
-
-    /// Learns looks, silhouette and colours as they are in `bounds`, which was looked at closely: `place` is what was seen there.
-    pub fn learn(&mut self, seen: &Observation, bounds: Rect2f, place: &Place) -> opencv::Result<()> {
+    /// Learns silhouette, colours and greys as they are in the box that was looked at closely: `place` is what was seen there.
+    pub fn learn(&mut self, place: &Place) {
         if self.learned_s < LEARNING_EVERY_S {
-            return Ok(());
+            return;
         }
         let rate = (LEARNING_PER_S * self.learned_s).min(MAX_LEARNING);
-        let ground_rate = (GROUND_LEARNING_PER_S * self.learned_s).min(0.5);
         self.learned_s = 0.0;
-        self.usual.learn(place.fit, place.response, rate);
+        let learned = |usual: f32, fit: f32| (usual + (fit - usual) * rate).max(LEAST_FIT);
+        self.usual_fit = self.usual_fit.with(place.fit, learned);
+        self.usual_correlation += (place.correlation - self.usual_correlation) * rate;
+        self.usual_correlation = self.usual_correlation.max(LEAST_CORRELATION);
         self.shape.learn(&self.map, rate);
+        self.greys.learn(&self.memory.cells, &self.map, rate);
         let (figure, ground) = self.memory.cells.histograms(&self.map);
         match (&mut self.colours, &figure, &ground) {
-            (Some(colours), ..) => colours.learn(figure, rate, ground, ground_rate),
+            (Some(colours), ..) => colours.learn(figure, ground, rate),
             (None, [Some(upper), Some(lower)], Some(ground)) => {
                 self.colours = Some(ColourModel::new([upper.clone(), lower.clone()], ground.clone()));
             }
             _ => (),
         }
-        self.learn_filter(seen, bounds, rate)
-    }
-
-    /// Has the filter learn the figure.
-    fn learn_filter(&mut self, seen: &Observation, bounds: Rect2f, rate: f32) -> opencv::Result<()> {
-        self.describe(seen, bounds)?;
-        self.map.reduce(FINER, &mut self.memory.figure);
-        self.filter.learn(&self.memory.figure, rate)
     }
 }
 
-/// What the silhouette says of a displacement in cells of the filter.
-fn silhouette(template: &Template, evidence: &Evidence, (x, y): (i32, i32)) -> f32 {
-    template.fit(evidence, (x * FINER as i32, y * FINER as i32)).mean().max(0.0)
+/// Columns and rows of cells around a target of that shape: whole steps, and the middle of the box between two of them.
+fn grid_for(bounds: Rect2f) -> Grid {
+    let aspect = (bounds.width * CONTEXT.0 / (bounds.height * CONTEXT.1).max(1.0)).clamp(0.2, 5.0);
+    let unit = 2 * STEP;
+    let whole = |cells: f32| unit * (cells / unit as f32).round() as usize;
+    Grid { columns: whole((CELLS * aspect).sqrt()), rows: whole((CELLS / aspect).sqrt()) }
+}
+
+/// Where the parabola through three neighbouring values peaks, -0.5 to 0.5 from the middle one.
+fn vertex(before: f32, middle: f32, after: f32) -> f32 {
+    let curvature = before - 2.0 * middle + after;
+    if curvature < -1e-6 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
 }

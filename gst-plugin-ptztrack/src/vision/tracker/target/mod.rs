@@ -6,7 +6,6 @@ mod appearance;
 mod point_flow;
 mod robust;
 mod thesis;
-mod usual;
 
 use opencv::core::{Point2f, Rect2f};
 

@@ -29,8 +29,8 @@ const CUT_SIZE: f32 = 0.6;
 const FIRST_EXISTENCE: f32 = 0.4;
 const MOST_EXISTENCE: f32 = 3.0;
 const SEEN_PER_S: f32 = 6.0;
-/// What it adds in a second that as much of it stands out from the background as usual.
-const STANDS_OUT_PER_S: f32 = 2.0;
+/// What it adds in a second that all of it stands out from the background.
+const STANDS_OUT_PER_S: f32 = 4.0;
 /// Deviation of where somebody is by their looks, in heights.
 const LOOKS_NOISE: f32 = 0.08;
 /// What is seen has another size than the track where their intersection over union is below this, and that is its size once it has been so
@@ -312,9 +312,9 @@ impl Track {
         self.down.measure_middle(middle.y, deviation);
     }
 
-    /// No region shows it alone, but where its looks say that it is so much stands out, as a share of what usually does, for `dt_s`.
+    /// No region shows it alone, but where its looks say that it is so much stands out, 0 to 1, for `dt_s`.
     pub fn stand_out(&mut self, share: f32, dt_s: f32) {
-        let evidence = STANDS_OUT_PER_S * share.min(1.0);
+        let evidence = STANDS_OUT_PER_S * share;
         self.existence = (self.existence + evidence * dt_s).min(MOST_EXISTENCE);
     }
 
