@@ -5,58 +5,79 @@
 
 use super::{Cells, FigureMap};
 
-/// Variance of greys below which there is nothing to correlate with.
+/// Variance of greys below which there is nothing to correlate.
 const FLAT: f32 = 4.0;
+/// How likely a cell must be figure to count.
+const FIGURE: f32 = 0.5;
+
+/// A cell that is figure.
+#[derive(Debug, Clone, Copy)]
+struct Cell {
+    index: usize,
+    /// Those of all cells sum to 1.
+    weight: f32,
+    /// Less the mean of all.
+    grey: f32,
+}
 
 /// Greys of the cells around a target.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct GreyTemplate {
     columns: usize,
     greys: Vec<f32>,
-    /// Of the cells that are figure: index, weight, and grey less the mean of all; the weights sum to 1.
-    figure: Vec<(usize, f32, f32)>,
-    /// Weighted variance of the greys.
+    figure: Vec<Cell>,
+    /// Weighted variance of the figure's greys.
     variance: f32,
 }
 
 impl GreyTemplate {
     /// Learns the greys of `cells`, of which `map` says what is figure, at that rate from 0 to 1.
     pub fn learn(&mut self, cells: &Cells, map: &FigureMap, rate: f32) {
-        let grid = cells.lattice.grid;
         let greys = cells.colours.iter().map(|(grey, _)| f32::from(*grey));
         if self.greys.len() == cells.colours.len() {
             self.greys.iter_mut().zip(greys).for_each(|(old, new)| *old += (new - *old) * rate);
         } else {
             self.greys = greys.collect();
         }
-        self.columns = grid.columns;
-        let figure = || map.probability.iter().enumerate().filter(|(_, share)| **share >= 0.5);
+        self.columns = cells.lattice.grid.columns;
+        let figure = || map.probability.iter().enumerate().filter(|(_, share)| **share >= FIGURE);
         let total = figure().map(|(_, share)| share).sum::<f32>().max(f32::EPSILON);
         let mean = figure().map(|(index, share)| share / total * self.greys[index]).sum::<f32>();
+        let cell = |(index, share): (usize, &f32)| Cell {
+            index,
+            weight: share / total,
+            grey: self.greys[index] - mean,
+        };
         self.figure.clear();
-        self.figure.extend(figure().map(|(index, share)| (index, share / total, self.greys[index] - mean)));
-        self.variance = self.figure.iter().map(|(_, weight, grey)| weight * grey * grey).sum();
+        self.figure.extend(figure().map(cell));
+        self.variance = self.figure.iter().map(|cell| cell.weight * cell.grey * cell.grey).sum();
     }
 
-    /// How well the greys of `cells`, from cells so many columns right and rows down on, correlate with the figure's: -1 to 1; 0 where there
-    /// is nothing to correlate.
-    pub fn correlation(&self, cells: &Cells, (right, down): (i32, i32)) -> f32 {
+    /// How well the greys of `cells`, from cells so many columns right and rows down on, correlate with the figure's: -1 to 1, and the nearer
+    /// to 0 the less of it lies in the picture. `None` where there is nothing to correlate.
+    pub fn correlation(&self, cells: &Cells, (right, down): (i32, i32)) -> Option<f32> {
         let columns = self.columns as i32;
-        let (mut sum, mut squares, mut product) = (0.0, 0.0, 0.0);
-        for (index, weight, grey) in &self.figure {
-            let column = *index as i32 % columns + right;
-            let moved = *index as i32 + down * columns + right;
-            let inside = (0..columns).contains(&column);
-            let seen =
-                usize::try_from(moved).ok().filter(|_| inside).and_then(|moved| cells.colours.get(moved));
-            let Some((seen, _)) = seen else { continue };
+        let (mut covered, mut own, mut sum, mut squares, mut product) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for Cell { index, weight, grey } in &self.figure {
+            let in_row = (0..columns).contains(&(*index as i32 % columns + right));
+            let moved = usize::try_from(*index as i32 + down * columns + right);
+            let Some(moved) = moved.ok().filter(|_| in_row) else { continue };
+            let (Some((seen, _)), Some(true)) = (cells.colours.get(moved), cells.inside.get(moved)) else {
+                continue;
+            };
             let seen = f32::from(*seen);
+            covered += weight;
+            own += weight * grey;
             sum += weight * seen;
             squares += weight * seen * seen;
             product += weight * grey * seen;
         }
-        let variance = squares - sum * sum;
-        if variance.min(self.variance) < FLAT { 0.0 } else { product / (variance * self.variance).sqrt() }
+        if covered <= f32::EPSILON {
+            return None;
+        }
+        let variance = squares - sum * sum / covered;
+        (variance.min(self.variance) >= FLAT)
+            .then(|| (product - own * sum / covered) / (variance * self.variance).sqrt())
     }
 }
 
@@ -99,19 +120,49 @@ mod tests {
         let template = learned(&cells(textured));
         let darker = cells(|x, y| textured(x - 3, y + 2) / 2 + 20);
         let best = (-8..=8).flat_map(|y| (-8..=8).map(move |x| (x, y))).max_by(|a, b| {
-            let correlation = |place| template.correlation(&darker, place);
+            let correlation = |place| template.correlation(&darker, place).expect("textured");
             correlation(*a).total_cmp(&correlation(*b))
         });
         assert_eq!(best, Some((3, -2)));
-        assert!(template.correlation(&darker, (3, -2)) > 0.98);
-        assert!(template.correlation(&darker, (0, 0)).abs() < 0.3);
+        assert!(template.correlation(&darker, (3, -2)).is_some_and(|correlation| correlation > 0.98));
+        assert!(template.correlation(&darker, (0, 0)).is_some_and(|correlation| correlation.abs() < 0.3));
     }
 
     #[test]
     fn what_is_even_correlates_with_nothing() {
         let even = cells(|_, _| 90);
-        assert_eq!(learned(&even).correlation(&cells(textured), (0, 0)), 0.0);
-        assert_eq!(learned(&cells(textured)).correlation(&even, (0, 0)), 0.0);
-        assert_eq!(GreyTemplate::default().correlation(&even, (0, 0)), 0.0);
+        assert_eq!(learned(&even).correlation(&cells(textured), (0, 0)), None);
+        assert_eq!(learned(&cells(textured)).correlation(&even, (0, 0)), None);
+        assert_eq!(GreyTemplate::default().correlation(&even, (0, 0)), None);
+    }
+
+    /// Dark trousers and a bright coat before an even wall, of which no more is seen: what is not seen says nothing.
+    #[test]
+    fn what_lies_beyond_the_picture_says_nothing() {
+        let template = learned(&cells(|x, y| if y < 28 { 200 } else { textured(x, y) / 8 }));
+        let noise = |x, y| 90 + textured(x, y) / 32;
+        let mut edge = cells(noise);
+        for (index, inside) in edge.inside.iter_mut().enumerate() {
+            *inside = index / GRID.columns < 30;
+        }
+        for place in [(0, 0), (0, 8), (20, 0), (-20, 26)] {
+            let correlation = template.correlation(&edge, place).unwrap_or_default();
+            assert!(correlation.abs() < 0.3, "{place:?}: {correlation}");
+        }
+        assert_eq!(template.correlation(&edge, (0, 100)), None);
+    }
+
+    #[test]
+    fn what_is_learned_slowly_takes_over() {
+        let mut template = learned(&cells(textured));
+        let other = |x, y| textured(y, x + 50);
+        let (before, after) = (cells(textured), cells(other));
+        let map = FigureMap::new(&after, &after.evidence(None), &Shape::upright(GRID));
+        template.learn(&after, &map, 0.1);
+        let correlation =
+            |template: &GreyTemplate, cells| template.correlation(cells, (0, 0)).expect("textured");
+        assert!(correlation(&template, &before) > 0.95);
+        (0..40).for_each(|_| template.learn(&after, &map, 0.1));
+        assert!(correlation(&template, &after) > 0.95 && correlation(&template, &before) < 0.3);
     }
 }

@@ -631,3 +631,17 @@ fn who_was_clicked_beside_their_middle_is_one_person() {
     }
     assert_eq!(last.state, TargetState::Tracking);
 }
+
+/// A detector that knows nothing of the background took something for somebody: it looks the same for ever, and nothing else speaks for it.
+#[test]
+fn looks_alone_keep_nobody_where_the_background_is_not_known() {
+    let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
+    let mut tracker = Tracker::new(config());
+    let mut process = |detections: &[Detection]| {
+        let seen = Observation { luma: picture.luma(), scene: None };
+        tracker.process(&seen, DT, detections).expect("track")
+    };
+    assert_eq!(process(&[detected(200.0, PERSON.0)]).changes, [TargetChange::Acquired]);
+    let lost = (0..200).find(|_| process(&[]).changes.contains(&TargetChange::Lost));
+    assert!(lost.is_some_and(|pictures| pictures > 20), "{lost:?}");
+}

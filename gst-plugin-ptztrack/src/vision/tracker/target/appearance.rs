@@ -18,12 +18,9 @@ const STEP: usize = 2;
 /// What is taken for a usual fit and a usual correlation at least.
 const LEAST_FIT: f32 = 0.02;
 const LEAST_CORRELATION: f32 = 0.1;
-/// Share of a usual correlation that is left where there is none: even clothes correlate with nothing.
-const LEAST_LOOKS: f32 = 0.02;
 /// Correlation with anybody, as a share of the usual one.
 const ANYBODY: f32 = 0.35;
-/// What a usual correlation of 1 weighs beside the usual fit of the silhouette where it is asked whether the target is there; and what it
-/// counts where it is asked for the best place.
+/// What a correlation of 1 weighs beside the fit of the silhouette where it is asked whether the target is there, and where it is.
 const CORRELATION_WEIGHT: f32 = 0.1;
 const PLACE_WEIGHT: f32 = 0.5;
 /// How fast what the target looks like is learned, per second, and never more at once; how often, seconds.
@@ -40,7 +37,7 @@ pub(super) struct Place {
     pub bounds: Rect2f,
     /// How well the silhouette fits there, and the greys correlate.
     fit: Halves,
-    correlation: f32,
+    correlation: Option<f32>,
     /// Both as a share of what is usual, from 0 to about 1.
     pub share: f32,
 }
@@ -146,7 +143,7 @@ impl Appearance {
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
         let score = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            let looks = PLACE_WEIGHT * self.greys.correlation(cells, (x, y)) / self.usual_correlation;
+            let looks = PLACE_WEIGHT * self.greys.correlation(cells, (x, y)).unwrap_or_default();
             let silhouette = template.fit(evidence, (x, y)).mean();
             (looks.max(0.0) + silhouette.max(0.0)) * (-0.5 * (u * u + v * v)).exp()
         };
@@ -170,12 +167,12 @@ impl Appearance {
     }
 
     /// Share of what is usual. Both must speak for it: somebody else stands out as well, and the wall may look like anybody. The one that
-    /// usually says more counts for more.
-    fn share(&self, fit: Halves, correlation: f32) -> f32 {
-        // A table may hide one half: it is no evidence against the other.
+    /// usually says more counts for more; where there is nothing to correlate, the silhouette alone.
+    fn share(&self, fit: Halves, correlation: Option<f32>) -> f32 {
+        // What hides one half takes nothing from the other.
         let silhouette = fit.with(self.usual_fit, |fit, usual| (fit / usual).clamp(0.0, 1.2)).mean();
-        let looks =
-            ((correlation / self.usual_correlation - ANYBODY) / (1.0 - ANYBODY)).clamp(LEAST_LOOKS, 1.2);
+        let Some(correlation) = correlation else { return silhouette };
+        let looks = ((correlation / self.usual_correlation - ANYBODY) / (1.0 - ANYBODY)).clamp(0.0, 1.2);
         let usual = self.usual_fit.mean();
         let weight = usual / (usual + CORRELATION_WEIGHT * self.usual_correlation);
         silhouette.powf(weight) * looks.powf(1.0 - weight)
@@ -188,10 +185,11 @@ impl Appearance {
         }
         let rate = (LEARNING_PER_S * self.learned_s).min(MAX_LEARNING);
         self.learned_s = 0.0;
-        let learned = |usual: f32, fit: f32| (usual + (fit - usual) * rate).max(LEAST_FIT);
-        self.usual_fit = self.usual_fit.with(place.fit, learned);
-        self.usual_correlation += (place.correlation - self.usual_correlation) * rate;
-        self.usual_correlation = self.usual_correlation.max(LEAST_CORRELATION);
+        let learned = |least: f32| move |usual: f32, seen: f32| (usual + (seen - usual) * rate).max(least);
+        self.usual_fit = self.usual_fit.with(place.fit, learned(LEAST_FIT));
+        if let Some(correlation) = place.correlation {
+            self.usual_correlation = learned(LEAST_CORRELATION)(self.usual_correlation, correlation);
+        }
         self.shape.learn(&self.map, rate);
         self.greys.learn(&self.memory.cells, &self.map, rate);
         let (figure, ground) = self.memory.cells.histograms(&self.map);
@@ -205,7 +203,7 @@ impl Appearance {
     }
 }
 
-/// Columns and rows of cells around a target of that shape: whole steps, and the middle of the box between two of them.
+/// Columns and rows of cells around a target of that shape: multiples of two steps.
 fn grid_for(bounds: Rect2f) -> Grid {
     let aspect = (bounds.width * CONTEXT.0 / (bounds.height * CONTEXT.1).max(1.0)).clamp(0.2, 5.0);
     let unit = 2 * STEP;
@@ -217,4 +215,72 @@ fn grid_for(bounds: Rect2f) -> Grid {
 fn vertex(before: f32, middle: f32, after: f32) -> f32 {
     let curvature = before - 2.0 * middle + after;
     if curvature < -1e-6 { (0.5 * (before - after) / curvature).clamp(-0.5, 0.5) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::tracker::geometry::{centre, length};
+    use crate::vision::tracker::synthetic::{Picture, Scene};
+    use proptest::prelude::*;
+
+    const PERSON: Rect2f = Rect2f { x: 140.0, y: 80.0, width: 40.0, height: 90.0 };
+    /// Below this share it is somebody else, or nobody.
+    const FOUND: f32 = 0.55;
+
+    /// A street with somebody of that texture so far from where they were.
+    fn street(moved: Point2f, texture: Option<u32>) -> Picture {
+        let mut picture = Scene::new(320, 240).background((0.0, 0.0));
+        if let Some(texture) = texture {
+            picture.paint(PERSON + moved, texture);
+        }
+        picture
+    }
+
+    /// Of a picture of which nobody knows the background.
+    fn observed(picture: &Picture) -> Observation<'_> {
+        Observation { luma: picture.luma(), scene: None }
+    }
+
+    fn share(picture: &Picture) -> f32 {
+        let mut appearance = Appearance::new(&observed(&street(Point2f::default(), Some(7))), PERSON);
+        appearance.pass(false, 0.04);
+        appearance.locate(&observed(picture), PERSON, 0.3).share
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn it_is_found_nearby(x in -14.0_f32..14.0, y in -14.0_f32..14.0) {
+            let mut appearance = Appearance::new(&observed(&street(Point2f::default(), Some(7))), PERSON);
+            appearance.pass(false, 0.04);
+            let moved = Point2f::new(x.round(), y.round());
+            let place = appearance.locate(&observed(&street(moved, Some(7))), PERSON, 0.6);
+            let off = length(centre(place.bounds) - centre(PERSON + moved));
+            prop_assert!(off < 4.0 && place.share >= FOUND, "{off} pixels off, {}", place.share);
+        }
+
+        #[test]
+        fn any_box_is_survived(
+            x in -200.0_f32..600.0, y in -200.0_f32..600.0, width in 1.0_f32..900.0, height in 1.0_f32..900.0,
+        ) {
+            let (bounds, picture) = (Rect2f::new(x, y, width, height), street(Point2f::default(), Some(7)));
+            let mut appearance = Appearance::new(&observed(&picture), bounds);
+            appearance.pass(true, 0.2);
+            let place = appearance.locate(&observed(&picture), bounds, 0.3);
+            appearance.look_closely(&observed(&picture), bounds);
+            appearance.learn(&place);
+            prop_assert!(place.share.is_finite() && place.bounds.x.is_finite() && place.bounds.y.is_finite());
+        }
+    }
+
+    #[test]
+    fn the_same_is_there_and_the_wall_and_others_are_not() {
+        let same = share(&street(Point2f::default(), Some(7)));
+        assert!(same > 0.9, "{same}");
+        for other in [None, Some(99), Some(4321)] {
+            let share = share(&street(Point2f::default(), other));
+            assert!(share < FOUND, "{other:?}: {share}");
+        }
+    }
 }

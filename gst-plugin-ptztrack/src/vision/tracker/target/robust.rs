@@ -19,11 +19,11 @@ use crate::vision::tracker::tracks::{Track, Tracks};
 /// Deviation of the target's looks from where it is expected, in sides of it, beside the track's own doubt.
 const SPREAD: f32 = 0.3;
 /// Share of what its looks usually say from which the target is there by its looks, and what must stand out from the background there,
-/// 0 to 1, to bear that out: of a wall it is a fiftieth, of somebody in clothes like the wall a fifth. What is taken for it where the
-/// background is not known.
+/// 0 to 1, to bear that out: of a wall it is a fiftieth, of somebody in clothes like the wall a fifth.
 const FOUND: f32 = 0.55;
 const FAINT: f32 = 0.1;
-const NOT_KNOWN: f32 = 0.5;
+/// What is taken to stand out where the background is not known: so little that nobody is kept for ever by their looks.
+const NOT_KNOWN: f32 = 0.2;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.15;
 /// For how long nothing may be seen of a target that is not hidden, seconds.
@@ -95,7 +95,9 @@ impl Follow for Robust {
         let Some(track) = tracks.get_mut(id) else { return Ok(Sight::Gone) };
         if is_there && !is_alone {
             track.measure_place(centre(place.bounds), place.share);
-            track.stand_out(stands_out, dt_s);
+            if stands_out >= FAINT {
+                track.stand_out(stands_out, dt_s);
+            }
         }
         self.unseen_s = if is_measured || is_there { 0.0 } else { self.unseen_s + dt_s };
         let is_hidden = self.unseen_s > DOUBT_S;
