@@ -219,14 +219,13 @@ fn vertex(before: f32, middle: f32, after: f32) -> f32 {
 
 #[cfg(test)]
 mod tests {
+    use super::super::robust::FOUND;
     use super::*;
     use crate::vision::tracker::geometry::{centre, length};
     use crate::vision::tracker::synthetic::{Picture, Scene};
     use proptest::prelude::*;
 
     const PERSON: Rect2f = Rect2f { x: 140.0, y: 80.0, width: 40.0, height: 90.0 };
-    /// Below this share it is somebody else, or nobody.
-    const FOUND: f32 = 0.55;
 
     /// A street with somebody of that texture so far from where they were.
     fn street(moved: Point2f, texture: Option<u32>) -> Picture {

@@ -20,7 +20,7 @@ use crate::vision::tracker::tracks::{Track, Tracks};
 const SPREAD: f32 = 0.3;
 /// Share of what its looks usually say from which the target is there by its looks, and what must stand out from the background there,
 /// 0 to 1, to bear that out: of a wall it is a fiftieth, of somebody in clothes like the wall a fifth.
-const FOUND: f32 = 0.55;
+pub(super) const FOUND: f32 = 0.55;
 const FAINT: f32 = 0.1;
 /// What is taken to stand out where the background is not known: so little that nobody is kept for ever by their looks.
 const NOT_KNOWN: f32 = 0.2;
