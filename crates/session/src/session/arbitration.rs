@@ -149,11 +149,6 @@ impl Arbitration {
         self.watch.suspects()
     }
 
-    /// Whether a camera just met is still watched for somebody else's move.
-    pub fn looks(&self, now: Time) -> bool {
-        self.found.as_ref().is_some_and(|found| now <= found.at + Self::FIRST_LOOK)
-    }
-
     /// Who else moves the camera, if anybody.
     pub fn owner(&self, now: Time) -> Option<ControlOwner> {
         if self.queue.is_held() {
@@ -243,10 +238,8 @@ mod tests {
     fn a_camera_found_moving_is_an_orphan_once() {
         let mut arbitration = Arbitration::new(true);
         assert_eq!(tell(&mut arbitration, 0.0, s(1)), Finding::Nothing);
-        assert!(arbitration.looks(s(1)));
         assert_eq!(tell(&mut arbitration, 0.5, s(2)), Finding::Orphan);
         assert_eq!(tell(&mut arbitration, 1.0, s(3)), Finding::Nothing);
-        assert!(!arbitration.looks(s(3)));
         let mut arbitration = Arbitration::new(true);
         tell(&mut arbitration, 0.0, s(1));
         let zoomed = (PanTilt::default(), Some(0.01));

@@ -16,15 +16,15 @@ use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent
 impl Session {
     /// A position is asked for this often while the zoom moves, by which the picture changes most, ...
     const POLL_ZOOMING: Duration = Duration::from_millis(400);
-    /// ... while the camera only turns, and ...
-    const POLL_MOVING: Duration = Duration::from_secs(1);
-    /// ... while it rests, so that an operator's zoom or a lost connection is noticed.
-    const POLL_RESTING: Duration = Duration::from_secs(5);
+    /// ... and else, at rest as well: whoever moves it while nothing of ours does is told from us by nothing but that.
+    const POLL: Duration = Duration::from_secs(1);
     /// While it may go on at an operator's word or at ours: in this time his shows if it is of 3 degrees per second.
     const POLL_CONTESTED: Duration = Duration::from_millis(500);
     /// While it goes to a position.
     const POLL_UNDER_WAY: Duration = Duration::from_millis(150);
-    /// A camera that does not tell its position is asked again this much later.
+    /// A camera that does not answer which presets it has is asked again this much later, ...
+    const PRESETS_LATER: Duration = Duration::from_secs(5);
+    /// ... and one that does not tell its position.
     const POLL_REFUSED: Duration = Duration::from_secs(30);
 
     /// The camera answered what was sent then, or did not. Returns what that says of it, in order.
@@ -146,7 +146,7 @@ impl Session {
             self.arbitration.excuse(now);
             self.next_poll = now + Self::POLL_UNDER_WAY;
         } else if command.is_stop() || !was_moving {
-            self.next_poll = now + Self::POLL_MOVING;
+            self.next_poll = now + Self::POLL;
         }
         if !steering.leads_home && !command.is_stop() {
             let mode = self.mode(now);
@@ -275,7 +275,7 @@ impl Session {
         self.next_poll = now;
         match query {
             Query::Queue(_) => self.arbitration.queue.failed(now),
-            Query::Presets => return vec![Fact::PresetsNotBefore(now + Self::POLL_RESTING)],
+            Query::Presets => return vec![Fact::PresetsNotBefore(now + Self::PRESETS_LATER)],
             _ => {
                 if self.discovery.unanswered(query, !self.connection.faulty(), now) {
                     self.discovered(now);
@@ -369,9 +369,7 @@ impl Session {
                 (false, true) if self.scheduler.is_contested() => Self::POLL_CONTESTED,
                 (false, _) if self.arbitration.asks() => Duration::ZERO,
                 (false, true) if steering.is_zooming => Self::POLL_ZOOMING,
-                (false, true) => Self::POLL_MOVING,
-                (false, false) if self.is_wanted(steering, now) => Self::POLL_MOVING,
-                (false, false) => Self::POLL_RESTING,
+                (false, _) => Self::POLL,
             };
     }
 
@@ -385,11 +383,6 @@ impl Session {
             self.discovery.renew();
         }
         self.events.push(SessionEvent::Connection(change));
-    }
-
-    /// A camera that somebody may be about to move, or that may be, is asked more often.
-    fn is_wanted(&self, steering: &Steering, now: Time) -> bool {
-        steering.holds_target || self.arbitration.owner(now).is_some() || self.arbitration.looks(now)
     }
 
     fn failed(&mut self, err: &Error, of_command: bool, now: Time) {
