@@ -16,8 +16,10 @@ use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent
 impl Session {
     /// A position is asked for this often while the zoom moves, by which the picture changes most, ...
     const POLL_ZOOMING: Duration = Duration::from_millis(400);
-    /// ... and else, at rest as well: whoever moves it while nothing of ours does is told from us by nothing but that.
+    /// ... and otherwise, at rest too: a move made while none of ours is under way can be told from ours only by being seen before our next.
     const POLL: Duration = Duration::from_secs(1);
+    /// At rest no more often than once in so many times that it takes to answer: the first command must not wait for that.
+    const ANSWERS: u32 = 4;
     /// While it may go on at an operator's word or at ours: in this time his shows if it is of 3 degrees per second.
     const POLL_CONTESTED: Duration = Duration::from_millis(500);
     /// While it goes to a position.
@@ -369,7 +371,8 @@ impl Session {
                 (false, true) if self.scheduler.is_contested() => Self::POLL_CONTESTED,
                 (false, _) if self.arbitration.asks() => Duration::ZERO,
                 (false, true) if steering.is_zooming => Self::POLL_ZOOMING,
-                (false, _) => Self::POLL,
+                (false, true) => Self::POLL,
+                (false, false) => Self::POLL.max(Self::ANSWERS * self.scheduler.round_trip()),
             };
     }
 

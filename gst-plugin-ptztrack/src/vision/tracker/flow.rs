@@ -8,11 +8,18 @@ use opencv::video;
 use super::geometry::length;
 use super::patch::Patch;
 
-/// Iterations and precision of one level of the pyramid: the residual is settled long before.
-const ITERATIONS: i32 = 20;
-const PRECISION: f64 = 0.03;
 /// Smaller eigenvalue of the gradient matrix, per pixel, below which equation 3.11 is not worth solving.
 const MIN_EIGENVALUE: f64 = 1e-4;
+
+/// When a search for a point ends.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Criteria {
+    /// Levels of the pyramid above the full one that are gone through, at most.
+    pub levels: i32,
+    /// Iterations on each, at most, and the step, pixels of that level, after which there are no more.
+    pub iterations: i32,
+    pub precision: f64,
+}
 
 /// How points are followed and when they count as lost.
 #[derive(Debug, Clone, Copy)]
@@ -23,6 +30,7 @@ pub(super) struct Flow {
     pub grown_window: i32,
     /// Mean absolute difference of the two windows, grey levels, above which a point is lost.
     pub max_residual: f32,
+    pub criteria: Criteria,
     /// Patch pixels that a point may be off after being followed forth and back; `None`: not tested.
     pub max_return_error: Option<f32>,
 }
@@ -78,7 +86,7 @@ impl Flow {
         window: i32,
     ) -> opencv::Result<()> {
         let Followed { starts, guesses, found, ends, returns } = points;
-        lucas_kanade(previous, next, starts, guesses, window, ends)?;
+        lucas_kanade((previous, next), (starts, guesses), window, self.criteria, ends)?;
         found.clear();
         found.extend(
             ends.iter().map(|end| {
@@ -87,9 +95,11 @@ impl Flow {
         );
         let Some(max_error) = self.max_return_error else { return Ok(()) };
         let limit = max_error * previous.step() as f32;
+        // Whether it stays where it came from is asked of the finest level, which is what decides.
         returns.clear();
         returns.extend(found.iter().zip(&*guesses).map(|(end, guess)| end.unwrap_or(*guess)));
-        lucas_kanade(next, previous, returns, starts, window, ends)?;
+        let criteria = Criteria { levels: 0, ..self.criteria };
+        lucas_kanade((next, previous), (returns, starts), window, criteria, ends)?;
         for ((place, returned), start) in found.iter_mut().zip(&*ends).zip(&*starts) {
             if returned.as_ref().is_none_or(|returned| length(returned.position - *start) > limit) {
                 *place = None;
@@ -105,13 +115,13 @@ struct End {
     residual: f32,
 }
 
-/// Leaves in `out` where `points` of one patch are in another, `None` for one that is not there.
+/// Leaves in `out` where points of one patch are in another, looked for from a guess of each with windows of that side; `None` for one that
+/// is not there.
 fn lucas_kanade(
-    from: &Patch,
-    to: &Patch,
-    points: &[Point2f],
-    guesses: &[Point2f],
+    (from, to): (&Patch, &Patch),
+    (points, guesses): (&[Point2f], &[Point2f]),
     window: i32,
+    criteria: Criteria,
     out: &mut Vec<Option<End>>,
 ) -> opencv::Result<()> {
     out.clear();
@@ -130,11 +140,11 @@ fn lucas_kanade(
         &mut status,
         &mut residuals,
         Size::new(window, window),
-        from.levels().min(to.levels()),
+        criteria.levels.min(from.levels()).min(to.levels()),
         TermCriteria {
             typ: TermCriteria_COUNT | TermCriteria_EPS,
-            max_count: ITERATIONS,
-            epsilon: PRECISION,
+            max_count: criteria.iterations,
+            epsilon: criteria.precision,
         },
         video::OPTFLOW_USE_INITIAL_FLOW,
         MIN_EIGENVALUE,
@@ -156,7 +166,14 @@ mod tests {
     use opencv::core::Rect2f;
     use proptest::prelude::*;
 
-    const FLOW: Flow = Flow { window: 15, grown_window: 31, max_residual: 20.0, max_return_error: Some(0.5) };
+    const CRITERIA: Criteria = Criteria { levels: 2, iterations: 10, precision: 0.1 };
+    const FLOW: Flow = Flow {
+        window: 15,
+        grown_window: 31,
+        criteria: CRITERIA,
+        max_residual: 20.0,
+        max_return_error: Some(0.5),
+    };
 
     fn lattice() -> Vec<Point2f> {
         (0..16).map(|n| Point2f::new(100.0 + 12.0 * (n % 4) as f32, 90.0 + 12.0 * (n / 4) as f32)).collect()

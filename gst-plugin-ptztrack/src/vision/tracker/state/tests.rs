@@ -645,3 +645,49 @@ fn looks_alone_keep_nobody_where_the_background_is_not_known() {
     let lost = (0..200).find(|_| process(&[]).changes.contains(&TargetChange::Lost));
     assert!(lost.is_some_and(|pictures| pictures > 20), "{lost:?}");
 }
+
+/// People of those places before an even wall.
+fn before_a_wall(people: &[f32]) -> Picture {
+    let mut picture = Scene::new(SIZE.0, SIZE.1).flat(240);
+    for x in people {
+        picture.paint(Rect2f::new(*x, 100.0, PERSON.0, PERSON.1), 7);
+    }
+    picture
+}
+
+/// Somebody who has come there before a wall that is known, beside these.
+fn come_to(x: f32, others: &[f32]) -> Chain {
+    let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    for _ in 0..20 {
+        step(&mut chain, &before_a_wall(others));
+    }
+    let mut last = Tracked::default();
+    for n in 0..40 {
+        let x = (30.0 + 10.0 * n as f32).min(x);
+        let people = [others, &[x]].concat();
+        last = chain.process(&before_a_wall(&people), DT, &[detected(x, PERSON.0)]);
+    }
+    assert_eq!(last.state, TargetState::Tracking);
+    chain
+}
+
+/// Somebody stands before a statue that looks as they do, and is gone: it does not stand out, as they did.
+#[test]
+fn what_looks_like_somebody_and_does_not_stand_out_is_the_wall() {
+    const STATUE_X: f32 = 330.0;
+    let mut chain = come_to(STATUE_X - 12.0, &[STATUE_X]);
+    let changes: Vec<_> =
+        (0..40).flat_map(|_| step(&mut chain, &before_a_wall(&[STATUE_X])).changes).collect();
+    assert_eq!(changes, [TargetChange::Occluded, TargetChange::Lost]);
+}
+
+/// Of a background that is not known, nobody can say what stands out.
+#[test]
+fn whoever_stands_where_the_background_was_forgotten_is_kept() {
+    let mut chain = come_to(200.0, &[]);
+    let picture = before_a_wall(&[200.0]);
+    for _ in 0..12 {
+        let seen = Observation { luma: picture.luma(), scene: None };
+        assert_near(&chain.tracker.process(&seen, DT, &[]).expect("track"), 200.0, 100.0, 8.0);
+    }
+}

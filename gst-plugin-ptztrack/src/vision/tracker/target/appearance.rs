@@ -4,6 +4,7 @@
 
 use opencv::core::{Point2f, Rect2f};
 
+use super::robust::FAINT;
 use crate::vision::Observation;
 use crate::vision::tracker::colour::ColourModel;
 use crate::vision::tracker::figure::{
@@ -23,6 +24,10 @@ const ANYBODY: f32 = 0.35;
 /// What a correlation of 1 weighs beside the fit of the silhouette where it is asked whether the target is there, and where it is.
 const CORRELATION_WEIGHT: f32 = 0.1;
 const PLACE_WEIGHT: f32 = 0.5;
+/// Share of what usually stands out of the target below which nothing of it is there.
+const OUTSTANDING: f32 = 0.3;
+/// More than silhouette and greys ever come to together: 1 and their weight, and a hundredth for rounding.
+const BEST_SCORE: f32 = 1.01 * (1.0 + PLACE_WEIGHT);
 /// How fast what the target looks like is learned, per second, and never more at once; how often, seconds.
 const LEARNING_PER_S: f32 = 0.8;
 const MAX_LEARNING: f32 = 0.15;
@@ -54,6 +59,8 @@ pub(super) struct Appearance {
     /// there.
     usual_fit: Halves,
     usual_correlation: f32,
+    /// How much of it usually stands out from the background, 0 to 1, once that was seen.
+    usually_stands_out: Option<f32>,
     /// Since somebody else was near.
     alone_s: f32,
     /// Since something was learned.
@@ -91,6 +98,7 @@ impl Appearance {
             greys: GreyTemplate::default(),
             usual_fit: Halves::default(),
             usual_correlation: 1.0,
+            usually_stands_out: None,
             alone_s: f32::INFINITY,
             learned_s: 0.0,
             looked_at: None,
@@ -141,15 +149,24 @@ impl Appearance {
         let Memory { cells, evidence, template } = &self.memory;
         let cell = cells.cell();
         let (across, down) = (spread * bounds.width / cell.x, spread * bounds.height / cell.y);
-        let score = |(x, y): (i32, i32)| {
+        let chance = |(x, y): (i32, i32)| {
             let (u, v) = (x as f32 / across, y as f32 / down);
-            let looks = PLACE_WEIGHT * self.greys.correlation(cells, (x, y)).unwrap_or_default();
-            let silhouette = template.fit(evidence, (x, y)).mean();
-            (looks.max(0.0) + silhouette.max(0.0)) * (-0.5 * (u * u + v * v)).exp()
+            (-0.5 * (u * u + v * v)).exp()
+        };
+        let score = |place| {
+            let looks = PLACE_WEIGHT * self.greys.correlation(cells, place).unwrap_or_default();
+            let silhouette = template.fit(evidence, place).mean();
+            let both = looks.max(0.0) + silhouette.max(0.0);
+            debug_assert!(both <= BEST_SCORE, "{looks} and {silhouette}");
+            both * chance(place)
         };
         let steps = || (-REACH..=REACH).step_by(STEP);
         let (mut best, mut height) = ((0, 0), score((0, 0)));
         for place in steps().flat_map(|y| steps().map(move |x| (x, y))) {
+            // Where the best that could be seen would be less, there is nothing to look for.
+            if BEST_SCORE * chance(place) <= height {
+                continue;
+            }
             let value = score(place);
             if value > height {
                 (best, height) = (place, value);
@@ -178,8 +195,15 @@ impl Appearance {
         silhouette.powf(weight) * looks.powf(1.0 - weight)
     }
 
-    /// Learns silhouette, colours and greys as they are in the box that was looked at closely: `place` is what was seen there.
-    pub fn learn(&mut self, place: &Place) {
+    /// How much of what is in its place must stand out from the background for that to be the target, 0 to 1: the rest is wall that looks
+    /// like it. Who never stood out need not.
+    pub fn least_outstanding(&self) -> f32 {
+        (OUTSTANDING * self.usually_stands_out.unwrap_or_default()).min(FAINT)
+    }
+
+    /// Learns silhouette, colours and greys as they are in the box that was looked at closely: `place` is what was seen there, of which so
+    /// much `stands_out` from the background where that is known.
+    pub fn learn(&mut self, place: &Place, stands_out: Option<f32>) {
         if self.learned_s < LEARNING_EVERY_S {
             return;
         }
@@ -187,6 +211,8 @@ impl Appearance {
         self.learned_s = 0.0;
         let learned = |least: f32| move |usual: f32, seen: f32| (usual + (seen - usual) * rate).max(least);
         self.usual_fit = self.usual_fit.with(place.fit, learned(LEAST_FIT));
+        let usually = self.usually_stands_out.or(stands_out);
+        self.usually_stands_out = usually.map(|usual| learned(0.0)(usual, stands_out.unwrap_or(usual)));
         if let Some(correlation) = place.correlation {
             self.usual_correlation = learned(LEAST_CORRELATION)(self.usual_correlation, correlation);
         }
@@ -268,7 +294,7 @@ mod tests {
             appearance.pass(true, 0.2);
             let place = appearance.locate(&observed(&picture), bounds, 0.3);
             appearance.look_closely(&observed(&picture), bounds);
-            appearance.learn(&place);
+            appearance.learn(&place, Some(0.4));
             prop_assert!(place.share.is_finite() && place.bounds.x.is_finite() && place.bounds.y.is_finite());
         }
     }

@@ -9,7 +9,7 @@ use crate::vision::Luma;
 use crate::vision::tracker::corners::{self, Search};
 use crate::vision::tracker::ego_motion::EgoMotion;
 use crate::vision::tracker::figure::FigureMap;
-use crate::vision::tracker::flow::{Flow, Followed};
+use crate::vision::tracker::flow::{Criteria, Flow, Followed};
 use crate::vision::tracker::geometry::{centre, in_ellipse, length, scaled};
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::Points;
@@ -17,6 +17,8 @@ use crate::vision::tracker::points::Points;
 /// Grey levels of mean absolute difference from which a point is lost, and pixels it may be off going forth and back.
 const MAX_RESIDUAL: f32 = 25.0;
 const MAX_RETURN_ERROR: f32 = 0.8;
+/// The target is within twice the window of where it is expected, and what is left after so small a step is far below `NOISE`.
+const CRITERIA: Criteria = Criteria { levels: 2, iterations: 10, precision: 0.1 };
 /// Share of the points that must agree for them to be believed alone.
 const BELIEVED_SHARE: f32 = 0.5;
 /// New points are looked for when fewer than this share of them is left, every so many seconds.
@@ -97,6 +99,7 @@ impl PointFlow {
         let flow = Flow {
             window: window_for(bounds, self.patch.step()),
             grown_window: GROWN_WINDOW,
+            criteria: CRITERIA,
             max_residual: MAX_RESIDUAL,
             max_return_error: Some(MAX_RETURN_ERROR),
         };

@@ -21,7 +21,7 @@ const SPREAD: f32 = 0.3;
 /// Share of what its looks usually say from which the target is there by its looks, and what must stand out from the background there,
 /// 0 to 1, to bear that out: of a wall it is a fiftieth, of somebody in clothes like the wall a fifth.
 pub(super) const FOUND: f32 = 0.55;
-const FAINT: f32 = 0.1;
+pub(super) const FAINT: f32 = 0.1;
 /// What is taken to stand out where the background is not known: so little that nobody is kept for ever by their looks.
 const NOT_KNOWN: f32 = 0.2;
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
@@ -89,8 +89,10 @@ impl Follow for Robust {
         let place = self.appearance.locate(seen, expected, SPREAD + doubt);
         let (is_alone, is_measured, is_whole) =
             (track.is_alone(), track.is_measured(), track.is_seen_whole());
-        let stands_out = tracks.stands_out(seen, place.bounds).unwrap_or(NOT_KNOWN);
-        let is_there = place.share >= FOUND && (is_alone || !tracks.is_anothers(place.bounds));
+        let known = tracks.stands_out(seen, place.bounds);
+        let is_wall = known.is_some_and(|share| share < self.appearance.least_outstanding());
+        let stands_out = known.unwrap_or(NOT_KNOWN);
+        let is_there = place.share >= FOUND && !is_wall && (is_alone || !tracks.is_anothers(place.bounds));
         self.estimate.is_borne_out = is_measured || (is_there && stands_out >= FAINT);
         let Some(track) = tracks.get_mut(id) else { return Ok(Sight::Gone) };
         if is_there && !is_alone {
@@ -115,7 +117,7 @@ impl Follow for Robust {
         self.appearance.look_closely(seen, bounds);
         // Who is seen whole and alone is learned however they look: who turns round looks new.
         if is_whole {
-            self.appearance.learn(&place);
+            self.appearance.learn(&place, known);
         }
         let map = self.appearance.map();
         let mass: Point2f = map.centre_of_mass(bounds).unwrap_or_else(|| centre(bounds));

@@ -6,7 +6,7 @@ use opencv::core::{Point2f, Rect2f};
 
 use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
 use crate::vision::tracker::corners::{self, Search};
-use crate::vision::tracker::flow::{Flow, Followed};
+use crate::vision::tracker::flow::{Criteria, Flow, Followed};
 use crate::vision::tracker::geometry::{around, centre, mean};
 use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
 use crate::vision::tracker::patch::{Patch, cut_around};
@@ -18,6 +18,8 @@ use crate::vision::{Luma, Observation};
 const DEVIATION_RANGE: f32 = 1.2;
 /// Grey levels of mean absolute difference from which a point is lost.
 const MAX_RESIDUAL: f32 = 20.0;
+/// Nobody says where a target goes while the camera turns: it is looked for far off, and to the end.
+const CRITERIA: Criteria = Criteria { levels: 4, iterations: 20, precision: 0.03 };
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.5;
 /// Time constant of the velocity that says where to look next, seconds.
@@ -76,6 +78,7 @@ impl Follow for Thesis {
         let flow = Flow {
             window: window_for(self.estimate.bounds, self.patch.step()),
             grown_window: GROWN_WINDOW,
+            criteria: CRITERIA,
             max_residual: MAX_RESIDUAL,
             max_return_error: None,
         };
