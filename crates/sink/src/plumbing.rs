@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::iter::successors;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Mutex, Weak};
 use std::time::Duration;
@@ -242,6 +243,8 @@ pub trait Plumbing: PtzSink {
         let told = element.clone();
         let outbox = Outbox::new(move |event| {
             if let Some(element) = told.upgrade() {
+                // GStreamer hands a bin what its elements post without holding it: an application may drop it at any time.
+                let _bins: Vec<gst::Object> = successors(element.parent(), GstObjectExt::parent).collect();
                 Self::from_obj(&element).tell(event);
             }
         })
