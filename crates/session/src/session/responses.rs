@@ -18,8 +18,10 @@ impl Session {
     const POLL_ZOOMING: Duration = Duration::from_millis(400);
     /// ... and otherwise, at rest too: a move made while none of ours is under way can be told from ours only by being seen before our next.
     const POLL: Duration = Duration::from_secs(1);
-    /// At rest no more often than once in so many times that it takes to answer: the first command must not wait for that.
+    /// At rest once in so many times that it takes to answer where that is longer, as the first command waits for the answer, but at least
+    /// this often.
     const ANSWERS: u32 = 4;
+    const POLL_SLOW: Duration = Duration::from_secs(5);
     /// While it may go on at an operator's word or at ours: in this time his shows if it is of 3 degrees per second.
     const POLL_CONTESTED: Duration = Duration::from_millis(500);
     /// While it goes to a position.
@@ -372,7 +374,9 @@ impl Session {
                 (false, _) if self.arbitration.asks() => Duration::ZERO,
                 (false, true) if steering.is_zooming => Self::POLL_ZOOMING,
                 (false, true) => Self::POLL,
-                (false, false) => Self::POLL.max(Self::ANSWERS * self.scheduler.round_trip()),
+                (false, false) => {
+                    (Self::ANSWERS * self.scheduler.round_trip()).clamp(Self::POLL, Self::POLL_SLOW)
+                }
             };
     }
 
