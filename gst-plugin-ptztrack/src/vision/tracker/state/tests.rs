@@ -100,11 +100,7 @@ fn a_walker_is_followed() {
 
 #[test]
 fn the_thesis_follows_a_walker_before_an_even_wall() {
-    let wall = |x| {
-        let mut picture = Scene::new(SIZE.0, SIZE.1).flat(240);
-        picture.paint(Rect2f::new(x, 100.0, PERSON.0, PERSON.1), 7);
-        picture
-    };
+    let wall = |x| before_a_wall(&[x]);
     let mut tracker = following(Profile::Thesis, &wall(80.0), 80.0, 100.0);
     for n in 1..30 {
         let x = 80.0 + 8.5 * n as f32;

@@ -211,8 +211,10 @@ impl Appearance {
         self.learned_s = 0.0;
         let learned = |least: f32| move |usual: f32, seen: f32| (usual + (seen - usual) * rate).max(least);
         self.usual_fit = self.usual_fit.with(place.fit, learned(LEAST_FIT));
-        let usually = self.usually_stands_out.or(stands_out);
-        self.usually_stands_out = usually.map(|usual| learned(0.0)(usual, stands_out.unwrap_or(usual)));
+        if let Some(share) = stands_out {
+            let usual = self.usually_stands_out.unwrap_or(share);
+            self.usually_stands_out = Some(learned(0.0)(usual, share));
+        }
         if let Some(correlation) = place.correlation {
             self.usual_correlation = learned(LEAST_CORRELATION)(self.usual_correlation, correlation);
         }
