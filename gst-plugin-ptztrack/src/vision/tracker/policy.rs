@@ -20,7 +20,7 @@ const RESTLESS: f32 = 0.5;
 /// Most places at which somebody stood that are remembered: the oldest goes.
 const MAX_PARKED: usize = 16;
 /// Nothing of somebody reaches as far as this part of their height.
-const ARM: f32 = 0.5;
+pub(super) const ARM: f32 = 0.5;
 /// Who is so many times as tall as when they stood has come nearer.
 const NEARER: f32 = 1.3;
 /// How far beside somebody a click may be, pixels.

@@ -12,7 +12,7 @@ use super::dwell_time::DwellTime;
 use super::ego_motion::EgoMotion;
 use super::geometry::Frame;
 use super::group::Group;
-use super::policy::{Choice, Policy, tell_apart};
+use super::policy::{ARM, Choice, Policy, tell_apart};
 use super::report::{Detection, Tracked, reported};
 use super::target::{Follow, Sight};
 use super::tracks::{Region, Rules, Track, Tracks};
@@ -304,8 +304,8 @@ impl Tracker {
     }
 
     /// Whether a target that was chosen because it moves stays where it is, while somebody else goes somewhere: at first anybody whom
-    /// the policy would choose, and later who has gone as far as they are tall, where the target never has. What a screen shows goes
-    /// to and fro for ever and never farther than its edge. Who is missed for a moment is judged by their way so far.
+    /// the policy would choose, and later who has gone as far as they are tall, where the target never went farther than an arm
+    /// reaches: what a screen shows goes to and fro for ever. Who is missed for a moment is judged by their way so far.
     fn is_outdone(&self, target: &Target, frame: Frame) -> bool {
         let Config { choice, must_travel, .. } = self.config;
         let track = self.tracks.get(target.id);
@@ -317,7 +317,9 @@ impl Tracker {
         let farthest = track.map_or(0.0, |track| track.journey.farthest);
         let height = target.follow.estimate().bounds.height;
         let goes_farther = |other: &Track| {
-            other.id != target.id && other.has_gone_as_far_as(height) && farthest < height.max(other.height())
+            other.id != target.id
+                && other.has_gone_as_far_as(height)
+                && farthest < ARM * height.max(other.height())
         };
         choice != Choice::Manual
             && target.dwell.is_of_motion()

@@ -558,12 +558,11 @@ fn what_was_selected_by_hand_is_kept() {
     assert_eq!(since_they_are_followed((30.0, 24.0), true), None);
 }
 
-/// Who walked in stands and looks about while somebody taller walks past.
-#[test]
-fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
+/// Who walked in, for so many pictures, stands and looks about while somebody taller walks past.
+fn stands_while_somebody_walks_past(walks: usize) {
     let mut chain = watching(Config { must_travel: true, ..config() });
     for n in 0..60 {
-        let first = Rect2f::new(460.0 - 10.0 * n.min(25) as f32, 90.0, 50.0, 130.0);
+        let first = Rect2f::new(460.0 - 10.0 * n.min(walks) as f32, 90.0, 50.0, 130.0);
         let other = Rect2f::new(10.0 * (n as f32 - 35.0) - 40.0, 90.0, 60.0, 150.0);
         let mut picture = street((0.0, 0.0), &[]);
         picture.paint(first, 7);
@@ -577,6 +576,17 @@ fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
             assert!(is_on(&last, first) > 0.5, "picture {n}: {:?} {:?}", last.state, last.bounds);
         }
     }
+}
+
+#[test]
+fn who_has_gone_as_far_and_stands_is_not_given_up_for_who_walks_past() {
+    stands_while_somebody_walks_past(25);
+}
+
+/// Farther than an arm reaches is far enough.
+#[test]
+fn who_has_gone_less_far_than_they_are_tall_is_not_given_up_for_who_walks_past() {
+    stands_while_somebody_walks_past(11);
 }
 
 /// Two come in as one, side by side, and an operator clicks on the left one's middle; then the other walks ahead.
