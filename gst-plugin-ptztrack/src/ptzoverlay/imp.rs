@@ -100,7 +100,7 @@ pub struct PtzOverlay {
     )]
     #[property(
         name = "boxes", get, set, type = bool, member = boxes, default = Settings::default().boxes, mutable_playing,
-        blurb = "Draw the boxes of what moves and of the target"
+        blurb = "Draw the boxes of what moves, where none of a track is drawn, and of the target"
     )]
     #[property(
         name = "tracks", get, set, type = bool, member = tracks, default = Settings::default().tracks, mutable_playing,

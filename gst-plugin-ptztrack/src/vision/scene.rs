@@ -47,7 +47,7 @@ impl FrameSize {
 pub struct Parts {
     /// Contours of what moves.
     pub contours: bool,
-    /// Boxes of what moves and of the target.
+    /// Boxes of what moves, but for who has one as a track, and of the target.
     pub boxes: bool,
     /// Boxes and numbers of everybody else who is seen.
     pub tracks: bool,
@@ -125,13 +125,11 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
     if parts.trail && seen.trail.len() > 1 {
         scene.trail(seen.trail);
     }
+    let tracks = seen.tracks.filter(|_| parts.tracks).map_or(&[][..], |meta| &meta.tracks);
     for region in seen.motion.iter().flat_map(|motion| &motion.regions) {
-        scene.region(region);
+        scene.region(region, tracks);
     }
-    if parts.tracks {
-        let others = seen.tracks.iter().flat_map(|meta| &meta.tracks).filter(|track| !track.is_target);
-        others.for_each(|track| scene.track(track));
-    }
+    tracks.iter().filter(|track| !track.is_target).for_each(|track| scene.track(track));
     if parts.cross_hair {
         scene.cross_hair();
     }
@@ -139,6 +137,10 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
         scene.target(target);
     }
     Ok(scene.shapes)
+}
+
+fn is_seen(track: &Track) -> bool {
+    track.state != TrackState::Hidden
 }
 
 struct Scene {
@@ -168,8 +170,11 @@ impl Scene {
         self.shapes.push(Shape::Frame { origin, end, width, colour });
     }
 
-    fn region(&mut self, region: &Region) {
-        if self.parts.boxes {
+    /// Who has a box of their own needs no other around the region in which they are seen.
+    fn region(&mut self, region: &Region, tracks: &[Track]) {
+        let is_boxed =
+            tracks.iter().any(|track| is_seen(track) && region.bounds.contains(track.bounds.centre()));
+        if self.parts.boxes && !is_boxed {
             self.bounds(region.bounds, MOTION.with_alpha(0.55));
         }
         if self.parts.contours {
@@ -179,7 +184,7 @@ impl Scene {
 
     /// A thin box with its number above; fainter where it is not seen.
     fn track(&mut self, track: &Track) {
-        let colour = TRACK.with_alpha(if track.state == TrackState::Hidden { 0.35 } else { 0.8 });
+        let colour = TRACK.with_alpha(if is_seen(track) { 0.8 } else { 0.35 });
         self.outline(track.bounds, 1, colour);
         let corner = self.frame.spot(Point { x: track.bounds.x, y: track.bounds.y });
         let height = self.style.text * 0.75;
@@ -350,6 +355,27 @@ mod tests {
         assert_eq!(count(Parts { state: true, ..NONE }), 2);
         assert_eq!(count(Parts { offset: true, ..NONE }), 3);
         assert_eq!(count(ALL), 18, "state and offset share a plate");
+    }
+
+    #[test]
+    fn who_is_seen_as_a_track_has_one_box() {
+        let bounds = Rect { x: 0.2, y: 0.2, width: 0.1, height: 0.4 };
+        let motion =
+            MotionMeta { regions: vec![Region { bounds, ..Region::default() }], ..MotionMeta::default() };
+        let boxes = |state: TrackState, x: f64, parts: Parts| {
+            let bounds = Rect { x, ..bounds };
+            let velocity = ptztrack_contract::Vector::default();
+            let track = Track { id: 3, bounds, velocity, state, confidence: 1.0, is_target: false };
+            let tracks = TracksMeta { tracks: vec![track] };
+            let seen = Seen { motion: Some(&motion), tracks: Some(&tracks), ..Seen::default() };
+            let shapes = scene(FRAME, parts, seen).unwrap();
+            shapes.iter().filter(|shape| matches!(shape, Shape::Frame { .. })).count()
+        };
+        let both = Parts { boxes: true, tracks: true, ..NONE };
+        assert_eq!(boxes(TrackState::Seen, 0.22, both), 1);
+        assert_eq!(boxes(TrackState::Seen, 0.6, both), 2, "somebody else");
+        assert_eq!(boxes(TrackState::Hidden, 0.22, both), 2, "what hides them");
+        assert_eq!(boxes(TrackState::Seen, 0.22, Parts { boxes: true, ..NONE }), 1, "tracks are not drawn");
     }
 
     #[test]
