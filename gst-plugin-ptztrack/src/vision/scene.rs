@@ -73,6 +73,8 @@ const TRAIL: Colour = Colour::new(255, 220, 90);
 const WHITE: Colour = Colour::new(255, 255, 255);
 const PLATE: Colour = Colour { red: 12, green: 16, blue: 22, alpha: 0.62 };
 const CENTRE: Point = Point { x: 0.5, y: 0.5 };
+/// A target whose box is so many times as large as its track's is a group of them.
+const GROUP: f64 = 2.0;
 
 fn state_colour(state: TargetState) -> Colour {
     match state {
@@ -129,7 +131,10 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
     for region in seen.motion.iter().flat_map(|motion| &motion.regions) {
         scene.region(region, tracks);
     }
-    tracks.iter().filter(|track| !track.is_target).for_each(|track| scene.track(track));
+    let is_the_targets = |track: &Track| {
+        track.is_target && target.is_none_or(|target| area(target.bounds) < GROUP * area(track.bounds))
+    };
+    tracks.iter().filter(|track| !is_the_targets(track)).for_each(|track| scene.track(track));
     if parts.cross_hair {
         scene.cross_hair();
     }
@@ -137,6 +142,10 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
         scene.target(target);
     }
     Ok(scene.shapes)
+}
+
+fn area(bounds: Rect) -> f64 {
+    bounds.width * bounds.height
 }
 
 fn is_seen(track: &Track) -> bool {
@@ -172,9 +181,8 @@ impl Scene {
 
     /// Who has a box of their own needs no other around the region in which they are seen.
     fn region(&mut self, region: &Region, tracks: &[Track]) {
-        let is_boxed =
-            tracks.iter().any(|track| is_seen(track) && region.bounds.contains(track.bounds.centre()));
-        if self.parts.boxes && !is_boxed {
+        let shows = |track: &Track| is_seen(track) && region.bounds.contains(track.bounds.centre());
+        if self.parts.boxes && !tracks.iter().any(shows) {
             self.bounds(region.bounds, MOTION.with_alpha(0.55));
         }
         if self.parts.contours {
@@ -376,6 +384,30 @@ mod tests {
         assert_eq!(boxes(TrackState::Seen, 0.6, both), 2, "somebody else");
         assert_eq!(boxes(TrackState::Hidden, 0.22, both), 2, "what hides them");
         assert_eq!(boxes(TrackState::Seen, 0.22, Parts { boxes: true, ..NONE }), 1, "tracks are not drawn");
+    }
+
+    #[test]
+    fn each_of_a_group_that_is_the_target_has_a_box_of_their_own() {
+        let one = target(TargetState::Tracking);
+        let Rect { x, y, width, height } = one.bounds;
+        let both = TargetMeta { bounds: Rect { x, y, width: 2.5 * width, height }, ..one.clone() };
+        let velocity = ptztrack_contract::Vector::default();
+        let track = Track {
+            id: one.id,
+            bounds: one.bounds,
+            velocity,
+            state: TrackState::Seen,
+            confidence: 1.0,
+            is_target: true,
+        };
+        let tracks = TracksMeta { tracks: vec![track] };
+        let numbers = |target: &TargetMeta| {
+            let seen = Seen { target: Some(target), tracks: Some(&tracks), ..Seen::default() };
+            let shapes = scene(FRAME, Parts { tracks: true, boxes: true, ..NONE }, seen).unwrap();
+            texts(&shapes).len()
+        };
+        assert_eq!(numbers(&one), 0, "the target's box is its own");
+        assert_eq!(numbers(&both), 1);
     }
 
     #[test]
