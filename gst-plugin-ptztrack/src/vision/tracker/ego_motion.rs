@@ -33,6 +33,13 @@ impl EgoMotion {
         Self(Homography([[growth, 0.0, 0.0], [0.0, growth, 0.0], [0.0, 0.0, 1.0]]))
     }
 
+    /// By a homography of pixels counted from `origin`.
+    #[cfg(test)]
+    pub fn around(centred: Homography, origin: Point2f) -> Self {
+        let (x, y) = (f64::from(origin.x), f64::from(origin.y));
+        Self(Homography::translation(-x, -y).then(&centred).then(&Homography::translation(x, y)))
+    }
+
     /// Where a background point of the last picture is now.
     pub fn apply(&self, point: Point2f) -> Point2f {
         let moved = self.0.apply(Point { x: f64::from(point.x), y: f64::from(point.y) });

@@ -9,6 +9,7 @@ use opencv::core::Rect2f;
 
 use super::assignment::Assigner;
 use super::region::Region;
+use super::size::SIZE_TIME_S;
 use super::track::Track;
 use crate::vision::tracker::geometry::{centre, overlap, share_inside, shared_sides};
 
@@ -18,8 +19,6 @@ const PLACE_NOISE: f32 = 0.12;
 /// something hides the rest.
 const LARGER: (f32, f32) = (0.3, 0.5);
 const SMALLER: (f32, f32) = (0.7, 0.8);
-/// Seconds in which a track has found its size.
-const SIZE_TIME_S: f64 = 1.0;
 /// How alike by colours anybody is to anybody, and what being less so costs.
 const ANYBODY: f32 = 0.7;
 const COLOUR_WEIGHT: f32 = 8.0;

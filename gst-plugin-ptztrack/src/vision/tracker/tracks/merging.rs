@@ -53,7 +53,7 @@ impl Tracks {
                 track.measure(bounds, sides);
                 if alone {
                     track.see_alone(number, bounds, dt_s);
-                    track.resize(bounds, cut[0] || cut[2], dt_s);
+                    track.resize(bounds, &self.floor, cut, dt_s);
                 } else {
                     track.see_shared(number, sides != [false; 4], dt_s);
                 }

@@ -12,10 +12,12 @@
 //! | what they look like | | `looks` |
 //! | who comes back | | `memory` |
 //! | what changes and goes nowhere | | `places` |
+//! | how large they are, by what others are where they stand | Hoiem et al. 2008 | `size`, `floor` |
 
 mod assignment;
 mod association;
 mod axis;
+mod floor;
 mod groups;
 mod heads;
 mod looks;
@@ -23,12 +25,14 @@ mod memory;
 mod merging;
 mod places;
 mod region;
+mod size;
 mod track;
 
 use opencv::core::Rect2f;
 use ptztrack_contract::TrackChange;
 
 use association::Association;
+use floor::Floor;
 use groups::Partings;
 use looks::Viewer;
 use memory::Memory;
@@ -79,6 +83,7 @@ pub(super) struct Tracks {
     regions: Vec<Region>,
     association: Association,
     places: RestlessPlaces,
+    floor: Floor,
     partings: Partings,
     memory: Memory,
     viewer: Viewer,
@@ -94,6 +99,7 @@ impl Tracks {
         self.tracks.clear();
         self.regions.clear();
         self.places.clear();
+        self.floor.clear();
         self.partings.clear();
         self.memory.clear();
         self.events.clear();
@@ -114,6 +120,7 @@ impl Tracks {
         self.tracks.retain(|track| !track.is_gone());
         self.tracks.iter_mut().for_each(|track| track.predict(ego, dt_s));
         self.places.carry(ego, dt_s);
+        self.floor.carry(ego, frame, dt_s);
         self.memory.pass(ego, dt_s, rules.memory_s);
         self.look(seen, regions, frame);
         let mut association = std::mem::take(&mut self.association);
@@ -127,6 +134,8 @@ impl Tracks {
         self.number(rules);
         self.partings.update(&mut self.tracks, &self.regions, dt_s);
         self.places.watch(self.tracks.iter(), dt_s);
+        let people = self.tracks.iter().filter(|track| track.is_confirmed() && !track.is_gone());
+        self.floor.watch(people, frame, dt_s);
     }
 
     /// Everybody who has a number.
@@ -274,7 +283,7 @@ impl Tracks {
             let cut = frame.cut_sides(whole);
             track.measure(whole, cut.map(|cut| !cut));
             track.see_alone(number, whole, dt_s);
-            track.resize(whole, cut[0] || cut[2], dt_s);
+            track.resize(whole, &self.floor, cut, dt_s);
             let region = &mut self.regions[number];
             region.is_owned = true;
             if track.is_seen_whole() {

@@ -201,6 +201,26 @@ fn a_table_before_the_legs_costs_nothing_at_first() {
     assert!((track.height() - 120.0).abs() < 15.0 && track.is_alone(), "{track:?}");
 }
 
+/// Somebody comes by where somebody else left their ghost in the background, and both are seen as one for a while.
+#[test]
+fn who_is_seen_whole_on_the_floor_has_their_own_height_again_soon() {
+    let height = |walkers_before: usize| {
+        let (mut tracks, ego) = (Tracks::default(), Some(EgoMotion::default()));
+        for n in 0..30 * walkers_before {
+            let down = 4.0 * (n % 30) as f32;
+            seen_in(&mut tracks, &[at(300.0, 60.0 + down, 35.0, 90.0 + down / 4.0)], ego, DT);
+        }
+        for n in 0..40 {
+            let x = 400.0 - 4.0 * n as f32;
+            let ghost = if (5..25).contains(&n) { 120.0 } else { 0.0 };
+            seen_in(&mut tracks, &[at(x, 100.0, 40.0, 100.0 + ghost)], ego, DT);
+        }
+        tracks.seen().map(|track| track.height()).next().expect("there")
+    };
+    assert!((height(2) - 100.0).abs() < 10.0, "{}", height(2));
+    assert!(height(0) > 150.0, "nothing is known of the floor: the legs may be hidden");
+}
+
 #[test]
 fn nobody_is_there_after_three_seconds_and_a_new_one_is_somebody_else() {
     let mut tracks = Tracks::default();

@@ -10,11 +10,11 @@ use super::axis::{Axis, ProcessNoise, Side};
 use super::looks::Views;
 use super::region::Region;
 use crate::vision::tracker::ego_motion::EgoMotion;
-use crate::vision::tracker::geometry::{Frame, breadth, centre, is_upright, length, overlap};
+use crate::vision::tracker::geometry::{Frame, breadth, centre, length};
 
 /// Deviation of a side that was seen, in heights of the track: arms and legs swing, heads hardly.
 const ACROSS_NOISE: f32 = 0.08;
-const DOWN_NOISE: f32 = 0.05;
+pub(super) const DOWN_NOISE: f32 = 0.05;
 /// And of any side, pixels: what is found is found in a reduced picture.
 const PIXEL_NOISE: f32 = 1.5;
 /// What somebody does by themselves, in heights: their acceleration as spectral density, heights² per second³, and the change of
@@ -22,8 +22,8 @@ const PIXEL_NOISE: f32 = 1.5;
 const ACCELERATION: f32 = 0.5;
 const GROWTH: f32 = 0.004;
 /// Deviations of what is seen first, in heights: of their rate per second, and of their size, or where that was cut off.
-const FIRST_RATE: f32 = 0.8;
-const FIRST_SIZE: f32 = 0.2;
+pub(super) const FIRST_RATE: f32 = 0.8;
+pub(super) const FIRST_SIZE: f32 = 0.2;
 const CUT_SIZE: f32 = 0.6;
 /// Logarithm of the odds that a track exists: at first, and at most; and what being seen adds in a second.
 const FIRST_EXISTENCE: f32 = 0.4;
@@ -33,10 +33,6 @@ const SEEN_PER_S: f32 = 6.0;
 const STANDS_OUT_PER_S: f32 = 4.0;
 /// Deviation of where somebody is by their looks, in heights.
 const LOOKS_NOISE: f32 = 0.08;
-/// What is seen has another size than the track where their intersection over union is below this, and that is its size once it has been so
-/// for so long, seconds. What is larger shows more of it; what is smaller may be what something hides.
-const GROWS: (f32, f64) = (0.65, 0.4);
-const SHRINKS: (f32, f64) = (0.5, 5.0);
 /// How much of the height must be seen for looks to be learned.
 const WHOLE: f32 = 0.7;
 /// Who was seen beside the target for so long, seconds, is somebody else.
@@ -77,7 +73,9 @@ pub(in super::super) struct Journey {
     pub pictures: u32,
     pub in_a_row: u32,
     /// For how long what is seen of it has had another size, seconds.
-    unlike_s: f64,
+    pub(super) unlike_s: f64,
+    /// And, of that, has stood on the floor as others do.
+    pub(super) stands_s: f64,
     /// Where its middle was first, carried along with the background.
     origin: Point2f,
     /// The farthest from there that it was seen alone, pixels.
@@ -91,8 +89,8 @@ pub(in super::super) struct Journey {
 pub(in super::super) struct Track {
     /// Counted from 1; 0 until it is confirmed.
     pub id: u64,
-    across: Axis,
-    down: Axis,
+    pub(super) across: Axis,
+    pub(super) down: Axis,
     /// Logarithm of the odds that there is somebody.
     existence: f32,
     pub evidence: Evidence,
@@ -135,6 +133,7 @@ impl Track {
                 pictures: 1,
                 in_a_row: 1,
                 unlike_s: 0.0,
+                stands_s: 0.0,
                 origin: middle,
                 farthest: 0.0,
                 way: VecDeque::from([(bounds, 0.0)]),
@@ -316,39 +315,6 @@ impl Track {
     pub fn stand_out(&mut self, share: f32, dt_s: f32) {
         let evidence = STANDS_OUT_PER_S * share;
         self.existence = (self.existence + evidence * dt_s).min(MOST_EXISTENCE);
-    }
-
-    /// What is seen of it alone is `whole`, of which left or right is `cut` off by the picture: where that is much larger or smaller for
-    /// long, this is its size. Somebody who stands upright never gets as broad as two: what is, is somebody and what is beside them.
-    pub fn resize(&mut self, whole: Rect2f, cut: bool, dt_s: f64) {
-        let bounds = self.bounds();
-        if is_upright(bounds) && !is_upright(whole) && !cut && whole.width > 2.0 * breadth(bounds) {
-            self.journey.unlike_s = 0.0;
-            return;
-        }
-        let (unlike, after_s) = if whole.height > bounds.height { GROWS } else { SHRINKS };
-        if overlap(bounds, whole) >= unlike {
-            self.journey.unlike_s = 0.0;
-            return;
-        }
-        self.journey.unlike_s += dt_s;
-        if self.journey.unlike_s >= after_s {
-            self.become_whole(whole);
-        }
-    }
-
-    /// Is as large as this from now on: what was seen before were parts of it.
-    pub fn become_whole(&mut self, whole: Rect2f) {
-        self.journey.unlike_s = 0.0;
-        let deviations = [DOWN_NOISE, FIRST_RATE, FIRST_SIZE].map(|deviation| deviation * whole.height);
-        let resized = |axis: Axis, middle: f32, size: f32| {
-            let mut resized = Axis::new(middle, size, deviations);
-            resized.rate = axis.rate;
-            resized
-        };
-        let middle = centre(whole);
-        self.across = resized(self.across, middle.x, whole.width);
-        self.down = resized(self.down, middle.y, whole.height);
     }
 
     /// What it was until now is no part of its way: it was seen in pieces.
