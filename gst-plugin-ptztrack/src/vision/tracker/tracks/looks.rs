@@ -27,6 +27,15 @@ const MAX_VIEWS: usize = 3;
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct Looks([Option<Histogram>; 2]);
 
+#[cfg(test)]
+impl Looks {
+    /// Of somebody whose clothes are of these greys, each with its share.
+    pub fn of_greys(greys: &[(u8, f32)]) -> Self {
+        let clothes = || Histogram::of(greys.iter().map(|&(grey, share)| ((grey, Some([128, 128])), share)));
+        Self([clothes(), clothes()])
+    }
+}
+
 /// Takes looks from pictures; keeps its memory for the next.
 #[derive(Debug, Default)]
 pub(super) struct Viewer {

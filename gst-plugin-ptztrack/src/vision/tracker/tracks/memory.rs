@@ -9,8 +9,8 @@ use super::track::Track;
 use crate::vision::tracker::ego_motion::EgoMotion;
 use crate::vision::tracker::geometry::{centre, length};
 
-/// How alike by colours somebody must be to be taken for who they were.
-const SAME: f32 = 0.8;
+/// How alike by colours somebody must be to be taken for who they were: most people in dark clothes are alike by four fifths.
+const SAME: f32 = 0.85;
 /// How far they may have come, in heights: at once, and in every second.
 const REACH: (f32, f32) = (1.0, 1.5);
 /// By how much, as a factor, their height may have changed.
@@ -69,5 +69,45 @@ impl Memory {
 
     pub fn clear(&mut self) {
         self.0.clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vision::tracker::geometry::Frame;
+    use crate::vision::tracker::tracks::looks::Looks;
+    use crate::vision::tracker::tracks::region::Region;
+
+    /// Somebody in dark clothes, of which that share is white.
+    fn somebody(x: f32, white: f32) -> Track {
+        let mut region = Region::new(Rect2f::new(x, 100.0, 40.0, 100.0), Vec::new(), false);
+        region.looks = Looks::of_greys(&[(40, 1.0 - white), (200, white)]);
+        Track::new(0, &region, Frame { width: 640.0, height: 480.0 })
+    }
+
+    /// The number of who is seen `after_s` later at `x`, where number 5 went away in dark clothes in the middle.
+    fn recalled(x: f32, white: f32, after_s: f64) -> Option<u64> {
+        let mut memory = Memory::default();
+        let mut gone = somebody(300.0, 0.0);
+        gone.id = 5;
+        memory.remember(&gone);
+        memory.pass(None, after_s, 60.0);
+        let number = memory.recall(&somebody(x, white));
+        assert!(number.is_none() || memory.recall(&somebody(x, white)).is_none(), "given twice");
+        number
+    }
+
+    #[test]
+    fn whoever_comes_back_has_their_old_number() {
+        assert_eq!(recalled(350.0, 0.1, 2.0), Some(5));
+        assert_eq!(recalled(600.0, 0.0, 2.0), Some(5), "three heights in two seconds");
+        assert_eq!(recalled(350.0, 0.0, 70.0), None, "forgotten");
+    }
+
+    #[test]
+    fn who_comes_after_them_is_somebody_else() {
+        assert_eq!(recalled(350.0, 0.3, 2.0), None, "a third of what they wear is white");
+        assert_eq!(recalled(600.0, 0.0, 0.5), None, "nobody runs so fast");
     }
 }
