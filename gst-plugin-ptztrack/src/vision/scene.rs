@@ -324,19 +324,23 @@ mod tests {
         }
     }
 
-    fn shapes(parts: Parts, target: &TargetMeta) -> Vec<Shape> {
-        let trail = [Point { x: 0.1, y: 0.1 }, Point { x: 0.2, y: 0.1 }, Point { x: 0.3, y: 0.1 }];
-        let region = Region { contour: trail.to_vec(), ..Region::default() };
-        let motion = MotionMeta { regions: vec![region], ..MotionMeta::default() };
-        let track = |id: u64| Track {
-            id,
+    fn track(target: &TargetMeta) -> Track {
+        Track {
+            id: target.id,
             bounds: target.bounds,
             velocity: ptztrack_contract::Vector::default(),
             state: TrackState::Seen,
             confidence: 1.0,
-            is_target: id == target.id,
-        };
-        let tracks = TracksMeta { tracks: vec![track(target.id), track(3)] };
+            is_target: true,
+        }
+    }
+
+    fn shapes(parts: Parts, target: &TargetMeta) -> Vec<Shape> {
+        let trail = [Point { x: 0.1, y: 0.1 }, Point { x: 0.2, y: 0.1 }, Point { x: 0.3, y: 0.1 }];
+        let region = Region { contour: trail.to_vec(), ..Region::default() };
+        let motion = MotionMeta { regions: vec![region], ..MotionMeta::default() };
+        let other = Track { id: 3, is_target: false, ..track(target) };
+        let tracks = TracksMeta { tracks: vec![track(target), other] };
         let seen = Seen { motion: Some(&motion), target: Some(target), tracks: Some(&tracks), trail: &trail };
         scene(FRAME, parts, seen).unwrap()
     }
@@ -372,9 +376,8 @@ mod tests {
             MotionMeta { regions: vec![Region { bounds, ..Region::default() }], ..MotionMeta::default() };
         let boxes = |state: TrackState, x: f64, parts: Parts| {
             let bounds = Rect { x, ..bounds };
-            let velocity = ptztrack_contract::Vector::default();
-            let track = Track { id: 3, bounds, velocity, state, confidence: 1.0, is_target: false };
-            let tracks = TracksMeta { tracks: vec![track] };
+            let other = Track { bounds, state, is_target: false, ..track(&target(TargetState::Tracking)) };
+            let tracks = TracksMeta { tracks: vec![other] };
             let seen = Seen { motion: Some(&motion), tracks: Some(&tracks), ..Seen::default() };
             let shapes = scene(FRAME, parts, seen).unwrap();
             shapes.iter().filter(|shape| matches!(shape, Shape::Frame { .. })).count()
@@ -391,16 +394,7 @@ mod tests {
         let one = target(TargetState::Tracking);
         let Rect { x, y, width, height } = one.bounds;
         let both = TargetMeta { bounds: Rect { x, y, width: 2.5 * width, height }, ..one.clone() };
-        let velocity = ptztrack_contract::Vector::default();
-        let track = Track {
-            id: one.id,
-            bounds: one.bounds,
-            velocity,
-            state: TrackState::Seen,
-            confidence: 1.0,
-            is_target: true,
-        };
-        let tracks = TracksMeta { tracks: vec![track] };
+        let tracks = TracksMeta { tracks: vec![track(&one)] };
         let numbers = |target: &TargetMeta| {
             let seen = Seen { target: Some(target), tracks: Some(&tracks), ..Seen::default() };
             let shapes = scene(FRAME, Parts { tracks: true, boxes: true, ..NONE }, seen).unwrap();
