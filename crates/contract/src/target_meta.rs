@@ -21,6 +21,8 @@ pub struct TargetMeta {
     pub id: u64,
     /// Bounding box; predicted while occluded.
     pub bounds: Rect,
+    /// Whether that holds several people who are followed together (`selection=group`), and not only who has the number.
+    pub is_group: bool,
     /// Centre of mass (thesis 3.15); predicted while occluded.
     pub centroid: Point,
     /// Motion of the target in the picture, frames per second of time: camera motion included.
@@ -49,6 +51,7 @@ impl Default for TargetMeta {
             state: TargetState::Searching,
             id: 0,
             bounds: Rect::default(),
+            is_group: false,
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
@@ -69,6 +72,9 @@ impl BufferMeta for TargetMeta {
         structure.set("state", self.state.name());
         structure.set("id", self.id);
         structure.set("box", codec::rect(self.bounds));
+        if self.is_group {
+            structure.set("group", true);
+        }
         structure.set("centroid", codec::point(self.centroid));
         structure.set("velocity", codec::vector(self.velocity));
         if let Some(ego) = self.ego_velocity {
@@ -104,6 +110,7 @@ impl BufferMeta for TargetMeta {
             state: reader.named("state")?,
             id: reader.get("id")?,
             bounds: reader.rect("box")?,
+            is_group: reader.get_optional("group")?.unwrap_or(false),
             centroid: reader.point("centroid")?,
             velocity: reader.vector("velocity")?,
             ego_velocity: reader.vector_optional("ego-velocity")?,

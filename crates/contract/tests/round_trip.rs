@@ -86,12 +86,13 @@ prop_compose! {
         unchanged_for in prop::option::of(clock_time()),
         confidence in 0.0..1.0f64,
         features in prop::collection::vec((point(), any::<bool>()), 0..20),
-        aspect in prop::option::of(0.1..10.0f64),
+        (aspect, is_group) in (prop::option::of(0.1..10.0f64), any::<bool>()),
         capture_time in prop::option::of(clock_time()),
     ) -> TargetMeta {
         let features = features.into_iter().map(|(position, kept)| Feature { position, kept }).collect();
         TargetMeta {
-            state, id, bounds, centroid, velocity, ego_velocity, ego_zoom, unchanged_for, confidence, features, aspect, capture_time,
+            state, id, bounds, is_group, centroid, velocity, ego_velocity, ego_zoom, unchanged_for, confidence, features, aspect,
+            capture_time,
         }
     }
 }

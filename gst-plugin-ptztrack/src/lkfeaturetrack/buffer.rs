@@ -88,6 +88,7 @@ pub(super) fn attach(
         state: tracked.state,
         id: tracked.id,
         bounds: tracked.bounds,
+        is_group: tracked.is_group,
         centroid: tracked.centroid,
         velocity: tracked.velocity,
         ego_velocity: tracked.ego_velocity,

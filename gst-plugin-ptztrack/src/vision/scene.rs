@@ -73,8 +73,6 @@ const TRAIL: Colour = Colour::new(255, 220, 90);
 const WHITE: Colour = Colour::new(255, 255, 255);
 const PLATE: Colour = Colour { red: 12, green: 16, blue: 22, alpha: 0.62 };
 const CENTRE: Point = Point { x: 0.5, y: 0.5 };
-/// A target whose box is so many times as large as its track's is a group of them.
-const GROUP: f64 = 2.0;
 
 fn state_colour(state: TargetState) -> Colour {
     match state {
@@ -131,10 +129,9 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
     for region in seen.motion.iter().flat_map(|motion| &motion.regions) {
         scene.region(region, tracks);
     }
-    let is_the_targets = |track: &Track| {
-        track.is_target && target.is_none_or(|target| area(target.bounds) < GROUP * area(track.bounds))
-    };
-    tracks.iter().filter(|track| !is_the_targets(track)).for_each(|track| scene.track(track));
+    // A box around a group is nobody's own.
+    let is_group = target.is_some_and(|target| target.is_group);
+    tracks.iter().filter(|track| is_group || !track.is_target).for_each(|track| scene.track(track));
     if parts.cross_hair {
         scene.cross_hair();
     }
@@ -142,10 +139,6 @@ pub fn scene(frame: FrameSize, parts: Parts, seen: Seen) -> opencv::Result<Vec<S
         scene.target(target);
     }
     Ok(scene.shapes)
-}
-
-fn area(bounds: Rect) -> f64 {
-    bounds.width * bounds.height
 }
 
 fn is_seen(track: &Track) -> bool {
@@ -392,8 +385,7 @@ mod tests {
     #[test]
     fn each_of_a_group_that_is_the_target_has_a_box_of_their_own() {
         let one = target(TargetState::Tracking);
-        let Rect { x, y, width, height } = one.bounds;
-        let both = TargetMeta { bounds: Rect { x, y, width: 2.5 * width, height }, ..one.clone() };
+        let both = TargetMeta { is_group: true, ..one.clone() };
         let tracks = TracksMeta { tracks: vec![track(&one)] };
         let numbers = |target: &TargetMeta| {
             let seen = Seen { target: Some(target), tracks: Some(&tracks), ..Seen::default() };

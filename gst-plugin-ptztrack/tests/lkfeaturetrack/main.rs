@@ -221,25 +221,29 @@ fn everybody_is_told_of_and_whoever_is_asked_for_is_followed() {
     assert_eq!(warnings, 1);
 }
 
-/// Two people who go apart: the outer sides of what is told of the target, pixels.
-fn sides_of_two_who_part(selection: &str) -> Vec<(f64, f64)> {
+/// Two people who go apart: what is told of the target.
+fn targets_of_two_who_part(selection: &str) -> Vec<TargetMeta> {
     let mut bench = Bench::new(|element| element.set_property_from_str("selection", selection));
-    let sides = (0..50).map(|n| {
+    let targets = (0..50).map(|n| {
         let places = [(130 - 2 * n, 100), (160 + 2 * n, 100)];
         let (width, height) = (PERSON.0 as u32, PERSON.1 as u32);
         let seen = places.map(|(x, y)| ("motion", (x as u32, y as u32, width, height)));
-        let meta = bench.push(street(0, places), &seen);
-        (meta.bounds.x * WIDTH as f64, (meta.bounds.x + meta.bounds.width) * WIDTH as f64)
+        bench.push(street(0, places), &seen)
     });
-    sides.collect()
+    targets.collect()
 }
 
 #[test]
 fn a_group_is_followed_in_one_box() {
-    let (left, right) = sides_of_two_who_part("group")[49];
-    assert!((left - 32.0).abs() < 12.0 && (right - 290.0).abs() < 12.0, "{left} {right}");
-    let (left, right) = sides_of_two_who_part("largest")[49];
-    assert!(right - left < 60.0, "{left} {right}");
+    let sides = |meta: &TargetMeta| {
+        [meta.bounds.x, meta.bounds.x + meta.bounds.width].map(|side| side * WIDTH as f64)
+    };
+    let both = &targets_of_two_who_part("group")[49];
+    let [left, right] = sides(both);
+    assert!((left - 32.0).abs() < 12.0 && (right - 290.0).abs() < 12.0 && both.is_group, "{left} {right}");
+    let one = &targets_of_two_who_part("largest")[49];
+    let [left, right] = sides(one);
+    assert!(right - left < 60.0 && !one.is_group, "{left} {right}");
 }
 
 #[test]

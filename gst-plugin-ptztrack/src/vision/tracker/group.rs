@@ -22,6 +22,8 @@ pub(super) struct Group {
 /// What is known of a group.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct GroupEstimate {
+    /// How many are in it.
+    pub people: usize,
     pub bounds: Rect2f,
     /// Its mean motion against the background, pixels per second.
     pub own_velocity: Point2f,
@@ -76,7 +78,7 @@ impl Group {
             None => all,
         };
         self.bounds = Some(bounds);
-        Some(GroupEstimate { bounds, own_velocity })
+        Some(GroupEstimate { people: members().count(), bounds, own_velocity })
     }
 }
 

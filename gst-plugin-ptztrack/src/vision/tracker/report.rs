@@ -39,6 +39,8 @@ pub struct Tracked {
     pub id: u64,
     /// Box of the target; predicted while it is hidden.
     pub bounds: Rect,
+    /// Whether that holds several people who are followed.
+    pub is_group: bool,
     /// Its centre of mass (3.15).
     pub centroid: Point,
     /// Its motion in the picture, camera motion included.
@@ -90,6 +92,7 @@ impl Tracked {
     pub(super) fn become_group(&mut self, group: &GroupEstimate, frame: Frame) {
         let (own, ego) = (frame.vector(group.own_velocity), self.ego_velocity.unwrap_or_default());
         self.bounds = frame.rect(group.bounds);
+        self.is_group = group.people > 1;
         self.centroid = frame.point(centre(group.bounds));
         self.velocity = Vector { x: own.x + ego.x, y: own.y + ego.y };
     }
@@ -122,6 +125,7 @@ impl Default for Tracked {
             released: None,
             id: 0,
             bounds: Rect::default(),
+            is_group: false,
             centroid: Point::default(),
             velocity: Vector::default(),
             ego_velocity: None,
