@@ -153,21 +153,23 @@ impl Appearance {
             let (u, v) = (x as f32 / across, y as f32 / down);
             (-0.5 * (u * u + v * v)).exp()
         };
-        let score = |place| {
+        let likeness = |place| {
             let looks = PLACE_WEIGHT * self.greys.correlation(cells, place).unwrap_or_default();
             let silhouette = template.fit(evidence, place).mean();
             let both = looks.max(0.0) + silhouette.max(0.0);
             debug_assert!(both <= BEST_SCORE, "{looks} and {silhouette}");
-            both * chance(place)
+            both
         };
+        let score = |place| likeness(place) * chance(place);
         let steps = || (-REACH..=REACH).step_by(STEP);
         let (mut best, mut height) = ((0, 0), score((0, 0)));
         for place in steps().flat_map(|y| steps().map(move |x| (x, y))) {
+            let chance = chance(place);
             // Where the best that could be seen would be less, there is nothing to look for.
-            if BEST_SCORE * chance(place) <= height {
+            if BEST_SCORE * chance <= height {
                 continue;
             }
-            let value = score(place);
+            let value = likeness(place) * chance;
             if value > height {
                 (best, height) = (place, value);
             }
