@@ -9,7 +9,7 @@ use std::sync::{Arc, PoisonError};
 use http::{HeaderMap, HeaderValue, header};
 use rustls::pki_types::ServerName;
 use session::Error;
-use session::http::{Authenticator, ClientSettings};
+use session::http::{Authenticator, ClientSettings, excerpt};
 use tokio::io::{
     AsyncBufReadExt, AsyncRead, AsyncWrite, AsyncWriteExt, BufReader, ReadHalf, WriteHalf, split,
 };
@@ -25,8 +25,11 @@ use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
 const PORT: u16 = 554;
 const TLS_PORT: u16 = 322;
 
-/// Of an address that somebody else wrote.
-const LONGEST_SHOWN: usize = 200;
+/// Challenges to one request that are answered, where each says that the one before is stale.
+const MOST_CHALLENGES: usize = 5;
+
+/// Streams that a camera may offer: `rtspsrc` sets up each of them.
+const MOST_STREAMS: usize = 16;
 
 /// A connection, in clear or not.
 trait Connection: AsyncRead + AsyncWrite + Send + Unpin {}
@@ -65,7 +68,7 @@ pub async fn carry(
         over_tls,
         login: Authenticator::new(settings.credentials.clone(), settings.authentication),
         last: None,
-        signed_fresh: false,
+        challenges: 0,
         to_camera,
     };
     let asking = Arc::new(Mutex::new(asking));
@@ -153,8 +156,8 @@ struct Asking {
     login: Authenticator,
     /// The request that waits for its answer, unsigned.
     last: Option<Message>,
-    /// Its signature answers a challenge to itself.
-    signed_fresh: bool,
+    /// How often it was challenged.
+    challenges: usize,
     to_camera: WriteHalf<Box<dyn Connection>>,
 }
 
@@ -166,7 +169,13 @@ impl Asking {
             let value = value.to_str().map_err(Failure::new)?.to_owned();
             request.headers.push(("Authorization".to_owned(), value));
         }
-        self.to_camera.write_all(&request.to_bytes()).await.map_err(Failure::new)
+        self.write(&request.to_bytes()).await
+    }
+
+    /// Whoever does not read is not there.
+    async fn write(&mut self, bytes: &[u8]) -> Result<(), Failure> {
+        let written = timeout(LONGEST_SILENCE, self.to_camera.write_all(bytes)).await;
+        written.map_err(|_| Failure::new("the camera takes nothing any more"))?.map_err(Failure::new)
     }
 
     /// Answers a challenge to the request that waits; whether it could.
@@ -176,7 +185,9 @@ impl Asking {
             response.headers_of("www-authenticate").filter_map(|offer| HeaderValue::from_str(offer).ok());
         let offers: HeaderMap = offers.map(|offer| (header::WWW_AUTHENTICATE, offer)).collect();
         let stale = self.login.challenged(&offers, self.over_tls)?;
-        if std::mem::replace(&mut self.signed_fresh, true) && !stale {
+        self.challenges += 1;
+        let most = if stale { MOST_CHALLENGES } else { 1 };
+        if self.challenges > most {
             return Err(Error::BadCredentials { user: self.login.user().to_owned() }.into());
         }
         self.send(&last).await
@@ -191,9 +202,9 @@ async fn ask(mut source: BufReader<ReadHalf<TcpStream>>, asking: &Mutex<Asking>)
             Item::Message(mut message) if message.request().is_some() => {
                 message.start = message.start.replacen(&asking.own, &asking.camera, 1);
                 asking.send(&message).await?;
-                (asking.last, asking.signed_fresh) = (Some(message), false);
+                (asking.last, asking.challenges) = (Some(message), 0);
             }
-            other => asking.to_camera.write_all(&other.to_bytes()).await.map_err(Failure::new)?,
+            other => asking.write(&other.to_bytes()).await?,
         }
     }
     Ok(())
@@ -213,8 +224,13 @@ async fn answer(
                 continue;
             }
             Item::Message(message) if message.status().is_some_and(|status| (300..400).contains(&status)) => {
-                let to = message.header("location").unwrap_or_default().chars().take(LONGEST_SHOWN).collect();
-                return Err(Error::Redirected(to).into());
+                let to = message.header("location").unwrap_or_default();
+                return Err(Error::Redirected(excerpt(to)).into());
+            }
+            Item::Message(message) if streams(&message.body) > MOST_STREAMS => {
+                let said =
+                    format!("the camera offers {} streams, more than {MOST_STREAMS}", streams(&message.body));
+                return Err(Failure::new(said));
             }
             _ => {}
         }
@@ -223,11 +239,64 @@ async fn answer(
     Ok(())
 }
 
+/// How many streams a description offers (SDP, RFC 8866): as many as it has media.
+fn streams(description: &[u8]) -> usize {
+    description
+        .split(|byte| matches!(byte, b'\r' | b'\n'))
+        .filter(|line| line.trim_ascii_start().starts_with(b"m="))
+        .count()
+}
+
 #[cfg(test)]
 mod tests {
-    use tokio::io::AsyncReadExt;
+    use session::http::{Authentication, Credentials, Secret};
+    use tokio::io::{AsyncReadExt, DuplexStream, duplex};
 
     use super::*;
+
+    fn message(start: &str, headers: &[(&str, &str)]) -> Message {
+        let headers = headers.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned()));
+        Message { start: start.to_owned(), headers: headers.collect(), body: Vec::new() }
+    }
+
+    /// Who has asked the camera at the other end for something.
+    fn asking(connection: DuplexStream) -> Asking {
+        let credentials = Credentials { user: "root".to_owned(), password: Secret::new("pass") };
+        let connection: Box<dyn Connection> = Box::new(connection);
+        Asking {
+            camera: "rtsp://camera".to_owned(),
+            own: "rtsp://own".to_owned(),
+            over_tls: false,
+            login: Authenticator::new(Some(credentials), Authentication::Auto),
+            last: Some(message("OPTIONS rtsp://camera/ RTSP/1.0", &[])),
+            challenges: 0,
+            to_camera: split(connection).1,
+        }
+    }
+
+    #[tokio::test]
+    async fn who_challenges_again_and_again_is_given_up() {
+        let (near, _far) = duplex(64 * 1024);
+        let mut asking = asking(near);
+        let stale = [("WWW-Authenticate", "Digest realm=\"a\", nonce=\"b\", stale=true")];
+        let challenge = message("RTSP/1.0 401 Unauthorized", &stale);
+        for _ in 0..MOST_CHALLENGES {
+            asking.challenged(&challenge).await.unwrap();
+        }
+        assert!(asking.challenged(&challenge).await.is_err());
+    }
+
+    #[tokio::test]
+    async fn who_does_not_read_keeps_nobody_waiting() {
+        let (near, _far) = duplex(16);
+        assert!(asking(near).write(&[0; 64]).await.is_err());
+    }
+
+    #[test]
+    fn streams_are_counted_as_rtspsrc_does() {
+        let description = b"v=0\r\nm=video 0 RTP/AVP 96\r\na=control:m=1\r\n \tm=audio 0 RTP/AVP 97\r\n";
+        assert_eq!((streams(description), streams(b"")), (2, 0));
+    }
 
     /// A connection within this machine that begins like this.
     async fn visitor(address: std::net::SocketAddr, first: &str) -> TcpStream {

@@ -9,7 +9,7 @@ use tokio::io::{AsyncBufRead, AsyncBufReadExt, AsyncReadExt};
 /// Longer heads are none.
 const MAX_HEAD_BYTES: usize = 64 * 1024;
 /// Descriptions of streams have a few kilobytes.
-const MAX_BODY_BYTES: usize = 1024 * 1024;
+const MAX_BODY_BYTES: usize = 64 * 1024;
 
 /// One thing on the wire.
 #[derive(Debug)]
@@ -20,10 +20,10 @@ pub enum Item {
     Message(Message),
 }
 
-/// A request or a response.
+/// A request or a response. Whoever reads it next finds the same in it: what others might read in another way is refused.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
-    /// The first line.
+    /// The first line, its words with one space between them.
     pub start: String,
     /// In their order, names as they came.
     pub headers: Vec<(String, String)>,
@@ -78,18 +78,31 @@ impl Message {
             }
             let line = String::from_utf8(line).map_err(|_| no_rtsp("a head that is no text"))?;
             let line = line.trim_end_matches(['\r', '\n']);
-            match (start.is_empty(), line.split_once(':')) {
-                (true, _) => line.clone_into(&mut start),
-                (false, _) if line.is_empty() => break,
-                (false, Some((name, value))) => {
-                    headers.push((name.trim().to_owned(), value.trim().to_owned()))
+            if line.contains(|c: char| c.is_control() && c != '\t') {
+                return Err(no_rtsp("a head that is no text"));
+            }
+            match line.split_once(':') {
+                _ if start.is_empty() => {
+                    start = first_line(line).ok_or_else(|| no_rtsp("neither a request nor a response"))?;
                 }
-                (false, None) => return Err(no_rtsp("a header without a name")),
+                _ if line.is_empty() => break,
+                // To some it goes on with the header before.
+                _ if line.starts_with([' ', '\t']) => {}
+                Some((name, value)) if is_token(name.trim_end()) => {
+                    headers.push((name.trim_end().to_owned(), value.trim().to_owned()))
+                }
+                Some(_) => {}
+                None => return Err(no_rtsp("a header without a name")),
             }
         }
         let mut message = Self { start, headers, body: Vec::new() };
-        let length = message.header("content-length").map_or(Ok(0), str::parse);
-        let length = length.ok().filter(|length| *length <= MAX_BODY_BYTES);
+        let length = {
+            let mut lengths = message.headers_of("content-length");
+            let first = lengths.next();
+            let length = first.map_or(Ok(0), str::parse).ok();
+            // Others may go by the second.
+            length.filter(|length| *length <= MAX_BODY_BYTES && lengths.all(|other| Some(other) == first))
+        };
         message.body.resize(length.ok_or_else(|| no_rtsp("a body of no length"))?, 0);
         wire.read_exact(&mut message.body).await?;
         Ok(message)
@@ -132,6 +145,36 @@ impl Message {
     }
 }
 
+/// The first line of a message: `None` where it is neither a request's nor a response's (RFC 2326, sections 6.1 and 7.1).
+fn first_line(line: &str) -> Option<String> {
+    let words: Vec<_> = line.split_whitespace().collect();
+    let is_version = |word: &str| {
+        let version = word.strip_prefix("RTSP/").and_then(|version| version.split_once('.'));
+        version.is_some_and(|(major, minor)| is_number(major) && is_number(minor))
+    };
+    let is_right = match words[..] {
+        [version, status, ..] if is_version(version) => status.len() == 3 && is_number(status),
+        // What begins like a version is a response to others.
+        [method, _, version] => {
+            is_version(version)
+                && method.bytes().all(|byte| byte.is_ascii_uppercase() || byte == b'_')
+                && !method.starts_with("RTSP")
+                && !method.starts_with("HTTP")
+        }
+        _ => false,
+    };
+    is_right.then(|| words.join(" "))
+}
+
+fn is_number(word: &str) -> bool {
+    !word.is_empty() && word.bytes().all(|byte| byte.is_ascii_digit())
+}
+
+/// Whether it can be the name of a header.
+fn is_token(name: &str) -> bool {
+    !name.is_empty() && name.bytes().all(|byte| byte.is_ascii_alphanumeric() || b"-_.".contains(&byte))
+}
+
 fn no_rtsp(what: &str) -> io::Error {
     io::Error::new(ErrorKind::InvalidData, format!("{what} came instead of RTSP"))
 }
@@ -167,6 +210,44 @@ mod tests {
     async fn empty_lines_before_something_are_nothing() {
         let items = all(b"\r\n\n$\0\0\x01x\r\n\r\nRTSP/1.0 200 OK\r\n\r\n\r\n").await.unwrap();
         assert!(matches!(&items[..], [Item::Packet(_), Item::Message(_)]), "{items:?}");
+    }
+
+    /// `rtspsrc` takes any space between words, and would follow a redirection that is none here.
+    #[tokio::test]
+    async fn a_status_is_a_status_however_it_is_spaced() {
+        for wire in
+            ["RTSP/1.0  302 Found\r\n\r\n", "RTSP/1.0\t302\tFound\r\n\r\n", " RTSP/1.0 302 Found\r\n\r\n"]
+        {
+            let items = all(wire.as_bytes()).await.unwrap();
+            let [Item::Message(response)] = &items[..] else { panic!("{items:?}") };
+            assert_eq!(response.status(), Some(302), "{wire:?}");
+            assert_eq!(response.to_bytes(), b"RTSP/1.0 302 Found\r\n\r\n");
+        }
+    }
+
+    #[tokio::test]
+    async fn what_has_no_name_of_a_header_is_left_out() {
+        let items = all(b"RTSP/1.0 200 OK\r\n Content-Length: 5\r\n\tmore\r\nA b: 1\r\nCSeq : 2\r\n\r\n")
+            .await
+            .unwrap();
+        assert_eq!(items[0].to_bytes(), b"RTSP/1.0 200 OK\r\nCSeq: 2\r\n\r\n");
+    }
+
+    #[tokio::test]
+    async fn what_others_might_read_in_another_way_is_an_error() {
+        for wire in [
+            "rtsp/1.0 302 Found\r\n\r\n",
+            "RTSP/1.0 +302 Found\r\n\r\n",
+            "RTSP/1.0 0302 Found\r\n\r\n",
+            "RTSP/1 302 Found\r\n\r\n",
+            "HTTP/1.0 302 RTSP/1.0\r\n\r\n",
+            "HTTP 302 RTSP/1.0\r\n\r\n",
+            "RTSP/1.0 200 OK\r\nX: a\rContent-Length: 5\r\n\r\n",
+            "RTSP/1.0 200 OK\r\nX: \0\r\n\r\n",
+            "RTSP/1.0 200 OK\r\nContent-Length: 1\r\nContent-Length: 0\r\n\r\na",
+        ] {
+            assert!(all(wire.as_bytes()).await.is_err(), "{wire:?}");
+        }
     }
 
     #[tokio::test]
