@@ -4,6 +4,8 @@
 //! takes the memory for it before there is a picture; an element that waits for the end of a picture keeps what comes until
 //! then. So both are looked at on their way.
 
+mod headers;
+mod jpeg;
 mod sizes;
 
 use std::sync::Arc;
@@ -17,6 +19,9 @@ const MOST_PIXELS: u64 = 8192 * 4320;
 
 /// The most bytes of one encoded picture: one that large of poorly compressed JPEG.
 const MOST_BYTES: usize = 64 * 1024 * 1024;
+
+/// Pictures in a row that cannot be read, of which the network may have broken some: a second or two.
+const MOST_UNREADABLE: usize = 50;
 
 /// Ends the pipeline with an error before one of its decoders gets a picture that is too large, or what comes from `source` grows
 /// without end before there is one.
@@ -71,6 +76,7 @@ fn count(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
 fn look_at_sizes(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
     let kinds =
         gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST | gst::PadProbeType::EVENT_DOWNSTREAM;
+    let unreadable = AtomicUsize::new(0);
     pad.add_probe(kinds, move |pad, info| {
         let largest = match &info.data {
             Some(gst::PadProbeData::Event(event)) => of_event(event),
@@ -86,9 +92,19 @@ fn look_at_sizes(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
                 let Size { width, height } = size;
                 refuse(pad, &format!("a picture of {width}x{height} is announced, which is not decoded"))
             }
-            Ok(_) => gst::PadProbeReturn::Ok,
-            // Its size cannot be read: no decoder is to guess it. Not `Drop`: on a sink pad GStreamer 1.22 then lets go of data that
-            // the bindings have taken.
+            Ok(_) => {
+                if info.event().is_none() {
+                    unreadable.store(0, Ordering::Relaxed);
+                }
+                gst::PadProbeReturn::Ok
+            }
+            Err(sizes::Unreadable) if unreadable.fetch_add(1, Ordering::Relaxed) + 1 >= MOST_UNREADABLE => {
+                refuse(
+                    pad,
+                    &format!("{MOST_UNREADABLE} pictures came one after the other whose size cannot be read"),
+                )
+            }
+            // No decoder is to guess it. Not `Drop`: on a sink pad GStreamer 1.22 then lets go of data that the bindings have taken.
             Err(sizes::Unreadable) => gst::PadProbeReturn::Handled,
         }
     });
@@ -130,8 +146,8 @@ fn refuse(pad: &gst::Pad, why: &str) -> gst::PadProbeReturn {
 mod tests {
     use super::*;
 
-    /// A decoder for what a harness is given; what the pipeline says of it.
-    fn error_of(decoder: &str, caps: &str, data: &[u8]) -> Option<String> {
+    /// What a pipeline with this decoder says of these buffers.
+    fn error_of(decoder: &str, caps: &str, buffers: &[&[u8]]) -> Option<String> {
         gst::init().unwrap();
         let caps: gst::Caps = caps.parse().unwrap();
         let pipeline =
@@ -141,7 +157,9 @@ mod tests {
         keep(&pipeline, Some(&source));
         let source = source.downcast::<gst_app::AppSrc>().unwrap();
         source.set_caps(Some(&caps));
-        source.push_buffer(gst::Buffer::from_slice(data.to_vec())).unwrap();
+        for buffer in buffers {
+            source.push_buffer(gst::Buffer::from_slice(buffer.to_vec())).unwrap();
+        }
         source.end_of_stream().unwrap();
         let _ = pipeline.set_state(gst::State::Playing);
         let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
@@ -164,20 +182,31 @@ mod tests {
     /// Progressive: of these, libjpeg takes the memory before it hands anything out.
     #[test]
     fn a_picture_that_claims_to_be_huge_takes_no_memory() {
-        let mut jpeg = vec![0xff, 0xd8, 0xff, 0xc2, 0, 17, 8];
-        jpeg.extend([30000_u16, 30000].map(u16::to_be_bytes).concat());
-        jpeg.extend([3, 1, 0x22, 0, 2, 0x11, 0, 3, 0x11, 0, 0xff, 0xda, 0, 12, 3, 1, 0, 2, 0, 3, 0, 0, 0, 0]);
-        jpeg.resize(4096, 0);
-        let before = peak();
-        let error = error_of("jpegdec", "image/jpeg", &jpeg);
-        assert!(error.as_ref().is_some_and(|error| error.contains("30000x30000")), "{error:?}");
-        assert!(peak() < before + 200_000, "{before}, then {}", peak());
+        // Also after a marker that has no length.
+        for start in [&[0xff_u8, 0xd8][..], &[0xff, 0xd8, 0xff, 0xd0]] {
+            let mut jpeg = [start, &[0xff, 0xc2, 0, 17, 8]].concat();
+            jpeg.extend([30000_u16, 30000].map(u16::to_be_bytes).concat());
+            jpeg.extend([3, 1, 0x22, 0, 2, 0x11, 0, 3, 0x11, 0]);
+            jpeg.extend([0xff, 0xda, 0, 12, 3, 1, 0, 2, 0, 3, 0, 0, 0, 0]);
+            jpeg.resize(4096, 0);
+            let before = peak();
+            let error = error_of("jpegdec", "image/jpeg", &[&jpeg]);
+            assert!(error.as_ref().is_some_and(|error| error.contains("30000x30000")), "{error:?}");
+            assert!(peak() < before + 200_000, "{before}, then {}", peak());
+        }
     }
 
     #[test]
     fn what_never_becomes_a_picture_is_not_kept() {
-        let error =
-            error_of("multipartdemux ! jpegdec", "multipart/x-mixed-replace", &vec![b'x'; MOST_BYTES + 1]);
+        let endless = vec![b'x'; MOST_BYTES + 1];
+        let error = error_of("multipartdemux ! jpegdec", "multipart/x-mixed-replace", &[&endless]);
         assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
+    }
+
+    #[test]
+    fn pictures_that_cannot_be_read_are_said() {
+        let none: &[u8] = b"no picture";
+        let error = error_of("jpegdec", "image/jpeg", &[none; MOST_UNREADABLE]);
+        assert!(error.as_ref().is_some_and(|error| error.contains("cannot be read")), "{error:?}");
     }
 }
