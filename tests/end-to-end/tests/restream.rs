@@ -4,7 +4,7 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -272,6 +272,29 @@ fn those_who_are_too_many_are_sent_away_and_nobody_is_followed_the_worse_for_it(
     while !ffprobe(&url).0 {
         assert!(begin.elapsed() < PATIENCE, "there is no room any more");
     }
+    program.end("TERM");
+}
+
+/// What is asked for before the log-in is short, and takes no place for long.
+#[test]
+fn a_stranger_fills_neither_the_memory_nor_the_places() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("stranger", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let server = url.trim_start_matches("rtsp://").trim_end_matches("/door");
+    let visit = |request: &str| {
+        let mut stranger = TcpStream::connect(server).unwrap();
+        stranger.set_read_timeout(Some(PATIENCE)).unwrap();
+        stranger.write_all(request.as_bytes()).unwrap();
+        let mut answer = String::new();
+        stranger.read_to_string(&mut answer).expect("it is sent away");
+        answer
+    };
+    let announced = "OPTIONS * RTSP/1.0\r\nCSeq: 1\r\nContent-Length: 4000000000\r\n\r\n";
+    assert!(visit(announced).starts_with("RTSP/1.0 413 "));
+    assert!(visit("OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\n").starts_with("RTSP/1.0 200 "));
+    let (read, said) = ffprobe(&url);
+    assert!(read, "{said}");
     program.end("TERM");
 }
 
