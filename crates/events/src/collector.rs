@@ -2,12 +2,11 @@
 
 use std::time::Duration;
 
+use crate::sighting::thin;
 use crate::{Crop, Sighting, Step};
 
 /// Between two steps of a path, at first.
 const STEP: Duration = Duration::from_secs(1);
-/// A path that has more steps loses every other one, and takes them half as often from then on.
-const MOST_STEPS: usize = 1024;
 
 /// Whom a camera follows, in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,9 +113,7 @@ impl Followed {
         if let Some((pan_deg, tilt_deg)) = target.direction.filter(|_| is_due) {
             path.push(Step { at_ms, pan_deg, tilt_deg });
         }
-        if path.len() > MOST_STEPS {
-            let mut nth = 0..;
-            path.retain(|_| nth.next().is_some_and(|nth| nth % 2 == 0));
+        if thin(path) {
             self.step *= 2;
         }
     }
@@ -129,6 +126,7 @@ fn milliseconds(time: Duration) -> i64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::sighting::MOST_STEPS;
 
     const FIRST: Target = Target { track: 1, height: 0.5, towards: 0.0, direction: Some((10.0, -5.0)) };
     const SECOND: Target = Target { track: 2, ..FIRST };

@@ -6,6 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::Looks;
 
+/// A path that has more steps loses every other one.
+pub(crate) const MOST_STEPS: usize = 1024;
+
 /// Somebody who was followed, from when to when. Times are milliseconds since 1970, UTC.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Sighting {
@@ -77,12 +80,23 @@ impl Sighting {
         self.to_ms = self.to_ms.max(later.to_ms);
         self.path.extend(later.path);
         self.path.sort_by_key(|step| step.at_ms);
+        while thin(&mut self.path) {}
         let quality = |picture: &Option<Picture>| picture.as_ref().map(|picture| picture.quality);
         if quality(&later.picture) > quality(&self.picture) {
             self.picture = later.picture;
         }
         self.recording = self.recording.take().or(later.recording);
     }
+}
+
+/// Takes every other step out of a path that has too many, and says whether it had.
+pub(crate) fn thin(path: &mut Vec<Step>) -> bool {
+    let has_too_many = path.len() > MOST_STEPS;
+    if has_too_many {
+        let mut nth = 0..;
+        path.retain(|_| nth.next().is_some_and(|nth| nth % 2 == 0));
+    }
+    has_too_many
 }
 
 /// Between two directions.
@@ -135,5 +149,15 @@ mod tests {
         assert_eq!(first.picture.as_ref().map(|picture| picture.quality), Some(5.0));
         first.join(sighting(300, vec![], 7.0));
         assert_eq!(first.picture.map(|picture| picture.quality), Some(7.0));
+    }
+
+    #[test]
+    fn who_is_taken_up_again_all_night_has_a_path_that_can_be_kept() {
+        let steps = |from: i64| (from..from + 600).map(|second| step(1000 * second, 1.0, 0.0)).collect();
+        let mut night = sighting(0, steps(0), 1.0);
+        (1..50).for_each(|nth| night.join(sighting(600_000 * nth, steps(600 * nth), 1.0)));
+        assert!((MOST_STEPS / 2..=MOST_STEPS).contains(&night.path.len()), "{}", night.path.len());
+        assert_eq!(night.path[0].at_ms, 0);
+        assert!(night.path.is_sorted_by_key(|step| step.at_ms) && night.to_ms > 29_000_000);
     }
 }
