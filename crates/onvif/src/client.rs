@@ -104,6 +104,7 @@ impl session::Client for Client {
 
     fn identity(&self) -> Identity {
         let mut identity = self.identity.clone();
+        identity.accepted = self.login == Login::Accepted;
         identity.findings = serde_json::to_value(self.findings()).unwrap_or_default();
         identity
     }

@@ -229,6 +229,19 @@ async fn a_camera_that_is_not_there_is_stopped_when_it_is_back() {
     ends(&program);
 }
 
+/// Somebody has tried passwords until the camera locked the account, and the application dies then.
+#[tokio::test]
+async fn a_camera_that_locked_an_account_that_worked_is_stopped_once_it_lets_it_in() {
+    let application = Application::new("locked").moving().await;
+    application.camera.set_fault(Fault::Locked);
+    let refused = application.camera.status().refused;
+    let (camera, program) = application.die();
+    assert!(camera.wait_for(PATIENCE, |status| status.refused > refused + 1), "it does not try");
+    camera.set_fault(Fault::None);
+    rests(&camera);
+    ends(&program);
+}
+
 #[tokio::test]
 async fn a_wrong_password_is_tried_once() {
     let mut application = Application::new("password").moving().await;

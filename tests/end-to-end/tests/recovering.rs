@@ -31,12 +31,35 @@ fn a_camera_that_refuses_an_account_that_worked_is_tried_again() {
     scene::assert_left_at_rest(&camera);
 }
 
+/// The next process of a camera knows that its account has worked; and the watchdog, refused as well, stops the camera once it can.
+#[test]
+fn a_camera_that_refuses_everybody_as_its_process_crashes_is_stopped_and_tried_again() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let file = |folder: &Path| {
+        Program::entry("door", &camera.url(), &folder.join("password")) + "isolation = \"process\"\n"
+    };
+    let mut program = Program::start("crashed", file, &[]);
+    scene::wait_until_following(&camera);
+    program.wait_for("/metrics", |metrics| metrics.contains("ptztrack_picture_up{camera=\"door\"} 1"));
+
+    camera.set_fault(Fault::Locked);
+    signal(program.process_of("door"), "ABRT");
+    let line = program.launch.wait_for_line("the camera refuses user");
+    assert!(line.contains("tried again"), "{line}");
+    camera.set_fault(Fault::None);
+    program.launch.wait_for_line("door: the picture is there");
+    program.end("TERM");
+    scene::assert_left_at_rest(&camera);
+}
+
 /// The thread that asks for the name cannot be ended: whoever waits for it waits for as long as the name server likes.
 #[test]
 fn a_name_that_is_looked_up_for_ever_keeps_nobody_waiting() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let network = Network::before(&camera);
     let names = plugin_folder().join("examples/libsilent_names.so");
+    // Where there is no such library the linker only warns.
+    assert!(names.is_file(), "{}", names.display());
     let good = |folder: &Path| Program::entry("good", &network.url(), &folder.join("password"));
     let file = |folder: &Path| {
         good(folder) + &Program::entry("lost", "http://camera.silent", &folder.join("password"))
@@ -71,6 +94,9 @@ fn a_camera_whose_own_process_hangs_is_given_another() {
     let mut program = Program::start("hangs", file, &[]);
     [&good, &door].into_iter().for_each(scene::wait_until_following);
     let process = program.process_of("door");
+    let limits = fs::read_to_string(format!("/proc/{process}/limits")).unwrap();
+    let memory = limits.lines().find(|line| line.starts_with("Max data size")).unwrap();
+    assert!(memory.contains(" 2147483648 "), "{memory}");
     signal(process, "STOP");
     program.launch.wait_for_line("door: error: its process hangs; it is started again");
     program.launch.wait_for_line("door: the picture is there");

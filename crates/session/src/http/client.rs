@@ -45,6 +45,9 @@ pub struct Identity {
     /// As they are by now: redirects followed, user and password those of the last request.
     pub settings: ClientSettings,
     cookies: Cookies,
+    /// The camera has accepted user and password: where it refuses them, that may pass.
+    #[serde(default)]
+    pub accepted: bool,
     /// What the camera has told, in the protocol's own form: whoever has it need not ask again.
     #[serde(default)]
     pub findings: serde_json::Value,
@@ -52,7 +55,7 @@ pub struct Identity {
 
 impl From<ClientSettings> for Identity {
     fn from(settings: ClientSettings) -> Self {
-        Self { settings, cookies: Cookies::default(), findings: serde_json::Value::Null }
+        Self { settings, cookies: Cookies::default(), accepted: false, findings: serde_json::Value::Null }
     }
 }
 
@@ -120,7 +123,7 @@ impl HttpClient {
 
     /// Who this client is to the camera.
     pub fn identity(&self) -> Identity {
-        Identity { cookies: self.cookies.clone(), ..self.settings.clone().into() }
+        Identity { cookies: self.cookies.clone(), accepted: self.accepted, ..self.settings.clone().into() }
     }
 
     /// Takes another user or password, and asks again even where the last were refused.

@@ -15,6 +15,9 @@ use crate::{Client, Command, Request, Stop};
 /// From one try to stop a camera to the next.
 const PAUSE: Duration = Duration::from_millis(500);
 
+/// The same where it refuses user and password that it accepted before, twice as long each time: to ask again could lock the account.
+const REFUSED_PAUSE: Duration = Duration::from_secs(10);
+
 /// A lease as it was last heard of.
 #[derive(Debug, Clone)]
 pub struct Held {
@@ -103,34 +106,44 @@ async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
 /// Stops the camera until it says yes; and again where it may act on a move after that.
 async fn stop<C: Client>(order: &StopOrder) {
     let tries = async {
-        let mut client = loop {
-            match C::in_place_of(order.identity.clone()) {
-                Ok(client) => break client,
-                // Out of file descriptors, for instance: there may be some later.
-                Err(_) => sleep(PAUSE).await,
-            }
-        };
-        let begin = Instant::now();
-        let mut confirmation = C::PROTOCOL.confirms_stops.then(StopConfirmation::without_pictures);
-        loop {
-            until_accepted(&mut client, order.words).await?;
-            let Some(confirmation) = &mut confirmation else { break };
-            confirmation.stopped(Time::ZERO);
-            if !confirmation.repeats_unseen(Time::ZERO) {
-                break;
-            }
+        let mut pause = REFUSED_PAUSE;
+        // Who was let in before may be so again: the account is locked for a while, or somebody answers in the camera's place.
+        while try_to_stop::<C>(order).await.is_none() && order.identity.accepted {
+            sleep(pause).await;
+            pause *= 2;
         }
-        if order.in_doubt {
-            sleep_until(begin + DOUBT).await;
-            until_accepted(&mut client, order.words).await?;
-        }
-        Some(())
     };
     // Whoever cannot be stopped by then is not to be by us.
     let _ = timeout(LAST_TRIES, tries).await;
 }
 
-/// `None`: the camera refuses user or password, and asking again could lock the account.
+/// `None`: the camera refuses user or password.
+async fn try_to_stop<C: Client>(order: &StopOrder) -> Option<()> {
+    let mut client = loop {
+        match C::in_place_of(order.identity.clone()) {
+            Ok(client) => break client,
+            // Out of file descriptors, for instance: there may be some later.
+            Err(_) => sleep(PAUSE).await,
+        }
+    };
+    let begin = Instant::now();
+    let mut confirmation = C::PROTOCOL.confirms_stops.then(StopConfirmation::without_pictures);
+    loop {
+        until_accepted(&mut client, order.words).await?;
+        let Some(confirmation) = &mut confirmation else { break };
+        confirmation.stopped(Time::ZERO);
+        if !confirmation.repeats_unseen(Time::ZERO) {
+            break;
+        }
+    }
+    if order.in_doubt {
+        sleep_until(begin + DOUBT).await;
+        until_accepted(&mut client, order.words).await?;
+    }
+    Some(())
+}
+
+/// `None`: the camera refuses user or password.
 async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
     loop {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {

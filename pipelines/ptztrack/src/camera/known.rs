@@ -36,6 +36,8 @@ pub struct Known {
     pub running: Mutex<Option<Arc<dyn Running>>>,
     pub pictures: AtomicU64,
     pub processed: AtomicU64,
+    /// User and password have worked, since the program was started.
+    pub worked: AtomicBool,
     /// By the pipelines before this one; between two, more than there can be.
     processed_before: AtomicU64,
     pub rebuilt: AtomicU64,
@@ -166,6 +168,7 @@ impl Known {
             running: Mutex::default(),
             pictures: AtomicU64::default(),
             processed: AtomicU64::default(),
+            worked: AtomicBool::default(),
             processed_before: AtomicU64::default(),
             rebuilt: AtomicU64::default(),
             failures: AtomicU64::default(),
@@ -218,6 +221,7 @@ impl Known {
     /// A picture went all the way.
     pub fn saw_picture(&self) {
         self.processed.fetch_add(1, Ordering::Relaxed);
+        self.worked.store(true, Ordering::Relaxed);
         self.last_picture.store(self.now(), Ordering::Relaxed);
     }
 

@@ -223,8 +223,12 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             Err(NotBuilt::Pipeline(err)) => return Err(err),
             Err(NotBuilt::Video(failure)) => {
                 lock(&known.running).take();
-                if failure.refused && !refusals.wait(known.processed.load(Ordering::Relaxed)) {
-                    return Err(failure.reason.into());
+                if failure.refused {
+                    refusals.wait(known.processed.load(Ordering::Relaxed));
+                    // One that never worked is wrong, and to try it again could lock the account.
+                    if !known.worked.load(Ordering::Relaxed) {
+                        return Err(failure.reason.into());
+                    }
                 }
                 waits.borrow_mut().out_of_reach(failure.reason);
             }

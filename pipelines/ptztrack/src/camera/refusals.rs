@@ -2,9 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-/// What to do where a camera refuses user and password. An account that has worked is tried again, at growing pauses: a camera
-/// that is starting may refuse everybody, and one that was attacked may have locked the account for a while. One that never
-/// worked is wrong, and to try it again could lock it.
+/// When a camera that refuses user and password is tried again, though they have worked: one that is starting may refuse everybody, and
+/// one that was attacked may have locked the account for a while.
 #[derive(Debug, Default)]
 pub struct Refusals {
     pause: Option<Duration>,
@@ -17,15 +16,14 @@ impl Refusals {
     const SHORTEST: Duration = Duration::from_secs(10);
     const LONGEST: Duration = Duration::from_secs(600);
 
-    /// It has refused, after so many pictures; whether it is to be tried again.
-    pub fn wait(&mut self, pictures: u64) -> bool {
+    /// It has refused, after so many pictures.
+    pub fn wait(&mut self, pictures: u64) {
         let worked_since = pictures > self.pictures;
         let pause = match self.pause {
             Some(pause) if !worked_since => (pause * 2).min(Self::LONGEST),
             _ => Self::SHORTEST,
         };
         (self.pause, self.until, self.pictures) = (Some(pause), Some(Instant::now() + pause), pictures);
-        pictures > 0
     }
 
     /// Whether it is not time yet.
@@ -41,10 +39,9 @@ mod tests {
     #[test]
     fn an_account_that_worked_is_tried_again_at_growing_pauses() {
         let mut refusals = Refusals::default();
-        assert!(!refusals.wait(0), "it never worked");
-        let mut refusals = Refusals::default();
         let mut pause = |pictures| {
-            assert!(refusals.wait(pictures) && refusals.are_waited_for());
+            refusals.wait(pictures);
+            assert!(refusals.are_waited_for());
             refusals.pause.unwrap().as_secs()
         };
         assert_eq!([7, 7, 7, 9, 9].map(&mut pause), [10, 20, 40, 10, 20]);

@@ -129,7 +129,12 @@ impl Processes {
     ) -> io::Result<()> {
         socket.set_read_timeout(Some(LONGEST_SILENCE))?;
         socket.set_write_timeout(Some(LONGEST_SILENCE))?;
-        (&socket).write_all(&line(&Start { settings: settings.clone(), control: known.control() })?)?;
+        let worked = known.worked.load(Ordering::Relaxed);
+        (&socket).write_all(&line(&Start {
+            settings: settings.clone(),
+            control: known.control(),
+            worked,
+        })?)?;
         let remote = Arc::new(Remote::new(socket.try_clone()?));
         *lock(&self.socket) = Some(socket.try_clone()?);
         *lock(&known.running) = Some(remote.clone());

@@ -26,6 +26,8 @@ pub struct Start {
     pub settings: CameraSettings,
     /// Who had the camera before.
     pub control: Control,
+    /// User and password have worked before.
+    pub worked: bool,
 }
 
 /// All further ones.
@@ -162,6 +164,7 @@ impl Report {
         for (counter, value) in counters {
             counter.store(value, Ordering::Relaxed);
         }
+        known.worked.fetch_or(self.processed > 0, Ordering::Relaxed);
         known.last_picture_was(self.since_picture);
         for (stopwatch, time) in known.times.iter().zip(&self.times) {
             stopwatch.set(*time);
@@ -182,6 +185,7 @@ mod tests {
         let there = Known::new("door");
         lock(&there.state).picture = true;
         there.pictures.store(7, Ordering::Relaxed);
+        there.processed.store(1, Ordering::Relaxed);
         *lock(&there.steering) = Steering::HandedOver;
         there.times[0].set((3, 0.5));
         let line = serde_json::to_string(&Word::Report(Box::new(Report::of(&there, 2)))).unwrap();
@@ -193,7 +197,7 @@ mod tests {
         assert_eq!(here.control(), Control::Ours, "an order is on its way");
         report.tell(&here, 2);
         assert_eq!(here.control(), Control::HandedOver);
-        assert!(lock(&here.state).picture);
+        assert!(lock(&here.state).picture && here.worked.load(Ordering::Relaxed));
         assert_eq!((here.pictures.load(Ordering::Relaxed), here.times[0].read()), (7, (3, 0.5)));
         assert!(!here.is_stuck());
         Report { rebuilt: 1, ..*report }.tell(&here, 2);
