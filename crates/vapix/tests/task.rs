@@ -3,7 +3,7 @@
 //! The task that talks to a camera, over real HTTP.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
-use std::sync::mpsc::RecvTimeoutError;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -79,7 +79,7 @@ fn dropped_it_stops_the_camera() {
 fn it_can_be_dropped_in_its_own_thread() {
     let camera = camera();
     let task = Arc::new(Mutex::new(None));
-    let (events, seen) = std::sync::mpsc::channel();
+    let (events, seen) = channel();
     let held = task.clone();
     let started = start(&camera, move |event| {
         if matches!(event, Event::Loop(LoopEvent::Session(SessionEvent::Moving))) {
@@ -98,16 +98,18 @@ fn it_can_be_dropped_in_its_own_thread() {
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
 }
 
-/// A watchdog in this process: to the camera's task it makes no difference.
-fn watchdog() -> (Arc<Watchdog>, std::path::PathBuf) {
+/// A watchdog in this process: to the camera's task it makes no difference. It says when it is asked for, and answers nothing as long
+/// as it is held back.
+fn watchdog(test: &str, asked: Sender<()>, held_back: Receiver<()>) -> (Arc<Watchdog>, std::path::PathBuf) {
     static ARMED: Armed = Armed::new(|_| {});
-    let socket = std::env::temp_dir().join(format!("vapix-watchdog-test-{}", std::process::id()));
+    let socket = std::env::temp_dir().join(format!("vapix-watchdog-{test}-{}", std::process::id()));
     let _ = std::fs::remove_file(&socket);
     let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
     std::thread::spawn(move || {
         let runtime = Builder::new_current_thread().enable_all().build().unwrap();
         let (application, _) = listener.accept().unwrap();
         application.set_nonblocking(true).unwrap();
+        let _ = (asked.send(()), held_back.recv());
         runtime.block_on(async {
             serve::<Client>(tokio::net::UnixStream::from_std(application).unwrap(), &ARMED).await;
         });
@@ -115,11 +117,31 @@ fn watchdog() -> (Arc<Watchdog>, std::path::PathBuf) {
     (Watchdog::new(WatchdogAddress::Socket(socket.clone())), socket)
 }
 
+/// A camera that is moved before the watchdog has its lease turns on where this process dies in that moment.
+#[test]
+fn no_move_is_sent_before_the_watchdog_has_the_lease() {
+    let camera = camera();
+    let ((ask, asked), (hold_back, held_back)) = (channel(), channel());
+    let (watchdog, socket) = watchdog("lease", ask, held_back);
+    let task = start_with(&camera, Some(watchdog), |_| {});
+    // Not before there is something to move.
+    see_until(&task, |wait| asked.recv_timeout(wait).is_ok());
+    for _ in 0..15 {
+        see(&task);
+        assert!(!camera.wait_for(PICTURE, |status| status.moving), "{:?}", camera.commands());
+    }
+    drop(hold_back);
+    see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
+    assert_eq!(task.statistics().dead_man, DeadManState::Armed);
+    drop(task);
+    std::fs::remove_file(socket).unwrap();
+}
+
 /// The process lives, and the socket with it: only the lease runs out.
 #[test]
 fn one_that_hangs_has_its_camera_stopped_by_the_watchdog() {
     let camera = camera();
-    let (watchdog, socket) = watchdog();
+    let (watchdog, socket) = watchdog("hangs", channel().0, channel().1);
     let (release, hold) = std::sync::mpsc::sync_channel::<()>(0);
     let hold = Arc::new(Mutex::new(hold));
     let task = start_with(&camera, Some(watchdog), move |event| {
@@ -139,7 +161,7 @@ fn one_that_hangs_has_its_camera_stopped_by_the_watchdog() {
 #[test]
 fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
     let camera = camera();
-    let (died, death) = std::sync::mpsc::channel();
+    let (died, death) = channel();
     let task = start(&camera, move |event| match event {
         Event::Loop(LoopEvent::Session(SessionEvent::Moving)) => panic!("provoked"),
         Event::Died(_) => died.send(()).unwrap(),

@@ -143,6 +143,10 @@ fn visitors_who_say_nothing_take_no_descriptors_from_cameras() {
     assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
     assert!(descriptors() < before + 150, "{before}, then {}", descriptors());
     drop(visitors);
+    // Nor do they keep a place for long.
+    let mut silent = TcpStream::connect(&page).unwrap();
+    silent.set_read_timeout(Some(PATIENCE)).unwrap();
+    silent.read_to_end(&mut Vec::new()).expect("it is sent away");
     program.end("TERM");
     scene::assert_left_at_rest(&camera);
 }
