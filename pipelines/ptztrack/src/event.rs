@@ -70,7 +70,19 @@ impl fmt::Display for Event {
             Level::Warning => "warning: ",
             Level::Error => "error: ",
         };
-        // One line, whatever the elements have to say.
-        write!(f, "{} {camera}: {level}{}", self.time, self.detail.replace('\n', " "))
+        // One line, and nothing that a terminal would obey, whatever the elements and cameras have to say.
+        let detail = self.detail.replace(char::is_control, " ");
+        write!(f, "{} {camera}: {level}{detail}", self.time)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_log_is_one_line_and_no_order_to_a_terminal() {
+        let line = Event::new(Level::Warning, Some("door"), "warning", "a\r\nb\u{1b}[2Jc").to_string();
+        assert!(line.ends_with("door: warning: a  b [2Jc") && !line.contains(char::is_control), "{line:?}");
     }
 }

@@ -12,6 +12,9 @@ use super::known::{Known, SEARCHING};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
+/// How much of what was said is remembered: a camera may put anything into words that are told on.
+const MOST_SAID: usize = 64;
+
 /// Makes events of what a pipeline says, and keeps what is to be known of the camera.
 pub struct Listener {
     known: Arc<Known>,
@@ -121,7 +124,7 @@ impl Listener {
                 self.trouble(Level::Warning, &event, detail, "")
             }
             CameraChange::Connected => {
-                self.said.retain(|said| !said.starts_with("camera "));
+                self.said.retain(|said| !said.starts_with("camera-"));
                 lock(&self.known.state).trouble = None;
                 self.trouble(Level::Info, &event, detail, "");
             }
@@ -138,6 +141,9 @@ impl Listener {
         if level > Level::Info {
             lock(&self.known.state).trouble = Some(text.clone());
         }
+        if self.said.len() >= MOST_SAID {
+            self.said.clear();
+        }
         if self.said.insert(format!("{event} {text}")) {
             self.tell(level, event, &format!("{text}{what_now}"));
         }
@@ -145,5 +151,43 @@ impl Listener {
 
     fn tell(&self, level: Level, event: &str, detail: &str) {
         self.log.tell(&Event::new(level, Some(&self.known.name), event, detail));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use ptztrack_contract::Times;
+
+    use super::*;
+
+    fn listener(log: &Arc<Log>) -> Listener {
+        gst::init().unwrap();
+        Listener::new(Arc::new(Known::new("door")), log.clone())
+    }
+
+    /// A sink says so.
+    fn say(listener: &mut Listener, change: CameraChange, detail: &str) {
+        let camera = CameraMessage { change, times: Times::default(), detail: detail.to_owned() };
+        listener.hear(&gst::message::Element::new(camera.to_structure()));
+    }
+
+    #[test]
+    fn every_outage_is_told_of_and_each_only_once() {
+        let log = Arc::new(Log::unwritten());
+        let (mut events, mut listener) = (log.subscribe(), listener(&log));
+        for _ in 0..2 {
+            say(&mut listener, CameraChange::Disconnected, "no route");
+            say(&mut listener, CameraChange::Disconnected, "no route");
+            say(&mut listener, CameraChange::Connected, "the camera answers");
+        }
+        let told: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).map(|event| event.event).collect();
+        assert_eq!(told, ["camera-disconnected", "camera-connected"].repeat(2));
+    }
+
+    #[test]
+    fn what_a_camera_says_is_not_remembered_for_ever() {
+        let mut listener = listener(&Arc::new(Log::unwritten()));
+        (0..1000).for_each(|nth| say(&mut listener, CameraChange::Refused, &format!("{nth} is refused")));
+        assert!(listener.said.len() <= MOST_SAID, "{}", listener.said.len());
     }
 }

@@ -193,12 +193,12 @@ impl CameraSettings {
                 .extend(table.table(element).iter().flat_map(|table| properties::read(element, table)));
         }
         camera.pipeline = pipeline(&mut table);
-        if camera.credentials.is_some() && camera.gives_password_to_souphttpsrc() {
-            table.wrong(
-                "`souphttpsrc` sends the password in clear to whoever answers in the camera's place: let `source` be an \
+        if let Some(source) = camera.credentials.as_ref().and_then(|_| camera.source_that_gives_password()) {
+            table.wrong(format!(
+                "`{source}` sends the password in clear to whoever answers in the camera's place: let `source` be an \
                  `appsrc name=source is-live=true do-timestamp=true format=time`, which gets the same, or allow it by \
                  `auth = \"basic\"`",
-            );
+            ));
         }
         if camera.pipeline.is_some() && camera.recording.is_some() {
             table.wrong("`recording` belongs to the program's own pipeline: with `pipeline`, put a splitmuxsink into that");
@@ -212,14 +212,13 @@ impl CameraSettings {
         Some(camera)
     }
 
-    fn gives_password_to_souphttpsrc(&self) -> bool {
-        let is_soup = |text: &String| {
-            let source = gst::parse::launch(text)
-                .ok()
-                .and_then(|made| made.downcast::<gst::Bin>().ok()?.by_name("source"));
-            source.and_then(|source| source.factory()).is_some_and(|factory| factory.name() == "souphttpsrc")
-        };
-        self.security().0 != Authentication::Basic && self.pipeline.as_ref().is_some_and(is_soup)
+    /// The source of a pipeline of one's own, by the name of its factory, where it would be given the password.
+    fn source_that_gives_password(&self) -> Option<String> {
+        let text = self.pipeline.as_ref().filter(|_| self.security().0 != Authentication::Basic)?;
+        let source = gst::parse::launch(text).ok()?.downcast::<gst::Bin>().ok()?.by_name("source")?;
+        let name = source.factory()?.name().to_string();
+        // An `rtspsrc` is given a way on which it needs none.
+        (source.has_property("user-pw") && name != "rtspsrc").then_some(name)
     }
 
     fn without_address(name: &str) -> Self {

@@ -56,6 +56,7 @@ pub async fn ask(
         for elsewhere in told_by(&address).await {
             match ask_onvif(&elsewhere, credentials).await {
                 Ok(streams) => return Ok(Found { protocol: Protocol::Onvif, address: elsewhere, streams }),
+                Err(err) if err.is_final() => return Err(sentence(&elsewhere, &err)),
                 Err(err) => refusals.push((Protocol::Onvif, err)),
             }
         }
@@ -157,7 +158,9 @@ async fn told_by(address: &str) -> Vec<String> {
         return Vec::new();
     };
     let Ok(socket) = UdpSocket::bind((Ipv4Addr::UNSPECIFIED, 0)).await else { return Vec::new() };
-    let heard = listen(socket, whom, PATIENCE / 3).await.unwrap_or_default();
+    let mut heard = listen(socket, whom, PATIENCE / 3).await.unwrap_or_default();
+    // Nobody else is heard: whoever answers is asked next, by who we are.
+    heard.retain(|heard| heard.is_of(whom.ip()));
     let mut addresses: Vec<_> = heard.iter().map(super::Heard::address).collect();
     addresses.dedup();
     addresses.retain(|elsewhere| elsewhere != address);
@@ -179,5 +182,26 @@ mod tests {
         ] {
             assert_eq!(with_scheme(typed), asked);
         }
+    }
+
+    /// Whoever hears the question can answer it, too.
+    #[tokio::test]
+    async fn where_else_it_is_is_told_by_its_own_host() {
+        let answer = |port: u16| {
+            format!(
+                "<e:Envelope xmlns:e='x' xmlns:d='y'><e:Body><d:ProbeMatches><d:ProbeMatch><d:XAddrs>\
+                 http://camera:{port}/onvif/device_service</d:XAddrs></d:ProbeMatch></d:ProbeMatches></e:Body></e:Envelope>"
+            )
+        };
+        let camera = UdpSocket::bind(("127.0.0.2", onvif::GROUP.port())).await.unwrap();
+        let stranger = UdpSocket::bind("127.0.0.3:0").await.unwrap();
+        tokio::spawn(async move {
+            let mut question = [0; 4096];
+            while let Ok((_, asking)) = camera.recv_from(&mut question).await {
+                stranger.send_to(answer(8001).as_bytes(), asking).await.unwrap();
+                camera.send_to(answer(8002).as_bytes(), asking).await.unwrap();
+            }
+        });
+        assert_eq!(told_by("http://127.0.0.2").await, ["http://127.0.0.2:8002"]);
     }
 }

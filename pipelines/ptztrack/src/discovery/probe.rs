@@ -37,9 +37,15 @@ impl Heard {
             let (host, path) = rest.find('/').map_or((rest, DEVICE_SERVICE), |path| rest.split_at(path));
             let port = host.rsplit_once(':').filter(|(_, port)| !port.contains(']'));
             let port = port.map_or(Some(80), |(_, port)| port.parse().ok())?;
-            Some((port, path.to_owned()))
+            let is_path = !path.contains(|c: char| c.is_control() || c.is_whitespace());
+            is_path.then(|| (port, path.to_owned()))
         })?;
         Some(Self { host: sender, port, path, name: announcement.name.clone() })
+    }
+
+    /// Whether it answered from there.
+    pub fn is_of(&self, host: IpAddr) -> bool {
+        self.host == host
     }
 
     /// Its HTTP server.
@@ -126,6 +132,6 @@ mod tests {
         assert_eq!(heard(&["http://192.168.1.1"]), usual);
         let other = "http://10.0.0.7:8899/onvif/device";
         assert_eq!(heard(&["http://[fe80::1]:8899/onvif/device"]), is(other, other));
-        assert_eq!(heard(&["ftp://a/", "http://a:x/"]), None);
+        assert_eq!(heard(&["ftp://a/", "http://a:x/", "http://a/\u{1b}[2J", "http://a/b c"]), None);
     }
 }

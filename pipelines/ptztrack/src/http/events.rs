@@ -15,6 +15,7 @@ use axum::routing::{get, post};
 use events::{Area, Entry, Error, Filter, Reader, Sighting, Store};
 use futures_util::{StreamExt, stream};
 use serde::{Deserialize, Serialize};
+use tokio::sync::Semaphore;
 
 use super::html;
 use crate::camera::recording::{self, Clip, Form, NoClip, Purpose};
@@ -23,6 +24,8 @@ use crate::report;
 
 /// No answer has more events.
 const MOST: usize = 10_000;
+/// So many look into the store at once.
+static PLACES: Semaphore = Semaphore::const_new(16);
 /// So many who look most like somebody are shown.
 const ALIKE: usize = 30;
 
@@ -257,7 +260,15 @@ async fn with<T: Send + 'static>(
         let reason = "No events are kept: `store` in [events] is \"off\".\n";
         return Err((StatusCode::NOT_FOUND, reason).into_response());
     };
-    match tokio::task::spawn_blocking(move || what(folder)).await {
+    // Where the disk hangs, others wait, and not every thread that there can be.
+    let Ok(place) = PLACES.acquire().await else {
+        return Err(StatusCode::INTERNAL_SERVER_ERROR.into_response());
+    };
+    let read = move || {
+        let _place = place;
+        what(folder)
+    };
+    match tokio::task::spawn_blocking(read).await {
         Ok(Ok(found)) => Ok(found),
         Ok(Err(err)) => Err((StatusCode::SERVICE_UNAVAILABLE, format!("{err}\n")).into_response()),
         Err(_) => Err(StatusCode::INTERNAL_SERVER_ERROR.into_response()),
