@@ -69,7 +69,7 @@ fn program(test: &str, sightings: Vec<Sighting>) -> (Program, PathBuf) {
 fn look(browser: &mut Browser, program: &Program) {
     browser.open(&format!("{}events", program.url()));
     browser.call("Emulation.setTimezoneOverride", json!({"timezoneId": "UTC"}));
-    browser.wait_for("document.querySelector('form')?.day.value");
+    browser.wait_for("document.querySelector('form')?.day?.value");
     set(browser, "day", "2026-01-10");
 }
 
@@ -179,7 +179,7 @@ fn whoever_was_recorded_is_played_and_kept_as_a_clip() {
         assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
         program.launch.wait_for_line(": event 1: target ");
         browser.open(&format!("{}events", program.url()));
-        browser.wait_for("document.querySelector('form')?.day.value");
+        browser.wait_for("document.querySelector('form')?.day?.value");
         // It may be past midnight by now.
         let list: Value = serde_json::from_str(&program.ask("GET", "/events/list").1).unwrap();
         let event = list["events"].as_array().unwrap().iter().find(|event| event["id"] == 1).unwrap();
