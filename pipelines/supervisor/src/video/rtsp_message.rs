@@ -252,11 +252,17 @@ mod tests {
 
     #[tokio::test]
     async fn what_is_no_rtsp_is_an_error() {
+        let length = format!("RTSP/1.0 200 OK\r\nContent-Length: {}\r\n\r\n", MAX_BODY_BYTES + 1);
+        let too_long = [length.as_bytes(), &vec![0; MAX_BODY_BYTES + 1]].concat();
         let endless = [b"RTSP/1.0 200 OK\r\nX: ".as_slice(), &vec![b'x'; MAX_HEAD_BYTES]].concat();
         for wire in [
             &b"HTTP"[..],
             b"a\r\nb\r\n\r\n",
             b"a b c\r\nContent-Length: -1\r\n\r\n",
+            b"RTSP/1.0 200 OK\r\nb\r\n\r\n",
+            b"RTSP/1.0 200 OK\r\nContent-Length: -1\r\n\r\n",
+            b"RTSP/1.0 200 OK\r\nContent-Length: 5\r\n\r\nfour",
+            &too_long,
             b"$\0\0\x09abc",
             &endless,
         ] {
