@@ -39,6 +39,11 @@ fn address(program: &mut Program) -> String {
     line.rsplit(' ').next().unwrap().replace("NAME", "door")
 }
 
+/// Host and port of such an address.
+fn server(url: &str) -> &str {
+    url.trim_start_matches("rtsp://").trim_end_matches("/door")
+}
+
 /// Whether it can be read, and what was said.
 fn ffprobe(url: &str) -> (bool, String) {
     let mut command = Command::new("timeout");
@@ -260,8 +265,7 @@ fn those_who_are_too_many_are_sent_away_and_nobody_is_followed_the_worse_for_it(
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let mut program = start("crowd", &camera, "codec = \"h264\"", "");
     let url = address(&mut program);
-    let server = url.trim_start_matches("rtsp://").trim_end_matches("/door");
-    let mut crowd: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(server).unwrap()).collect();
+    let mut crowd: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(server(&url)).unwrap()).collect();
     // The last of them is told nothing but that.
     let last = crowd.last_mut().unwrap();
     last.set_read_timeout(Some(PATIENCE)).unwrap();
@@ -281,9 +285,8 @@ fn a_stranger_fills_neither_the_memory_nor_the_places() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let mut program = start("stranger", &camera, "codec = \"h264\"", "");
     let url = address(&mut program);
-    let server = url.trim_start_matches("rtsp://").trim_end_matches("/door");
     let visit = |request: &str| {
-        let mut stranger = TcpStream::connect(server).unwrap();
+        let mut stranger = TcpStream::connect(server(&url)).unwrap();
         stranger.set_read_timeout(Some(PATIENCE)).unwrap();
         stranger.write_all(request.as_bytes()).unwrap();
         let mut answer = String::new();
