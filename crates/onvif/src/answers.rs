@@ -12,6 +12,9 @@ use crate::soap::Element;
 /// More profiles or presets than a camera has; some list 300 of the latter.
 const MOST: usize = 1024;
 
+/// Bytes of a token, a name or a path; what has more is none. They are said in each message, and to the watchdog.
+const LONGEST: usize = 1024;
+
 /// Paths of the services that matter here, on the camera's own host: the addresses that cameras tell are often not those by
 /// which they are reached, and a password is for its own host only.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -67,11 +70,16 @@ pub fn parse_services(body: &Element) -> Option<Services> {
     Some(Services { media, media2, ptz })
 }
 
-/// Path and query of an address.
+/// Path and query of an address. HTTP knows no backslash: it would be sent as another path than is signed.
 fn path(address: &str) -> Option<String> {
     let (_, rest) = address.split_once("://")?;
-    let path = &rest[rest.find('/')?..];
-    path.chars().all(|c| c.is_ascii_graphic()).then(|| path.to_owned())
+    let path = bounded(&rest[rest.find('/')?..])?;
+    path.chars().all(|c| c.is_ascii_graphic() && c != '\\').then_some(path)
+}
+
+/// Of a length that something real has.
+fn bounded(text: &str) -> Option<String> {
+    (text.len() <= LONGEST).then(|| text.to_owned())
 }
 
 /// Reads `GetProfilesResponse`: the profiles that have a PTZ configuration.
@@ -79,9 +87,9 @@ pub fn parse_profiles(body: &Element) -> Vec<Profile> {
     let Some(response) = body.child("GetProfilesResponse") else { return Vec::new() };
     let profiles = response.children("Profiles").take(MOST).filter_map(|profile| {
         Some(Profile {
-            token: profile.attribute("token")?.to_owned(),
-            name: profile.child("Name").map_or("", Element::text).to_owned(),
-            configuration: profile.child("PTZConfiguration")?.attribute("token")?.to_owned(),
+            token: bounded(profile.attribute("token")?)?,
+            name: bounded(profile.child("Name").map_or("", Element::text))?,
+            configuration: bounded(profile.child("PTZConfiguration")?.attribute("token")?)?,
         })
     });
     profiles.collect()
@@ -161,6 +169,36 @@ mod tests {
         let expected =
             Profile { token: "sub".to_owned(), name: "Sub".to_owned(), configuration: "ptz0".to_owned() };
         assert_eq!(parse_profiles(&list), [expected]);
+    }
+
+    #[test]
+    fn a_path_is_one_that_can_be_sent() {
+        assert_eq!(
+            path("http://h//elsewhere/p").as_deref(),
+            Some("//elsewhere/p"),
+            "on the camera's own host"
+        );
+        assert_eq!(path("http://h/\\elsewhere/p"), None);
+        assert_eq!(
+            path(&format!("http://h/{}", "p".repeat(LONGEST - 1))).map(|path| path.len()),
+            Some(LONGEST)
+        );
+        assert_eq!(path(&format!("http://h/{}", "p".repeat(LONGEST))), None);
+    }
+
+    /// The watchdog of all cameras is told of it.
+    #[test]
+    fn a_profile_with_words_without_end_is_none() {
+        let long = "&quot;".repeat(40_000);
+        let profile = |token: &str, name: &str, configuration: &str| {
+            parse_profiles(&body(&format!(
+                "<GetProfilesResponse><Profiles token='{token}'><Name>{name}</Name><PTZConfiguration token='{configuration}'/></Profiles></GetProfilesResponse>"
+            )))
+        };
+        assert_eq!(profile("a", "b", "c").len(), 1);
+        assert_eq!(profile(&long, "b", "c"), []);
+        assert_eq!(profile("a", &long, "c"), []);
+        assert_eq!(profile("a", "b", &long), []);
     }
 
     #[test]

@@ -308,11 +308,21 @@ impl Client {
             let header = token.map_or_else(String::new, |credentials| {
                 security(&credentials, &self.clock.unwrap_or_else(CameraClock::assumed).now())
             });
-            let answer = self.http.post(&path, &envelope(&header, message), repeat).await?;
-            match read_answer(&answer)? {
+            let answer = match self.http.post(&path, &envelope(&header, message), repeat).await {
+                Ok(answer) => read_answer(&answer)?,
+                // Of HTTP too it is known that we were let in before: it may be for the time of our token.
+                Err(Error::NotPermitted { .. }) => {
+                    self.login = Login::Accepted;
+                    self.http.forget_challenge();
+                    Answer::NotAuthorized
+                }
+                Err(err) => return Err(err),
+            };
+            match answer {
                 Answer::Body(body) => {
                     if judged {
                         self.login = Login::Accepted;
+                        self.http.note_accepted();
                     }
                     return Ok(body);
                 }

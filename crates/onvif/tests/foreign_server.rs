@@ -3,10 +3,15 @@
 //! Our client before a server that others wrote, with WSDL and log-in of its own: the crate `onvif-server`.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use async_trait::async_trait;
+use axum::extract::Request as HttpRequest;
+use axum::http::{StatusCode, header};
+use axum::middleware::{Next, from_fn};
+use axum::response::IntoResponse;
 use onvif::{Client, Encoding};
 use onvif_server::generated::{DeviceInfo, PTZPreset, PTZStatusResult};
 use onvif_server::{DeviceService, MediaService, OnvifError, OnvifServer, PTZService};
@@ -69,6 +74,11 @@ impl PTZService for Camera {
 }
 
 async fn served(camera: Camera) -> String {
+    served_with(camera, Arc::default()).await
+}
+
+/// So many requests are refused in between, whoever asks, and Digest asked for: as of a camera that restarts.
+async fn served_with(camera: Camera, refusals: Arc<AtomicUsize>) -> String {
     let server = OnvifServer::builder()
         .auth("admin", "secret")
         .device_service(camera.clone())
@@ -77,6 +87,18 @@ async fn served(camera: Camera) -> String {
     let listener = tokio::net::TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
     let address = listener.local_addr().unwrap();
     let router = server.port(address.port()).build().unwrap().into_router().unwrap();
+    let router = router.layer(from_fn(move |request: HttpRequest, next: Next| {
+        let one_less = |left: usize| left.checked_sub(1);
+        let refuses = refusals.fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less).is_ok();
+        async move {
+            if refuses {
+                let challenge = r#"Digest realm="camera", nonce="1", qop="auth""#;
+                (StatusCode::UNAUTHORIZED, [(header::WWW_AUTHENTICATE, challenge)]).into_response()
+            } else {
+                next.run(request).await
+            }
+        }
+    }));
     tokio::spawn(async move { axum::serve(listener, router).await });
     format!("http://{address}")
 }
@@ -132,4 +154,25 @@ async fn a_wrong_password_moves_nothing_and_is_not_tried_for_ever() {
         assert_eq!(client.exchange(&rest).await, Err(Error::BadCredentials { user: "admin".to_owned() }));
     }
     assert_eq!(camera.take(), [""; 0]);
+}
+
+/// Where that were for good, the camera would go on turning.
+#[tokio::test]
+async fn who_was_let_in_by_a_token_is_let_in_again_after_a_momentary_refusal() {
+    let (camera, refusals) = (Camera::default(), Arc::new(AtomicUsize::new(0)));
+    let address = served_with(camera.clone(), refusals.clone()).await;
+    let mut client = client(&address, "secret");
+    let right = Request::Command(Command::Move {
+        motion: Motion::Velocity { pan: 0.5, tilt: 0.0, zoom: None },
+        free: false,
+    });
+    assert_eq!(client.exchange(&right).await, Ok(Response::Accepted));
+    // Refused by its token and by HTTP; and where that is so for longer, as it asks for the time.
+    let forbidden = Err(Error::NotPermitted { user: "admin".to_owned() });
+    for (refused, answer) in [(2, Ok(Response::Accepted)), (4, forbidden)] {
+        refusals.store(refused, Ordering::SeqCst);
+        assert_eq!(client.exchange(&right).await, answer);
+        assert_eq!(refusals.load(Ordering::SeqCst), 0);
+        assert_eq!(client.exchange(&right).await, Ok(Response::Accepted));
+    }
 }

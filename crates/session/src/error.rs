@@ -90,7 +90,8 @@ impl Error {
             || matches!(self, Self::Status { status: 400..=499, .. })
     }
 
-    /// Whether asking again is useless, or harmful, until a setting changes.
+    /// Whether asking again is useless, or harmful, until a setting changes; but a camera that did without a user before may
+    /// do so again.
     pub fn is_final(&self) -> bool {
         matches!(self, Self::CredentialsMissing | Self::BadCredentials { .. })
     }
@@ -105,7 +106,9 @@ impl Error {
                 "Check `location`, the cable and, with https, the certificate (`ca-file`, `insecure`); retrying."
             }
             Self::Timeout(_) | Self::Broken(_) => "Check camera and network; retrying.",
-            Self::CredentialsMissing => "Set `user` and `password`; nothing more is sent until then.",
+            Self::CredentialsMissing => {
+                "Set `user` and `password`; a camera that never did without is sent nothing more until then."
+            }
             Self::BadCredentials { .. } => {
                 "Correct `user` or `password`; nothing more is sent until then, so as not to lock the account."
             }

@@ -138,6 +138,17 @@ impl HttpClient {
         self.authenticator.is_signing()
     }
 
+    /// The camera did something for user and password that a message carried, which HTTP knows nothing of: what it refuses
+    /// from here on is not for them.
+    pub fn note_accepted(&mut self) {
+        self.accepted = true;
+    }
+
+    /// Nothing is signed until the camera asks for it again: one that is restarting may have done so for a moment only.
+    pub fn forget_challenge(&mut self) {
+        self.authenticator.forget_challenge();
+    }
+
     /// Who we are, where anybody is set.
     pub fn credentials(&self) -> Option<&Credentials> {
         self.settings.credentials.as_ref()
@@ -153,7 +164,7 @@ impl HttpClient {
     /// # Errors
     /// Any; an HTTP status that is no success is [`Error::Status`].
     pub async fn get(&mut self, target: &str, repeat: Repeat) -> Result<CompleteResponse, Error> {
-        let url = self.settings.location.join(target)?;
+        let url = self.settings.location.join(target);
         self.exchange(&path_and_query(&url), None, repeat).await
     }
 
@@ -177,7 +188,7 @@ impl HttpClient {
     /// # Errors
     /// Any.
     pub async fn open(&mut self, target: &str, longest: Duration) -> Result<Stream, Error> {
-        let target = path_and_query(&self.settings.location.join(target)?);
+        let target = path_and_query(&self.settings.location.join(target));
         let mut broken = None;
         let opened = self.attempts(&target, None, Repeat::WhereBroken, &mut broken);
         let response = tokio::time::timeout(longest, opened).await.unwrap_or(Err(Error::Timeout(longest)))?;
@@ -235,8 +246,7 @@ impl HttpClient {
                 let stale =
                     self.authenticator.challenged(response.headers(), self.settings.location.is_https())?;
                 if signed_fresh && !stale {
-                    self.locked_out = !self.accepted;
-                    return Err(if self.accepted { self.not_permitted() } else { self.bad_credentials() });
+                    return Err(self.refused());
                 }
                 signed_fresh = true;
                 // Read to its end, so that the connection can carry the answer to the challenge.
@@ -262,7 +272,7 @@ impl HttpClient {
         message: Option<&str>,
         repeat: Repeat,
     ) -> Result<Response, Error> {
-        let url = self.settings.location.at(target)?;
+        let url = self.settings.location.at(target);
         let http = if repeat == Repeat::Never { &self.http_once } else { &self.http };
         let (method, mut request) = match message {
             None => ("GET", http.get(url)),
@@ -306,6 +316,15 @@ impl HttpClient {
         self.authenticator.forget_challenge();
         self.connected = false;
         Ok(())
+    }
+
+    /// The camera does not take the signature that it has asked for.
+    fn refused(&mut self) -> Error {
+        if self.accepted {
+            return self.not_permitted();
+        }
+        self.locked_out = true;
+        self.bad_credentials()
     }
 
     fn bad_credentials(&self) -> Error {

@@ -72,15 +72,19 @@ impl Location {
     }
 
     /// The address of a request below its own path; `target` is path and query.
-    pub(super) fn join(&self, target: &str) -> Result<Url, Error> {
+    pub(super) fn join(&self, target: &str) -> Url {
         self.at(&format!("{}{target}", self.path()))
     }
 
-    /// The address of a request to this path and query of its host.
-    pub(super) fn at(&self, target: &str) -> Result<Url, Error> {
-        self.0
-            .join(target)
-            .map_err(|err| Error::Location { location: self.to_string(), reason: err.to_string() })
+    /// The address of a request to this path and query of its host, and of no other: cameras tell paths, and one that begins
+    /// with two slashes names a host where it is resolved as a link is.
+    pub(super) fn at(&self, target: &str) -> Url {
+        let (path, query) =
+            target.split_once('?').map_or((target, None), |(path, query)| (path, Some(query)));
+        let mut url = self.0.clone();
+        url.set_path(path);
+        url.set_query(query);
+        url
     }
 
     /// The camera's own HTTPS, where `redirect` leads there from `target`; anything else could carry off the credentials.
@@ -89,7 +93,7 @@ impl Location {
         let upgrade =
             !self.is_https() && redirected.scheme() == "https" && redirected.host() == self.0.host();
         let (location, _) = upgrade.then(|| Self::parse(redirected.as_str()).ok())??;
-        if self.at(target).is_ok_and(|asked| asked.path() == redirected.path()) {
+        if self.at(target).path() == redirected.path() {
             let mut url = redirected;
             url.set_path(self.0.path());
             url.set_query(None);
@@ -168,7 +172,7 @@ mod tests {
         ] {
             let (location, _) = Location::parse(text).unwrap();
             assert_eq!(location.to_string(), shown);
-            assert_eq!(location.join("/axis-cgi/a?b=c").unwrap().as_str(), request);
+            assert_eq!(location.join("/axis-cgi/a?b=c").as_str(), request);
             assert_eq!(Location::parse(&location.to_string()).unwrap().0, location);
         }
         let (location, _) = Location::parse("http://proxy/1").unwrap();
@@ -178,7 +182,7 @@ mod tests {
         let (location, _) = Location::parse("http://camera").unwrap();
         let service = "/onvif/ptz_service";
         let upgraded = location.upgraded_by("https://camera/onvif/ptz_service", service).unwrap();
-        assert_eq!(upgraded.at(service).unwrap().as_str(), "https://camera/onvif/ptz_service");
+        assert_eq!(upgraded.at(service).as_str(), "https://camera/onvif/ptz_service");
     }
 
     #[test]
@@ -202,7 +206,51 @@ mod tests {
         assert_eq!(upgraded.upgraded_by("http://camera/", "/"), None);
     }
 
+    /// Who tells such a path would have the password for another host.
+    #[test]
+    fn no_path_leads_to_another_host() {
+        for base in ["http://camera:8080", "https://camera:8443/door/1"] {
+            let (location, _) = Location::parse(base).unwrap();
+            for target in [
+                "//elsewhere/x",
+                "/\\elsewhere/x",
+                "\\\\elsewhere",
+                "http://elsewhere/",
+                "@elsewhere",
+                ":1@elsewhere/",
+            ] {
+                assert_eq!(location.at(target).origin(), location.0.origin(), "{target}");
+                assert_eq!(location.join(target).origin(), location.0.origin(), "{target}");
+            }
+        }
+    }
+
+    /// Else a signature would be for something else than is asked.
+    #[test]
+    fn path_and_query_are_sent_as_they_are() {
+        let (location, _) = Location::parse("http://camera:8080/1").unwrap();
+        for target in [
+            "/axis-cgi/com/ptz.cgi?camera=1&continuouspantiltmove=-12,100",
+            "/axis-cgi/param.cgi?action=list&group=root.PTZ,Properties.PTZ",
+            "/axis-cgi/com/ptz.cgi?gotoserverpresetname=T%C3%BCr%20%26%20Tor",
+            "/axis-cgi/com/ptz.cgi?center=320,240&imagewidth=640?b",
+            "/onvif/ptz_service?",
+            "//onvif/ptz_service",
+        ] {
+            assert_eq!(location.at(target).as_str(), format!("http://camera:8080{target}"));
+            assert_eq!(location.join(target).as_str(), format!("http://camera:8080/1{target}"));
+            let below = format!("http://camera:8080/1{target}");
+            assert_eq!(Url::parse(&below).unwrap(), location.join(target), "as it was resolved before");
+        }
+    }
+
     proptest! {
+        #[test]
+        fn no_text_leads_to_another_host(target in ".{0,64}") {
+            let (location, _) = Location::parse("http://camera:8080").unwrap();
+            prop_assert_eq!(location.at(&target).origin(), location.0.origin());
+        }
+
         #[test]
         fn any_text_is_read_or_refused(text in ".{0,64}") {
             let _ = Location::parse(&text);

@@ -23,6 +23,8 @@ pub enum ConnectionChange {
 #[derive(Debug, Default)]
 pub struct Connection {
     connected: bool,
+    /// It did as it was told.
+    obeyed: bool,
     fault: Option<Fault>,
     /// When which kind was last reported.
     told: Vec<(FaultKind, Time)>,
@@ -50,8 +52,11 @@ enum FaultKind {
 }
 
 impl FaultKind {
-    fn of(err: &Error) -> Self {
+    /// `did_without`: the camera was well without a user.
+    fn of(err: &Error, did_without: bool) -> Self {
         match err {
+            // There is no account to be locked, and it may pass: one that restarts may ask everybody for a while.
+            Error::CredentialsMissing if did_without => Self::Refusing,
             err if err.is_final() => Self::LockedOut,
             Error::NotPermitted { .. } => Self::Forbidden,
             err if err.is_refusal() => Self::Refusing,
@@ -102,6 +107,7 @@ impl Connection {
     /// Something was answered as it should be. `idle`: no command is waiting, so that a query may
     /// mend what a command met.
     pub fn succeeded(&mut self, of_command: bool, idle: bool) -> Option<ConnectionChange> {
+        self.obeyed |= of_command;
         let mended = match &self.fault {
             Some(fault) => of_command || !fault.of_command || (idle && fault.kind == FaultKind::Silent),
             None => !self.connected,
@@ -110,7 +116,8 @@ impl Connection {
             return None;
         }
         let news = self.fault.as_ref().is_none_or(|fault| !fault.reported.is_empty());
-        *self = Self { connected: true, told: mem::take(&mut self.told), ..Self::default() };
+        let told = mem::take(&mut self.told);
+        *self = Self { connected: true, obeyed: self.obeyed, told, ..Self::default() };
         news.then_some(ConnectionChange::Connected)
     }
 
@@ -119,7 +126,8 @@ impl Connection {
         self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
         // Who has waited in vain has paused already; else silence would last longer than the camera's.
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
-        let kind = FaultKind::of(err);
+        // That it lets anybody ask does not say that it lets anybody move it.
+        let kind = FaultKind::of(err, if of_command { self.obeyed } else { self.connected });
         // But once: a server that restarts between challenge and answer refuses alike.
         let again = self.fault.as_ref().is_some_and(|fault| fault.kind == kind);
         let rarely = again && kind == FaultKind::Forbidden;
@@ -245,6 +253,31 @@ mod tests {
         connection.failed(&broken(), true, ms(0));
         assert_eq!(connection.succeeded(false, false), None);
         assert_eq!(connection.succeeded(false, true), Some(ConnectionChange::Connected));
+    }
+
+    #[test]
+    fn a_missing_user_halts_only_where_the_camera_never_did_without() {
+        let missing = Error::CredentialsMissing;
+        let mut connection = Connection::default();
+        connection.failed(&missing, false, ms(0));
+        assert!(connection.halted());
+
+        let mut connection = Connection::default();
+        connection.succeeded(false, true);
+        connection.failed(&missing, false, ms(0));
+        assert!(!connection.halted());
+        assert_eq!(connection.retry_at(), Connection::FIRST_PAUSE.into());
+        connection.failed(&missing, true, ms(200));
+        assert!(connection.halted(), "it was never moved");
+
+        let mut connection = Connection::default();
+        connection.succeeded(true, false);
+        for time in [0, 125, 375, 875, 1875, 2875] {
+            connection.failed(&missing, true, ms(time));
+            assert!(!connection.halted());
+        }
+        assert_eq!(connection.retry_at(), ms(3875), "after growing pauses, and never after a minute");
+        assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::{LAST_RETRIES, Mailbox, Statistics};
 use crate::http::{ClientSettings, Location};
-use crate::{Client, Command, Request, Stop};
+use crate::{Client, Command, Error, Request, Stop};
 use ptztrack_contract::lock::lock;
 
 /// After a stop that was not confirmed, where no control loop is left to see to it, the next one is sent after this.
@@ -78,7 +78,7 @@ impl Predecessor {
                         lock(&self.statistics).status.moving = false;
                         break;
                     }
-                    Err(err) if err.is_final() => break,
+                    Err(Error::BadCredentials { .. }) => break,
                     Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
                 }
             }

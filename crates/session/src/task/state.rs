@@ -441,6 +441,21 @@ mod tests {
         }
     }
 
+    /// As one that restarts may refuse anybody: were that for good, it would turn on, and no watchdog stop it.
+    #[test]
+    fn a_stop_that_was_refused_for_a_moment_is_sent_again_and_the_lease_held_until_then() {
+        for refusal in [Error::CredentialsMissing, Error::NotPermitted { user: "root".to_owned() }] {
+            let (mut state, _told) = state();
+            state.see(Visibility::Seen);
+            assert_eq!(state.serve_at(ms(1000), |_| Ok(Response::Accepted)).len(), 1, "it turns");
+            state.control.release();
+            assert_eq!(state.serve_at(ms(1500), |_| Err(refusal.clone())), [HALT]);
+            assert!(state.is_ours_to_stop());
+            assert_eq!(state.serve_at(ms(2000), |_| Ok(Response::Accepted)), [HALT]);
+            assert!(!state.is_ours_to_stop() && state.control.session().stays_at_rest());
+        }
+    }
+
     #[test]
     fn only_a_stop_that_still_waits_has_a_move_abandoned() {
         let (mut state, _) = state();

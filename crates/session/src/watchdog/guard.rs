@@ -10,7 +10,7 @@ use super::camera_lock::CameraLock;
 use super::protocol::StopOrder;
 use super::{Armed, LAST_TRIES};
 use crate::session::{DOUBT, StopConfirmation};
-use crate::{Client, Command, Request, Stop};
+use crate::{Client, Command, Error, Request, Stop};
 
 /// From one try to stop a camera to the next.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -148,8 +148,53 @@ async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
     loop {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
-            Err(err) if err.is_final() => return None,
+            Err(Error::BadCredentials { .. }) => return None,
+            // One that asks for a user where none is set was moved without: that may pass, and there is no account to lock.
             Err(_) => sleep(PAUSE).await,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::http::{Credentials, Identity};
+    use crate::{Protocol, Response};
+
+    /// Answers from the last of these on; then yes.
+    #[derive(Debug)]
+    struct Refusing(Vec<Error>);
+
+    impl Client for Refusing {
+        const PROTOCOL: Protocol = Protocol {
+            questions: &[],
+            keep_alive: Duration::from_secs(1),
+            confirms_stops: false,
+            has_control_queue: false,
+        };
+
+        fn in_place_of(_: Identity) -> Result<Self, Error> {
+            Err(Error::NoPtz)
+        }
+
+        fn identity(&self) -> Identity {
+            unreachable!("nobody asks")
+        }
+
+        fn set_credentials(&mut self, _: Option<Credentials>) {}
+
+        async fn exchange(&mut self, _: &Request) -> Result<Response, Error> {
+            self.0.pop().map_or(Ok(Response::Accepted), Err)
+        }
+    }
+
+    /// A camera that is moved without a user is stopped, though it asks for one for a moment; a wrong password is tried once.
+    #[test]
+    fn only_a_wrong_password_is_not_tried_again() {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let stop =
+            |error| runtime.block_on(until_accepted(&mut Refusing(vec![error]), Stop::PanTilt)).is_some();
+        assert!(stop(Error::CredentialsMissing));
+        assert!(!stop(Error::BadCredentials { user: "root".to_owned() }));
     }
 }

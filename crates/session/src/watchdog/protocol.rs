@@ -3,10 +3,14 @@
 //! What an application tells its watchdog, and what that answers. It says all there is to say each time: a watchdog that was started anew, or took
 //! over, needs to know nothing of before.
 
+use serde::ser::Error as _;
 use serde::{Deserialize, Serialize};
 
 use crate::Stop;
 use crate::http::Identity;
+
+/// A line that is longer is none, and ends the connection: real ones have less than a kilobyte.
+pub(super) const MAX_LINE_BYTES: usize = 64 * 1024;
 
 /// One line.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,12 +58,28 @@ pub struct StopOrder {
 }
 
 impl Message {
-    /// With the end of the line.
+    /// With the end of the line. What the camera has told is left out where there is too much of it: the watchdog asks it
+    /// anew, and ends the leases of all cameras for a line that is too long.
     ///
     /// # Errors
-    /// Where a value has no JSON form, which none of these lacks but a path that is not UTF-8.
+    /// Where a value has no JSON form, which none of these lacks but a path that is not UTF-8; or where the line is too long
+    /// even so.
     pub fn to_line(&self) -> Result<Vec<u8>, serde_json::Error> {
-        to_line(self)
+        let mut line = to_line(self)?;
+        if line.len() > MAX_LINE_BYTES {
+            line = to_line(&self.clone().without_findings())?;
+        }
+        if line.len() > MAX_LINE_BYTES {
+            return Err(serde_json::Error::custom("what is to be said of this camera is too long"));
+        }
+        Ok(line)
+    }
+
+    fn without_findings(mut self) -> Self {
+        if let Self::Hold { stop, .. } = &mut self {
+            stop.identity.findings = serde_json::Value::Null;
+        }
+        self
     }
 
     /// Reads a line.
@@ -101,11 +121,10 @@ mod tests {
     use crate::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
     use std::time::Duration;
 
-    #[test]
-    fn a_line_says_all_and_its_debug_form_keeps_the_password() {
+    fn hold(channel: &str) -> Message {
         let settings = ClientSettings {
             location: Location::parse("https://camera:8443").unwrap().0,
-            channel: "2".to_owned(),
+            channel: channel.to_owned(),
             credentials: Some(Credentials { user: "root".to_owned(), password: Secret::new("geheim") }),
             authentication: Authentication::default(),
             timeout: Duration::from_millis(1500),
@@ -113,7 +132,12 @@ mod tests {
         };
         let identity = settings.into();
         let stop = StopOrder { identity, words: Stop::AllAxes, in_doubt: true };
-        let message = Message::Hold { lease: 7, stop: Box::new(stop) };
+        Message::Hold { lease: 7, stop: Box::new(stop) }
+    }
+
+    #[test]
+    fn a_line_says_all_and_its_debug_form_keeps_the_password() {
+        let message = hold("2");
         let line = message.to_line().unwrap();
         assert_eq!(line.iter().filter(|byte| **byte == b'\n').count(), 1);
         assert_eq!(Message::of_line(&line).unwrap(), message);
@@ -121,5 +145,17 @@ mod tests {
         assert!(Message::of_line(b"{}").is_err());
         let answer = Answer::Held { lease: 7 };
         assert_eq!(Answer::of_line(&answer.to_line().unwrap()).unwrap(), answer);
+    }
+
+    /// Else one camera would end the watchdog of all.
+    #[test]
+    fn no_line_is_longer_than_is_read() {
+        let mut message = hold("2");
+        let Message::Hold { stop, .. } = &mut message else { panic!() };
+        stop.identity.findings = serde_json::json!({ "profile": { "name": "\"".repeat(40_000) } });
+        let line = message.to_line().unwrap();
+        assert!(line.len() <= MAX_LINE_BYTES);
+        assert_eq!(Message::of_line(&line).unwrap(), hold("2"), "all but what it told");
+        assert!(hold(&"2".repeat(MAX_LINE_BYTES)).to_line().is_err());
     }
 }

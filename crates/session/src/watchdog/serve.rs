@@ -11,11 +11,8 @@ use tokio::time::Instant;
 
 use super::LEASE;
 use super::guard::{Held, guard};
-use super::protocol::{Answer, Message};
+use super::protocol::{Answer, MAX_LINE_BYTES, Message};
 use crate::Client;
-
-/// A line that is longer is none: real ones have less than a kilobyte.
-const MAX_LINE_BYTES: u64 = 64 * 1024;
 
 /// More cameras than one application has.
 const MAX_LEASES: usize = 4096;
@@ -62,7 +59,7 @@ pub async fn serve<C: Client>(application: UnixStream, armed: &'static Armed) {
     loop {
         line.clear();
         // An end, a fault of the socket or a line without end: there is no application to be heard any more.
-        match (&mut lines).take(MAX_LINE_BYTES).read_until(b'\n', &mut line).await {
+        match (&mut lines).take(MAX_LINE_BYTES as u64).read_until(b'\n', &mut line).await {
             Ok(_) if line.ends_with(b"\n") => {}
             _ => break,
         }
