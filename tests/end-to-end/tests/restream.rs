@@ -4,10 +4,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs;
-use std::io::{Read, Write};
-use std::net::{TcpListener, TcpStream};
+use std::io::{ErrorKind, Read, Write};
+use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::thread;
 use std::time::{Duration, Instant};
 
 use chrono::DateTime;
@@ -296,6 +297,41 @@ fn a_stranger_fills_neither_the_memory_nor_the_places() {
     let announced = "OPTIONS * RTSP/1.0\r\nCSeq: 1\r\nContent-Length: 4000000000\r\n\r\n";
     assert!(visit(announced).starts_with("RTSP/1.0 413 "));
     assert!(visit("OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n\r\n").starts_with("RTSP/1.0 200 "));
+    let (read, said) = ffprobe(&url);
+    assert!(read, "{said}");
+    program.end("TERM");
+}
+
+/// Nor does one who writes without end, whether that is ever a request or not; and who sends them away leaves no thread behind that
+/// goes on reading.
+#[test]
+fn who_writes_without_end_is_sent_away_and_leaves_nothing_behind() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("endless", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    assert!(ffprobe(&url).0);
+    let threads = || fs::read_dir(format!("/proc/{}/task", program.launch.id())).unwrap().count();
+    let before = threads();
+    let line = "A".repeat(64 * 1024);
+    let header = format!("Accept: {}\r\n", "a,".repeat(1500)).repeat(20);
+    for (begin, piece) in [("", &line), ("", &line), ("OPTIONS * RTSP/1.0\r\nCSeq: 1\r\n", &header)] {
+        let mut stranger = TcpStream::connect(server(&url)).unwrap();
+        let mut hears = stranger.try_clone().unwrap();
+        let (begin, piece) = (begin.to_owned(), piece.clone());
+        let writes = thread::spawn(move || {
+            let _ = stranger.write_all(begin.as_bytes());
+            while stranger.write_all(piece.as_bytes()).is_ok() {}
+        });
+        hears.set_read_timeout(Some(PATIENCE)).unwrap();
+        let heard = hears.read(&mut [0; 64]).map_err(|err| err.kind());
+        assert!(matches!(heard, Ok(0) | Err(ErrorKind::ConnectionReset)), "not sent away: {heard:?}");
+        let _ = hears.shutdown(Shutdown::Both);
+        writes.join().unwrap();
+    }
+    let begin = Instant::now();
+    while threads() > before {
+        assert!(begin.elapsed() < PATIENCE, "somebody still reads: {} threads, {before} before", threads());
+    }
     let (read, said) = ffprobe(&url);
     assert!(read, "{said}");
     program.end("TERM");

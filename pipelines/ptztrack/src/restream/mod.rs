@@ -11,6 +11,7 @@
 mod factory;
 mod feed;
 mod payloader;
+mod visitor;
 
 use std::collections::BTreeMap;
 use std::net::SocketAddr;
@@ -21,8 +22,8 @@ use std::time::Duration;
 
 use factory::MediaFactory;
 use gst_rtsp_server::{
-    RTSP_TOKEN_MEDIA_FACTORY_ROLE, RTSPAuth, RTSPClient, RTSPFilterResult, RTSPServer, RTSPToken, gio,
-    gst_rtsp, prelude::*,
+    RTSP_TOKEN_MEDIA_FACTORY_ROLE, RTSPAuth, RTSPFilterResult, RTSPServer, RTSPToken, gio, gst_rtsp,
+    prelude::*,
 };
 use pipeline_supervisor::Backoff;
 use ptztrack_contract::lock::lock;
@@ -41,9 +42,6 @@ const MOST_CLIENTS: usize = 128;
 
 /// Nobody has to send more than a few words in the body of a request; it is read before anybody has logged in.
 const LONGEST_BODY: u32 = 64 * 1024;
-
-/// Who has set up nothing by then is sent away. The server waits for a camera's first picture for 20 s.
-const LONGEST_VISIT: Duration = Duration::from_secs(30);
 
 /// How often sessions whose client vanished are looked for, in seconds.
 const CLEANING: u32 = 5;
@@ -90,11 +88,8 @@ impl Restreaming {
         let context = glib::MainContext::new();
         server.connect_client_connected({
             let context = context.clone();
-            move |server, client| {
-                let is_too_much = server.client_filter(None).len() > MOST_CLIENTS;
-                // Not before the server has taken it on: it would never let it go.
-                context.spawn(send_away(client.downgrade(), is_too_much));
-            }
+            // Called in the thread of that context.
+            move |server, client| visitor::receive(server, client, &context)
         });
         let main_loop = glib::MainLoop::new(Some(&context), false);
         context.spawn(serve(server.clone(), context.clone(), settings.clone(), log));
@@ -145,17 +140,6 @@ impl Restreaming {
         });
         // Nothing is ever sent: it ends with the thread.
         let _ = self.ended.recv_timeout(LONGEST_END);
-    }
-}
-
-/// Closes a client at once, or where it has no session after a while.
-async fn send_away(client: glib::WeakRef<RTSPClient>, at_once: bool) {
-    if !at_once {
-        glib::timeout_future(LONGEST_VISIT).await;
-    }
-    if let Some(client) = client.upgrade().filter(|client| at_once || client.session_filter(None).is_empty())
-    {
-        client.close();
     }
 }
 
