@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! Who has which camera, kept for after a restart, a crash or an upgrade: in `control.json` of the folder that systemd calls
-//! `STATE_DIRECTORY`. Without such a folder it is kept for as long as the program runs.
+//! `STATE_DIRECTORY`, or, as processes that share the cameras may share the folder, in `control.0-of-2.json` of share `0/2`. Without
+//! such a folder it is kept for as long as the program runs.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,6 +12,10 @@ use std::{fs, io};
 use ptztrack_contract::lock::lock;
 
 use crate::camera::Control;
+use crate::shard::Shard;
+
+/// Of a process that has all cameras.
+const OF_ALL: &str = "control.json";
 
 /// By the names of the cameras; who is not in it has nothing to be kept.
 type Kept = BTreeMap<String, Control>;
@@ -31,14 +36,20 @@ struct Last {
 }
 
 impl ControlFile {
-    pub fn new() -> Self {
-        let folder = std::env::var_os("STATE_DIRECTORY");
-        Self { path: folder.map(|folder| PathBuf::from(folder).join("control.json")), last: Mutex::default() }
+    /// Of a process that has this share of the cameras, or all of them.
+    pub fn new(shard: Option<Shard>) -> Self {
+        Self::at(std::env::var_os("STATE_DIRECTORY").map(PathBuf::from), shard)
+    }
+
+    fn at(folder: Option<PathBuf>, shard: Option<Shard>) -> Self {
+        let of = |shard: Shard| format!("control.{}-of-{}.json", shard.number(), shard.of());
+        let name = shard.map_or_else(|| OF_ALL.to_owned(), of);
+        Self { path: folder.map(|folder| folder.join(name)), last: Mutex::default() }
     }
 
     /// What was kept. Nothing, where there is no such file or something else is in it.
     pub fn load(&self) -> Kept {
-        let text = self.path.as_ref().and_then(|path| fs::read(path).ok());
+        let text = self.path.as_ref().and_then(|path| read(path).ok());
         text.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default()
     }
 
@@ -61,6 +72,15 @@ impl ControlFile {
     }
 }
 
+/// A share that has kept nothing yet begins with what was kept for all.
+fn read(path: &Path) -> io::Result<Vec<u8>> {
+    match fs::read(path) {
+        Err(err) if err.kind() == io::ErrorKind::NotFound => fs::read(path.with_file_name(OF_ALL)),
+        found => found,
+    }
+}
+
+/// The new file is named after the share, too.
 fn write(path: &Path, control: &Kept) -> io::Result<()> {
     let new = path.with_extension("new");
     fs::write(&new, serde_json::to_vec(control)?)?;
@@ -83,6 +103,27 @@ mod tests {
         assert_eq!((kept.len(), kept["door"], kept["hall"]), (2, Control::HandedOver, Control::Operator));
         fs::write(folder.join("control.json"), "{").unwrap();
         assert!(file().load().is_empty());
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn processes_that_share_cameras_and_folder_keep_their_own_each() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-control-shards-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let of =
+            |shard: Option<&str>| ControlFile::at(Some(folder.clone()), shard.map(|s| s.parse().unwrap()));
+        let kept = |camera: &str| Kept::from([(camera.to_owned(), Control::HandedOver)]);
+        let files = [(None, "hall"), (Some("0/2"), "door"), (Some("1/2"), "yard")];
+        of(None).keep(kept("hall")).unwrap();
+        assert_eq!(of(Some("0/2")).load(), kept("hall"), "what was kept before there were shares");
+        for (shard, camera) in files {
+            of(shard).keep(kept(camera)).unwrap();
+        }
+        for (shard, camera) in files {
+            assert_eq!(of(shard).load(), kept(camera), "{shard:?}");
+        }
+        let names = ["control.json", "control.0-of-2.json", "control.1-of-2.json"];
+        assert!(names.iter().all(|name| folder.join(name).exists()));
         fs::remove_dir_all(&folder).unwrap();
     }
 

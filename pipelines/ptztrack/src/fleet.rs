@@ -11,6 +11,7 @@ use crate::config::{CameraSettings, Codec, Kind};
 use crate::control_file::ControlFile;
 use crate::event::{Event, Level};
 use crate::log::Log;
+use crate::shard::Shard;
 
 /// That of the sinks.
 const TARGET_HEIGHT: f64 = 0.4;
@@ -27,7 +28,12 @@ pub struct Fleet {
 
 impl Fleet {
     pub fn new(log: Arc<Log>) -> Self {
-        Self { cameras: Mutex::default(), ending: Mutex::default(), had: ControlFile::new(), log }
+        Self { cameras: Mutex::default(), ending: Mutex::default(), had: ControlFile::new(None), log }
+    }
+
+    /// The same, of a process that has this share of the cameras.
+    pub fn of_share(self, shard: Option<Shard>) -> Self {
+        Self { had: ControlFile::new(shard), ..self }
     }
 
     /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits for

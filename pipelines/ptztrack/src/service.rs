@@ -71,7 +71,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     let (mut terminate, mut interrupt) = (terminate.map_err(said)?, interrupt.map_err(said)?);
     let mut hangup = signal(SignalKind::hangup()).map_err(said)?;
 
-    let fleet = Arc::new(Fleet::new(log.clone()));
+    let fleet = Arc::new(Fleet::new(log.clone()).of_share(origin.shard()));
     if let Some(http) = config.http.clone() {
         tokio::spawn(serve(http, fleet.clone(), Events::of(&config), log.clone()));
     }

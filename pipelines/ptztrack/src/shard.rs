@@ -30,6 +30,11 @@ impl Shard {
         self.number
     }
 
+    /// How many there are.
+    pub fn of(self) -> u32 {
+        self.of
+    }
+
     /// Whether a camera is in it. By the name alone, so that no other entry of the file changes it: while some processes have
     /// read a new file and others have not, none of them takes a camera that another has.
     pub fn has(self, camera: &CameraSettings) -> bool {

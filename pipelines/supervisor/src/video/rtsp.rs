@@ -2,9 +2,11 @@
 
 //! RTSP, between an `rtspsrc` on this machine and the camera: `rtspsrc` knows no password, and what it asks for is signed here.
 
+use std::collections::VecDeque;
 use std::io;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, PoisonError};
+use std::time::Duration;
 
 use http::{HeaderMap, HeaderValue, header};
 use rustls::pki_types::ServerName;
@@ -15,6 +17,7 @@ use tokio::io::{
 };
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::Mutex;
+use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 
@@ -30,6 +33,9 @@ const MOST_CHALLENGES: usize = 5;
 
 /// Streams that a camera may offer: `rtspsrc` sets up each of them.
 const MOST_STREAMS: usize = 16;
+
+/// Connections within this machine that are listened to at a time.
+const MOST_VISITORS: usize = 64;
 
 /// A connection, in clear or not.
 trait Connection: AsyncRead + AsyncWrite + Send + Unpin {}
@@ -124,25 +130,57 @@ async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Con
 
 /// The first connection that knows the word; whoever else of this machine connects is sent away.
 async fn accept(listener: &TcpListener, own: &str) -> io::Result<TcpStream> {
+    let mut visitors = Visitors::default();
     loop {
-        let (stream, _) = listener.accept().await?;
-        let mut first = [0; 256];
-        let asks = async {
-            // Before the first line is whole, nothing is to be said of it.
-            loop {
-                let bytes = stream.peek(&mut first).await?;
-                let text = String::from_utf8_lossy(&first[..bytes]).into_owned();
-                if bytes == 0 || bytes == first.len() || text.contains('\n') {
-                    return io::Result::Ok(
-                        text.split(' ').nth(1).is_some_and(|address| address.starts_with(own)),
-                    );
+        tokio::select! {
+            visitor = listener.accept() => visitors.add(visitor?.0, own.to_owned()),
+            heard = visitors.heard.join_next(), if !visitors.heard.is_empty() => {
+                // Who was sent away to make room is an error here.
+                if let Ok(Some(stream)) = heard.unwrap_or(Ok(None)) {
+                    return Ok(stream);
                 }
-                tokio::time::sleep(std::time::Duration::from_millis(5)).await;
             }
-        };
-        if matches!(timeout(LONGEST_SILENCE, asks).await, Ok(Ok(true))) {
-            return Ok(stream);
         }
+    }
+}
+
+/// Who is listened to, all at once: who connects and says nothing must not keep `rtspsrc` waiting behind.
+#[derive(Default)]
+struct Visitors {
+    heard: JoinSet<Option<TcpStream>>,
+    oldest_first: VecDeque<AbortHandle>,
+}
+
+impl Visitors {
+    /// Makes room by the one who has said nothing for longest: `rtspsrc` speaks at once.
+    fn add(&mut self, stream: TcpStream, own: String) {
+        self.oldest_first.retain(|visitor| !visitor.is_finished());
+        if self.oldest_first.len() >= MOST_VISITORS
+            && let Some(oldest) = self.oldest_first.pop_front()
+        {
+            oldest.abort();
+        }
+        self.oldest_first.push_back(self.heard.spawn(hear(stream, own)));
+    }
+}
+
+/// Gives back who knows the word, and says so in time.
+async fn hear(stream: TcpStream, own: String) -> Option<TcpStream> {
+    let knows = timeout(LONGEST_SILENCE, asks_for(&stream, &own)).await;
+    matches!(knows, Ok(Ok(true))).then_some(stream)
+}
+
+/// Whether a connection begins with a request for this; nothing is read from it.
+async fn asks_for(stream: &TcpStream, own: &str) -> io::Result<bool> {
+    let mut first = [0; 256];
+    // Before the first line is whole, nothing is to be said of it.
+    loop {
+        let bytes = stream.peek(&mut first).await?;
+        let text = String::from_utf8_lossy(&first[..bytes]).into_owned();
+        if bytes == 0 || bytes == first.len() || text.contains('\n') {
+            return Ok(text.split(' ').nth(1).is_some_and(|address| address.starts_with(own)));
+        }
+        tokio::time::sleep(Duration::from_millis(5)).await;
     }
 }
 
@@ -323,5 +361,34 @@ mod tests {
         assert_eq!(stranger.read(&mut [0]).await.unwrap_or(0), 0);
         let friend = visitor(address, &own).await;
         assert_eq!(accepted.await.unwrap().unwrap().peer_addr().unwrap(), friend.local_addr().unwrap());
+    }
+
+    /// One after the other, the silent ones would take twice as long as there is.
+    #[tokio::test]
+    async fn who_says_nothing_at_the_door_keeps_nobody_waiting() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let own = format!("rtsp://{address}/{}", word().unwrap());
+        let mut silent = Vec::new();
+        for _ in 0..8 {
+            silent.push(TcpStream::connect(address).await.unwrap());
+        }
+        let friend = visitor(address, &own).await;
+        let accepted = timeout(LONGEST_START, accept(&listener, &own)).await.unwrap().unwrap();
+        assert_eq!(accepted.peer_addr().unwrap(), friend.local_addr().unwrap());
+    }
+
+    #[tokio::test]
+    async fn a_crowd_at_the_door_is_no_larger_than_is_listened_to() {
+        let listener = TcpListener::bind(("127.0.0.1", 0)).await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let own = format!("rtsp://{address}/{}", word().unwrap());
+        let (mut visitors, mut silent) = (Visitors::default(), Vec::new());
+        for _ in 0..=MOST_VISITORS {
+            silent.push(TcpStream::connect(address).await.unwrap());
+            visitors.add(listener.accept().await.unwrap().0, own.clone());
+        }
+        assert!(visitors.oldest_first.len() <= MOST_VISITORS);
+        assert_eq!(silent[0].read(&mut [0]).await.unwrap(), 0);
     }
 }

@@ -23,7 +23,7 @@ const MOST_BYTES: usize = 64 * 1024 * 1024;
 /// Pictures in a row that cannot be read, of which the network may have broken some: a second or two.
 const MOST_UNREADABLE: usize = 50;
 
-/// Ends the pipeline with an error before one of its decoders gets a picture that is too large, or what comes from `source` grows
+/// Ends the pipeline with an error before one of its decoders gets a picture that is too large, or what `source` brings grows
 /// without end before there is one.
 pub fn keep(pipeline: &gst::Pipeline, source: Option<&gst::Element>) {
     let waiting = Arc::new(AtomicUsize::new(0));
@@ -35,8 +35,9 @@ pub fn keep(pipeline: &gst::Pipeline, source: Option<&gst::Element>) {
             look_at_sizes(&pad, waiting.clone());
         }
     }
+    // What goes in, where anything does: a depayloader keeps packets until they are a picture, and nothing comes out until then.
     if let Some(pad) =
-        source.and_then(|source| source.static_pad("src").or_else(|| source.static_pad("sink")))
+        source.and_then(|source| source.static_pad("sink").or_else(|| source.static_pad("src")))
     {
         count(&pad, waiting);
     }
@@ -146,19 +147,30 @@ fn refuse(pad: &gst::Pad, why: &str) -> gst::PadProbeReturn {
 mod tests {
     use super::*;
 
-    /// What a pipeline with this decoder says of these buffers.
-    fn error_of(decoder: &str, caps: &str, buffers: &[&[u8]]) -> Option<String> {
+    /// What a pipeline with this decoder says of these bytes.
+    fn error_of(decoder: &str, caps: &str, bytes: &[&[u8]]) -> Option<String> {
+        gst::init().unwrap();
+        let buffers = bytes.iter().map(|bytes| gst::Buffer::from_slice(bytes.to_vec()));
+        error_of_buffers(decoder, caps, buffers)
+    }
+
+    /// The same of buffers. Counted is as in a pipeline of ours: at what is called `received`, or else at the source.
+    fn error_of_buffers(
+        decoder: &str,
+        caps: &str,
+        buffers: impl Iterator<Item = gst::Buffer>,
+    ) -> Option<String> {
         gst::init().unwrap();
         let caps: gst::Caps = caps.parse().unwrap();
         let pipeline =
             gst::parse::launch(&format!("appsrc name=source format=time ! {decoder} ! fakesink")).unwrap();
         let pipeline = pipeline.downcast::<gst::Pipeline>().unwrap();
         let source = pipeline.by_name("source").unwrap();
-        keep(&pipeline, Some(&source));
+        keep(&pipeline, Some(&pipeline.by_name("received").unwrap_or_else(|| source.clone())));
         let source = source.downcast::<gst_app::AppSrc>().unwrap();
         source.set_caps(Some(&caps));
         for buffer in buffers {
-            source.push_buffer(gst::Buffer::from_slice(buffer.to_vec())).unwrap();
+            source.push_buffer(buffer).unwrap();
         }
         source.end_of_stream().unwrap();
         let _ = pipeline.set_state(gst::State::Playing);
@@ -200,6 +212,23 @@ mod tests {
     fn what_never_becomes_a_picture_is_not_kept() {
         let endless = vec![b'x'; MOST_BYTES + 1];
         let error = error_of("multipartdemux ! jpegdec", "multipart/x-mixed-replace", &[&endless]);
+        assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
+    }
+
+    /// Packets of RTP (RFC 3550), none of which has the marker that ends a picture. They carry the same memory: another test looks at
+    /// how much this process takes.
+    #[test]
+    fn packets_that_never_become_a_picture_are_not_kept() {
+        gst::init().unwrap();
+        let carried = gst::Memory::from_slice(vec![b'x'; 1 << 20]);
+        let packets = (0..=MOST_BYTES >> 20).map(|number| {
+            let [high, low] = u16::try_from(number).unwrap().to_be_bytes();
+            let mut packet = gst::Buffer::from_slice([0x80, 96, high, low, 0, 0, 0, 0, 0, 0, 0, 1]);
+            packet.get_mut().unwrap().append_memory(carried.clone());
+            packet
+        });
+        let caps = "application/x-rtp,media=video,clock-rate=90000,encoding-name=MP4V-ES";
+        let error = error_of_buffers("rtpmp4vdepay name=received", caps, packets);
         assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
     }
 

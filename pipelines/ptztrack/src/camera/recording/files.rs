@@ -5,7 +5,7 @@
 use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, SystemTime};
 
 use events::Pointer;
@@ -17,17 +17,32 @@ use crate::config::Recording;
 /// This share of a disk is left to others: one in so many.
 const FREE_SHARE: u64 = 20;
 
+const SHORT: &str = "less than a twentieth of the disk is free";
+
 /// The files of a recording that began last, and when, in milliseconds since 1970. They are not looked for: the disk may hang.
 #[derive(Debug, Default)]
-pub struct Segments(Mutex<VecDeque<(i64, PathBuf)>>);
+pub struct Segments(Mutex<VecDeque<Segment>>);
+
+#[derive(Debug)]
+struct Segment {
+    at_ms: i64,
+    file: PathBuf,
+    /// Whoever writes it, while they do.
+    writer: Weak<()>,
+}
 
 impl Segments {
     /// More are not remembered.
     const MOST: usize = 64;
 
-    fn begin(&self, at_ms: i64, file: PathBuf) {
+    /// Whoever writes this one writes none of those before any more.
+    fn begin(&self, at_ms: i64, file: PathBuf, writer: &Arc<()>) {
+        let writer = Arc::downgrade(writer);
         let mut segments = lock(&self.0);
-        segments.push_back((at_ms, file));
+        for before in segments.iter_mut().filter(|segment| segment.writer.ptr_eq(&writer)) {
+            before.writer = Weak::new();
+        }
+        segments.push_back(Segment { at_ms, file, writer });
         let surplus = segments.len().saturating_sub(Self::MOST);
         segments.drain(..surplus);
     }
@@ -35,8 +50,13 @@ impl Segments {
     /// Where a time is.
     pub fn at(&self, at_ms: i64) -> Option<Pointer> {
         let segments = lock(&self.0);
-        let (began, file) = segments.iter().rfind(|(began, _)| *began <= at_ms)?;
-        Some(Pointer { file: file.clone(), offset_ms: at_ms - began })
+        let segment = segments.iter().rfind(|segment| segment.at_ms <= at_ms)?;
+        Some(Pointer { file: segment.file.clone(), offset_ms: at_ms - segment.at_ms })
+    }
+
+    /// Whether somebody still writes a file; its name need not be the newest, where the clock was set back.
+    fn is_written(&self, file: &Path) -> bool {
+        lock(&self.0).iter().any(|segment| segment.file == file && segment.writer.strong_count() > 0)
     }
 }
 
@@ -71,12 +91,24 @@ pub fn pieces(from: &Pointer, lasts_ms: i64) -> Vec<Piece> {
     pieces
 }
 
-/// Whose recording a file is of, and when it began, in milliseconds since 1970.
+/// Whose recording a file is of, and when it began, in milliseconds since 1970. Nothing but names as [`configure`] gives them: a clip
+/// that somebody keeps beside the recordings, as `door-17.mkv`, is none of them.
 fn name_of(file: &Path) -> Option<(&str, i64)> {
-    let (camera, time) = file.file_stem()?.to_str()?.rsplit_once('-')?;
-    let (seconds, thousandths) = time.split_at_checked(15)?;
+    let (camera, time) = file.file_name()?.to_str()?.strip_suffix(".mkv")?.rsplit_once('-')?;
+    let is_ours = |(at, byte): (usize, u8)| if at == 8 { byte == b'T' } else { byte.is_ascii_digit() };
+    (time.len() == TIME && time.bytes().enumerate().all(is_ours)).then_some(())?;
+    let (seconds, thousandths) = time.split_at_checked(TIME - 3)?;
     let time = glib::DateTime::from_iso8601(&format!("{seconds}Z"), None).ok()?;
     Some((camera, time.to_unix() * 1000 + thousandths.parse::<i64>().ok()?))
+}
+
+/// So long is the time in a name, as `20260101T000000250`. To the millisecond: a pipeline that is started anew must not write over what
+/// it recorded just before.
+const TIME: usize = 18;
+
+fn now_ms() -> i64 {
+    let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
+    i64::try_from(now.as_millis()).unwrap_or(i64::MAX)
 }
 
 /// Names the files by the time at which they begin, and deletes old ones whenever another begins.
@@ -84,30 +116,44 @@ pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, 
     let Some(sink) = pipeline.by_name("recording") else { return };
     sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
     let (recording, camera, segments) = (recording.clone(), camera.to_owned(), segments.clone());
+    // Goes with the sink.
+    let writer = Arc::new(());
     sink.connect("format-location", false, move |_| {
         // Where a folder cannot be written, the element says so.
         let _ = fs::create_dir_all(&recording.folder);
         delete_old(&recording, &camera);
         let time = glib::DateTime::now_utc().and_then(|now| now.format("%Y%m%dT%H%M%S%f"));
-        // To the millisecond: a pipeline that is started anew must not write over what it recorded just before.
-        let time = time.map(|time| time.chars().take(18).collect::<String>()).unwrap_or_default();
+        let time = time.map(|time| time.chars().take(TIME).collect::<String>()).unwrap_or_default();
         let file = recording.folder.join(format!("{camera}-{time}.mkv"));
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        segments.begin(i64::try_from(now.as_millis()).unwrap_or(i64::MAX), file.clone());
+        segments.begin(now_ms(), file.clone(), &writer);
         Some(file.to_value())
     });
 }
 
-/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest.
-pub fn make_room(recording: &Recording, camera: &str) {
+/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for what is being written.
+///
+/// # Errors
+/// It has less still.
+pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Result<(), &'static str> {
     let mut files = files(&recording.folder, camera);
-    files.sort_by(|a, b| b.path.cmp(&a.path));
-    while files.len() > 1 && is_short(&recording.folder) {
-        let oldest = files.pop();
-        if oldest.is_none_or(|oldest| fs::remove_file(oldest.path).is_err()) {
-            return;
+    sort_newest_first(&mut files, now_ms());
+    let oldest_first = files.into_iter().rev().map(|file| file.path);
+    delete_while(|| is_short(&recording.folder), oldest_first, segments)
+}
+
+fn delete_while(
+    is_short: impl Fn() -> bool,
+    files: impl Iterator<Item = PathBuf>,
+    segments: &Segments,
+) -> Result<(), &'static str> {
+    for file in files.filter(|file| !segments.is_written(file)) {
+        if !is_short() {
+            return Ok(());
         }
+        // One that cannot be deleted keeps none of the others.
+        let _ = fs::remove_file(file);
     }
+    if is_short() { Err(SHORT) } else { Ok(()) }
 }
 
 fn is_short(folder: &Path) -> bool {
@@ -123,6 +169,8 @@ pub fn newest_grew(recording: &Recording, camera: &str, within: Duration) -> boo
 #[derive(Debug)]
 struct Kept {
     path: PathBuf,
+    /// By its name, in milliseconds since 1970.
+    began_ms: i64,
     bytes: u64,
     /// Since it was last written to, by the clock.
     age: Duration,
@@ -132,7 +180,7 @@ struct Kept {
 
 /// A file that cannot be deleted is tried again when the next begins.
 fn delete_old(recording: &Recording, camera: &str) {
-    for file in too_much(files(&recording.folder, camera), recording) {
+    for file in too_much(files(&recording.folder, camera), recording, now_ms()) {
         let _ = fs::remove_file(file);
     }
 }
@@ -142,24 +190,28 @@ fn files(folder: &Path, camera: &str) -> Vec<Kept> {
     let now = SystemTime::now();
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
     let kept = |entry: fs::DirEntry| {
-        let name = entry.file_name().into_string().ok()?;
-        let time = name.strip_prefix(camera)?.strip_prefix('-')?.strip_suffix(".mkv")?;
-        // Not those of a camera called door-2.
-        time.starts_with(|c: char| c.is_ascii_digit()).then_some(())?;
-        (!time.contains('-')).then_some(())?;
+        let path = entry.path();
+        let (of, began_ms) = name_of(&path)?;
+        (of == camera).then_some(())?;
         let meta = entry.metadata().ok()?;
         let age = now.duration_since(meta.modified().ok()?).unwrap_or_default();
         let written =
             meta.created().ok().and_then(|created| meta.modified().ok()?.duration_since(created).ok());
-        Some(Kept { path: entry.path(), bytes: meta.len(), age, lasts: written.unwrap_or(Duration::MAX) })
+        Some(Kept { path, began_ms, bytes: meta.len(), age, lasts: written.unwrap_or(Duration::MAX) })
     };
     entries.filter_map(kept).collect()
 }
 
+/// By their names. Those that have yet to begin are from before the clock was set back, and so the oldest: as the newest, they would
+/// leave no room for whatever is recorded until then.
+fn sort_newest_first(files: &mut [Kept], now_ms: i64) {
+    files.sort_by(|a, b| (b.began_ms <= now_ms, &b.path).cmp(&(a.began_ms <= now_ms, &a.path)));
+}
+
 /// What is more than is kept: the oldest, by their names. How long they last is counted, not how old they are by a clock, which
 /// may jump.
-fn too_much(mut files: Vec<Kept>, recording: &Recording) -> Vec<PathBuf> {
-    files.sort_by(|a, b| b.path.cmp(&a.path));
+fn too_much(mut files: Vec<Kept>, recording: &Recording, now_ms: i64) -> Vec<PathBuf> {
+    sort_newest_first(&mut files, now_ms);
     let (mut bytes, mut newer) = (0, Duration::ZERO);
     let mut goes = |file: &Kept| {
         bytes += file.bytes;
@@ -178,24 +230,28 @@ mod tests {
     fn kept(path: &str, bytes: u64) -> Kept {
         Kept {
             path: path.into(),
+            began_ms: 0,
             bytes,
             age: Duration::from_secs(1_000_000),
             lasts: Duration::from_secs(1_000_000),
         }
     }
 
-    #[test]
-    fn the_oldest_go_where_there_is_too_much_whatever_the_clock_says() {
-        let files = || vec![kept("door-3", 40), kept("door-1", 30), kept("door-2", 50)];
-        let recording = |keep_s: Option<u64>, keep_bytes| Recording {
+    fn recording(keep_s: Option<u64>, keep_bytes: Option<u64>) -> Recording {
+        Recording {
             folder: "/r".into(),
             segment: Duration::from_secs(600),
             keep: keep_s.map(Duration::from_secs),
             keep_bytes,
             overlay: false,
-        };
+        }
+    }
+
+    #[test]
+    fn the_oldest_go_where_there_is_too_much_whatever_the_clock_says() {
+        let files = || vec![kept("door-3", 40), kept("door-1", 30), kept("door-2", 50)];
         let names = |keep, bytes| {
-            let gone = too_much(files(), &recording(keep, bytes));
+            let gone = too_much(files(), &recording(keep, bytes), 0);
             gone.iter().map(|path| path.display().to_string()).collect::<Vec<_>>()
         };
         assert_eq!(names(None, Some(100)), ["door-1"]);
@@ -205,11 +261,53 @@ mod tests {
     }
 
     #[test]
+    fn those_from_before_the_clock_was_set_back_go_first() {
+        let of = |name: &str| {
+            let path = PathBuf::from(format!("door-{name}.mkv"));
+            let (_, began_ms) = name_of(&path).unwrap();
+            Kept { began_ms, ..kept(path.to_str().unwrap(), 1) }
+        };
+        let [ahead, further, present] = ["20360101T000000000", "20360101T001000000", "20260101T001000000"];
+        let now_ms = of(present).began_ms;
+        let gone = |keep_s| {
+            let files = [further, present, ahead].map(of).into();
+            too_much(files, &recording(Some(keep_s), None), now_ms)
+        };
+        assert_eq!(gone(600), [of(further).path, of(ahead).path]);
+        assert_eq!(gone(1200), [of(ahead).path]);
+    }
+
+    #[test]
+    fn a_disk_that_stays_short_is_said_once_all_is_gone_but_what_is_written() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-short-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let [oldest, old, written] = ["a", "b", "c"].map(|name| folder.join(name));
+        let files = || [&oldest, &old, &written].map(PathBuf::clone).into_iter();
+        files().for_each(|file| fs::write(file, "x").unwrap());
+        let (segments, writer) = (Segments::default(), Arc::new(()));
+        segments.begin(0, old.clone(), &writer);
+        segments.begin(1, written.clone(), &writer);
+        let there = || files().map(|file| file.exists()).collect::<Vec<_>>();
+        assert_eq!(delete_while(|| oldest.exists(), files(), &segments), Ok(()));
+        assert_eq!(there(), [false, true, true]);
+        assert_eq!(delete_while(|| true, files(), &segments), Err(SHORT));
+        assert_eq!(there(), [false, false, true], "what is written stays");
+        // As when it is begun anew.
+        drop(writer);
+        assert_eq!(delete_while(|| written.exists(), files(), &segments), Ok(()));
+        assert_eq!(there(), [false, false, false]);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
     fn only_files_of_this_camera_are_looked_at() {
         let folder = std::env::temp_dir().join(format!("ptztrack-files-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        for name in ["door-20260101T000000000.mkv", "door-2-20260101T000000000.mkv", "door.mkv", "notes.txt"]
-        {
+        let recordings = ["door-20260101T000000000.mkv", "door-2-20260101T000000000.mkv"];
+        // Clips that somebody keeps there, among others.
+        let others =
+            ["door-17.mkv", "door-21.mkv", "door-20260101T000000000-17.mkv", "door.mkv", "notes.txt"];
+        for name in recordings.iter().chain(&others) {
             fs::write(folder.join(name), "x").unwrap();
         }
         let found = files(&folder, "door");
@@ -244,14 +342,15 @@ mod tests {
     fn a_time_is_in_the_file_that_began_last() {
         let segments = Segments::default();
         assert_eq!(segments.at(5000), None);
+        let writer = Arc::new(());
         for (at_ms, file) in [(1000, "a.mkv"), (3000, "b.mkv")] {
-            segments.begin(at_ms, file.into());
+            segments.begin(at_ms, file.into(), &writer);
         }
         let in_file = |file: &str, offset_ms| Some(Pointer { file: file.into(), offset_ms });
         assert_eq!(segments.at(999), None);
         assert_eq!(segments.at(2999), in_file("a.mkv", 1999));
         assert_eq!(segments.at(3000), in_file("b.mkv", 0));
-        (4..100).for_each(|second| segments.begin(1000 * second, "c.mkv".into()));
+        (4..100).for_each(|second| segments.begin(1000 * second, "c.mkv".into(), &writer));
         assert_eq!((segments.at(3500), segments.at(99_500)), (None, in_file("c.mkv", 500)));
     }
 }

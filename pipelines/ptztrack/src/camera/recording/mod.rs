@@ -13,6 +13,7 @@ mod files;
 pub use clip::{Clip, Form, NoClip, Purpose, cut};
 pub use files::{Segments, pieces};
 
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -30,6 +31,10 @@ pub const ENCODER: &str = "x264enc tune=zerolatency speed-preset=superfast key-i
 
 /// So much waits for a disk that is slow for a moment, in bytes.
 const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
+
+/// Of pictures in a row that need the one before, in bytes: a minute at 8 Mbit/s. Cameras send one that needs no other every few
+/// seconds.
+const LONGEST_GROUP: usize = 64 * 1024 * 1024;
 
 /// Between two tries; twice as long each time.
 const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
@@ -141,7 +146,7 @@ impl Recorder {
 
     /// Until the end of the stream.
     fn write(&self, feed: &Feed) -> Result<(), String> {
-        files::make_room(&self.settings, &self.camera);
+        files::make_room(&self.settings, &self.camera, &self.segments)?;
         let said = |err: glib::Error| err.message().to_owned();
         let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
@@ -156,7 +161,9 @@ impl Recorder {
             let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
             match bus.timed_pop_filtered(wait, &kinds) {
                 None => {
-                    files::make_room(&self.settings, &self.camera);
+                    if let Err(short) = files::make_room(&self.settings, &self.camera, &self.segments) {
+                        break Err(short.to_owned());
+                    }
                     if files::newest_grew(&self.settings, &self.camera, LOOK * 2)
                         && std::mem::take(&mut *lock(&self.trouble))
                     {
@@ -214,6 +221,7 @@ impl Feed {
     }
 
     fn start(&self, source: gst_app::AppSrc) {
+        bound_groups(&source);
         let mut state = lock(&self.0);
         if state.ended {
             let _ = source.end_of_stream();
@@ -236,6 +244,35 @@ impl Feed {
     fn has_ended(&self) -> bool {
         lock(&self.0).ended
     }
+}
+
+/// Ends the recording with an error where pictures go on and on that need the one before: `splitmuxsink` keeps them all until one
+/// comes that needs no other. Which ones do is known behind the parser only: not every depayloader says so, as that of MPEG-4.
+fn bound_groups(source: &gst_app::AppSrc) {
+    let Some(pad) = parsed(source) else { return };
+    let kept = AtomicUsize::new(0);
+    pad.add_probe(gst::PadProbeType::BUFFER, move |pad, info| {
+        let before = kept.load(Ordering::Relaxed);
+        let Some(buffer) = info.buffer().filter(|_| before <= LONGEST_GROUP) else {
+            return gst::PadProbeReturn::Handled;
+        };
+        let delta = buffer.flags().contains(gst::BufferFlags::DELTA_UNIT);
+        let now = buffer.size().saturating_add(if delta { before } else { 0 });
+        kept.store(now, Ordering::Relaxed);
+        if now <= LONGEST_GROUP {
+            return gst::PadProbeReturn::Ok;
+        }
+        if let Some(element) = pad.parent_element() {
+            let why = format!("{LONGEST_GROUP} bytes came without a picture that needs no other");
+            gst::element_error!(element, gst::StreamError::Mux, ("{why}"));
+        }
+        gst::PadProbeReturn::Handled
+    });
+}
+
+/// Where pictures leave the parser, which is next to the source.
+fn parsed(source: &gst_app::AppSrc) -> Option<gst::Pad> {
+    source.static_pad("src")?.peer()?.parent_element()?.static_pad("src")
 }
 
 /// Ends its feed when it is dropped.
@@ -267,5 +304,72 @@ mod tests {
         }
         let waiting = source.current_level_bytes();
         assert!((LONGEST_QUEUE / 2..=LONGEST_QUEUE).contains(&waiting), "{waiting}");
+    }
+
+    /// A picture of a mebibyte.
+    fn picture(delta: bool) -> gst::Sample {
+        let mut picture = gst::Buffer::from_slice(vec![0; 1 << 20]);
+        if delta {
+            picture.get_mut().unwrap().set_flags(gst::BufferFlags::DELTA_UNIT);
+        }
+        gst::Sample::builder().buffer(&picture).build()
+    }
+
+    /// What is said of these pictures, and how many bytes of them go on from where a parser stands.
+    fn recorded<'a>(pictures: impl Iterator<Item = &'a gst::Sample>) -> (Option<String>, usize) {
+        // Plays before anything comes: after an error it would not begin to, and so not end.
+        let text = "appsrc name=feed format=time ! identity ! fakesink name=recording async=false";
+        let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
+        let written = Arc::new(AtomicUsize::new(0));
+        let sink = pipeline.by_name("recording").unwrap().static_pad("sink").unwrap();
+        sink.add_probe(gst::PadProbeType::BUFFER, {
+            let written = written.clone();
+            move |_, info| {
+                written.fetch_add(info.buffer().map_or(0, |buffer| buffer.size()), Ordering::Relaxed);
+                gst::PadProbeReturn::Ok
+            }
+        });
+        let source = pipeline.by_name("feed").unwrap().downcast::<gst_app::AppSrc>().unwrap();
+        let feed = Feed::default();
+        feed.start(source);
+        pipeline.set_state(gst::State::Playing).unwrap();
+        pictures.for_each(|picture| feed.copy(picture));
+        feed.end();
+        let (bus, mut said) = (pipeline.bus().unwrap(), None);
+        let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+        loop {
+            let message = bus.timed_pop_filtered(gst::ClockTime::from_seconds(60), &kinds).unwrap();
+            let gst::MessageView::Error(error) = message.view() else { break };
+            assert!(said.replace(error.error().message().to_owned()).is_none(), "it is said once");
+        }
+        pipeline.set_state(gst::State::Null).unwrap();
+        (said, written.load(Ordering::Relaxed))
+    }
+
+    #[test]
+    fn pictures_that_all_need_the_one_before_end_the_recording() {
+        gst::init().unwrap();
+        let (key, delta) = (picture(false), picture(true));
+        let most = LONGEST_GROUP >> 20;
+        // Also what begins anew comes too late.
+        let endless =
+            std::iter::once(&key).chain(std::iter::repeat_n(&delta, 2 * most)).chain([&key, &delta]);
+        let (said, written) = recorded(endless);
+        assert!(said.as_ref().is_some_and(|said| said.contains("needs no other")), "{said:?}");
+        assert_eq!(written, LONGEST_GROUP);
+        let groups = (0..4 * most).map(|number| if number.is_multiple_of(most) { &key } else { &delta });
+        assert_eq!(recorded(groups), (None, 4 * LONGEST_GROUP));
+    }
+
+    #[test]
+    fn pictures_are_looked_at_where_they_leave_the_parser() {
+        gst::init().unwrap();
+        for codec in [Codec::Mjpeg, Codec::Mpeg4, Codec::H264, Codec::H265] {
+            let pipeline = gst::parse::launch(&description(codec)).unwrap();
+            let pipeline = pipeline.downcast::<gst::Pipeline>().unwrap();
+            let source = pipeline.by_name("feed").unwrap().downcast::<gst_app::AppSrc>().unwrap();
+            let next = parsed(&source).unwrap().peer().unwrap().parent_element();
+            assert_eq!(next, pipeline.by_name("recording"));
+        }
     }
 }
