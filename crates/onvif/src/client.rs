@@ -133,7 +133,14 @@ impl Client {
     async fn answer(&mut self, request: &Request) -> Result<Response, Error> {
         let abilities = self.connected().await?;
         match request {
-            Request::Command(command) => self.send(command, &abilities).await.map(|()| Response::Accepted),
+            Request::Command(command) => {
+                self.send(command, &abilities).await?;
+                // Only by what it does is it known to have judged them: some let anybody ask.
+                if self.login == Login::Accepted {
+                    self.http.note_accepted();
+                }
+                Ok(Response::Accepted)
+            }
             Request::Query(Query::Position) => self.position(&abilities).await.map(Response::Position),
             Request::Query(Query::Limits) => Ok(Response::Limits(abilities.limits())),
             Request::Query(Query::Parameters) => Ok(Response::Parameters(abilities.parameters())),
@@ -304,14 +311,15 @@ impl Client {
             // By HTTP's Digest it is known who we are; a camera that does not take that word for it is told in both ways.
             let tells = fresh || !open && !self.http.is_signing();
             let token = self.http.credentials().filter(|_| tells).cloned();
-            let judged = token.is_some() || self.http.is_signing();
+            let signed = self.http.is_signing();
+            let judged = token.is_some() || signed;
             let header = token.map_or_else(String::new, |credentials| {
                 security(&credentials, &self.clock.unwrap_or_else(CameraClock::assumed).now())
             });
             let answer = match self.http.post(&path, &envelope(&header, message), repeat).await {
                 Ok(answer) => read_answer(&answer)?,
-                // Of HTTP too it is known that we were let in before: it may be for the time of our token.
-                Err(Error::NotPermitted { .. }) => {
+                // We were let in before, by a token alone: it may be for the time of that.
+                Err(Error::NotPermitted { .. }) if !signed => {
                     self.login = Login::Accepted;
                     self.http.forget_challenge();
                     Answer::NotAuthorized
@@ -322,7 +330,6 @@ impl Client {
                 Answer::Body(body) => {
                     if judged {
                         self.login = Login::Accepted;
-                        self.http.note_accepted();
                     }
                     return Ok(body);
                 }

@@ -72,12 +72,25 @@ impl ControlFile {
     }
 }
 
-/// A share that has kept nothing yet begins with what was kept for all.
+/// A share that has kept nothing yet begins with what was kept for all, unless there were other shares since: that is old then.
 fn read(path: &Path) -> io::Result<Vec<u8>> {
     match fs::read(path) {
-        Err(err) if err.kind() == io::ErrorKind::NotFound => fs::read(path.with_file_name(OF_ALL)),
+        Err(err) if err.kind() == io::ErrorKind::NotFound && !has_others(path) => {
+            fs::read(path.with_file_name(OF_ALL))
+        }
         found => found,
     }
+}
+
+/// Whether shares of another number have kept something there.
+fn has_others(path: &Path) -> bool {
+    let number = |path: &Path| Some(path.file_name()?.to_str()?.split_once("-of-")?.1.to_owned());
+    let files = path.parent().and_then(|folder| fs::read_dir(folder).ok());
+    let mut names = files.into_iter().flatten().flatten().map(|entry| entry.path());
+    names.any(|other| {
+        let is_share = other.file_name().is_some_and(|name| name.as_encoded_bytes().starts_with(b"control."));
+        is_share && number(&other).is_some_and(|of| of.ends_with(".json") && Some(of) != number(path))
+    })
 }
 
 /// The new file is named after the share, too.
@@ -122,6 +135,7 @@ mod tests {
         for (shard, camera) in files {
             assert_eq!(of(shard).load(), kept(camera), "{shard:?}");
         }
+        assert!(of(Some("0/3")).load().is_empty(), "what was kept for all is older than two shares");
         let names = ["control.json", "control.0-of-2.json", "control.1-of-2.json"];
         assert!(names.iter().all(|name| folder.join(name).exists()));
         fs::remove_dir_all(&folder).unwrap();

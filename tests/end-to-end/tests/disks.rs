@@ -73,7 +73,7 @@ fn a_full_disk_is_said_once_and_recorded_on_when_there_is_room() {
     // As much as there is room for.
     let _ = fs::write(&other, vec![0; (MEBIBYTES as usize) << 20]);
     let mut recorded = Recorded::on(&disk, "full");
-    let short = "door: warning: nothing is recorded: less than a twentieth of the disk is free";
+    let short = "door: warning: nothing is recorded: less than a fortieth of the disk is free";
     recorded.program.launch.wait_for_line(short);
     assert!(recordings(&disk).is_empty(), "the last of the room is for others");
     recorded.is_steered();

@@ -25,7 +25,7 @@ const MOST_WAITING: i32 = 16 * 1024;
 /// Between two looks at what they have sent.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether a client has set up a stream, or is gone.
+/// Whether a client has set up a stream.
 type Settled = Arc<AtomicBool>;
 
 /// Takes on a client that has just connected, in the thread that carries out `context`.
@@ -34,11 +34,12 @@ pub(super) fn receive(server: &RTSPServer, client: &RTSPClient, context: &glib::
     // Where it is not taken, more is read.
     let _ = socket.set_option(libc::SOL_SOCKET, libc::SO_RCVBUF, MOST_WAITING);
     let settled = Settled::default();
-    let (set_up, gone) = (settled.clone(), settled.clone());
-    client.connect_new_session(move |_, _| set_up.store(true, Ordering::Relaxed));
-    client.add_weak_ref_notify(move || gone.store(true, Ordering::Relaxed));
+    client.connect_new_session({
+        let settled = settled.clone();
+        move |_, _| settled.store(true, Ordering::Relaxed)
+    });
     let is_too_much = server.client_filter(None).len() > MOST_CLIENTS;
-    context.spawn_local(watch(socket, settled, is_too_much));
+    context.spawn_local(watch(socket, client.downgrade(), settled, is_too_much));
 }
 
 /// By which a client is connected.
@@ -52,13 +53,20 @@ fn socket_of(client: &RTSPClient) -> Option<gio::Socket> {
 }
 
 /// Sends a client away at once, or where it stays for too long or sends too much without setting up a stream.
-async fn watch(socket: gio::Socket, settled: Settled, is_too_much: bool) {
+async fn watch(socket: gio::Socket, client: glib::WeakRef<RTSPClient>, settled: Settled, is_too_much: bool) {
     let begin = Instant::now();
-    while !is_too_much && begin.elapsed() < LONGEST_VISIT && received(&socket) <= MOST_BYTES {
+    let is_short = || received(&socket) <= MOST_BYTES;
+    while !is_too_much && begin.elapsed() < LONGEST_VISIT && is_short() {
         glib::timeout_future(LOOK).await;
         if settled.load(Ordering::Relaxed) || socket.is_closed() {
             return;
         }
+    }
+    // One that goes on with a session of before; or, where the client is gone and its socket is not, that of a tunnel through HTTP,
+    // which is another client's now.
+    let belongs = || client.upgrade().is_none_or(|client| !client.session_filter(None).is_empty());
+    if !is_too_much && is_short() && belongs() {
+        return;
     }
     // The client's own thread reads the end of it, and closes it. Closed by another thread, a connection that is just being read would
     // keep its thread busy for ever.

@@ -17,7 +17,9 @@ use crate::config::Recording;
 /// This share of a disk is left to others: one in so many.
 const FREE_SHARE: u64 = 20;
 
-const SHORT: &str = "less than a twentieth of the disk is free";
+/// Of the disk, no file is begun or written where less than this share is free: others delete theirs before it comes to that.
+const LEAST_SHARE: u64 = 2 * FREE_SHARE;
+const SHORT: &str = "less than a fortieth of the disk is free";
 
 /// The files of a recording that began last, and when, in milliseconds since 1970. They are not looked for: the disk may hang.
 #[derive(Debug, Default)]
@@ -130,34 +132,32 @@ pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, 
     });
 }
 
-/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for what is being written.
+/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest and what is being
+/// written.
 ///
 /// # Errors
-/// It has less still.
+/// It has so little still that nothing is to be written.
 pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Result<(), &'static str> {
     let mut files = files(&recording.folder, camera);
     sort_newest_first(&mut files, now_ms());
-    let oldest_first = files.into_iter().rev().map(|file| file.path);
-    delete_while(|| is_short(&recording.folder), oldest_first, segments)
+    let oldest_first = files.into_iter().skip(1).rev().map(|file| file.path);
+    delete_while(|| has_less(&recording.folder, FREE_SHARE), oldest_first, segments);
+    if has_less(&recording.folder, LEAST_SHARE) { Err(SHORT) } else { Ok(()) }
 }
 
-fn delete_while(
-    is_short: impl Fn() -> bool,
-    files: impl Iterator<Item = PathBuf>,
-    segments: &Segments,
-) -> Result<(), &'static str> {
+fn delete_while(is_short: impl Fn() -> bool, files: impl Iterator<Item = PathBuf>, segments: &Segments) {
     for file in files.filter(|file| !segments.is_written(file)) {
         if !is_short() {
-            return Ok(());
+            return;
         }
         // One that cannot be deleted keeps none of the others.
         let _ = fs::remove_file(file);
     }
-    if is_short() { Err(SHORT) } else { Ok(()) }
 }
 
-fn is_short(folder: &Path) -> bool {
-    rustix::fs::statvfs(folder).is_ok_and(|disk| disk.f_bavail < disk.f_blocks / FREE_SHARE)
+/// Whether less than one part of so many is free.
+fn has_less(folder: &Path, share: u64) -> bool {
+    rustix::fs::statvfs(folder).is_ok_and(|disk| disk.f_bavail < disk.f_blocks / share)
 }
 
 /// Whether something was written not long ago.
@@ -278,7 +278,7 @@ mod tests {
     }
 
     #[test]
-    fn a_disk_that_stays_short_is_said_once_all_is_gone_but_what_is_written() {
+    fn as_much_is_deleted_as_is_needed_but_never_what_is_written() {
         let folder = std::env::temp_dir().join(format!("ptztrack-short-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
         let [oldest, old, written] = ["a", "b", "c"].map(|name| folder.join(name));
@@ -288,13 +288,13 @@ mod tests {
         segments.begin(0, old.clone(), &writer);
         segments.begin(1, written.clone(), &writer);
         let there = || files().map(|file| file.exists()).collect::<Vec<_>>();
-        assert_eq!(delete_while(|| oldest.exists(), files(), &segments), Ok(()));
+        delete_while(|| oldest.exists(), files(), &segments);
         assert_eq!(there(), [false, true, true]);
-        assert_eq!(delete_while(|| true, files(), &segments), Err(SHORT));
+        delete_while(|| true, files(), &segments);
         assert_eq!(there(), [false, false, true], "what is written stays");
         // As when it is begun anew.
         drop(writer);
-        assert_eq!(delete_while(|| written.exists(), files(), &segments), Ok(()));
+        delete_while(|| written.exists(), files(), &segments);
         assert_eq!(there(), [false, false, false]);
         fs::remove_dir_all(&folder).unwrap();
     }

@@ -17,7 +17,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use gst::prelude::*;
 use ptztrack_contract::lock::lock;
@@ -32,9 +32,9 @@ pub const ENCODER: &str = "x264enc tune=zerolatency speed-preset=superfast key-i
 /// So much waits for a disk that is slow for a moment, in bytes.
 const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
 
-/// Of pictures in a row that need the one before, in bytes: a minute at 8 Mbit/s. Cameras send one that needs no other every few
-/// seconds.
-const LONGEST_GROUP: usize = 64 * 1024 * 1024;
+/// Of pictures in a row that need the one before, in bytes: a minute at 32 Mbit/s. Cameras send one that needs no other every few
+/// seconds, or once a minute where nothing moves and little is sent.
+const LONGEST_GROUP: usize = 256 * 1024 * 1024;
 
 /// Between two tries; twice as long each time.
 const SHORTEST_PAUSE: Duration = Duration::from_secs(1);
@@ -126,10 +126,14 @@ impl Recorder {
     fn run(&self, feed: &Feed) {
         let mut pause = SHORTEST_PAUSE;
         loop {
+            let begin = Instant::now();
             let failure = match self.write(feed) {
                 Ok(()) => return,
                 Err(failure) => failure,
             };
+            if begin.elapsed() > LONGEST_PAUSE {
+                pause = SHORTEST_PAUSE;
+            }
             feed.stop();
             if feed.has_ended() {
                 return;
