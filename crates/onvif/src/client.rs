@@ -416,13 +416,14 @@ impl Client {
     ) -> Result<(), Error> {
         let velocity = abilities.velocity(parts, zoom);
         let moved = self.move_at(&velocity, abilities).await;
-        let (Err(Error::Camera(_)), Some(space)) = (&moved, &velocity.space) else { return moved };
+        let (refusal, space) = match (moved, &velocity.space) {
+            (Err(refusal @ Error::Camera(_)), Some(space)) => (refusal, space),
+            (moved, _) => return moved,
+        };
         let mut others = abilities.clone();
         others.forget_space(space);
-        if Box::pin(self.turn(parts, zoom, &others)).await.is_err() {
-            // It was not for the unit.
-            return moved;
-        }
+        // Where that is refused too, it was not for the unit.
+        Box::pin(self.turn(parts, zoom, &others)).await.map_err(|err| worse(refusal, err))?;
         if let Some(abilities) = &mut self.abilities {
             abilities.forget_space(space);
         }
@@ -447,7 +448,7 @@ impl Client {
         };
         let message = messages::continuous_move(self.profile(), velocity, None);
         // Where it refuses even so, it was not for the timeout.
-        self.call(Path::Ptz, &message).await.map_err(|_| refusal)?;
+        self.call(Path::Ptz, &message).await.map_err(|err| worse(refusal, err))?;
         if let Some(abilities) = &mut self.abilities {
             abilities.timeout = MoveTimeout::Never;
         }
@@ -530,6 +531,11 @@ impl Client {
     fn warn(&mut self, text: &str) {
         self.warning = Some(text.to_owned());
     }
+}
+
+/// Which of two failures to tell: the first, in its own words, but not where the camera may have acted on the second.
+fn worse(first: Error, second: Error) -> Error {
+    if second.may_have_acted() { second } else { first }
 }
 
 /// Where a message goes.

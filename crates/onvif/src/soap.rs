@@ -2,6 +2,7 @@
 
 //! SOAP 1.2: envelopes, and what is in them.
 
+use quick_xml::XmlVersion;
 use quick_xml::escape::{escape, unescape};
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
@@ -130,8 +131,10 @@ impl Element {
 
     fn begun(start: &BytesStart) -> Option<Self> {
         let local = |name: &[u8]| String::from_utf8(name.to_vec()).ok();
-        let attributes = start.attributes().flatten().filter_map(|attribute| {
-            let value = attribute.unescape_value().ok()?.into_owned();
+        // A name that comes twice is none of ours; to look for such takes time by the square of their number.
+        let mut attributes = start.attributes();
+        let attributes = attributes.with_checks(false).flatten().filter_map(|attribute| {
+            let value = attribute.normalized_value(XmlVersion::Implicit1_0).ok()?.into_owned();
             Some((local(attribute.key.local_name().as_ref())?, value))
         });
         Some(Self {

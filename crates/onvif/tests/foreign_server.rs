@@ -8,10 +8,11 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
 use async_trait::async_trait;
+use axum::body::to_bytes;
 use axum::extract::Request as HttpRequest;
 use axum::http::{StatusCode, header};
 use axum::middleware::{Next, from_fn};
-use axum::response::IntoResponse;
+use axum::response::{IntoResponse, Response as Answer};
 use onvif::{Client, Encoding};
 use onvif_server::generated::{DeviceInfo, PTZPreset, PTZStatusResult};
 use onvif_server::{DeviceService, MediaService, OnvifError, OnvifServer, PTZService};
@@ -20,6 +21,8 @@ use session::http::{Authentication, ClientSettings, Credentials, Location, Secre
 use session::{Client as _, Command, Error, Query, Request, Response, Stop};
 
 const PATIENCE: Duration = Duration::from_secs(60);
+
+const LONGEST_MESSAGE: usize = 64 * 1024;
 
 /// What a camera was told.
 #[derive(Clone, Default)]
@@ -74,11 +77,20 @@ impl PTZService for Camera {
 }
 
 async fn served(camera: Camera) -> String {
-    served_with(camera, Arc::default()).await
+    served_with(camera, |_| None).await
 }
 
-/// So many requests are refused in between, whoever asks, and Digest asked for: as of a camera that restarts.
-async fn served_with(camera: Camera, refusals: Arc<AtomicUsize>) -> String {
+/// Asks for Digest.
+fn challenge() -> Answer {
+    let challenge = r#"Digest realm="camera", nonce="1", qop="auth""#;
+    (StatusCode::UNAUTHORIZED, [(header::WWW_AUTHENTICATE, challenge)]).into_response()
+}
+
+/// Where `instead` has an answer to a message, whoever sends it gets that.
+async fn served_with(
+    camera: Camera,
+    instead: impl Fn(&str) -> Option<Answer> + Clone + Send + Sync + 'static,
+) -> String {
     let server = OnvifServer::builder()
         .auth("admin", "secret")
         .device_service(camera.clone())
@@ -88,14 +100,13 @@ async fn served_with(camera: Camera, refusals: Arc<AtomicUsize>) -> String {
     let address = listener.local_addr().unwrap();
     let router = server.port(address.port()).build().unwrap().into_router().unwrap();
     let router = router.layer(from_fn(move |request: HttpRequest, next: Next| {
-        let one_less = |left: usize| left.checked_sub(1);
-        let refuses = refusals.fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less).is_ok();
+        let instead = instead.clone();
         async move {
-            if refuses {
-                let challenge = r#"Digest realm="camera", nonce="1", qop="auth""#;
-                (StatusCode::UNAUTHORIZED, [(header::WWW_AUTHENTICATE, challenge)]).into_response()
-            } else {
-                next.run(request).await
+            let (head, body) = request.into_parts();
+            let body = to_bytes(body, LONGEST_MESSAGE).await.unwrap();
+            match instead(&String::from_utf8_lossy(&body)) {
+                Some(answer) => answer,
+                None => next.run(HttpRequest::from_parts(head, body.into())).await,
             }
         }
     }));
@@ -113,6 +124,11 @@ fn client(address: &str, password: &str) -> Client {
         trust: Trust::System,
     })
     .unwrap()
+}
+
+fn right() -> Request {
+    let motion = Motion::Velocity { pan: 0.5, tilt: 0.0, zoom: None };
+    Request::Command(Command::Move { motion, free: false })
 }
 
 #[tokio::test]
@@ -160,12 +176,13 @@ async fn a_wrong_password_moves_nothing_and_is_not_tried_for_ever() {
 #[tokio::test]
 async fn who_was_let_in_by_a_token_is_let_in_again_after_a_momentary_refusal() {
     let (camera, refusals) = (Camera::default(), Arc::new(AtomicUsize::new(0)));
-    let address = served_with(camera.clone(), refusals.clone()).await;
+    let left = refusals.clone();
+    let one_less = |left: usize| left.checked_sub(1);
+    let refuses = move |_: &str| left.fetch_update(Ordering::SeqCst, Ordering::SeqCst, one_less).ok();
+    let instead = move |message: &str| refuses(message).map(|_| challenge());
+    let address = served_with(camera.clone(), instead).await;
     let mut client = client(&address, "secret");
-    let right = Request::Command(Command::Move {
-        motion: Motion::Velocity { pan: 0.5, tilt: 0.0, zoom: None },
-        free: false,
-    });
+    let right = right();
     assert_eq!(client.exchange(&right).await, Ok(Response::Accepted));
     // Refused by its token and by HTTP; and where that is so for longer, as it asks for the time.
     let forbidden = Err(Error::NotPermitted { user: "admin".to_owned() });
@@ -174,5 +191,50 @@ async fn who_was_let_in_by_a_token_is_let_in_again_after_a_momentary_refusal() {
         assert_eq!(client.exchange(&right).await, answer);
         assert_eq!(refusals.load(Ordering::SeqCst), 0);
         assert_eq!(client.exchange(&right).await, Ok(Response::Accepted));
+    }
+}
+
+/// Some let anybody ask, and judge a password by HTTP where they are to move: that questions were answered says nothing of it.
+#[tokio::test]
+async fn a_password_that_is_judged_for_moves_only_is_not_tried_for_ever() {
+    let (camera, tries) = (Camera::default(), Arc::new(AtomicUsize::new(0)));
+    let tried = tries.clone();
+    let instead = move |message: &str| {
+        let judged = message.contains("ContinuousMove");
+        tried.fetch_add(judged.into(), Ordering::SeqCst);
+        judged.then(challenge)
+    };
+    let mut client = client(&served_with(camera.clone(), instead).await, "secret");
+    let presets = client.exchange(&Request::Query(Query::Presets)).await;
+    assert!(matches!(presets, Ok(Response::Presets(_))), "{presets:?}");
+    for _ in 0..2 {
+        let answer = client.exchange(&right()).await;
+        assert_eq!(answer, Err(Error::BadCredentials { user: "admin".to_owned() }));
+        assert_eq!(tries.load(Ordering::SeqCst), 2, "without a signature, and with one");
+    }
+    assert_eq!(camera.take(), [""; 0]);
+}
+
+/// A move that may have been carried out is not taken for one that was refused, or nobody would stop it.
+#[tokio::test]
+async fn what_becomes_of_a_move_without_a_timeout_is_told_where_one_with_it_was_refused() {
+    for (status, may_have_acted) in
+        [(StatusCode::INTERNAL_SERVER_ERROR, true), (StatusCode::NOT_FOUND, false)]
+    {
+        let fault = r#"<e:Envelope xmlns:e="http://www.w3.org/2003/05/soap-envelope"><e:Body><e:Fault><e:Reason>
+            <e:Text>no such timeout</e:Text></e:Reason></e:Fault></e:Body></e:Envelope>"#;
+        let instead =
+            move |message: &str| match (message.contains("ContinuousMove"), message.contains("Timeout")) {
+                (false, _) => None,
+                (true, true) => Some((StatusCode::BAD_REQUEST, fault).into_response()),
+                (true, false) => Some(status.into_response()),
+            };
+        let camera = Camera::default();
+        let mut client = client(&served_with(camera.clone(), instead).await, "secret");
+        let failed = client.exchange(&right()).await.unwrap_err();
+        assert_eq!(failed.may_have_acted(), may_have_acted, "{failed}");
+        if !may_have_acted {
+            assert_eq!(failed, Error::Camera("no such timeout".to_owned()));
+        }
     }
 }

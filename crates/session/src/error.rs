@@ -117,7 +117,7 @@ impl Error {
                 "Use https, or choose Digest in the camera's settings; `auth=basic` allows it all the same; retrying."
             }
             Self::NotPermitted { .. } => {
-                "Give this user the right to control PTZ, or set another `user` and `password`; retrying once a minute, so as not to lock the account."
+                "Give this user the right to control PTZ, or set another `user` and `password`; retrying at growing pauses, up to a minute, so as not to lock the account."
             }
             Self::Status { status: 403, .. } => "Give this user the right to control PTZ; retrying.",
             Self::Status { status: 500.., .. } => "It may be starting up or busy; retrying.",

@@ -8,7 +8,9 @@ use std::sync::PoisonError;
 use std::time::Duration;
 
 use gst::prelude::*;
-use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::http::{
+    Authentication, ClientSettings, Credentials, Location, Secret, Trust, without_user_info,
+};
 use url::Url;
 
 use crate::video::{Ended, LONGEST_SILENCE, Video};
@@ -27,7 +29,7 @@ impl LogIn {
         Self { password: password.into(), ended: Ended::default() }
     }
 
-    /// Gives the password to elements with a `user`. A `souphttpsrc` or `rtspsrc` with a `user-id` gets its pictures from here, and
+    /// Gives the password to our sinks with a `user`. A `souphttpsrc` or `rtspsrc` with a `user-id` gets its pictures from here, and
     /// is without it then: an `appsrc` takes the place of the first. `auth`, `ca-file` and `insecure` are those of the sink.
     ///
     /// # Errors
@@ -38,16 +40,14 @@ impl LogIn {
             return Err(refused.into());
         }
         let elements: Vec<_> = pipeline.iterate_recurse().into_iter().flatten().collect();
-        let sink =
-            elements.iter().find(|element| element.has_property_with_type("insecure", glib::Type::BOOL));
-        let security = sink.map(security).unwrap_or_default();
+        let security = elements.iter().find(|element| is_ours(element)).map(security).unwrap_or_default();
         for element in &elements {
             let factory = element.factory().map(|factory| factory.name().to_string()).unwrap_or_default();
             if let Some(user) = text(element, "user-id")
                 && matches!(factory.as_str(), "souphttpsrc" | "rtspsrc")
             {
                 self.open(element, &user, security.clone())?;
-            } else if text(element, "user").is_some() {
+            } else if text(element, "user").is_some() && is_ours(element) {
                 element.set_property("password", &self.password);
             }
         }
@@ -61,7 +61,12 @@ impl LogIn {
         (authentication, trust): (Authentication, Trust),
     ) -> Result<(), Box<dyn Error>> {
         let location = text(source, "location").unwrap_or_default();
-        let url = Url::parse(&location).map_err(|err| format!("`{location}` is no address: {err}"))?;
+        let shown = without_user_info(&location);
+        let mut url = Url::parse(&location).map_err(|err| format!("`{shown}` is no address: {err}"))?;
+        // Who names a user beside the address logs in as that one.
+        if url.set_username("").and_then(|()| url.set_password(None)).is_err() {
+            return Err(format!("`{shown}` names no host").into());
+        }
         let target = url[url::Position::BeforePath..].to_owned();
         let origin = url[..url::Position::BeforePath].to_owned();
         let host = url.host_str().unwrap_or_default();
@@ -85,6 +90,11 @@ impl LogIn {
         }
         Ok(())
     }
+}
+
+/// Whether it is a sink of ours; others have users too, of whatever they speak to, but no watchdog.
+fn is_ours(element: &gst::Element) -> bool {
+    element.has_property_with_type("dead-man", glib::Type::BOOL)
 }
 
 /// How the sink proves who we are, and whom it believes.
@@ -131,6 +141,35 @@ mod tests {
 
     use super::*;
     use crate::video::Failure;
+
+    /// A user and a password in an address reach no message: whoever reads the journal would know them.
+    #[test]
+    fn an_address_is_told_without_the_password_in_it() {
+        gst::init().unwrap();
+        for scheme in ["rtsp", "http"] {
+            for rest in [":xyzzy@", ":xyzzy@camera:notaport/video", ":xyzzy@[/"] {
+                let source = if scheme == "http" { "souphttpsrc" } else { "rtspsrc" };
+                let pipeline = gst::Pipeline::new();
+                let element = gst::ElementFactory::make(source).name("source").build().unwrap();
+                element.set_property("user-id", "operator");
+                element.set_property("location", format!("{scheme}://operator{rest}"));
+                pipeline.add(&element).unwrap();
+                let said = LogIn::new("plugh").apply(&pipeline).unwrap_err().to_string();
+                assert!(!said.contains("xyzzy") && !said.is_empty(), "{said}");
+            }
+        }
+    }
+
+    /// Others have users too, of whatever they speak to.
+    #[test]
+    fn only_our_sinks_are_given_the_password() {
+        gst::init().unwrap();
+        let pipeline = gst::Pipeline::new();
+        let other = gst::ElementFactory::make("curlhttpsink").property("user", "operator").build().unwrap();
+        pipeline.add(&other).unwrap();
+        LogIn::new("plugh").apply(&pipeline).unwrap();
+        assert_eq!(text(&other, "passwd"), None);
+    }
 
     /// Whoever answers in a camera's place and asks for Basic.
     fn stranger(protocol: &'static str) -> (String, std::sync::mpsc::Receiver<String>) {

@@ -9,6 +9,7 @@ use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
 use gst::prelude::*;
+use session::http::without_user_info;
 use url::Url;
 
 /// As long as a pipeline's own source waits.
@@ -21,7 +22,8 @@ const RTSP_PORT: u16 = 554;
 /// # Errors
 /// Why nobody accepts a connection there.
 pub fn check(address: &str) -> Result<(), String> {
-    let (host, port) = endpoint(address).ok_or_else(|| format!("{address} names no host"))?;
+    let (host, port) =
+        endpoint(address).ok_or_else(|| format!("{} names no host", without_user_info(address)))?;
     let said = |err: std::io::Error| format!("{host}, port {port}: {err}");
     let addresses = (host.as_str(), port).to_socket_addrs().map_err(said)?;
     let mut last = std::io::Error::other("the name has no address");

@@ -179,7 +179,9 @@ impl HttpClient {
         message: &str,
         repeat: Repeat,
     ) -> Result<CompleteResponse, Error> {
-        self.exchange(target, Some(message), repeat).await
+        // As it is sent, or what is signed is another.
+        let target = path_and_query(&self.settings.location.at(target));
+        self.exchange(&target, Some(message), repeat).await
     }
 
     /// Asks for something without end, as MJPEG is; the answer must begin within this time, and from then on something must

@@ -132,7 +132,7 @@ fn prefix(path: &str) -> &str {
 }
 
 /// `text` without what stands before an `@` in its authority, for messages about addresses that do not parse.
-pub(super) fn without_user_info(text: &str) -> String {
+pub fn without_user_info(text: &str) -> String {
     match text.rsplit_once('@') {
         Some((before, host)) => {
             let scheme = before.split_once("://").map_or("", |(scheme, _)| scheme);

@@ -14,6 +14,6 @@ pub use auth::{Authentication, Authenticator, Credentials, answer_to_challenge};
 pub use client::{ClientSettings, CompleteResponse, HttpClient, Identity, Repeat, Stream};
 pub use cookies::answer_to_cookie;
 pub use excerpt::{excerpt, unexpected};
-pub use location::{Location, UserInfo};
+pub use location::{Location, UserInfo, without_user_info};
 pub use secret::Secret;
 pub use tls::Trust;

@@ -72,7 +72,11 @@ impl Connection {
     /// Short enough for control to be back within two seconds of the camera's return.
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-    /// What is not permitted is tried again no sooner than this: each time may count as a wrong login.
+    /// Where it refuses user and password that it accepted before, for the second time; twice as long each time: to ask again
+    /// could lock the account.
+    pub const FORBIDDEN_PAUSE: Duration = Duration::from_secs(10);
+
+    /// At most.
     pub const RARELY: Duration = Duration::from_secs(60);
 
     /// A fault that comes again within this time is reported only if it lasts longer.
@@ -80,7 +84,7 @@ impl Connection {
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        assert!(self.pause <= Self::LONGEST_PAUSE, "{self:?}");
+        assert!(self.pause <= Self::RARELY, "{self:?}");
         assert!(self.fault.is_some() || self.retry_at == Time::ZERO, "a pause without a fault: {self:?}");
     }
 
@@ -123,15 +127,19 @@ impl Connection {
 
     /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
     pub fn failed(&mut self, err: &Error, of_command: bool, now: Time) -> Option<ConnectionChange> {
-        self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
         // Who has waited in vain has paused already; else silence would last longer than the camera's.
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
         // That it lets anybody ask does not say that it lets anybody move it.
         let kind = FaultKind::of(err, if of_command { self.obeyed } else { self.connected });
         // But once: a server that restarts between challenge and answer refuses alike.
         let again = self.fault.as_ref().is_some_and(|fault| fault.kind == kind);
-        let rarely = again && kind == FaultKind::Forbidden;
-        self.retry_at = now + if rarely { Self::RARELY } else { self.pause.saturating_sub(waited) };
+        let (first, longest) = if again && kind == FaultKind::Forbidden {
+            (Self::FORBIDDEN_PAUSE, Self::RARELY)
+        } else {
+            (Self::FIRST_PAUSE, Self::LONGEST_PAUSE)
+        };
+        self.pause = (self.pause * 2).clamp(first, longest);
+        self.retry_at = now + self.pause.saturating_sub(waited);
         let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
         fault.kind = kind;
         fault.of_command |= of_command;
@@ -229,9 +237,11 @@ mod tests {
             Some(ConnectionChange::Refused(forbidden.clone()))
         );
         assert_eq!(connection.retry_at(), Connection::FIRST_PAUSE.into());
-        for time in [ms(125), ms(60_125), ms(120_125)] {
+        let mut time: Time = Connection::FIRST_PAUSE.into();
+        for pause_s in [10, 20, 40, 60, 60] {
             assert_eq!(connection.failed(&forbidden, true, time), None);
-            assert_eq!(connection.retry_at(), time + Connection::RARELY);
+            assert_eq!(connection.retry_at() - time, Duration::from_secs(pause_s));
+            time = connection.retry_at();
         }
         assert!(!connection.halted());
         assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));

@@ -42,6 +42,8 @@ use crate::{Protocol, SessionEvent, SessionSettings, Stop};
 
 /// A camera that did not answer a move is not expected to act on it later than this.
 pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
+/// From one try to the next where the camera refuses user and password that it accepted before; twice as long each time.
+pub(crate) const FORBIDDEN_PAUSE: Duration = Connection::FORBIDDEN_PAUSE;
 
 /// Speaks with one camera: says what to send, hears what is answered. Sends nothing itself, and has no clock: both are the
 /// caller's.
@@ -225,6 +227,13 @@ impl Session {
     /// Whether somebody else moves the camera.
     pub fn is_taken_over(&self, now: Time) -> bool {
         self.arbitration.owner(now).is_some()
+    }
+
+    /// Whether a stop is ours to send: the camera may be moving at our word, and would hear it. Who has taken the camera has not
+    /// ended what it still does for us; but for what it may yet do, from rest, his move is not to be stopped.
+    pub fn is_ours_to_stop(&self, now: Time) -> bool {
+        let may_yet_move = self.in_doubt() && !self.is_taken_over(now);
+        !self.halted() && (!self.is_at_rest() || may_yet_move)
     }
 
     /// Whether nothing may be sent until a setting changes.

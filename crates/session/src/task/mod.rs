@@ -248,6 +248,10 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             }
         }
         self.state.give_up();
+        if self.state.is_succeeded {
+            // Or the watchdog would stop his camera.
+            self.dead_man.release();
+        }
     }
 
     /// Until something comes up, or this time.
@@ -265,7 +269,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         let Self { client, dead_man, state, move_waits, .. } = self;
         let in_doubt = state.control.session().in_doubt();
         if !std::mem::take(move_waits) {
-            if !state.is_ours_to_stop() {
+            if !state.control.session().is_ours_to_stop(state.mailbox.now()) {
                 dead_man.release();
             } else if dead_man.is_outdated(in_doubt) {
                 let (identity, words) = (client.identity(), state.control.stop());

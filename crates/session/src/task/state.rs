@@ -31,6 +31,8 @@ pub struct TaskState<O> {
     pub deadline: Option<Time>,
     /// Nobody waits any more.
     gave_up: bool,
+    /// Somebody else has the camera from here on, who knows what is to be stopped.
+    pub is_succeeded: bool,
 }
 
 impl<O: Fn(Event)> TaskState<O> {
@@ -52,6 +54,7 @@ impl<O: Fn(Event)> TaskState<O> {
             settling: Vec::new(),
             deadline: None,
             gave_up: false,
+            is_succeeded: false,
         }
     }
 
@@ -98,19 +101,13 @@ impl<O: Fn(Event)> TaskState<O> {
             self.control.session_mut().leave(now);
         }
         if quit {
-            (self.deadline, self.gave_up) = (Some(now), true);
+            (self.deadline, self.gave_up, self.is_succeeded) = (Some(now), true, true);
         }
         if let Some(measurement) = measurement.filter(|_| self.deadline.is_none()) {
             self.control.measure(measurement, now);
         }
         self.waiting.extend(waiting);
         self.settling.extend(settling);
-    }
-
-    /// Whether a camera that moves does so at our word, and would hear our stop.
-    pub fn is_ours_to_stop(&self) -> bool {
-        let session = self.control.session();
-        !session.stays_at_rest() && !session.halted() && !session.is_taken_over(self.mailbox.now())
     }
 
     /// Has the watchdog go on, where it is to stop the camera, and tells how it stands with it.
@@ -450,9 +447,10 @@ mod tests {
             assert_eq!(state.serve_at(ms(1000), |_| Ok(Response::Accepted)).len(), 1, "it turns");
             state.control.release();
             assert_eq!(state.serve_at(ms(1500), |_| Err(refusal.clone())), [HALT]);
-            assert!(state.is_ours_to_stop());
+            assert!(state.control.session().is_ours_to_stop(state.mailbox.now()));
             assert_eq!(state.serve_at(ms(2000), |_| Ok(Response::Accepted)), [HALT]);
-            assert!(!state.is_ours_to_stop() && state.control.session().stays_at_rest());
+            let session = state.control.session();
+            assert!(!session.is_ours_to_stop(state.mailbox.now()) && session.stays_at_rest());
         }
     }
 

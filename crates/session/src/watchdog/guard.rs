@@ -9,14 +9,11 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::camera_lock::CameraLock;
 use super::protocol::StopOrder;
 use super::{Armed, LAST_TRIES};
-use crate::session::{DOUBT, StopConfirmation};
+use crate::session::{DOUBT, FORBIDDEN_PAUSE, StopConfirmation};
 use crate::{Client, Command, Error, Request, Stop};
 
 /// From one try to stop a camera to the next.
 const PAUSE: Duration = Duration::from_millis(500);
-
-/// The same where it refuses user and password that it accepted before, twice as long each time: to ask again could lock the account.
-const REFUSED_PAUSE: Duration = Duration::from_secs(10);
 
 /// A lease as it was last heard of.
 #[derive(Debug, Clone)]
@@ -106,7 +103,7 @@ async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
 /// Stops the camera until it says yes; and again where it may act on a move after that.
 async fn stop<C: Client>(order: &StopOrder) {
     let tries = async {
-        let mut pause = REFUSED_PAUSE;
+        let mut pause = FORBIDDEN_PAUSE;
         // Who was let in before may be so again: the account is locked for a while, or somebody answers in the camera's place.
         while try_to_stop::<C>(order).await.is_none() && order.identity.accepted {
             sleep(pause).await;

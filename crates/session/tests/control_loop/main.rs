@@ -403,12 +403,16 @@ fn what_the_user_may_not_ask_is_not_asked_again_and_the_rest_is_done() {
 #[test]
 fn a_move_that_the_user_may_not_make_is_tried_rarely() {
     let mut rig = Rig::new(ServoSettings::default());
-    for _ in 0..1500 {
+    for _ in 0..2000 {
         rig.see(0.9, 0.5);
         rig.run(|_| Err(Error::NotPermitted { user: "root".to_owned() }));
         rig.now += ms(100);
     }
-    assert_eq!(mem::take(&mut rig.sent).len(), 4, "at once, once more, and in each minute once");
+    assert_eq!(
+        mem::take(&mut rig.sent).len(),
+        7,
+        "at once, once more, after 10, 20, 40 and 60 s, and in each minute once"
+    );
     assert!(matches!(
         rig.reports()[..],
         [LoopEvent::Session(SessionEvent::Connection(ConnectionChange::Refused(_)))]

@@ -124,6 +124,18 @@ fn the_place_is_kept_for_the_second_stop_of_an_unanswered_move() {
     assert!(rig.control.session().stays_at_rest() && !rig.control.session().is_queued());
 }
 
+/// Were the lease given up with the turn, nobody would stop the camera where we cannot any more.
+#[test]
+fn what_moves_for_us_is_ours_to_stop_until_it_rests_whoever_has_the_camera() {
+    let mut rig = Rig::turning_in_turn();
+    rig.aside(ms(6000), queued(Some(2), false));
+    let session = rig.control.session();
+    assert!(session.is_taken_over(rig.now) && session.is_ours_to_stop(rig.now));
+    rig.aside(ms(6000), queued(Some(2), true));
+    let session = rig.control.session();
+    assert!(session.is_taken_over(rig.now) && !session.is_ours_to_stop(rig.now));
+}
+
 fn at(pan_deg: f64) -> Said {
     let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom: Some(0.0) };
     Some(Ok(Response::Position(position)))

@@ -11,7 +11,7 @@ use std::time::Duration;
 use http::{HeaderMap, HeaderValue, header};
 use rustls::pki_types::ServerName;
 use session::Error;
-use session::http::{Authenticator, ClientSettings, excerpt};
+use session::http::{Authenticator, ClientSettings, excerpt, without_user_info};
 use tokio::io::{
     AsyncBufReadExt, AsyncRead, AsyncWrite, AsyncWriteExt, BufReader, ReadHalf, WriteHalf, split,
 };
@@ -112,7 +112,7 @@ fn word() -> io::Result<String> {
 
 async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Connection>, bool), Failure> {
     let (host, port, over_tls) =
-        host(camera).ok_or_else(|| Failure::new(format!("{camera} names no host")))?;
+        host(camera).ok_or_else(|| Failure::new(format!("{} names no host", without_user_info(camera))))?;
     let bare = host.trim_matches(['[', ']']);
     let said = |err: io::Error| Failure::new(format!("{host}, port {port}: {err}"));
     let late = |_| said(io::ErrorKind::TimedOut.into());
