@@ -4,7 +4,6 @@
 
 use std::time::{Duration, Instant};
 
-use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
 use super::known::{Gaze, Known, Steering};
@@ -40,20 +39,24 @@ impl Known {
     /// Turns it, and leaves it alone for so long. From where it was told to look last: on its way it can be told more.
     pub fn turn_here(&self, turn: Turn, left_alone: Duration) {
         let Some(pose) = self.sight.borrow().1.pose_about(Duration::ZERO) else { return };
-        let last = match *lock(&self.steering) {
-            Steering::Turned(gaze, _) => gaze,
-            _ => Gaze { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, fov_deg: None },
-        };
-        let width_deg = last.fov_deg.unwrap_or(pose.horizontal_fov_deg);
-        let height_deg = pose.vertical_fov_deg * width_deg / pose.horizontal_fov_deg;
-        let gaze = turn.from(last, [width_deg, height_deg]);
-        self.steer(Steering::Turned(gaze, Instant::now() + left_alone));
+        self.steer_by(|now| {
+            let last = match now {
+                Steering::Turned(gaze, _) => gaze,
+                _ => Gaze { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, fov_deg: None },
+            };
+            let width_deg = last.fov_deg.unwrap_or(pose.horizontal_fov_deg);
+            let height_deg = pose.vertical_fov_deg * width_deg / pose.horizontal_fov_deg;
+            let gaze = turn.from(last, [width_deg, height_deg]);
+            Some(Steering::Turned(gaze, Instant::now() + left_alone))
+        });
     }
 }
 
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+
+    use ptztrack_contract::lock::lock;
 
     use super::*;
     use crate::camera::{Control, Pose, Sight};

@@ -16,6 +16,8 @@ mod servo_stats;
 mod sight;
 mod sightings;
 mod stopwatch;
+#[cfg(test)]
+pub mod told;
 mod video;
 mod view;
 
@@ -279,7 +281,8 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
         Steering::Follow | Steering::HandedOver => false,
     };
     if over {
-        known.steer(Steering::Follow);
+        // Whoever has taken it meanwhile keeps it.
+        known.steer_if(|now| now == steering, Steering::Follow);
     }
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
@@ -331,12 +334,6 @@ impl Known {
         lock(&self.origin).take();
         lock(&self.selected).take();
         self.with(|running| running.release());
-    }
-
-    /// Lets it follow, or hands it over.
-    pub fn steer(&self, steering: Steering) {
-        *lock(&self.steering) = steering;
-        self.with(|running| running.steer(steering));
     }
 
     /// Lets the target go, and sends the camera home.

@@ -130,6 +130,7 @@ impl Processes {
         socket.set_read_timeout(Some(LONGEST_SILENCE))?;
         socket.set_write_timeout(Some(LONGEST_SILENCE))?;
         let worked = known.worked.load(Ordering::Relaxed);
+        let told = *lock(&known.steering);
         (&socket).write_all(&line(&Start {
             settings: settings.clone(),
             control: known.control(),
@@ -138,6 +139,8 @@ impl Processes {
         let remote = Arc::new(Remote::new(socket.try_clone()?));
         *lock(&self.socket) = Some(socket.try_clone()?);
         *lock(&known.running) = Some(remote.clone());
+        // Whoever took the camera since was heard by nobody.
+        known.steer_since(told);
         if self.told_to_end.load(Ordering::SeqCst) {
             self.end();
         }
@@ -173,7 +176,7 @@ impl Processes {
 pub fn hear(line: &[u8]) -> bool {
     let Ok(word) = serde_json::from_slice(line) else { return false };
     if let Word::Report(report) = word {
-        report.tell(&Known::new("camera"), 0);
+        report.tell(&Known::new("camera"), &AtomicU64::new(0));
     }
     true
 }
@@ -235,7 +238,7 @@ impl Remote {
     }
 
     fn hear(&self, report: Report, known: &Known) {
-        report.tell(known, self.given.load(Ordering::SeqCst));
+        report.tell(known, &self.given);
         *lock(&self.last) = Some(report);
         self.look(known.looking.load(Ordering::Relaxed) > 0);
         let taken = known.packets.receiver_count() > 0;
