@@ -36,6 +36,17 @@ impl Fleet {
         Self { had: ControlFile::new(shard), ..self }
     }
 
+    /// A camera of this name that is never started.
+    #[cfg(test)]
+    pub fn at_rest(name: &str) -> Self {
+        let text = format!("[camera.{name}]\naddress = \"http://127.0.0.1:1\"\n");
+        let settings = crate::config::Config::parse(&text).unwrap().cameras.remove(0);
+        let fleet = Self::new(Arc::new(Log::unwritten()));
+        let camera = Camera::new(settings, Control::Ours, fleet.log.clone(), None);
+        lock(&fleet.cameras).insert(name.to_owned(), camera);
+        fleet
+    }
+
     /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits for
     /// none that ends: who takes a camera over does.
     pub fn apply(&self, wanted: Vec<CameraSettings>) {

@@ -200,6 +200,11 @@ impl Known {
         }
     }
 
+    /// It is left alone until it is taken back.
+    pub fn is_handed_over(&self) -> bool {
+        *lock(&self.steering) == Steering::HandedOver
+    }
+
     /// Who had the camera before us.
     pub fn take_control(&self, control: Control) {
         match control {

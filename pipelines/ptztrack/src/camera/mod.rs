@@ -336,15 +336,19 @@ impl Known {
         self.with(|running| running.release());
     }
 
-    /// Lets the target go, and sends the camera home.
-    pub fn go_home(&self) {
-        self.release();
-        self.steer(Steering::GoHome(Instant::now()));
+    /// Sends the camera home, and lets the target go; `false`: it is handed over.
+    pub fn go_home(&self) -> bool {
+        let goes = self.steer_if(|now| now != Steering::HandedOver, Steering::GoHome(Instant::now()));
+        if goes {
+            self.release();
+        }
+        goes
     }
 
-    /// Turns it by hand.
-    pub fn turn(&self, turn: Turn) {
-        self.with(|running| running.turn(self, turn));
+    /// Turns it by hand; `false`: it is handed over.
+    pub fn turn(&self, turn: Turn) -> bool {
+        let running = lock(&self.running).clone();
+        running.map_or_else(|| !self.is_handed_over(), |running| running.turn(self, turn))
     }
 
     /// What can be done with the camera.

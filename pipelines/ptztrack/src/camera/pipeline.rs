@@ -331,8 +331,8 @@ impl Running for Elements {
         }
     }
 
-    fn turn(&self, known: &Known, turn: Turn) {
-        known.turn_here(turn, self.override_timeout());
+    fn turn(&self, known: &Known, turn: Turn) -> bool {
+        known.turn_here(turn, self.override_timeout())
     }
 
     fn abilities(&self, known: &Known) -> Abilities {

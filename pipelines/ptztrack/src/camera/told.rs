@@ -62,8 +62,8 @@ impl Running for Told {
         lock(&self.steering).push((steering, locked));
     }
 
-    fn turn(&self, known: &Known, turn: Turn) {
-        known.turn_here(turn, Duration::from_secs(5));
+    fn turn(&self, known: &Known, turn: Turn) -> bool {
+        known.turn_here(turn, Duration::from_secs(5))
     }
 
     fn abilities(&self, _: &Known) -> Abilities {

@@ -275,8 +275,15 @@ impl Running for Remote {
         self.order(&Order::Steer(steering.into()));
     }
 
-    fn turn(&self, _: &Known, turn: Turn) {
+    fn turn(&self, known: &Known, turn: Turn) -> bool {
+        let mut steering = lock(&known.steering);
+        if *steering == Steering::HandedOver {
+            return false;
+        }
+        // Where it turns to is told by its next report; until then nobody calls it away.
+        *steering = Steering::Operator(Instant::now());
         self.order(&Order::Turn(turn));
+        true
     }
 
     fn abilities(&self, _: &Known) -> Abilities {
