@@ -5,24 +5,34 @@
 //! such a folder it is kept for as long as the program runs.
 
 use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::sync::Mutex;
+use std::sync::{Arc, Mutex};
 use std::{fs, io};
 
 use ptztrack_contract::lock::lock;
 
 use crate::camera::Control;
+use crate::log::Log;
 use crate::shard::Shard;
 
 /// Of a process that has all cameras.
 const OF_ALL: &str = "control.json";
 
 /// By the names of the cameras; who is not in it has nothing to be kept.
-type Kept = BTreeMap<String, Control>;
+pub type Kept = BTreeMap<String, Control>;
+
+/// So many cameras are remembered that are gone from the configuration.
+const MOST_GONE: usize = 1024;
 
 #[derive(Debug)]
 pub struct ControlFile {
     path: Option<PathBuf>,
+    log: Arc<Log>,
+    /// Who had which camera last, those that are gone from the configuration, too; `None` until it was read.
+    had: Mutex<Option<Kept>>,
+    /// Held while it is written, which a disk may delay for ever.
     last: Mutex<Last>,
 }
 
@@ -37,29 +47,76 @@ struct Last {
 
 impl ControlFile {
     /// Of a process that has this share of the cameras, or all of them.
-    pub fn new(shard: Option<Shard>) -> Self {
-        Self::at(std::env::var_os("STATE_DIRECTORY").map(PathBuf::from), shard)
+    pub fn new(shard: Option<Shard>, log: Arc<Log>) -> Self {
+        Self::at(std::env::var_os("STATE_DIRECTORY").map(PathBuf::from), shard, log)
     }
 
-    fn at(folder: Option<PathBuf>, shard: Option<Shard>) -> Self {
+    /// The same, in this folder, if any.
+    pub fn at(folder: Option<PathBuf>, shard: Option<Shard>, log: Arc<Log>) -> Self {
         let of = |shard: Shard| format!("control.{}-of-{}.json", shard.number(), shard.of());
         let name = shard.map_or_else(|| OF_ALL.to_owned(), of);
-        Self { path: folder.map(|folder| folder.join(name)), last: Mutex::default() }
+        let path = folder.map(|folder| folder.join(name));
+        Self { path, log, had: Mutex::default(), last: Mutex::default() }
     }
 
-    /// What was kept. Nothing, where there is no such file or something else is in it.
+    /// Who had which camera last: at first by what was kept. Nobody, where there is no such file or something else is in it.
     pub fn load(&self) -> Kept {
-        let text = self.path.as_ref().and_then(|path| read(path).ok());
-        text.and_then(|text| serde_json::from_slice(&text).ok()).unwrap_or_default()
+        let mut had = lock(&self.had);
+        if let Some(had) = &*had {
+            return had.clone();
+        }
+        let Some(path) = &self.path else { return Kept::new() };
+        match self.read(path) {
+            // A share that has kept nothing yet begins with what was kept for all, unless there were other shares since: that is
+            // old then. The cameras of other shares are theirs to remember.
+            Err(err) if err.kind() == io::ErrorKind::NotFound && !has_others(path) => {
+                *had = Some(Kept::new());
+                self.read(&path.with_file_name(OF_ALL)).unwrap_or_default()
+            }
+            kept => had.insert(kept.unwrap_or_default()).clone(),
+        }
     }
 
-    /// Keeps this, if it is not what is kept already. A file that is broken off halfway never takes the place of the last one.
+    /// One that makes no sense or cannot be read is moved aside, so that it is not written over.
+    fn read(&self, path: &Path) -> io::Result<Kept> {
+        let read = fs::read(path).and_then(|text| Ok(serde_json::from_slice(&text)?));
+        if let Err(err) = &read
+            && err.kind() != io::ErrorKind::NotFound
+        {
+            let aside = path.with_extension("json.aside");
+            // Where that fails, it is written over.
+            let _ = fs::rename(path, &aside);
+            let detail = format!(
+                "who had which camera is not known: {}: {err}; it is kept as {}",
+                path.display(),
+                aside.display()
+            );
+            self.log.error("control-not-read", detail);
+        }
+        read
+    }
+
+    /// Remembers who has these cameras, which may be gone from now on.
+    pub fn remember(&self, control: Kept) {
+        self.load();
+        lock(&self.had).get_or_insert_default().extend(control);
+    }
+
+    /// Keeps who has all the cameras that are there, if it is not what is kept already; nothing, where nobody says that any more.
+    /// A file that is broken off halfway never takes the place of the last one.
     ///
     /// # Errors
     /// Why it cannot be written: said once, and tried again every time.
-    pub fn keep(&self, mut control: Kept) -> io::Result<()> {
-        control.retain(|_, control| *control != Control::Ours);
+    pub fn keep(&self, control: impl FnOnce() -> Option<Kept>) -> io::Result<()> {
         let mut last = lock(&self.last);
+        // What is asked for later is written later.
+        let Some(control) = control() else { return Ok(()) };
+        // It is read before it is written over.
+        self.load();
+        let mut had = lock(&self.had);
+        let control = with(had.take().unwrap_or_default(), control);
+        *had = Some(control.clone());
+        drop(had);
         let Some(path) = self.path.as_ref().filter(|_| last.kept.as_ref() != Some(&control)) else {
             return Ok(());
         };
@@ -72,14 +129,14 @@ impl ControlFile {
     }
 }
 
-/// A share that has kept nothing yet begins with what was kept for all, unless there were other shares since: that is old then.
-fn read(path: &Path) -> io::Result<Vec<u8>> {
-    match fs::read(path) {
-        Err(err) if err.kind() == io::ErrorKind::NotFound && !has_others(path) => {
-            fs::read(path.with_file_name(OF_ALL))
-        }
-        found => found,
-    }
+/// What is to be kept. Whoever was given a camera that is gone from the configuration has it when it comes back; an operator has let
+/// go of it by then.
+fn with(had: Kept, control: Kept) -> Kept {
+    let is_gone =
+        |(name, had): &(String, Control)| *had == Control::HandedOver && !control.contains_key(name);
+    let mut kept: Kept = had.into_iter().filter(is_gone).take(MOST_GONE).collect();
+    kept.extend(control.into_iter().filter(|(_, control)| *control != Control::Ours));
+    kept
 }
 
 /// Whether shares of another number have kept something there.
@@ -93,44 +150,106 @@ fn has_others(path: &Path) -> bool {
     })
 }
 
-/// The new file is named after the share, too.
+/// The new file is named after the share, too. It is on the disk before it has the last one's name: that could stand for an empty
+/// file after a power cut.
 fn write(path: &Path, control: &Kept) -> io::Result<()> {
     let new = path.with_extension("new");
-    fs::write(&new, serde_json::to_vec(control)?)?;
-    fs::rename(new, path)
+    let mut file = File::create(&new)?;
+    file.write_all(&serde_json::to_vec(control)?)?;
+    file.sync_all()?;
+    fs::rename(new, path)?;
+    if let Some(folder) = path.parent() {
+        // Not every file system does that for a folder; the file is there.
+        let _ = File::open(folder).and_then(|folder| folder.sync_all());
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn scratch(name: &str) -> PathBuf {
+        std::env::temp_dir().join(format!("ptztrack-control-{name}-{}", std::process::id()))
+    }
+
+    fn file(folder: &Path) -> ControlFile {
+        ControlFile::at(Some(folder.to_owned()), None, Arc::new(Log::unwritten()))
+    }
+
+    fn kept(control: &[(&str, Control)]) -> Kept {
+        control.iter().map(|&(name, control)| (name.to_owned(), control)).collect()
+    }
+
     #[test]
-    fn what_is_kept_is_there_after_a_restart_and_nonsense_is_nothing() {
-        let folder = std::env::temp_dir().join(format!("ptztrack-control-{}", std::process::id()));
+    fn what_is_kept_is_there_after_a_restart() {
+        let folder = scratch("restart");
         fs::create_dir_all(&folder).unwrap();
-        let file = || ControlFile { path: Some(folder.join("control.json")), last: Mutex::default() };
-        assert!(file().load().is_empty());
+        assert!(file(&folder).load().is_empty());
         let control = [("door", Control::HandedOver), ("hall", Control::Operator), ("yard", Control::Ours)];
-        file().keep(control.map(|(name, control)| (name.to_owned(), control)).into()).unwrap();
-        let kept = file().load();
-        assert_eq!((kept.len(), kept["door"], kept["hall"]), (2, Control::HandedOver, Control::Operator));
-        fs::write(folder.join("control.json"), "{").unwrap();
-        assert!(file().load().is_empty());
+        file(&folder).keep(|| Some(kept(&control))).unwrap();
+        assert_eq!(file(&folder).load(), kept(&control[..2]));
         fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]
-    fn processes_that_share_cameras_and_folder_keep_their_own_each() {
-        let folder = std::env::temp_dir().join(format!("ptztrack-control-shards-{}", std::process::id()));
+    fn a_file_that_is_broken_is_told_of_and_moved_aside_before_another_takes_its_place() {
+        let folder = scratch("broken");
         fs::create_dir_all(&folder).unwrap();
-        let of =
-            |shard: Option<&str>| ControlFile::at(Some(folder.clone()), shard.map(|s| s.parse().unwrap()));
-        let kept = |camera: &str| Kept::from([(camera.to_owned(), Control::HandedOver)]);
+        for broken in ["{", ""] {
+            fs::write(folder.join(OF_ALL), broken).unwrap();
+            let file = file(&folder);
+            let mut told = file.log.subscribe();
+            file.keep(|| Some(Kept::new())).unwrap();
+            assert_eq!(told.try_recv().unwrap().event, "control-not-read");
+            assert_eq!(fs::read_to_string(folder.join("control.json.aside")).unwrap(), broken);
+            assert_eq!(fs::read_to_string(folder.join(OF_ALL)).unwrap(), "{}");
+        }
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn whoever_was_given_a_camera_that_is_gone_from_the_configuration_has_it_when_it_comes_back() {
+        let folder = scratch("gone");
+        fs::create_dir_all(&folder).unwrap();
+        let control = kept(&[("door", Control::HandedOver), ("hall", Control::Operator)]);
+        file(&folder).keep(|| Some(control.clone())).unwrap();
+        let after = file(&folder);
+        after.keep(|| Some(kept(&[("yard", Control::HandedOver)]))).unwrap();
+        let both = kept(&[("door", Control::HandedOver), ("yard", Control::HandedOver)]);
+        assert_eq!((after.load(), file(&folder).load()), (both.clone(), both), "no operator stays for ever");
+        after.keep(|| Some(kept(&[("door", Control::Ours)]))).unwrap();
+        assert_eq!(file(&folder).load(), kept(&[("yard", Control::HandedOver)]), "it was taken back");
+        fs::remove_dir_all(&folder).unwrap();
+
+        let without = ControlFile::at(None, None, Arc::new(Log::unwritten()));
+        without.remember(control);
+        without.keep(|| Some(Kept::new())).unwrap();
+        assert_eq!(without.load(), kept(&[("door", Control::HandedOver)]), "while the program runs");
+    }
+
+    #[test]
+    fn no_more_cameras_that_are_gone_are_remembered_than_a_configuration_may_have() {
+        let file = ControlFile::at(None, None, Arc::new(Log::unwritten()));
+        file.remember((0..2 * MOST_GONE).map(|n| (n.to_string(), Control::HandedOver)).collect());
+        file.keep(|| Some(Kept::new())).unwrap();
+        assert_eq!(file.load().len(), MOST_GONE);
+    }
+
+    #[test]
+    fn processes_that_share_cameras_and_folder_keep_their_own_each() {
+        let folder = scratch("shards");
+        fs::create_dir_all(&folder).unwrap();
+        let of = |shard: Option<&str>| {
+            let shard = shard.map(|shard| shard.parse().unwrap());
+            ControlFile::at(Some(folder.clone()), shard, Arc::new(Log::unwritten()))
+        };
+        let kept = |camera: &str| kept(&[(camera, Control::HandedOver)]);
         let files = [(None, "hall"), (Some("0/2"), "door"), (Some("1/2"), "yard")];
-        of(None).keep(kept("hall")).unwrap();
+        of(None).keep(|| Some(kept("hall"))).unwrap();
         assert_eq!(of(Some("0/2")).load(), kept("hall"), "what was kept before there were shares");
         for (shard, camera) in files {
-            of(shard).keep(kept(camera)).unwrap();
+            of(shard).keep(|| Some(kept(camera))).unwrap();
         }
         for (shard, camera) in files {
             assert_eq!(of(shard).load(), kept(camera), "{shard:?}");
@@ -144,14 +263,14 @@ mod tests {
     /// As on a disk that is full for a while.
     #[test]
     fn what_could_not_be_kept_is_kept_once_it_can() {
-        let folder = std::env::temp_dir().join(format!("ptztrack-control-later-{}", std::process::id()));
-        let file = ControlFile { path: Some(folder.join("control.json")), last: Mutex::default() };
-        let control = || Kept::from([("door".to_owned(), Control::HandedOver)]);
-        assert!(file.keep(control()).is_err());
-        assert!(file.keep(control()).is_ok(), "said once");
+        let folder = scratch("later");
+        let control = || Some(kept(&[("door", Control::HandedOver)]));
+        let before = file(&folder);
+        assert!(before.keep(control).is_err());
+        assert!(before.keep(control).is_ok(), "said once");
         fs::create_dir_all(&folder).unwrap();
-        file.keep(control()).unwrap();
-        assert_eq!(file.load(), control());
+        before.keep(control).unwrap();
+        assert_eq!(Some(file(&folder).load()), control());
         fs::remove_dir_all(&folder).unwrap();
     }
 }

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 
 use ptztrack_contract::lock::lock;
 
-use crate::camera::{Camera, Control, Known};
+#[cfg(test)]
+use crate::camera::Control;
+use crate::camera::{Camera, Known};
 use crate::config::{CameraSettings, Codec, Kind};
-use crate::control_file::ControlFile;
+use crate::control_file::{ControlFile, Kept};
 use crate::event::{Event, Level};
 use crate::log::Log;
 use crate::shard::Shard;
@@ -20,6 +23,8 @@ const TARGET_HEIGHT: f64 = 0.4;
 #[derive(Debug)]
 pub struct Fleet {
     cameras: Mutex<BTreeMap<String, Camera>>,
+    /// They were told to end; changed while the cameras are locked.
+    ended: AtomicBool,
     /// Those that were told to end and have no successor.
     ending: Mutex<Vec<JoinHandle<()>>>,
     had: ControlFile,
@@ -28,36 +33,53 @@ pub struct Fleet {
 
 impl Fleet {
     pub fn new(log: Arc<Log>) -> Self {
-        Self { cameras: Mutex::default(), ending: Mutex::default(), had: ControlFile::new(None), log }
+        let had = ControlFile::new(None, log.clone());
+        Self { cameras: Mutex::default(), ended: AtomicBool::new(false), ending: Mutex::default(), had, log }
     }
 
     /// The same, of a process that has this share of the cameras.
     pub fn of_share(self, shard: Option<Shard>) -> Self {
-        Self { had: ControlFile::new(shard), ..self }
+        Self { had: ControlFile::new(shard, self.log.clone()), ..self }
+    }
+
+    /// A camera of this name that is never started.
+    #[cfg(test)]
+    pub fn at_rest(name: &str) -> Self {
+        let text = format!("[camera.{name}]\naddress = \"http://127.0.0.1:1\"\n");
+        let settings = crate::config::Config::parse(&text).unwrap().cameras.remove(0);
+        let fleet = Self::new(Arc::new(Log::unwritten()));
+        let camera = Camera::new(settings, Control::Ours, fleet.log.clone(), None);
+        lock(&fleet.cameras).insert(name.to_owned(), camera);
+        fleet
     }
 
     /// Has these cameras run and no others; those that stay as they were are not touched, unless they were given up. Waits for
     /// none that ends: who takes a camera over does.
     pub fn apply(&self, wanted: Vec<CameraSettings>) {
         // Who has a camera has it whatever becomes of its entry.
-        let mut had = self.had.load();
-        had.extend(self.control());
+        let had = self.had.load();
         let mut cameras = lock(&self.cameras);
+        // Nobody would end those that begin now.
+        if self.ended.load(Ordering::SeqCst) {
+            return;
+        }
         let stays = |camera: &Camera| !camera.is_over() && wanted.contains(&camera.settings);
         let (stay, mut go): (BTreeMap<_, _>, BTreeMap<_, _>) =
             std::mem::take(&mut *cameras).into_iter().partition(|(_, camera)| stays(camera));
         *cameras = stay;
         go.values().for_each(Camera::end);
+        let has = control_of(&go);
         for settings in wanted {
             if cameras.contains_key(&settings.name) {
                 continue;
             }
             let name = settings.name.clone();
-            let control = had.get(&name).copied().unwrap_or_default();
+            let control = has.get(&name).or_else(|| had.get(&name)).copied().unwrap_or_default();
             let camera = Camera::new(settings, control, self.log.clone(), go.remove(&name));
             cameras.insert(name, camera);
         }
         drop(cameras);
+        self.had.remember(has);
         self.start_all();
         let mut ending = lock(&self.ending);
         ending.retain(|thread| !thread.is_finished());
@@ -80,23 +102,33 @@ impl Fleet {
         }
     }
 
-    fn control(&self) -> BTreeMap<String, Control> {
-        self.known().iter().map(|known| (known.name.clone(), known.control())).collect()
+    /// Who has which; `None` once they were told to end, when that was kept for the last time.
+    fn control(&self) -> Option<Kept> {
+        let cameras = lock(&self.cameras);
+        (!self.ended.load(Ordering::SeqCst)).then(|| control_of(&cameras))
     }
 
     /// Keeps who has which camera, for after a restart.
     pub fn keep_control(&self) {
-        if let Err(err) = self.had.keep(self.control()) {
+        self.keep(|| self.control());
+    }
+
+    fn keep(&self, control: impl FnOnce() -> Option<Kept>) {
+        if let Err(err) = self.had.keep(control) {
             self.log.error("not-kept", format!("who has which camera is forgotten at a restart: {err}"));
         }
     }
 
-    /// Ends all, and waits until their cameras rest.
+    /// Ends all, keeps who has them, for those who have taken one since that was kept last, and waits until their cameras rest.
     pub fn end(&self) {
-        let cameras = std::mem::take(&mut *lock(&self.cameras));
-        let ending = std::mem::take(&mut *lock(&self.ending));
-        // All at once: each may take seconds.
+        let mut cameras = lock(&self.cameras);
+        self.ended.store(true, Ordering::SeqCst);
+        let ends = std::mem::take(&mut *cameras);
+        drop(cameras);
+        let (cameras, ending) = (ends, std::mem::take(&mut *lock(&self.ending)));
+        // All at once: each may take seconds. And before the disk is waited for.
         cameras.values().for_each(Camera::end);
+        self.keep(|| Some(control_of(&cameras)));
         for thread in cameras.into_values().filter_map(Camera::into_thread).chain(ending) {
             // One that panicked has said so.
             let _ = thread.join();
@@ -146,8 +178,14 @@ impl Fleet {
     }
 }
 
+fn control_of(cameras: &BTreeMap<String, Camera>) -> Kept {
+    cameras.iter().map(|(name, camera)| (name.clone(), camera.known.control())).collect()
+}
+
 #[cfg(test)]
 mod tests {
+    use std::fs;
+    use std::path::Path;
     use std::process::Command;
 
     use rustix::process::{Resource, Rlimit, Uid, getrlimit, getuid, setrlimit};
@@ -188,6 +226,71 @@ mod tests {
             all.push(told.blocking_recv().unwrap().event);
         }
         all
+    }
+
+    /// One that keeps who has which camera in this folder.
+    fn fleet_in(folder: &Path) -> Fleet {
+        let log = Arc::new(Log::unwritten());
+        let had = ControlFile::at(Some(folder.to_owned()), None, log.clone());
+        Fleet { had, ..Fleet::new(log) }
+    }
+
+    fn control(fleet: &Fleet) -> Control {
+        fleet.of("door").unwrap().control()
+    }
+
+    #[test]
+    fn a_camera_that_is_handed_over_in_the_last_second_is_so_after_a_restart_whatever_is_kept_later() {
+        gst::init().unwrap();
+        let folder = std::env::temp_dir().join(format!("ptztrack-fleet-end-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let fleet = fleet_in(&folder);
+        fleet.apply(door("http://127.0.0.1:1"));
+        fleet.keep_control();
+        let known = fleet.of("door").unwrap();
+        known.steer(Steering::HandedOver);
+        fleet.end();
+        fleet.keep_control();
+        fleet.apply(door("http://127.0.0.1:1"));
+        assert!(fleet.of("door").is_none(), "it has ended");
+        let next = fleet_in(&folder);
+        next.apply(door("http://127.0.0.1:1"));
+        assert_eq!(control(&next), Control::HandedOver);
+        next.end();
+        // An operator's camera is forgotten where it seems to be gone.
+        let last = fleet_in(&folder);
+        last.apply(door("http://127.0.0.1:1"));
+        let known = last.of("door").unwrap();
+        known.steer(Steering::Follow);
+        known.operator.store(true, Ordering::Relaxed);
+        last.end();
+        last.keep_control();
+        let text = fs::read_to_string(folder.join("control.json")).unwrap();
+        assert_eq!(text, r#"{"door":"operator"}"#);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_camera_whose_entry_comes_back_is_handed_over_as_it_was() {
+        gst::init().unwrap();
+        let folder = std::env::temp_dir().join(format!("ptztrack-fleet-gone-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let fleet = fleet_in(&folder);
+        fleet.apply(door("http://127.0.0.1:1"));
+        fleet.of("door").unwrap().steer(Steering::HandedOver);
+        fleet.apply(Vec::new());
+        fleet.keep_control();
+        fleet.apply(door("http://127.0.0.1:1"));
+        assert_eq!(control(&fleet), Control::HandedOver);
+        fleet.apply(Vec::new());
+        fleet.end();
+        let next = fleet_in(&folder);
+        next.apply(Vec::new());
+        next.keep_control();
+        next.apply(door("http://127.0.0.1:1"));
+        assert_eq!(control(&next), Control::HandedOver, "after a restart, too");
+        next.end();
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

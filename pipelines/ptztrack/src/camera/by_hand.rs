@@ -4,7 +4,6 @@
 
 use std::time::{Duration, Instant};
 
-use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
 use super::known::{Gaze, Known, Steering};
@@ -37,17 +36,22 @@ impl Known {
         !self.sight.borrow().1.poses.is_empty()
     }
 
-    /// Turns it, and leaves it alone for so long. From where it was told to look last: on its way it can be told more.
-    pub fn turn_here(&self, turn: Turn, left_alone: Duration) {
-        let Some(pose) = self.sight.borrow().1.pose_about(Duration::ZERO) else { return };
-        let last = match *lock(&self.steering) {
-            Steering::Turned(gaze, _) => gaze,
-            _ => Gaze { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, fov_deg: None },
-        };
-        let width_deg = last.fov_deg.unwrap_or(pose.horizontal_fov_deg);
-        let height_deg = pose.vertical_fov_deg * width_deg / pose.horizontal_fov_deg;
-        let gaze = turn.from(last, [width_deg, height_deg]);
-        self.steer(Steering::Turned(gaze, Instant::now() + left_alone));
+    /// Turns it, and leaves it alone for so long; `false`: it is handed over. From where it was told to look last: on its way it can
+    /// be told more.
+    pub fn turn_here(&self, turn: Turn, left_alone: Duration) -> bool {
+        let pose = self.sight.borrow().1.pose_about(Duration::ZERO);
+        let Some(pose) = pose else { return !self.is_handed_over() };
+        self.steer_by(|now| {
+            let last = match now {
+                Steering::HandedOver => return None,
+                Steering::Turned(gaze, _) => gaze,
+                _ => Gaze { pan_deg: pose.pan_deg, tilt_deg: pose.tilt_deg, fov_deg: None },
+            };
+            let width_deg = last.fov_deg.unwrap_or(pose.horizontal_fov_deg);
+            let height_deg = pose.vertical_fov_deg * width_deg / pose.horizontal_fov_deg;
+            let gaze = turn.from(last, [width_deg, height_deg]);
+            Some(Steering::Turned(gaze, Instant::now() + left_alone))
+        })
     }
 }
 
@@ -55,13 +59,16 @@ impl Known {
 mod tests {
     use std::sync::Arc;
 
+    use ptztrack_contract::lock::lock;
+
     use super::*;
     use crate::camera::{Control, Pose, Sight};
 
     #[test]
     fn it_is_turned_by_parts_of_what_it_sees_from_where_it_was_told_to_look() {
         let known = Known::new("door");
-        let turn = |right, up, zoom| known.turn_here(Turn { right, up, zoom }, Duration::from_secs(5));
+        let turn =
+            |right, up, zoom| assert!(known.turn_here(Turn { right, up, zoom }, Duration::from_secs(5)));
         turn(1.0, 0.0, 0.0);
         assert_eq!(*lock(&known.steering), Steering::Follow, "nobody knows where it looks");
         let pose = Pose {
@@ -84,5 +91,8 @@ mod tests {
         turn(0.5, 1.0, 0.0);
         assert_eq!(gaze(), Gaze { pan_deg: -160.0, tilt_deg: 5.0, fov_deg: Some(30.0) });
         assert_eq!(known.control(), Control::Operator);
+        known.steer(Steering::HandedOver);
+        assert!(!known.turn_here(Turn { right: 0.5, up: 0.0, zoom: 0.0 }, Duration::from_secs(5)));
+        assert_eq!(*lock(&known.steering), Steering::HandedOver, "it is left alone until it is taken back");
     }
 }

@@ -200,6 +200,11 @@ impl Known {
         }
     }
 
+    /// It is left alone until it is taken back.
+    pub fn is_handed_over(&self) -> bool {
+        *lock(&self.steering) == Steering::HandedOver
+    }
+
     /// Who had the camera before us.
     pub fn take_control(&self, control: Control) {
         match control {
@@ -209,13 +214,37 @@ impl Known {
         }
     }
 
-    /// How the next pipeline is to begin: who is moving the camera has it for as long as they would have had in the last one.
-    pub fn steering_at_start(&self, operator_has_it: Duration) -> Steering {
+    /// Steers it by what `next` says to who has it now, if it says anything; whether it did. Nobody takes the camera between that
+    /// question and the word to what runs it, which waits for nothing.
+    pub fn steer_by(&self, next: impl FnOnce(Steering) -> Option<Steering>) -> bool {
         let mut steering = lock(&self.steering);
-        if *steering == Steering::Follow && self.operator.swap(false, Ordering::Relaxed) {
-            *steering = Steering::Operator(Instant::now() + operator_has_it);
-        }
-        *steering
+        let Some(next) = next(*steering) else { return false };
+        *steering = next;
+        self.with(|running| running.steer(next));
+        true
+    }
+
+    /// Lets it follow, or hands it over, whoever has it.
+    pub fn steer(&self, steering: Steering) {
+        self.steer_by(|_| Some(steering));
+    }
+
+    /// The same, where who has it now may lose it to that; whether it was done.
+    pub fn steer_if(&self, may: impl FnOnce(Steering) -> bool, steering: Steering) -> bool {
+        self.steer_by(|now| may(now).then_some(steering))
+    }
+
+    /// Tells what runs now who has the camera, if somebody has taken it since that was `told`.
+    pub fn steer_since(&self, told: Steering) {
+        self.steer_by(|now| (now != told).then_some(now));
+    }
+
+    /// Tells the next pipeline how to begin: who is moving the camera has it for as long as they would have had in the last one.
+    pub fn steer_at_start(&self, operator_has_it: Duration) {
+        self.steer_by(|now| {
+            let moves = now == Steering::Follow && self.operator.swap(false, Ordering::Relaxed);
+            Some(if moves { Steering::Operator(Instant::now() + operator_has_it) } else { now })
+        });
     }
 
     /// A picture went all the way.
@@ -354,20 +383,50 @@ impl Known {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::told::Told;
 
     #[test]
     fn who_has_a_camera_has_it_beyond_a_pipeline() {
         let known = Known::new("door");
-        assert_eq!(known.steering_at_start(Duration::from_secs(5)), Steering::Follow);
+        let begin = |known: &Known| {
+            known.steer_at_start(Duration::from_secs(5));
+            *lock(&known.steering)
+        };
+        assert_eq!(begin(&known), Steering::Follow);
         known.operator.store(true, Ordering::Relaxed);
         assert_eq!(known.control(), Control::Operator);
-        assert!(matches!(known.steering_at_start(Duration::from_secs(5)), Steering::Operator(_)));
+        assert!(matches!(begin(&known), Steering::Operator(_)));
         let next = Known::new("door");
         next.take_control(known.control());
         assert_eq!(next.control(), Control::Operator);
         *lock(&known.steering) = Steering::HandedOver;
         next.take_control(known.control());
-        assert_eq!(next.steering_at_start(Duration::ZERO), Steering::HandedOver);
+        assert_eq!(begin(&next), Steering::HandedOver);
+    }
+
+    #[test]
+    fn what_runs_a_camera_is_told_of_who_has_it_before_anybody_else_can_take_it() {
+        let (known, told) = Told::running("door");
+        known.steer(Steering::HandedOver);
+        assert!(!known.steer_if(|now| now == Steering::Follow, Steering::GoHome(Instant::now())));
+        assert_eq!(
+            (*lock(&known.steering), told.steering()),
+            (Steering::HandedOver, vec![Steering::HandedOver])
+        );
+        assert!(known.steer_if(|now| now == Steering::HandedOver, Steering::Follow));
+        assert_eq!(told.steering(), [Steering::HandedOver, Steering::Follow]);
+        assert!(told.was_told_under_lock());
+    }
+
+    /// The pipeline or the process before was there no more, or had been told already.
+    #[test]
+    fn who_took_a_camera_while_nothing_ran_it_has_it_from_what_runs_next() {
+        let (known, told) = Told::running("door");
+        *lock(&known.steering) = Steering::HandedOver;
+        known.steer_at_start(Duration::ZERO);
+        known.steer_since(Steering::Follow);
+        known.steer_since(Steering::HandedOver);
+        assert_eq!(told.steering(), [Steering::HandedOver; 2], "it had heard of the last one");
     }
 
     /// The connection breaks while a picture is on its way through the tracker.

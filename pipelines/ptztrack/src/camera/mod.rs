@@ -16,6 +16,8 @@ mod servo_stats;
 mod sight;
 mod sightings;
 mod stopwatch;
+#[cfg(test)]
+pub mod told;
 mod video;
 mod view;
 
@@ -279,7 +281,8 @@ fn look_after(known: &Arc<Known>, supervisor: &Supervisor, log: &Log) {
         Steering::Follow | Steering::HandedOver => false,
     };
     if over {
-        known.steer(Steering::Follow);
+        // Whoever has taken it meanwhile keeps it.
+        known.steer_if(|now| now == steering, Steering::Follow);
     }
     if known.since_picture() > LONGEST_SILENCE {
         let detail = format!("no picture for {} s: the pipeline is built anew", LONGEST_SILENCE.as_secs());
@@ -333,21 +336,19 @@ impl Known {
         self.with(|running| running.release());
     }
 
-    /// Lets it follow, or hands it over.
-    pub fn steer(&self, steering: Steering) {
-        *lock(&self.steering) = steering;
-        self.with(|running| running.steer(steering));
+    /// Sends the camera home, and lets the target go; `false`: it is handed over.
+    pub fn go_home(&self) -> bool {
+        let goes = self.steer_if(|now| now != Steering::HandedOver, Steering::GoHome(Instant::now()));
+        if goes {
+            self.release();
+        }
+        goes
     }
 
-    /// Lets the target go, and sends the camera home.
-    pub fn go_home(&self) {
-        self.release();
-        self.steer(Steering::GoHome(Instant::now()));
-    }
-
-    /// Turns it by hand.
-    pub fn turn(&self, turn: Turn) {
-        self.with(|running| running.turn(self, turn));
+    /// Turns it by hand; `false`: it is handed over.
+    pub fn turn(&self, turn: Turn) -> bool {
+        let running = lock(&self.running).clone();
+        running.map_or_else(|| !self.is_handed_over(), |running| running.turn(self, turn))
     }
 
     /// What can be done with the camera.

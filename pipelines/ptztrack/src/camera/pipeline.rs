@@ -156,8 +156,10 @@ pub fn build(
     let elements = Elements::of(&pipeline);
     view::show(elements.view.as_ref(), elements.picture.as_ref(), known);
     elements.look(known.looking.load(Ordering::Relaxed) > 0);
-    elements.steer(known.steering_at_start(elements.override_timeout()));
+    let override_timeout = elements.override_timeout();
+    // Whoever takes the camera from here on is heard by these elements, and who took it before is told to them.
     *lock(&known.running) = Some(Arc::new(elements));
+    known.steer_at_start(override_timeout);
     Ok(pipeline)
 }
 
@@ -329,8 +331,8 @@ impl Running for Elements {
         }
     }
 
-    fn turn(&self, known: &Known, turn: Turn) {
-        known.turn_here(turn, self.override_timeout());
+    fn turn(&self, known: &Known, turn: Turn) -> bool {
+        known.turn_here(turn, self.override_timeout())
     }
 
     fn abilities(&self, known: &Known) -> Abilities {

@@ -36,8 +36,8 @@ pub trait Running: Debug + Send + Sync {
     /// Lets the camera follow, sends it home, or leaves it to somebody else.
     fn steer(&self, steering: Steering);
 
-    /// Turns the camera by hand, which is left alone for a while after that.
-    fn turn(&self, known: &Known, turn: Turn);
+    /// Turns the camera by hand, which is left alone for a while after that; `false`: it is handed over.
+    fn turn(&self, known: &Known, turn: Turn) -> bool;
 
     /// What can be done with the camera.
     fn abilities(&self, known: &Known) -> Abilities;

@@ -251,7 +251,9 @@ mod tests {
         fn ignore(&self, _: &BTreeSet<u64>) {}
         fn release(&self) {}
         fn steer(&self, _: Steering) {}
-        fn turn(&self, _: &Known, _: Turn) {}
+        fn turn(&self, _: &Known, _: Turn) -> bool {
+            false
+        }
         fn abilities(&self, _: &Known) -> Abilities {
             Abilities::default()
         }

@@ -3,6 +3,7 @@
 //! A camera that was called for somebody: it turns to where they have to be, takes them up, and follows them for as long as the
 //! one that called says that it is they.
 
+use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use handover::{Aim, Direction};
@@ -105,10 +106,8 @@ impl Call {
                 self.end(&called.known, Steering::Follow);
                 Progress::Refused
             }
-            (None, _) => {
-                self.turn(link, from, called);
-                Progress::Going
-            }
+            (None, _) if self.turn(link, from, called) => Progress::Going,
+            (None, _) => Progress::Over,
         }
     }
 
@@ -123,25 +122,40 @@ impl Call {
     }
 
     fn end(&self, called: &Known, steering: Steering) {
-        if self.followed.is_none() && matches!(*lock(&called.steering), Steering::LookAt(..)) {
-            called.steer(steering);
+        if self.followed.is_none() {
+            called.steer_if(|now| matches!(now, Steering::LookAt(..)), steering);
         }
     }
 
     /// Whether somebody else has the camera, or has chosen whom it follows.
     fn is_overruled(&self, called: &View) -> bool {
-        let steering = *lock(&called.known.steering);
         match self.followed {
             Some(_) => {
                 let is_ours =
                     |origin: &Origin| origin.camera == self.errand.from && origin.id == self.errand.id;
                 !called.follows() || !lock(&called.known.origin).as_ref().is_some_and(is_ours)
             }
-            None => self.ordered.is_some() && !matches!(steering, Steering::LookAt(..)),
+            None => !self.may_turn(&called.known, *lock(&called.known.steering)),
+        }
+    }
+
+    /// Whether this call may have the camera: it turns for it already; or it was not told to yet, it follows or turns for another
+    /// call, and no operator moves it.
+    fn may_turn(&self, called: &Known, steering: Steering) -> bool {
+        match steering {
+            Steering::LookAt(..) if self.ordered.is_some() => true,
+            Steering::LookAt(..) | Steering::Follow => {
+                self.ordered.is_none() && !called.operator.load(Ordering::Relaxed)
+            }
+            _ => false,
         }
     }
 
     fn take_up(&mut self, person: &Person, called: &View) -> Progress {
+        let is_ours = |now| matches!(now, Steering::LookAt(..));
+        if self.followed.is_none() && !called.known.steer_if(is_ours, Steering::Follow) {
+            return Progress::Over;
+        }
         self.astray = None;
         if !person.is_target {
             called.known.select_track(person.id);
@@ -152,9 +166,6 @@ impl Call {
         }
         let origin = Origin { target: person.id, id: self.errand.id, camera: self.errand.from.clone() };
         *lock(&called.known.origin) = Some(origin);
-        if before.is_none() {
-            called.known.steer(Steering::Follow);
-        }
         Progress::TakenUp(person.id)
     }
 
@@ -178,15 +189,20 @@ impl Call {
         Progress::Again
     }
 
-    fn turn(&mut self, link: &Link, from: &View, called: &View) {
-        if let Some(gaze) = self.gaze(link, from, called).filter(|gaze| self.is_due(gaze, called)) {
-            let now = Instant::now();
-            if self.ordered.replace((now, gaze)).is_none() {
-                self.refusals = lock(&called.known.state).refused_moves;
-                self.before = self.before.or(called.gaze());
-            }
-            called.known.steer(Steering::LookAt(gaze, now));
+    /// Tells the camera where to look, if there is something to tell; `false`: somebody else has it.
+    fn turn(&mut self, link: &Link, from: &View, called: &View) -> bool {
+        let gaze = self.gaze(link, from, called).filter(|gaze| self.is_due(gaze, called));
+        let Some(gaze) = gaze else { return true };
+        let (known, now) = (&called.known, Instant::now());
+        let refusals = lock(&known.state).refused_moves;
+        if !known.steer_if(|steering| self.may_turn(known, steering), Steering::LookAt(gaze, now)) {
+            return false;
         }
+        if self.ordered.replace((now, gaze)).is_none() {
+            self.refusals = refusals;
+            self.before = self.before.or(called.gaze());
+        }
+        true
     }
 
     /// Whether the camera has refused to turn, as one does that takes no move to a position.
@@ -357,6 +373,43 @@ mod tests {
         let before = Gaze { pan_deg: 0.0, tilt_deg: -10.0, fov_deg: Some(60.0) };
         let steering = *lock(&bench.door.steering);
         assert!(matches!(steering, Steering::TurnBack(gaze, _) if gaze == before), "{steering:?}");
+    }
+
+    /// It was not told yet, as nobody knew where they are, or they are looked for again.
+    #[test]
+    fn a_camera_that_somebody_takes_before_it_was_told_to_turn_is_left_to_them() {
+        let gaze = Gaze { pan_deg: 5.0, tilt_deg: 0.0, fov_deg: None };
+        let now = Instant::now();
+        for taken in [Steering::HandedOver, Steering::Turned(gaze, now), Steering::GoHome(now)] {
+            let mut bench = Bench::new();
+            bench.door.steer(taken);
+            assert_eq!(bench.see(&[]), Progress::Over);
+            assert_eq!(*lock(&bench.door.steering), taken);
+
+            let mut bench = Bench::new();
+            bench.take_up();
+            bench.call.look_again();
+            bench.door.steer(taken);
+            assert_eq!(bench.see(&[]), Progress::Over, "they were to be looked for again");
+            assert_eq!(*lock(&bench.door.steering), taken);
+        }
+        let mut bench = Bench::new();
+        bench.door.operator.store(true, Ordering::Relaxed);
+        assert_eq!(bench.see(&[]), Progress::Over, "an operator moves it");
+        assert_eq!(*lock(&bench.door.steering), Steering::Follow);
+    }
+
+    /// Between the look at who has it and the order.
+    #[test]
+    fn a_camera_that_somebody_takes_as_it_is_told_to_turn_is_left_to_them() {
+        let mut bench = Bench::new();
+        let yard = view("yard", false, bench.came, vec![person(3, FEET, RATE)]);
+        let door = View { known: bench.door.clone(), ..view("door", true, bench.came, Vec::new()) };
+        bench.door.steer(Steering::HandedOver);
+        assert!(!bench.call.turn(&bench.link, &yard, &door));
+        assert_eq!(*lock(&bench.door.steering), Steering::HandedOver);
+        bench.call.cancel(&bench.door);
+        assert_eq!(*lock(&bench.door.steering), Steering::HandedOver);
     }
 
     #[test]

@@ -146,8 +146,13 @@ thread_local! {
 
 impl Empty {
     fn new() -> std::io::Result<Self> {
+        Self::of(Fleet::new(Arc::new(Log::unwritten())))
+    }
+
+    /// With these cameras.
+    fn of(fleet: Fleet) -> std::io::Result<Self> {
         let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
-        let router = router(&http, Arc::new(Fleet::new(Arc::new(Log::unwritten()))), Events::default());
+        let router = router(&http, Arc::new(fleet), Events::default());
         Ok(Self { router, runtime: tokio::runtime::Builder::new_current_thread().enable_time().build()? })
     }
 
@@ -216,7 +221,7 @@ async fn cameras(State(fleet): State<Arc<Fleet>>) -> Response {
 }
 
 fn describe(known: &Known) -> serde_json::Value {
-    let abilities = known.abilities();
+    let (abilities, handed_over) = (known.abilities(), known.is_handed_over());
     let state = lock(&known.state).clone();
     json!({
         "name": known.name,
@@ -224,10 +229,10 @@ fn describe(known: &Known) -> serde_json::Value {
         "well": state.picture && !state.given_up,
         "target": state.target_id,
         "calls": *lock(&known.calls),
-        "handed_over": *lock(&known.steering) == Steering::HandedOver,
-        "can_go_home": abilities.home,
+        "handed_over": handed_over,
+        "can_go_home": abilities.home && !handed_over,
         "can_hand_over": abilities.hand_over,
-        "can_turn": abilities.turn && *lock(&known.steering) != Steering::HandedOver,
+        "can_turn": abilities.turn && !handed_over,
     })
 }
 
@@ -288,6 +293,11 @@ async fn point(known: &Known, from: String, there: Point, here: Point) -> Respon
     }
 }
 
+/// Whoever has been given a camera keeps it until it is taken back.
+fn handed_over() -> Response {
+    (StatusCode::CONFLICT, "the camera is handed over: take it back first\n").into_response()
+}
+
 /// What somebody wants of a camera.
 async fn order(
     State(fleet): State<Arc<Fleet>>,
@@ -314,12 +324,14 @@ async fn order(
             _ if !known.abilities().turn => {
                 return (StatusCode::CONFLICT, "it does not say where it looks\n").into_response();
             }
-            [right, up, zoom] => known.turn(Turn { right, up, zoom }),
+            [right, up, zoom] if !known.turn(Turn { right, up, zoom }) => return handed_over(),
+            _ => {}
         },
         ("release", ..) => known.release(),
         ("hand-over", ..) => known.steer(Steering::HandedOver),
         ("take-back", ..) => known.steer(Steering::Follow),
-        ("home", ..) => known.go_home(),
+        ("home", ..) if !known.go_home() => return handed_over(),
+        ("home", ..) => {}
         _ => return StatusCode::NOT_FOUND.into_response(),
     }
     StatusCode::NO_CONTENT.into_response()
@@ -328,6 +340,7 @@ async fn order(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::told::Told;
 
     fn answer(request: &str) -> String {
         let said = format!("{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
@@ -341,6 +354,36 @@ mod tests {
             assert!(answer.starts_with("HTTP/1.1 200 OK\r\n"), "{answer}");
             assert!(answer.contains("\r\ncontent-security-policy: frame-ancestors 'none'\r\n"), "{answer}");
         }
+    }
+
+    #[test]
+    fn a_camera_that_is_handed_over_neither_goes_home_nor_turns_until_it_is_taken_back() {
+        let fleet = Fleet::at_rest("door");
+        let known = fleet.of("door").unwrap();
+        let told = Told::run(&known);
+        let page = Empty::of(fleet).unwrap();
+        let ask = |request: &str| {
+            let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+            let said = format!("{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
+            String::from_utf8(page.answer_to(said.as_bytes(), visit)).unwrap()
+        };
+        let order = |order: &str| ask(&format!("POST /cameras/door/{order}"));
+        assert!(ask("GET /cameras").contains(r#""can_go_home":true,"can_hand_over":true,"can_turn":true"#));
+        assert!(order("hand-over").starts_with("HTTP/1.1 204 "));
+        for wanted in ["home", "turn?x=0.5"] {
+            let answer = order(wanted);
+            assert!(answer.starts_with("HTTP/1.1 409 ") && answer.contains("handed over"), "{answer}");
+        }
+        assert_eq!(told.steering(), [Steering::HandedOver]);
+        assert!(known.is_handed_over());
+        let cameras = ask("GET /cameras");
+        assert!(
+            cameras.contains(r#""can_go_home":false,"can_hand_over":true,"can_turn":false"#),
+            "{cameras}"
+        );
+        assert!(order("take-back").starts_with("HTTP/1.1 204 "));
+        assert!(order("home").starts_with("HTTP/1.1 204 "));
+        assert!(matches!(*lock(&known.steering), Steering::GoHome(_)));
     }
 
     #[test]

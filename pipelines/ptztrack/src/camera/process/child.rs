@@ -68,7 +68,9 @@ pub async fn run() -> io::Result<()> {
                     Order::Ignore(ids) => known.ignore(ids),
                     Order::Release => known.release(),
                     Order::Steer(hand) => known.steer(hand.into()),
-                    Order::Turn(turn) => known.turn(turn),
+                    Order::Turn(turn) => {
+                        known.turn(turn);
+                    }
                     Order::Look(somebody) => look = somebody.then(|| known.look()),
                     Order::Stream(taken) => packets = taken.then(|| known.packets.subscribe()),
                 }

@@ -13,7 +13,7 @@ pub mod child;
 mod protocol;
 
 use std::collections::BTreeSet;
-use std::io::{self, BufRead, BufReader, Read, Write};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
@@ -130,6 +130,7 @@ impl Processes {
         socket.set_read_timeout(Some(LONGEST_SILENCE))?;
         socket.set_write_timeout(Some(LONGEST_SILENCE))?;
         let worked = known.worked.load(Ordering::Relaxed);
+        let told = *lock(&known.steering);
         (&socket).write_all(&line(&Start {
             settings: settings.clone(),
             control: known.control(),
@@ -138,6 +139,8 @@ impl Processes {
         let remote = Arc::new(Remote::new(socket.try_clone()?));
         *lock(&self.socket) = Some(socket.try_clone()?);
         *lock(&known.running) = Some(remote.clone());
+        // Whoever took the camera since was heard by nobody.
+        known.steer_since(told);
         if self.told_to_end.load(Ordering::SeqCst) {
             self.end();
         }
@@ -145,12 +148,16 @@ impl Processes {
         let mut word = Vec::new();
         loop {
             word.clear();
-            match (&mut words).take(MOST_BYTES).read_until(b'\n', &mut word) {
+            let read = (&mut words).take(MOST_BYTES).read_until(b'\n', &mut word);
+            if remote.is_deaf.load(Ordering::SeqCst) {
+                return Err(hangs());
+            }
+            match read {
                 // One that died may have been at a word.
                 Ok(_) if !word.ends_with(b"\n") => return Ok(()),
                 Ok(_) => {}
-                Err(err) if err.kind() == io::ErrorKind::WouldBlock => return Err(hangs()),
-                Err(err) if err.kind() == io::ErrorKind::ConnectionReset => return Ok(()),
+                Err(err) if err.kind() == ErrorKind::WouldBlock => return Err(hangs()),
+                Err(err) if err.kind() == ErrorKind::ConnectionReset => return Ok(()),
                 Err(err) => return Err(err),
             }
             match serde_json::from_slice(&word)? {
@@ -173,7 +180,7 @@ impl Processes {
 pub fn hear(line: &[u8]) -> bool {
     let Ok(word) = serde_json::from_slice(line) else { return false };
     if let Word::Report(report) = word {
-        report.tell(&Known::new("camera"), 0);
+        report.tell(&Known::new("camera"), &AtomicU64::new(0));
     }
     true
 }
@@ -209,6 +216,8 @@ struct Remote {
     socket: UnixStream,
     /// Orders so far.
     given: AtomicU64,
+    /// One of them could not be said.
+    is_deaf: AtomicBool,
     somebody_looks: AtomicBool,
     somebody_takes_packets: AtomicBool,
     last: Mutex<Option<Report>>,
@@ -219,23 +228,33 @@ impl Remote {
         Self {
             socket,
             given: AtomicU64::new(0),
+            is_deaf: AtomicBool::new(false),
             somebody_looks: AtomicBool::new(false),
             somebody_takes_packets: AtomicBool::new(false),
             last: Mutex::default(),
         }
     }
 
-    /// Waits for nothing: one that reads nothing hangs, and hears of it no more.
+    /// Waits for nothing: one that leaves no room for another order hangs.
     fn order(&self, order: &Order) {
+        let Ok(line) = line(order) else { return };
         self.given.fetch_add(1, Ordering::SeqCst);
-        if let Ok(line) = line(order) {
-            let _ =
-                SockRef::from(&self.socket).send_with_flags(&line, libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL);
+        let flags = libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL;
+        match SockRef::from(&self.socket).send_with_flags(&line, flags) {
+            Ok(sent) if sent == line.len() => {}
+            // It has ended or is told to: what it says of the camera from now on is older than this order.
+            Err(err) if [ErrorKind::BrokenPipe, ErrorKind::ConnectionReset].contains(&err.kind()) => {}
+            // It heard half of this order or nothing, so that no report of it would count any more.
+            _ => {
+                self.is_deaf.store(true, Ordering::SeqCst);
+                // Whoever hears what it says is woken by that.
+                let _ = self.socket.shutdown(Shutdown::Both);
+            }
         }
     }
 
     fn hear(&self, report: Report, known: &Known) {
-        report.tell(known, self.given.load(Ordering::SeqCst));
+        report.tell(known, &self.given);
         *lock(&self.last) = Some(report);
         self.look(known.looking.load(Ordering::Relaxed) > 0);
         let taken = known.packets.receiver_count() > 0;
@@ -272,8 +291,15 @@ impl Running for Remote {
         self.order(&Order::Steer(steering.into()));
     }
 
-    fn turn(&self, _: &Known, turn: Turn) {
+    fn turn(&self, known: &Known, turn: Turn) -> bool {
+        let mut steering = lock(&known.steering);
+        if *steering == Steering::HandedOver {
+            return false;
+        }
+        // Where it turns to is told by its next report; until then nobody calls it away.
+        *steering = Steering::Operator(Instant::now());
         self.order(&Order::Turn(turn));
+        true
     }
 
     fn abilities(&self, _: &Known) -> Abilities {
@@ -282,5 +308,46 @@ impl Running for Remote {
 
     fn servo_stats(&self) -> Option<ServoStats> {
         lock(&self.last).as_ref()?.servo.clone()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::config::Config;
+
+    /// It would never be believed again what it says of who has the camera.
+    #[test]
+    fn a_process_that_says_on_and_reads_no_more_orders_hangs() {
+        gst::init().unwrap();
+        let settings = Config::parse("[camera.door]\naddress = \"http://127.0.0.1:1\"\n").unwrap().cameras;
+        let known = Known::new("door");
+        let (ours, mut its) = UnixStream::pair().unwrap();
+        let report = Word::Report(Box::new(Report::of(&Known::new("door"), 0)));
+        let report = line(&report).unwrap();
+        thread::scope(|scope| {
+            let talk =
+                scope.spawn(|| Processes::default().talk(ours, &settings[0], &known, &Log::unwritten()));
+            scope.spawn(move || while its.write_all(&report).is_ok() {});
+            while !talk.is_finished() {
+                known.select(0.5, 0.5);
+            }
+            assert_eq!(talk.join().unwrap().unwrap_err().to_string(), hangs().to_string());
+        });
+    }
+
+    /// Whoever takes the camera then has it after a restart.
+    #[test]
+    fn what_a_process_says_that_was_told_to_end_is_older_than_the_last_order() {
+        gst::init().unwrap();
+        let (ours, its) = UnixStream::pair().unwrap();
+        let remote = Arc::new(Remote::new(ours));
+        let known = Known::new("door");
+        *lock(&known.running) = Some(remote.clone());
+        remote.socket.shutdown(Shutdown::Write).unwrap();
+        known.steer(Steering::HandedOver);
+        remote.hear(Report::of(&Known::new("door"), 0), &known);
+        assert!(known.is_handed_over() && !remote.is_deaf.load(Ordering::SeqCst));
+        drop(its);
     }
 }

@@ -3,7 +3,7 @@
 //! What a camera's process and the one that started it tell each other: one object of JSON on a line. Both are the same program.
 
 use std::collections::BTreeSet;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
 use axum::body::Bytes;
@@ -126,7 +126,7 @@ impl From<Hand> for Steering {
 impl Report {
     /// After so many orders.
     pub fn of(known: &Known, orders: u64) -> Self {
-        let count = |counter: &std::sync::atomic::AtomicU64| counter.load(Ordering::Relaxed);
+        let count = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         Self {
             state: lock(&known.state).clone(),
             hand: (*lock(&known.steering)).into(),
@@ -144,14 +144,16 @@ impl Report {
         }
     }
 
-    /// Makes it known here, where so many orders were given.
-    pub fn tell(&self, known: &Known, orders: u64) {
+    /// Makes it known here, where so many orders are `given`.
+    pub fn tell(&self, known: &Known, given: &AtomicU64) {
         *lock(&known.state) = self.state.clone();
-        // Before it has heard them all, it knows less of that than we do.
-        if self.orders == orders {
-            *lock(&known.steering) = self.hand.into();
+        let mut steering = lock(&known.steering);
+        // Before it has heard them all, it knows less of that than we do. Nobody steers between question and answer.
+        if self.orders == given.load(Ordering::SeqCst) {
+            *steering = self.hand.into();
             known.operator.store(self.operator, Ordering::Relaxed);
         }
+        drop(steering);
         if known.rebuilt.load(Ordering::Relaxed) != self.rebuilt {
             known.forget_tracks();
         }
@@ -192,15 +194,15 @@ mod tests {
         let Ok(Word::Report(report)) = serde_json::from_str(&line) else { panic!("{line}") };
         let here = Known::new("door");
         here.ignored.lock().unwrap().insert(7);
-        report.tell(&here, 3);
+        report.tell(&here, &AtomicU64::new(3));
         assert_eq!(here.ignored.lock().unwrap().len(), 1, "it is the same pipeline");
         assert_eq!(here.control(), Control::Ours, "an order is on its way");
-        report.tell(&here, 2);
+        report.tell(&here, &AtomicU64::new(2));
         assert_eq!(here.control(), Control::HandedOver);
         assert!(lock(&here.state).picture && here.worked.load(Ordering::Relaxed));
         assert_eq!((here.pictures.load(Ordering::Relaxed), here.times[0].read()), (7, (3, 0.5)));
         assert!(!here.is_stuck());
-        Report { rebuilt: 1, ..*report }.tell(&here, 2);
+        Report { rebuilt: 1, ..*report }.tell(&here, &AtomicU64::new(2));
         assert!(here.ignored.lock().unwrap().is_empty(), "its tracks have other numbers");
     }
 }
