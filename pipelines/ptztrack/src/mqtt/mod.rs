@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use rumqttc::{
-    AsyncClient, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS, TlsConfiguration, Transport,
+    AsyncClient, ConnectionError, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS,
+    TlsConfiguration, Transport,
 };
 use tokio::sync::broadcast::error::RecvError;
 use tokio::task::JoinHandle;
@@ -98,11 +99,27 @@ fn options(settings: &Mqtt, what: &str) -> Result<MqttOptions, session::Error> {
     Ok(options)
 }
 
+/// What happens next on a connection. Where it breaks, all that was under way is lost: what the broker keeps is published again, and
+/// events are told once at most. The library would keep it until a broker says that it has forgotten us, and one that never says
+/// so and hangs up each time would have it grow without end.
+///
+/// # Errors
+/// Why there is no connection, or no more.
+async fn next(events: &mut EventLoop) -> Result<rumqttc::Event, ConnectionError> {
+    let happened = events.poll().await;
+    if happened.is_err() {
+        events.pending.clear();
+        // A message whose number was still taken, as the broker answered in another order. As long as it waits, none is sent.
+        events.state.collision = None;
+    }
+    happened
+}
+
 /// Says once that the broker is away, and once that it is there.
 async fn keep_connected(mut events: EventLoop, connected: Arc<AtomicBool>, broker: String, log: Arc<Log>) {
     let mut told = false;
     loop {
-        match events.poll().await {
+        match next(&mut events).await {
             Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
                 told = false;
                 connected.store(true, Ordering::Relaxed);
@@ -182,7 +199,51 @@ fn changes(kept: &BTreeMap<String, String>, wanted: &BTreeMap<String, String>) -
 
 #[cfg(test)]
 mod tests {
+    use std::io::{Read, Write};
+    use std::net::TcpListener;
+
+    use rumqttc::Publish;
+
     use super::*;
+
+    /// A broker that says each time that it knows us, hears this many bytes after that, and hangs up; its port.
+    fn broker(hears: usize) -> u16 {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.unwrap();
+                // CONNECT, which is short.
+                let mut head = [0; 2];
+                stream.read_exact(&mut head).unwrap();
+                stream.read_exact(&mut vec![0; head[1].into()]).unwrap();
+                // CONNACK: the session is present, and accepted.
+                stream.write_all(&[0x20, 2, 1, 0]).unwrap();
+                stream.read_exact(&mut vec![0; hears]).unwrap();
+            }
+        });
+        port
+    }
+
+    #[tokio::test]
+    async fn a_broker_that_hangs_up_each_time_and_claims_to_know_us_leaves_nothing_behind() {
+        let options = MqttOptions::new("test", "127.0.0.1", broker(1));
+        let (client, mut events) = AsyncClient::new(options, WAITING);
+        for _ in 0..3 {
+            for _ in 0..50 {
+                client.try_publish("topic", QoS::AtLeastOnce, true, "payload").unwrap();
+            }
+            let mut published = 0;
+            while let Ok(happened) = next(&mut events).await {
+                if matches!(happened, rumqttc::Event::Outgoing(Outgoing::Publish(_))) {
+                    published += 1;
+                    events.state.collision = Some(Publish::new("topic", QoS::AtLeastOnce, "payload"));
+                }
+            }
+            assert!(published > 0, "what collided in the last connection keeps nothing from this one");
+            assert!(events.pending.is_empty() && events.state.collision.is_none());
+        }
+    }
 
     #[test]
     fn what_changed_is_published_and_what_is_gone_forgotten() {

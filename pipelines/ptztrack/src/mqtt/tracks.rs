@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
 use super::topics::Topics;
-use super::{PAUSE, options};
+use super::{PAUSE, next, options};
 use crate::config::Mqtt;
 use crate::handover::{Exchange, Message};
 use crate::log::Log;
@@ -67,7 +67,7 @@ impl Hearing {
     async fn run(self, mut events: EventLoop) {
         let (mut warned, mut away) = (false, false);
         loop {
-            match events.poll().await {
+            match next(&mut events).await {
                 Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
                     away = false;
                     // The queue is empty: nothing is said before this.
