@@ -17,6 +17,8 @@ use crate::shard::Shard;
 /// Of a process that has all cameras.
 const OF_ALL: &str = "control.json";
 
+const NO_FOLDER: &str = "STATE_DIRECTORY names no folder to keep it in";
+
 /// By the names of the cameras; who is not in it has nothing to be kept.
 type Kept = BTreeMap<String, Control>;
 
@@ -56,13 +58,19 @@ impl ControlFile {
     /// Keeps this, if it is not what is kept already. A file that is broken off halfway never takes the place of the last one.
     ///
     /// # Errors
-    /// Why it cannot be written: said once, and tried again every time.
+    /// Why it cannot be written: said once, and tried again every time. That there is no folder, once a camera is handed over.
     pub fn keep(&self, mut control: Kept) -> io::Result<()> {
         control.retain(|_, control| *control != Control::Ours);
         let mut last = lock(&self.last);
-        let Some(path) = self.path.as_ref().filter(|_| last.kept.as_ref() != Some(&control)) else {
-            return Ok(());
+        let Some(path) = &self.path else {
+            let is_handed_over = control.values().any(|control| *control == Control::HandedOver);
+            // As after a failure, it is said once.
+            let is_new = is_handed_over && !std::mem::replace(&mut last.failed, true);
+            return if is_new { Err(io::Error::other(NO_FOLDER)) } else { Ok(()) };
         };
+        if last.kept.as_ref() == Some(&control) {
+            return Ok(());
+        }
         let written = write(path, &control);
         let has_failed = std::mem::replace(&mut last.failed, written.is_err());
         if written.is_ok() {
@@ -139,6 +147,15 @@ mod tests {
         let names = ["control.json", "control.0-of-2.json", "control.1-of-2.json"];
         assert!(names.iter().all(|name| folder.join(name).exists()));
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn that_there_is_no_folder_is_said_once_when_a_camera_is_handed_over() {
+        let file = ControlFile::at(None, None);
+        let keep =
+            |control| file.keep(Kept::from([("door".to_owned(), control)])).map_err(|err| err.to_string());
+        let kept = [Control::Ours, Control::Operator, Control::HandedOver, Control::HandedOver].map(keep);
+        assert_eq!(kept, [Ok(()), Ok(()), Err(NO_FOLDER.to_owned()), Ok(())]);
     }
 
     /// As on a disk that is full for a while.

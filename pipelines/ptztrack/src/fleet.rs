@@ -87,7 +87,8 @@ impl Fleet {
     /// Keeps who has which camera, for after a restart.
     pub fn keep_control(&self) {
         if let Err(err) = self.had.keep(self.control()) {
-            self.log.error("not-kept", format!("who has which camera is forgotten at a restart: {err}"));
+            let detail = format!("who has which camera is forgotten at a restart: {err}");
+            self.log.tell(&Event::new(Level::Warning, None, "not-kept", detail));
         }
     }
 
