@@ -2,14 +2,17 @@
 
 //! What happens, told to an MQTT broker: events as they come, and what is kept there for who comes later.
 
+mod presence;
 mod topics;
 mod tracks;
 
 use std::collections::BTreeMap;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use presence::Presence;
 use rumqttc::{
     AsyncClient, ConnectionError, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS,
     TlsConfiguration, Transport,
@@ -84,9 +87,12 @@ impl Publisher {
     }
 }
 
-/// Where the broker is, and who we are; `what` tells our connections apart.
+/// Where the broker is, and who we are; `what` tells our connections apart. A broker ends a connection where another one begins by the
+/// same name: two containers may have the host's name and the same number of a process.
 fn options(settings: &Mqtt, what: &str) -> Result<MqttOptions, session::Error> {
-    let id = format!("ptztrack-{}-{}{what}", glib::host_name(), std::process::id());
+    // Of keys that are drawn by chance.
+    let chance = RandomState::new().build_hasher().finish();
+    let id = format!("ptztrack-{}-{chance:016x}{what}", glib::host_name());
     let mut options = MqttOptions::new(id, &settings.host, settings.port);
     options.set_keep_alive(KEEP_ALIVE);
     if let Some(credentials) = &settings.credentials {
@@ -115,20 +121,24 @@ async fn next(events: &mut EventLoop) -> Result<rumqttc::Event, ConnectionError>
     happened
 }
 
-/// Says once that the broker is away, and once that it is there.
+/// Says that the broker is away, and that it is there.
 async fn keep_connected(mut events: EventLoop, connected: Arc<AtomicBool>, broker: String, log: Arc<Log>) {
-    let mut told = false;
+    let mut presence = Presence::default();
     loop {
-        match next(&mut events).await {
-            Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
-                told = false;
-                connected.store(true, Ordering::Relaxed);
-                log.info("mqtt-connected", format!("connected to the MQTT broker {broker}"));
-            }
+        let happened = next(&mut events).await;
+        let is_to_be_told = presence.is_to_be_told(happened.is_ok(), Instant::now());
+        match happened {
             Ok(rumqttc::Event::Outgoing(Outgoing::Disconnect)) => return,
-            Ok(_) => {}
+            Ok(event) => {
+                if matches!(event, rumqttc::Event::Incoming(Incoming::ConnAck(_))) {
+                    connected.store(true, Ordering::Relaxed);
+                }
+                if is_to_be_told {
+                    log.info("mqtt-connected", format!("connected to the MQTT broker {broker}"));
+                }
+            }
             Err(err) => {
-                if !std::mem::replace(&mut told, true) {
+                if is_to_be_told {
                     let detail =
                         format!("no connection to the MQTT broker {broker}: {err}; it is tried again");
                     log.error("mqtt-disconnected", detail);
