@@ -73,7 +73,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 
     let fleet = Arc::new(Fleet::new(log.clone()).of_share(origin.shard()));
     if let Some(http) = config.http.clone() {
-        tokio::spawn(serve(http, fleet.clone(), Events::of(&config), log.clone()));
+        let events = Events::of(&config, log.clone());
+        tokio::spawn(serve(http, fleet.clone(), events, log.clone()));
     }
     let publisher = config.mqtt.as_ref().and_then(|mqtt| {
         let pictures = config.store.what.is_some_and(|kept| kept.pictures);
