@@ -200,7 +200,7 @@ async fn serve(http: Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
     if let Ok(address) = listener.local_addr() {
         log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
     }
-    http::serve(listener, &http, fleet, events).await;
+    http::serve(listener, &http, fleet, events, log).await;
 }
 
 /// Where a disk hangs, it waits for itself and for nobody else.
