@@ -118,13 +118,16 @@ impl Store {
     /// Deletes all that is known of somebody: of one track. Whether there was something.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// Where it cannot be written. [`Error::Read`]: nobody finds it any more, but it is still in the log of the file, as somebody has
+    /// been reading there for seconds; to delete it again takes it out of there.
     pub fn delete(&mut self, id: i64) -> Result<bool, Error> {
         let found = self.delete_where("id = ?1", id)? > 0;
         // It is not in the log either.
-        let shorten = |row: &rusqlite::Row| row.get::<_, i64>(0);
-        let shortened = self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], shorten);
-        shortened.map_err(Error::file(&self.file))?;
+        let shorten = |row: &rusqlite::Row| row.get::<_, bool>(0);
+        let is_read = self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], shorten);
+        if is_read.map_err(Error::file(&self.file))? {
+            return Err(Error::Read { file: self.file.display().to_string() });
+        }
         Ok(found)
     }
 

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
-use events::{Area, FILE, Filter, Looks, Picture, Pointer, Reader, Retention, Sighting, Step, Store};
+use events::{Area, Error, FILE, Filter, Looks, Picture, Pointer, Reader, Retention, Sighting, Step, Store};
 
 /// A folder that is gone with the test.
 struct Folder(PathBuf);
@@ -200,6 +200,22 @@ fn of_whom_was_deleted_nothing_is_left_in_the_files() {
     // Its number is nobody else's.
     drop(store);
     assert!(folder.store().keep(&sighting(3)).unwrap() > goes);
+}
+
+/// Waits for as long as whoever reads is given.
+#[test]
+fn what_somebody_reads_is_not_said_to_be_deleted_as_long_as_it_is_in_a_file() {
+    let folder = Folder::new("read-meanwhile");
+    let mut store = folder.store();
+    let id = store.keep(&sighting(1)).unwrap();
+    let reader = rusqlite::Connection::open(folder.0.join(FILE)).unwrap();
+    reader.execute_batch("BEGIN").unwrap();
+    let count = || reader.query_row("SELECT count(*) FROM sighting", [], |row| row.get::<_, i64>(0));
+    assert_eq!(count(), Ok(1));
+    assert!(matches!(store.delete(id), Err(Error::Read { .. })));
+    reader.execute_batch("COMMIT").unwrap();
+    assert_eq!(count(), Ok(0));
+    assert!(!store.delete(id).unwrap(), "it is gone already");
 }
 
 #[test]
