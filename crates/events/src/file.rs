@@ -67,6 +67,14 @@ pub enum Error {
         /// What the system says.
         cause: io::Error,
     },
+    /// Somebody reads what was deleted, for as long as that lasts.
+    #[error(
+        "{file}: what was deleted is still in the file beside it, as somebody reads that; delete it again"
+    )]
+    Read {
+        /// The file.
+        file: String,
+    },
     /// It was written by another version.
     #[error("{file} is of another version of ptztrack: it is moved aside when that version keeps events")]
     OtherVersion {

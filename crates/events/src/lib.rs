@@ -8,6 +8,7 @@
 //!
 //! Nothing here knows GStreamer, HTTP or a camera.
 
+mod clock;
 mod collector;
 mod crop;
 mod file;

@@ -2,10 +2,11 @@
 
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, SystemTime};
+use std::time::{Duration, Instant, SystemTime};
 
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 
+use crate::clock::Clock;
 use crate::file::{self, Error, Identity};
 use crate::reader::{columns, entry};
 use crate::{Picture, Sighting};
@@ -13,7 +14,7 @@ use crate::{Picture, Sighting};
 /// How much is kept.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Retention {
-    /// Whatever ended longer ago goes.
+    /// Whatever ended longer ago goes; by a clock that has jumped ahead, once that is believed: after six hours.
     pub age: Duration,
     /// The oldest go where the file has more.
     pub bytes: u64,
@@ -26,6 +27,8 @@ pub struct Store {
     identity: Identity,
     folder: PathBuf,
     file: PathBuf,
+    /// Once somebody has asked for the time.
+    clock: Option<Clock>,
 }
 
 /// So many of the oldest go at a time where there is too much.
@@ -40,7 +43,7 @@ impl Store {
     pub fn open(folder: &Path) -> Result<(Self, Option<PathBuf>), Error> {
         let (connection, identity, aside) = file::open(folder)?;
         let folder = folder.to_owned();
-        Ok((Self { connection, identity, file: folder.join(file::FILE), folder }, aside))
+        Ok((Self { connection, identity, file: folder.join(file::FILE), folder, clock: None }, aside))
     }
 
     /// Whether its file still has its name. What is written to one that was moved or deleted is found by nobody.
@@ -72,13 +75,13 @@ impl Store {
         keep(&mut self.connection).map_err(said)
     }
 
-    /// Deletes what is more than is kept, at this time.
+    /// Deletes what is more than is kept, at this time. No moment of a wrong clock takes what cannot be had again: time goes on from
+    /// the newest that is kept as this process runs, until a clock that is ahead of that has been so for six hours.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn retain(&mut self, retention: &Retention, now: SystemTime) -> Result<(), Error> {
-        let oldest =
-            now.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default().saturating_sub(retention.age);
+        let oldest = since_1970(self.believed(now)?).saturating_sub(retention.age);
         let oldest_ms = i64::try_from(oldest.as_millis()).unwrap_or(i64::MAX);
         self.delete_where("to_ms < ?1", oldest_ms)?;
         while self.bytes()? > retention.bytes {
@@ -90,16 +93,41 @@ impl Store {
         Ok(())
     }
 
+    /// The time, as far as a clock that says this is believed.
+    fn believed(&mut self, now: SystemTime) -> Result<SystemTime, Error> {
+        let at = Instant::now();
+        let mut clock = match self.clock.take() {
+            Some(clock) => clock,
+            None => Clock::new(self.newest(now)?.unwrap_or(now), at),
+        };
+        let believed = clock.read(now, at);
+        self.clock = Some(clock);
+        Ok(believed)
+    }
+
+    /// When the last of all ended, but for those that a clock which was ahead has in the future.
+    fn newest(&self, now: SystemTime) -> Result<Option<SystemTime>, Error> {
+        let now_ms = i64::try_from(since_1970(now).as_millis()).unwrap_or(i64::MAX);
+        let sql = "SELECT max(to_ms) FROM sighting WHERE to_ms <= ?1";
+        let newest_ms = self.connection.query_row(sql, [now_ms], |row| row.get::<_, Option<i64>>(0));
+        let newest_ms = newest_ms.map_err(Error::file(&self.file))?;
+        let since = newest_ms.and_then(|newest| u64::try_from(newest).ok()).map(Duration::from_millis);
+        Ok(since.map(|since| SystemTime::UNIX_EPOCH + since))
+    }
+
     /// Deletes all that is known of somebody: of one track. Whether there was something.
     ///
     /// # Errors
-    /// Where it cannot be written.
+    /// Where it cannot be written. [`Error::Read`]: nobody finds it any more, but it is still in the log of the file, as somebody has
+    /// been reading there for seconds; to delete it again takes it out of there.
     pub fn delete(&mut self, id: i64) -> Result<bool, Error> {
         let found = self.delete_where("id = ?1", id)? > 0;
         // It is not in the log either.
-        let shorten = |row: &rusqlite::Row| row.get::<_, i64>(0);
-        let shortened = self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], shorten);
-        shortened.map_err(Error::file(&self.file))?;
+        let shorten = |row: &rusqlite::Row| row.get::<_, bool>(0);
+        let is_read = self.connection.query_row("PRAGMA wal_checkpoint(TRUNCATE)", [], shorten);
+        if is_read.map_err(Error::file(&self.file))? {
+            return Err(Error::Read { file: self.file.display().to_string() });
+        }
         Ok(found)
     }
 
@@ -123,6 +151,10 @@ impl Store {
         };
         delete().map_err(Error::file(&self.file))
     }
+}
+
+fn since_1970(time: SystemTime) -> Duration {
+    time.duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default()
 }
 
 fn write(transaction: &Transaction, new: &Sighting) -> rusqlite::Result<i64> {

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::{Duration, SystemTime};
 
-use events::{Area, FILE, Filter, Looks, Picture, Pointer, Reader, Retention, Sighting, Step, Store};
+use events::{Area, Error, FILE, Filter, Looks, Picture, Pointer, Reader, Retention, Sighting, Step, Store};
 
 /// A folder that is gone with the test.
 struct Folder(PathBuf);
@@ -157,6 +157,29 @@ fn what_is_too_old_or_too_much_goes_the_oldest_first() {
 }
 
 #[test]
+fn a_moment_of_a_clock_that_is_ahead_deletes_nothing() {
+    let folder = Folder::new("clock-ahead");
+    let mut store = folder.store();
+    let ids: Vec<i64> = (0..10).rev().map(|n| store.keep(&sighting(n)).unwrap()).collect();
+    let minutes = |minutes: u64| Retention { age: Duration::from_secs(60 * minutes), bytes: u64::MAX };
+    let year = Duration::from_secs(365 * 24 * 3600);
+    let now = SystemTime::UNIX_EPOCH + Duration::from_millis(sighting(9).to_ms.unsigned_abs());
+    store.retain(&minutes(60), now).unwrap();
+    store.retain(&minutes(60), now + year).unwrap();
+    // As where the program is started anew meanwhile, and then keeps somebody as of that year.
+    let mut store = folder.store();
+    store.retain(&minutes(60), now + year).unwrap();
+    let ahead_ms = sighting(9).to_ms + 1000 * 365 * 24 * 3600;
+    let ahead = Sighting { run_ms: 8, from_ms: ahead_ms, to_ms: ahead_ms, ..sighting(9) };
+    let ahead = store.keep(&ahead).unwrap();
+    store.retain(&minutes(60), now + year).unwrap();
+    assert_eq!(folder.all(), [&[ahead], &ids[..]].concat());
+    // Whoever is in the future keeps the others no longer.
+    folder.store().retain(&minutes(5), now).unwrap();
+    assert_eq!(folder.all(), [&[ahead], &ids[..6]].concat());
+}
+
+#[test]
 fn of_whom_was_deleted_nothing_is_left_in_the_files() {
     let folder = Folder::new("deleted");
     let mut store = folder.store();
@@ -177,6 +200,22 @@ fn of_whom_was_deleted_nothing_is_left_in_the_files() {
     // Its number is nobody else's.
     drop(store);
     assert!(folder.store().keep(&sighting(3)).unwrap() > goes);
+}
+
+/// Waits for as long as whoever reads is given.
+#[test]
+fn what_somebody_reads_is_not_said_to_be_deleted_as_long_as_it_is_in_a_file() {
+    let folder = Folder::new("read-meanwhile");
+    let mut store = folder.store();
+    let id = store.keep(&sighting(1)).unwrap();
+    let reader = rusqlite::Connection::open(folder.0.join(FILE)).unwrap();
+    reader.execute_batch("BEGIN").unwrap();
+    let count = || reader.query_row("SELECT count(*) FROM sighting", [], |row| row.get::<_, i64>(0));
+    assert_eq!(count(), Ok(1));
+    assert!(matches!(store.delete(id), Err(Error::Read { .. })));
+    reader.execute_batch("COMMIT").unwrap();
+    assert_eq!(count(), Ok(0));
+    assert!(!store.delete(id).unwrap(), "it is gone already");
 }
 
 #[test]

@@ -8,7 +8,7 @@ use clap::{Args, Subcommand};
 use events::{Filter, Reader};
 
 use crate::config::{Config, Store, Zone, units};
-use crate::report;
+use crate::{report, store};
 
 #[derive(Debug, Args)]
 #[command(args_conflicts_with_subcommands = true)]
@@ -81,7 +81,8 @@ impl AskEvents {
     pub fn answer(self) -> Result<String, String> {
         let said = |err: events::Error| format!("{err}; --folder says where events are");
         if let Some(Change::Delete { id, place }) = self.change {
-            let (mut store, _) = events::Store::open(&place.read()?.0).map_err(said)?;
+            let (mut store, aside) = events::Store::open(&place.read()?.0).map_err(said)?;
+            aside.iter().for_each(|aside| eprintln!("{}", store::moved(aside)));
             return match store.delete(id).map_err(said)? {
                 true => Ok(format!("Event {id} is deleted.\n")),
                 false => Err(format!("There is no event {id}.")),

@@ -20,6 +20,8 @@ use crate::shard::Shard;
 /// Of a process that has all cameras.
 const OF_ALL: &str = "control.json";
 
+const NO_FOLDER: &str = "STATE_DIRECTORY names no folder to keep it in";
+
 /// By the names of the cameras; who is not in it has nothing to be kept.
 pub type Kept = BTreeMap<String, Control>;
 
@@ -106,7 +108,7 @@ impl ControlFile {
     /// A file that is broken off halfway never takes the place of the last one.
     ///
     /// # Errors
-    /// Why it cannot be written: said once, and tried again every time.
+    /// Why it cannot be written: said once, and tried again every time. That there is no folder, once a camera is handed over.
     pub fn keep(&self, control: impl FnOnce() -> Option<Kept>) -> io::Result<()> {
         let mut last = lock(&self.last);
         // What is asked for later is written later.
@@ -117,9 +119,15 @@ impl ControlFile {
         let control = with(had.take().unwrap_or_default(), control);
         *had = Some(control.clone());
         drop(had);
-        let Some(path) = self.path.as_ref().filter(|_| last.kept.as_ref() != Some(&control)) else {
-            return Ok(());
+        let Some(path) = &self.path else {
+            let is_handed_over = control.values().any(|control| *control == Control::HandedOver);
+            // As after a failure, it is said once.
+            let is_new = is_handed_over && !std::mem::replace(&mut last.failed, true);
+            return if is_new { Err(io::Error::other(NO_FOLDER)) } else { Ok(()) };
         };
+        if last.kept.as_ref() == Some(&control) {
+            return Ok(());
+        }
         let written = write(path, &control);
         let has_failed = std::mem::replace(&mut last.failed, written.is_err());
         if written.is_ok() {
@@ -224,7 +232,7 @@ mod tests {
 
         let without = ControlFile::at(None, None, Arc::new(Log::unwritten()));
         without.remember(control);
-        without.keep(|| Some(Kept::new())).unwrap();
+        assert_eq!(without.keep(|| Some(Kept::new())).unwrap_err().to_string(), NO_FOLDER);
         assert_eq!(without.load(), kept(&[("door", Control::HandedOver)]), "while the program runs");
     }
 
@@ -258,6 +266,14 @@ mod tests {
         let names = ["control.json", "control.0-of-2.json", "control.1-of-2.json"];
         assert!(names.iter().all(|name| folder.join(name).exists()));
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn that_there_is_no_folder_is_said_once_when_a_camera_is_handed_over() {
+        let file = ControlFile::at(None, None, Arc::default());
+        let keep = |control| file.keep(|| Some(kept(&[("door", control)]))).map_err(|err| err.to_string());
+        let kept = [Control::Ours, Control::Operator, Control::HandedOver, Control::HandedOver].map(keep);
+        assert_eq!(kept, [Ok(()), Ok(()), Err(NO_FOLDER.to_owned()), Ok(())]);
     }
 
     /// As on a disk that is full for a while.

@@ -115,7 +115,8 @@ impl Fleet {
 
     fn keep(&self, control: impl FnOnce() -> Option<Kept>) {
         if let Err(err) = self.had.keep(control) {
-            self.log.error("not-kept", format!("who has which camera is forgotten at a restart: {err}"));
+            let detail = format!("who has which camera is forgotten at a restart: {err}");
+            self.log.tell(&Event::new(Level::Warning, None, "not-kept", detail));
         }
     }
 

@@ -32,6 +32,12 @@ pub struct Log {
     sightings: Mutex<Option<Waiting>>,
 }
 
+impl Default for Log {
+    fn default() -> Self {
+        Self::unwritten()
+    }
+}
+
 /// So many events wait for somebody who is slow; those before are lost to them.
 const WAITING: usize = 256;
 

@@ -73,7 +73,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
 
     let fleet = Arc::new(Fleet::new(log.clone()).of_share(origin.shard()));
     if let Some(http) = config.http.clone() {
-        tokio::spawn(serve(http, fleet.clone(), Events::of(&config), log.clone()));
+        let events = Events::of(&config, log.clone());
+        tokio::spawn(serve(http, fleet.clone(), events, log.clone()));
     }
     let publisher = config.mqtt.as_ref().and_then(|mqtt| {
         let pictures = config.store.what.is_some_and(|kept| kept.pictures);
@@ -199,7 +200,7 @@ async fn serve(http: Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
     if let Ok(address) = listener.local_addr() {
         log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
     }
-    http::serve(listener, &http, fleet, events).await;
+    http::serve(listener, &http, fleet, events, log).await;
 }
 
 /// Where a disk hangs, it waits for itself and for nobody else.

@@ -179,23 +179,25 @@ impl Keeping {
 
     fn open_anew(&self) -> Result<events::Store, Error> {
         let (store, aside) = events::Store::open(&self.folder)?;
-        aside.iter().for_each(|aside| self.tell_moved(aside));
+        aside.iter().for_each(|aside| tell_moved(&self.log, aside));
         Ok(store)
     }
 
     /// A file that has turned out to be broken while it was written.
     fn put_aside(&self, store: events::Store) -> bool {
         let aside = store.put_aside();
-        aside.iter().flatten().for_each(|aside| self.tell_moved(aside));
+        aside.iter().flatten().for_each(|aside| tell_moved(&self.log, aside));
         aside.is_ok()
-    }
-
-    fn tell_moved(&self, aside: &Path) {
-        self.log.tell(&Event::new(Level::Warning, None, "events-moved-aside", moved(aside)));
     }
 }
 
-fn moved(aside: &Path) -> String {
+/// Says where the file of events is now, which was moved aside.
+pub fn tell_moved(log: &Log, aside: &Path) {
+    log.tell(&Event::new(Level::Warning, None, "events-moved-aside", moved(aside)));
+}
+
+/// The same, in words.
+pub fn moved(aside: &Path) -> String {
     format!(
         "the file of events is broken or of another version: it is {} now, and a new one was begun",
         aside.display()

@@ -8,6 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::known::{Gaze, Known, Steering};
 
+/// Cameras that zoom see no less and no more than that, in degrees, unless they show that they do.
+const NARROWEST_DEG: f64 = 0.5;
+const WIDEST_DEG: f64 = 120.0;
+
 /// Where somebody turns a camera.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Turn {
@@ -49,7 +53,12 @@ impl Known {
             };
             let width_deg = last.fov_deg.unwrap_or(pose.horizontal_fov_deg);
             let height_deg = pose.vertical_fov_deg * width_deg / pose.horizontal_fov_deg;
-            let gaze = turn.from(last, [width_deg, height_deg]);
+            let mut gaze = turn.from(last, [width_deg, height_deg]);
+            let shown_deg = pose.horizontal_fov_deg;
+            // However often somebody zooms: what no camera sees is refused, and every turn from there with it.
+            let bound =
+                |fov_deg: f64| fov_deg.min(WIDEST_DEG.max(shown_deg)).max(NARROWEST_DEG.min(shown_deg));
+            gaze.fov_deg = gaze.fov_deg.map(bound);
             Some(Steering::Turned(gaze, Instant::now() + left_alone))
         })
     }
@@ -91,6 +100,10 @@ mod tests {
         turn(0.5, 1.0, 0.0);
         assert_eq!(gaze(), Gaze { pan_deg: -160.0, tilt_deg: 5.0, fov_deg: Some(30.0) });
         assert_eq!(known.control(), Control::Operator);
+        (0..10).for_each(|_| turn(0.0, 0.0, -1.0));
+        assert_eq!(gaze().fov_deg, Some(120.0), "no camera sees half of the world");
+        (0..100).for_each(|_| turn(0.0, 0.0, 1.0));
+        assert_eq!(gaze().fov_deg, Some(0.5));
         known.steer(Steering::HandedOver);
         assert!(!known.turn_here(Turn { right: 0.5, up: 0.0, zoom: 0.0 }, Duration::from_secs(5)));
         assert_eq!(*lock(&known.steering), Steering::HandedOver, "it is left alone until it is taken back");

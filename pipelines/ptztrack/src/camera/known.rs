@@ -51,7 +51,7 @@ pub struct Known {
     /// What ended the pictures, where that is known better than an element can say.
     pub ended: Ended,
     /// How many look at the picture.
-    pub looking: AtomicUsize,
+    pub looking: Arc<AtomicUsize>,
     /// What was seen last, and when, of a camera that people are handed over from or to.
     pub sight: watch::Sender<Arc<(Instant, Sight)>>,
     /// What somebody has said that it sees, which nobody has taken notice of yet.
@@ -177,7 +177,7 @@ impl Known {
             steering: Mutex::default(),
             operator: AtomicBool::default(),
             ended: Ended::default(),
-            looking: AtomicUsize::default(),
+            looking: Arc::default(),
             sight: watch::Sender::new(Arc::new((Instant::now(), Sight::default()))),
             points: Mutex::default(),
             ignored: Mutex::default(),

@@ -2,7 +2,7 @@
 
 //! The picture for who looks, with what it shows.
 
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
@@ -79,16 +79,17 @@ pub fn show(view: Option<&gst::Element>, picture: Option<&gst_app::AppSink>, kno
 /// Somebody looks; where nobody does any more, the camera's own timer ends it, as the next may come soon.
 #[derive(Debug)]
 pub struct Look {
-    known: Arc<Known>,
+    /// Of what is known of the camera no more: that ends with the camera, and with it this.
+    looking: Arc<AtomicUsize>,
     pictures: watch::Receiver<Shown>,
 }
 
 impl Known {
     /// Pictures are made while this is held.
-    pub fn look(self: &Arc<Self>) -> Look {
+    pub fn look(&self) -> Look {
         self.looking.fetch_add(1, Ordering::Relaxed);
         self.with(|running| running.look(true));
-        Look { pictures: self.view.subscribe(), known: self.clone() }
+        Look { pictures: self.view.subscribe(), looking: self.looking.clone() }
     }
 }
 
@@ -102,7 +103,7 @@ impl Look {
 
 impl Drop for Look {
     fn drop(&mut self) {
-        self.known.looking.fetch_sub(1, Ordering::Relaxed);
+        self.looking.fetch_sub(1, Ordering::Relaxed);
     }
 }
 
@@ -111,6 +112,18 @@ mod tests {
     use ptztrack_contract::{Point, Rect};
 
     use super::*;
+
+    /// As where its entry was changed: whoever looks on asks for the new one.
+    #[test]
+    fn whoever_looks_at_a_camera_that_is_no_more_hears_of_it() {
+        let known = Known::new("door");
+        let mut look = known.look();
+        drop(known.look());
+        assert_eq!(known.looking.load(Ordering::Relaxed), 1);
+        drop(known);
+        let runtime = tokio::runtime::Builder::new_current_thread().build().unwrap();
+        assert!(runtime.block_on(look.next()).is_none());
+    }
 
     /// By the time at which somebody asks, another one is followed.
     #[test]

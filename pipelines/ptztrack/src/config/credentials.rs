@@ -105,5 +105,9 @@ fn from_systemd(name: &str) -> Result<Secret, String> {
     }
     let folder = PathBuf::from(folder);
     let own = folder.join(name);
-    Secret::from_file(&if own.exists() { own } else { folder.join(format!("passwords_{name}")) })
+    let password =
+        Secret::from_file(&if own.exists() { own } else { folder.join(format!("passwords_{name}")) });
+    password.map_err(|reason| {
+        format!("{reason}; systemd reads passwords as a service starts: restart it once there is one")
+    })
 }

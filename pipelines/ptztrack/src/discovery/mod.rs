@@ -8,11 +8,15 @@ mod probe;
 use std::fmt::Write;
 use std::time::Duration;
 
-use futures_util::future::join_all;
+use futures_util::StreamExt;
+use futures_util::stream;
 
 pub use ask::{Found, ask};
 use ask::{has_vapix, onvif_client};
-use probe::{Heard, probe};
+use probe::{Heard, MOST, probe};
+
+/// So many are asked at once.
+const AT_ONCE: usize = 32;
 
 /// One line of the table.
 struct Row {
@@ -34,7 +38,11 @@ pub async fn discover(wait: Duration) -> Result<(), String> {
              between; any other can be asked by its address: ptztrack follow 192.168.0.90"
         ));
     }
-    print!("{}", table(&join_all(heard.iter().map(describe)).await));
+    let rows: Vec<Row> = stream::iter(heard.iter().map(describe)).buffered(AT_ONCE).collect().await;
+    print!("{}", table(&rows));
+    if heard.len() == MOST {
+        eprintln!("There may be more: no more than {MOST} are listed.");
+    }
     Ok(())
 }
 

@@ -15,6 +15,9 @@ use tokio::time::{Instant, timeout_at};
 /// Longest answer; one that is longer is cut by the network in any case.
 const LONGEST: usize = 65_536;
 
+/// Who answers with any number of cameras has no more than these taken.
+pub const MOST: usize = 512;
+
 /// Where ONVIF has its device service, unless a camera says otherwise.
 const DEVICE_SERVICE: &str = "/onvif/device_service";
 
@@ -80,6 +83,7 @@ pub async fn probe(wait: Duration) -> Result<Vec<Heard>, String> {
     let mut heard: Vec<Heard> = heard.into_iter().flatten().flatten().collect();
     heard.sort_by_key(|heard| (heard.host, heard.port));
     heard.dedup();
+    heard.truncate(MOST);
     match failures.into_iter().find_map(Result::err) {
         Some(failure) if heard.is_empty() => Err(format!("nobody can be asked: {failure}")),
         _ => Ok(heard),
@@ -95,7 +99,7 @@ async fn ask_network(own: Ipv4Addr, wait: Duration) -> io::Result<Vec<Heard>> {
     listen(UdpSocket::from_std(socket.into())?, onvif::GROUP.into(), wait).await
 }
 
-/// Asks there, twice as a datagram may be lost, and hears who answers.
+/// Asks there, twice as a datagram may be lost, and hears who answers: so many at most.
 pub async fn listen(socket: UdpSocket, whom: SocketAddr, wait: Duration) -> io::Result<Vec<Heard>> {
     let question = onvif::probe();
     let end = Instant::now() + wait;
@@ -108,7 +112,12 @@ pub async fn listen(socket: UdpSocket, whom: SocketAddr, wait: Duration) -> io::
             let Ok((length, sender)) = received else { break };
             let text = String::from_utf8_lossy(answer.get(..length).unwrap_or_default());
             let announcements = onvif::parse_announcements(&text);
-            heard.extend(announcements.iter().filter_map(|camera| Heard::of(camera, sender.ip())));
+            let cameras = announcements.iter().filter_map(|camera| Heard::of(camera, sender.ip()));
+            for camera in cameras {
+                if heard.len() < MOST && !heard.contains(&camera) {
+                    heard.push(camera);
+                }
+            }
         }
     }
     Ok(heard)

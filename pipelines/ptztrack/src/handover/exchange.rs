@@ -2,7 +2,7 @@
 
 //! What processes that share the cameras of a file tell each other of them, so that people are handed over between all.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::atomic::Ordering;
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
@@ -60,6 +60,8 @@ pub struct Exchange {
     /// When it began, milliseconds since 1970: no camera has a new pipeline as often.
     began_ms: u64,
     said: mpsc::Sender<Message>,
+    /// Cameras that ours work with; of no other anything is taken, so that nobody can have us remember any number of them.
+    concerned: Mutex<BTreeSet<String>>,
     heard: Mutex<BTreeMap<String, Heard>>,
 }
 
@@ -80,7 +82,12 @@ impl Exchange {
         let (said, saying) = mpsc::channel(WAITING);
         let since = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
         let began_ms = u64::try_from(since.as_millis()).unwrap_or_default();
-        (Arc::new(Self { began_ms, said, heard: Mutex::default() }), saying)
+        (Arc::new(Self { began_ms, said, concerned: Mutex::default(), heard: Mutex::default() }), saying)
+    }
+
+    /// Hears of these cameras from now on.
+    pub fn listen_for(&self, cameras: BTreeSet<String>) {
+        *lock(&self.concerned) = cameras;
     }
 
     /// Tells others of a camera.
@@ -91,11 +98,14 @@ impl Exchange {
         }
     }
 
-    /// Takes what others say of a camera.
+    /// Takes what others say of a camera, where it is one that is listened for.
     ///
     /// # Errors
     /// Where it makes no sense.
     pub fn hear(&self, camera: &str, said: &[u8]) -> Result<(), String> {
+        if !lock(&self.concerned).contains(camera) {
+            return Ok(());
+        }
         let report: Report = serde_json::from_slice(said).map_err(|err| err.to_string())?;
         report.check()?;
         let mut heard = lock(&self.heard);
@@ -218,10 +228,25 @@ mod tests {
         (door, said)
     }
 
+    /// Of another process, which works with the door.
+    fn another() -> Arc<Exchange> {
+        let (exchange, _) = Exchange::new();
+        exchange.listen_for(["door".to_owned()].into());
+        exchange
+    }
+
+    #[test]
+    fn of_cameras_that_ours_do_not_work_with_nothing_is_taken() {
+        let (_, said) = said();
+        let exchange = another();
+        (0..1000).for_each(|n| exchange.hear(&format!("camera-{n}"), said.as_bytes()).unwrap());
+        assert!(lock(&exchange.heard).is_empty());
+    }
+
     #[test]
     fn what_one_process_sees_another_one_knows() {
         let (door, said) = said();
-        let (exchange, _) = Exchange::new();
+        let exchange = another();
         let before = Instant::now();
         exchange.hear("door", said.as_bytes()).unwrap();
         let views = exchange.views(before);
@@ -237,7 +262,7 @@ mod tests {
     #[test]
     fn what_makes_no_sense_is_not_believed() {
         let (_, said) = said();
-        let (exchange, _) = Exchange::new();
+        let exchange = another();
         for (right, wrong) in [
             ("\"tilt_deg\":-10.0", "\"tilt_deg\":1e300"),
             ("\"horizontal_fov_deg\":60.0", "\"horizontal_fov_deg\":0.0"),

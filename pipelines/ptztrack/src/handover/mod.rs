@@ -159,6 +159,9 @@ impl Dispatcher {
     /// The file says something else: nobody is called any more by a camera that is not to call them, and what a camera was told for
     /// the sake of others is over where it works with none.
     fn change(&mut self, wishes: &[HandOver], cameras: &[Arc<Known>]) {
+        if let Some(exchange) = &self.exchange {
+            exchange.listen_for(wishes.iter().flat_map(HandOver::cameras).cloned().collect());
+        }
         let is_over = |to: &String, call: &mut Call| {
             !wishes.iter().any(|wish| wish.from == call.errand.from && wish.calls.contains(to))
         };

@@ -3,8 +3,9 @@
 //! Who may see and steer.
 
 use std::net::IpAddr;
-use std::sync::Arc;
 use std::sync::atomic::Ordering;
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
 
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
@@ -14,18 +15,50 @@ use base64::Engine;
 use base64::prelude::BASE64_STANDARD;
 use subtle::ConstantTimeEq;
 
+use ptztrack_contract::lock::lock;
+
 use super::Visit;
 use crate::config::{Credentials, Http, Secret};
+use crate::event::{Event, Level};
+use crate::log::Log;
+
+/// Who says a wrong user or password waits for so long: whoever tries all of them has no more than so many tries a second on each of a
+/// few connections.
+const PAUSE: Duration = Duration::from_millis(500);
+/// Between two times at which that is told.
+const TELL_EVERY: Duration = Duration::from_secs(60);
 
 /// What is asked of everybody, for all but `/healthz`.
 #[derive(Debug)]
 pub struct Access {
     hosts: Vec<String>,
     credentials: Option<Credentials>,
+    refused: Mutex<Refused>,
+    log: Arc<Log>,
+}
+
+/// Log-ins that were refused.
+#[derive(Debug, Default)]
+struct Refused {
+    /// Since that was told last.
+    count: u64,
+    told: Option<Instant>,
+}
+
+impl Refused {
+    /// One more: how many, where that is to be told.
+    fn one_more(&mut self, now: Instant) -> Option<u64> {
+        self.count += 1;
+        if self.told.is_some_and(|told| now.saturating_duration_since(told) < TELL_EVERY) {
+            return None;
+        }
+        self.told = Some(now);
+        Some(std::mem::take(&mut self.count))
+    }
 }
 
 impl Access {
-    pub fn new(http: &Http) -> Self {
+    pub fn new(http: &Http, log: Arc<Log>) -> Self {
         let ip = match http.listen.ip() {
             IpAddr::V6(ip) => format!("[{ip}]"),
             ip @ IpAddr::V4(_) => ip.to_string(),
@@ -34,7 +67,19 @@ impl Access {
         Self {
             hosts: own.into_iter().chain(http.hosts.clone()).collect(),
             credentials: http.credentials.clone(),
+            refused: Mutex::default(),
+            log,
         }
+    }
+
+    /// Somebody there said a wrong user or password.
+    fn tell_refused(&self, peer: Option<IpAddr>) {
+        let Some(count) = lock(&self.refused).one_more(Instant::now()) else { return };
+        let peer = peer.map_or_else(|| "an unknown address".to_owned(), |peer| peer.to_string());
+        let detail = format!(
+            "the page refused user and password, times: {count}; the last time they came from {peer}"
+        );
+        self.log.tell(&Event::new(Level::Warning, None, "log-in-refused", detail));
     }
 
     /// Why it is refused.
@@ -75,8 +120,8 @@ pub fn lets_in(authorization: &[u8]) -> bool {
 
 /// Every request passes here.
 pub async fn check(State(access): State<Arc<Access>>, request: Request, next: Next) -> Response {
-    let visit = request.extensions().get::<Visit>();
-    match access.refuse(request.method(), request.headers(), visit.map(|visit| visit.local)) {
+    let visit = request.extensions().get::<Visit>().cloned();
+    match access.refuse(request.method(), request.headers(), visit.as_ref().map(|visit| visit.local)) {
         None => {
             if let Some(visit) = visit {
                 visit.welcome.store(true, Ordering::Relaxed);
@@ -84,6 +129,11 @@ pub async fn check(State(access): State<Arc<Access>>, request: Request, next: Ne
             next.run(request).await
         }
         Some((StatusCode::UNAUTHORIZED, reason)) => {
+            // A browser says nothing at first, and then asks who sits before it.
+            if request.headers().contains_key(header::AUTHORIZATION) {
+                access.tell_refused(visit.map(|visit| visit.peer));
+                tokio::time::sleep(PAUSE).await;
+            }
             let ask = [(header::WWW_AUTHENTICATE, "Basic realm=\"ptztrack\", charset=\"UTF-8\"")];
             (StatusCode::UNAUTHORIZED, ask, reason).into_response()
         }
@@ -124,11 +174,12 @@ mod tests {
     use super::*;
 
     fn access(credentials: Option<Credentials>) -> Access {
-        Access::new(&Http {
+        let http = Http {
             listen: "127.0.0.1:9100".parse().unwrap(),
             hosts: vec!["cameras.example".to_owned()],
             credentials,
-        })
+        };
+        Access::new(&http, Arc::default())
     }
 
     fn answer(access: &Access, method: Method, headers: &[(header::HeaderName, &str)]) -> Option<u16> {
@@ -160,6 +211,13 @@ mod tests {
         }
         // It learns nothing by this: browsers keep the answer from it.
         assert_eq!(from(Method::GET, "http://evil.example"), None);
+    }
+
+    #[test]
+    fn refused_log_ins_are_told_once_a_minute_with_how_many_there_were() {
+        let (begin, mut refused) = (Instant::now(), Refused::default());
+        let told = (0..150).filter_map(|second| refused.one_more(begin + Duration::from_secs(second)));
+        assert_eq!(told.collect::<Vec<_>>(), [1, 60, 60]);
     }
 
     #[test]

@@ -20,7 +20,8 @@ use tokio::sync::Semaphore;
 use super::html;
 use crate::camera::recording::{self, Clip, Form, NoClip, Purpose};
 use crate::config::{Config, Zone};
-use crate::report;
+use crate::log::Log;
+use crate::{report, store};
 
 /// No answer has more events.
 const MOST: usize = 10_000;
@@ -35,13 +36,14 @@ pub struct Events {
     /// The folder that events are kept in; `None` where they are not.
     folder: Option<PathBuf>,
     zones: Vec<Zone>,
+    log: Arc<Log>,
 }
 
 type Asked = State<Arc<Events>>;
 
 impl Events {
-    pub fn of(config: &Config) -> Self {
-        Self { folder: config.store.kept_in(), zones: config.zones.clone() }
+    pub fn of(config: &Config, log: Arc<Log>) -> Self {
+        Self { folder: config.store.kept_in(), zones: config.zones.clone(), log }
     }
 }
 
@@ -219,7 +221,12 @@ fn body(clip: Clip) -> Body {
 }
 
 async fn delete(asked: Asked, Path(id): Path<i64>) -> Response {
-    let delete = move |folder: PathBuf| Store::open(&folder)?.0.delete(id);
+    let log = asked.log.clone();
+    let delete = move |folder: PathBuf| {
+        let (mut store, aside) = Store::open(&folder)?;
+        aside.iter().for_each(|aside| store::tell_moved(&log, aside));
+        store.delete(id)
+    };
     match with(asked, delete).await {
         Ok(true) => StatusCode::NO_CONTENT.into_response(),
         Ok(false) => StatusCode::NOT_FOUND.into_response(),

@@ -68,6 +68,8 @@ const BOUNDARY: &str = "ptztrack-picture";
 pub struct Visit {
     /// The address of this machine that was connected to.
     local: IpAddr,
+    /// The one that it came from.
+    peer: IpAddr,
     /// Something was asked that they may ask.
     welcome: Arc<AtomicBool>,
 }
@@ -83,12 +85,12 @@ pub async fn listen(http: &Http) -> std::io::Result<TcpListener> {
 /// Serves until the process ends. Whoever connects before they have said who they are costs a little for a short time: no more
 /// than so many at once, none that says nothing, none that takes nothing, so that cameras never lack a descriptor. Where there
 /// are too many, the first of them makes room.
-pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events: Events) {
-    let router = router(http, fleet, events);
+pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
+    let router = router(http, fleet, events, log);
     let places = Arc::new(Semaphore::new(MOST_CONNECTIONS));
     let mut visits: Vec<(Visit, JoinHandle<()>)> = Vec::new();
     loop {
-        let Ok((stream, _)) = listener.accept().await else {
+        let Ok((stream, peer)) = listener.accept().await else {
             // Out of descriptors, for instance: there may be some later.
             tokio::time::sleep(ACCEPT_AGAIN).await;
             continue;
@@ -103,7 +105,7 @@ pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events
         // It is never closed.
         let Ok(place) = places.clone().acquire_owned().await else { return };
         let local = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip());
-        let visit = Visit { local, welcome: Arc::default() };
+        let visit = Visit { local, peer: peer.ip(), welcome: Arc::default() };
         // Who takes nothing of what was sent is gone; where that cannot be asked for, the system has its own limit.
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(LONGEST_STALL));
         let connection = answer(stream, router.clone(), visit.clone());
@@ -152,7 +154,7 @@ impl Empty {
     /// With these cameras.
     fn of(fleet: Fleet) -> std::io::Result<Self> {
         let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
-        let router = router(&http, Arc::new(fleet), Events::default());
+        let router = router(&http, Arc::new(fleet), Events::default(), Arc::default());
         Ok(Self { router, runtime: tokio::runtime::Builder::new_current_thread().enable_time().build()? })
     }
 
@@ -177,12 +179,13 @@ impl Empty {
 
 /// All that is answered to somebody who says this and no more, on a page without cameras or password.
 pub fn answer_to(said: &[u8]) -> Vec<u8> {
-    let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+    let local = Http::LISTEN.ip();
+    let visit = Visit { local, peer: local, welcome: Arc::default() };
     EMPTY.with(|empty| empty.as_ref().map_or_else(Vec::new, |empty| empty.answer_to(said, visit)))
 }
 
-fn router(http: &Http, fleet: Arc<Fleet>, events: Events) -> Router {
-    let access = Arc::new(Access::new(http));
+fn router(http: &Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) -> Router {
+    let access = Arc::new(Access::new(http, log));
     Router::new()
         .route("/", get(async || html(include_str!("page.html"))))
         .route("/metrics", get(metrics::answer))
@@ -363,7 +366,8 @@ mod tests {
         let told = Told::run(&known);
         let page = Empty::of(fleet).unwrap();
         let ask = |request: &str| {
-            let visit = Visit { local: Http::LISTEN.ip(), welcome: Arc::default() };
+            let local = Http::LISTEN.ip();
+            let visit = Visit { local, peer: local, welcome: Arc::default() };
             let said = format!("{request} HTTP/1.1\r\nHost: localhost\r\nConnection: close\r\n\r\n");
             String::from_utf8(page.answer_to(said.as_bytes(), visit)).unwrap()
         };
@@ -388,7 +392,8 @@ mod tests {
 
     #[test]
     fn every_request_of_a_visit_may_ask_by_the_address_that_was_connected_to() {
-        let visit = Visit { local: IpAddr::from([192, 0, 2, 1]), welcome: Arc::default() };
+        let local = IpAddr::from([192, 0, 2, 1]);
+        let visit = Visit { local, peer: local, welcome: Arc::default() };
         let request = "GET /cameras HTTP/1.1\r\nHost: 192.0.2.1\r\n\r\n".repeat(2);
         let answered = Empty::new().unwrap().answer_to(request.as_bytes(), visit.clone());
         let answered = String::from_utf8(answered).unwrap();

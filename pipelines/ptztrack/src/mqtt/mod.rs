@@ -2,16 +2,20 @@
 
 //! What happens, told to an MQTT broker: events as they come, and what is kept there for who comes later.
 
+mod presence;
 mod topics;
 mod tracks;
 
 use std::collections::BTreeMap;
+use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use presence::Presence;
 use rumqttc::{
-    AsyncClient, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS, TlsConfiguration, Transport,
+    AsyncClient, ConnectionError, EventLoop, Incoming, LastWill, MqttOptions, Outgoing, QoS,
+    TlsConfiguration, Transport,
 };
 use tokio::sync::broadcast::error::RecvError;
 use tokio::task::JoinHandle;
@@ -83,9 +87,12 @@ impl Publisher {
     }
 }
 
-/// Where the broker is, and who we are; `what` tells our connections apart.
+/// Where the broker is, and who we are; `what` tells our connections apart. A broker ends a connection where another one begins by the
+/// same name: two containers may have the host's name and the same number of a process.
 fn options(settings: &Mqtt, what: &str) -> Result<MqttOptions, session::Error> {
-    let id = format!("ptztrack-{}-{}{what}", glib::host_name(), std::process::id());
+    // Of keys that are drawn by chance.
+    let chance = RandomState::new().build_hasher().finish();
+    let id = format!("ptztrack-{}-{chance:016x}{what}", glib::host_name());
     let mut options = MqttOptions::new(id, &settings.host, settings.port);
     options.set_keep_alive(KEEP_ALIVE);
     if let Some(credentials) = &settings.credentials {
@@ -98,20 +105,40 @@ fn options(settings: &Mqtt, what: &str) -> Result<MqttOptions, session::Error> {
     Ok(options)
 }
 
-/// Says once that the broker is away, and once that it is there.
+/// What happens next on a connection. Where it breaks, all that was under way is lost: what the broker keeps is published again, and
+/// events are told once at most. The library would keep it until a broker says that it has forgotten us, and one that never says
+/// so and hangs up each time would have it grow without end.
+///
+/// # Errors
+/// Why there is no connection, or no more.
+async fn next(events: &mut EventLoop) -> Result<rumqttc::Event, ConnectionError> {
+    let happened = events.poll().await;
+    if happened.is_err() {
+        events.pending.clear();
+        // A message whose number was still taken, as the broker answered in another order. As long as it waits, none is sent.
+        events.state.collision = None;
+    }
+    happened
+}
+
+/// Says that the broker is away, and that it is there.
 async fn keep_connected(mut events: EventLoop, connected: Arc<AtomicBool>, broker: String, log: Arc<Log>) {
-    let mut told = false;
+    let mut presence = Presence::default();
     loop {
-        match events.poll().await {
-            Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
-                told = false;
-                connected.store(true, Ordering::Relaxed);
-                log.info("mqtt-connected", format!("connected to the MQTT broker {broker}"));
-            }
+        let happened = next(&mut events).await;
+        let is_to_be_told = presence.is_to_be_told(happened.is_ok(), Instant::now());
+        match happened {
             Ok(rumqttc::Event::Outgoing(Outgoing::Disconnect)) => return,
-            Ok(_) => {}
+            Ok(event) => {
+                if matches!(event, rumqttc::Event::Incoming(Incoming::ConnAck(_))) {
+                    connected.store(true, Ordering::Relaxed);
+                }
+                if is_to_be_told {
+                    log.info("mqtt-connected", format!("connected to the MQTT broker {broker}"));
+                }
+            }
             Err(err) => {
-                if !std::mem::replace(&mut told, true) {
+                if is_to_be_told {
                     let detail =
                         format!("no connection to the MQTT broker {broker}: {err}; it is tried again");
                     log.error("mqtt-disconnected", detail);
@@ -182,7 +209,51 @@ fn changes(kept: &BTreeMap<String, String>, wanted: &BTreeMap<String, String>) -
 
 #[cfg(test)]
 mod tests {
+    use std::io::{Read, Write};
+    use std::net::TcpListener;
+
+    use rumqttc::Publish;
+
     use super::*;
+
+    /// A broker that says each time that it knows us, hears this many bytes after that, and hangs up; its port.
+    fn broker(hears: usize) -> u16 {
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let port = listener.local_addr().unwrap().port();
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let mut stream = stream.unwrap();
+                // CONNECT, which is short.
+                let mut head = [0; 2];
+                stream.read_exact(&mut head).unwrap();
+                stream.read_exact(&mut vec![0; head[1].into()]).unwrap();
+                // CONNACK: the session is present, and accepted.
+                stream.write_all(&[0x20, 2, 1, 0]).unwrap();
+                stream.read_exact(&mut vec![0; hears]).unwrap();
+            }
+        });
+        port
+    }
+
+    #[tokio::test]
+    async fn a_broker_that_hangs_up_each_time_and_claims_to_know_us_leaves_nothing_behind() {
+        let options = MqttOptions::new("test", "127.0.0.1", broker(1));
+        let (client, mut events) = AsyncClient::new(options, WAITING);
+        for _ in 0..3 {
+            for _ in 0..50 {
+                client.try_publish("topic", QoS::AtLeastOnce, true, "payload").unwrap();
+            }
+            let mut published = 0;
+            while let Ok(happened) = next(&mut events).await {
+                if matches!(happened, rumqttc::Event::Outgoing(Outgoing::Publish(_))) {
+                    published += 1;
+                    events.state.collision = Some(Publish::new("topic", QoS::AtLeastOnce, "payload"));
+                }
+            }
+            assert!(published > 0, "what collided in the last connection keeps nothing from this one");
+            assert!(events.pending.is_empty() && events.state.collision.is_none());
+        }
+    }
 
     #[test]
     fn what_changed_is_published_and_what_is_gone_forgotten() {

@@ -4,13 +4,15 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant;
 
 use rumqttc::{AsyncClient, EventLoop, Incoming, MqttOptions, Publish, QoS, SubscribeReasonCode};
 use tokio::sync::mpsc;
 use tokio::task::JoinHandle;
 
+use super::presence::Presence;
 use super::topics::Topics;
-use super::{PAUSE, options};
+use super::{PAUSE, next, options};
 use crate::config::Mqtt;
 use crate::handover::{Exchange, Message};
 use crate::log::Log;
@@ -65,17 +67,19 @@ struct Hearing {
 
 impl Hearing {
     async fn run(self, mut events: EventLoop) {
-        let (mut warned, mut away) = (false, false);
+        let (mut warned, mut refused, mut presence) = (false, false, Presence::default());
         loop {
-            match events.poll().await {
+            let happened = next(&mut events).await;
+            let is_to_be_told = presence.is_to_be_told(happened.is_ok(), Instant::now());
+            match happened {
                 Ok(rumqttc::Event::Incoming(Incoming::ConnAck(_))) => {
-                    away = false;
                     // The queue is empty: nothing is said before this.
                     let _ = self.client.try_subscribe(self.topics.tracks("+"), QoS::AtMostOnce);
                     self.connected.store(true, Ordering::Relaxed);
                 }
                 Ok(rumqttc::Event::Incoming(Incoming::SubAck(answer))) => {
-                    if answer.return_codes.contains(&SubscribeReasonCode::Failure) {
+                    let is_refused = answer.return_codes.contains(&SubscribeReasonCode::Failure);
+                    if is_refused && !std::mem::replace(&mut refused, true) {
                         self.not_exchanged("it lets this client hear none");
                     }
                 }
@@ -89,7 +93,7 @@ impl Hearing {
                 Ok(_) => {}
                 Err(err) => {
                     self.connected.store(false, Ordering::Relaxed);
-                    if !std::mem::replace(&mut away, true) {
+                    if is_to_be_told {
                         self.not_exchanged(&err.to_string());
                     }
                     tokio::time::sleep(PAUSE).await;

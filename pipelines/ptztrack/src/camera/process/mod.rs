@@ -18,7 +18,7 @@ use std::net::Shutdown;
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
 use std::os::unix::process::CommandExt;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -44,6 +44,9 @@ const LONGEST_SILENCE: Duration = Duration::from_secs(10);
 
 /// Between its last word and its end.
 const LONGEST_END: Duration = Duration::from_secs(5);
+
+/// Between two looks whether it has ended.
+const LOOK_AGAIN: Duration = Duration::from_millis(20);
 
 /// To start one costs half a second of a processor, so it is not tried as often as a pipeline; one that lasted for so long
 /// was well.
@@ -112,11 +115,43 @@ impl Processes {
         let heard = self.talk(ours, settings, known, log);
         lock(&self.socket).take();
         lock(&known.running).take();
-        let status = end(&mut child, heard.is_ok());
+        // However long its end takes.
+        lock(&known.state).picture = false;
+        let status = self.see_end(known, heard.is_ok(), LONGEST_END, |kill| {
+            if kill {
+                // It may have ended by now.
+                let _ = child.kill();
+            }
+            child.try_wait()
+        });
         if self.told_to_end.load(Ordering::SeqCst) || lock(&known.state).given_up {
             return Ok(());
         }
         Err(heard.err().map_or_else(|| format!("its process ended: {status}"), |err| err.to_string()))
+    }
+
+    /// Waits for its end where it may come by itself within this time, and sees to it otherwise. One that cannot even be killed, as in
+    /// a driver that never returns, is waited for: this thread is well meanwhile, and no other camera is the worse for it. Where
+    /// this one is to end, it is not waited for any longer.
+    fn see_end(
+        &self,
+        known: &Known,
+        by_itself: bool,
+        longest: Duration,
+        mut try_end: impl FnMut(bool) -> io::Result<Option<ExitStatus>>,
+    ) -> String {
+        let begin = Instant::now();
+        loop {
+            known.beat();
+            match try_end(!by_itself || begin.elapsed() >= longest) {
+                Ok(Some(status)) => return status.to_string(),
+                Err(err) => return err.to_string(),
+                Ok(None) if self.told_to_end.load(Ordering::SeqCst) && begin.elapsed() >= 2 * longest => {
+                    return "it cannot be ended".to_owned();
+                }
+                Ok(None) => thread::park_timeout(LOOK_AGAIN),
+            }
+        }
     }
 
     /// Until it says nothing any more.
@@ -193,21 +228,6 @@ fn line(value: &impl Serialize) -> io::Result<Vec<u8>> {
     let mut line = serde_json::to_vec(value)?;
     line.push(b'\n');
     Ok(line)
-}
-
-/// Waits for its end where it may come by itself, and sees to it otherwise.
-fn end(child: &mut Child, by_itself: bool) -> String {
-    let begin = Instant::now();
-    while by_itself && begin.elapsed() < LONGEST_END {
-        match child.try_wait() {
-            Ok(None) => thread::sleep(Duration::from_millis(20)),
-            Ok(Some(status)) => return status.to_string(),
-            Err(err) => return err.to_string(),
-        }
-    }
-    // It may have ended by now.
-    let _ = child.kill();
-    child.wait().map_or_else(|err| err.to_string(), |status: ExitStatus| status.to_string())
 }
 
 /// A camera's process, as others see it.
@@ -349,5 +369,30 @@ mod tests {
         remote.hear(Report::of(&Known::new("door"), 0), &known);
         assert!(known.is_handed_over() && !remote.is_deaf.load(Ordering::SeqCst));
         drop(its);
+    }
+
+    #[test]
+    fn one_that_cannot_be_killed_is_waited_for_until_the_camera_is_to_end() {
+        let (processes, known) = (Processes::default(), Known::new("door"));
+        let mut tries = Vec::new();
+        let status = processes.see_end(&known, true, Duration::ZERO, |kill| {
+            tries.push(kill);
+            if tries.len() == 3 {
+                processes.end();
+            }
+            Ok(None)
+        });
+        assert_eq!((status.as_str(), tries), ("it cannot be ended", vec![true; 3]));
+    }
+
+    #[test]
+    fn one_that_ends_by_itself_is_not_killed() {
+        let (processes, known) = (Processes::default(), Known::new("door"));
+        let mut tries = Vec::new();
+        let status = processes.see_end(&known, true, Duration::MAX / 2, |kill| {
+            tries.push(kill);
+            Ok((tries.len() == 2).then(ExitStatus::default))
+        });
+        assert_eq!((status, tries), (ExitStatus::default().to_string(), vec![false; 2]));
     }
 }
