@@ -21,6 +21,9 @@ use virtual_camera::VirtualCamera;
 /// Between two pictures of the camera.
 const INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / 15);
 
+/// Ours has to send a stranger away before the server would do so by itself, after a minute.
+const LONGEST_TUNNEL: Duration = Duration::from_secs(50);
+
 /// A camera that is passed on, with more in its entry and in the server's.
 #[track_caller]
 fn start(test: &str, camera: &VirtualCamera, entry: &str, restream: &str) -> Program {
@@ -331,6 +334,34 @@ fn who_writes_without_end_is_sent_away_and_leaves_nothing_behind() {
     let begin = Instant::now();
     while threads() > before {
         assert!(begin.elapsed() < PATIENCE, "somebody still reads: {} threads, {before} before", threads());
+    }
+    let (read, said) = ffprobe(&url);
+    assert!(read, "{said}");
+    program.end("TERM");
+}
+
+/// Both requests of a tunnel through HTTP are heard; that which comes second goes on with the client of the first.
+#[test]
+fn a_tunnel_without_a_stream_has_its_place_no_longer_than_others_whichever_request_comes_first() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("tunnel", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let begin = Instant::now();
+    let request = |method: &str, cookie: &str| {
+        let mut stranger = TcpStream::connect(server(&url)).unwrap();
+        stranger.set_read_timeout(Some(PATIENCE)).unwrap();
+        let head = format!("{method} /door HTTP/1.0\r\nx-sessioncookie: {cookie}\r\n\r\n");
+        stranger.write_all(head.as_bytes()).unwrap();
+        // So that it is heard before the other.
+        thread::sleep(Duration::from_millis(500));
+        stranger
+    };
+    let tunnels = [["POST", "GET"], ["GET", "POST"]]
+        .map(|methods| methods.map(|method| (method, request(method, methods[0]))));
+    for (method, mut stranger) in tunnels.into_iter().flatten() {
+        let mut answer = String::new();
+        stranger.read_to_string(&mut answer).unwrap_or_else(|err| panic!("{method} is not sent away: {err}"));
+        assert!(begin.elapsed() < LONGEST_TUNNEL, "{method} is sent away after {:?}", begin.elapsed());
     }
     let (read, said) = ffprobe(&url);
     assert!(read, "{said}");

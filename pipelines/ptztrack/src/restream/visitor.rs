@@ -42,12 +42,23 @@ pub(super) fn receive(server: &RTSPServer, client: &RTSPClient, context: &glib::
     context.spawn_local(watch(socket, client.downgrade(), settled, is_too_much));
 }
 
-/// By which a client is connected.
+/// By which a client has connected.
 fn socket_of(client: &RTSPClient) -> Option<gio::Socket> {
     // SAFETY: the connection lives at least as long as its client, and the socket as long as somebody has a reference to it.
     unsafe {
         let connection = gst_rtsp_server::ffi::gst_rtsp_client_get_connection(client.as_ptr());
         let socket = gst_rtsp_server::gst_rtsp::ffi::gst_rtsp_connection_get_read_socket(connection);
+        from_glib_none(socket)
+    }
+}
+
+/// By which a client is answered: in a tunnel through HTTP, another than that by which it asks, and than that by which it connected where
+/// its POST came first.
+fn answering(client: &RTSPClient) -> Option<gio::Socket> {
+    // SAFETY: as above. This socket goes with the connection; the one that is read from does not, as a tunnel may lose it.
+    unsafe {
+        let connection = gst_rtsp_server::ffi::gst_rtsp_client_get_connection(client.as_ptr());
+        let socket = gst_rtsp_server::gst_rtsp::ffi::gst_rtsp_connection_get_write_socket(connection);
         from_glib_none(socket)
     }
 }
@@ -58,19 +69,25 @@ async fn watch(socket: gio::Socket, client: glib::WeakRef<RTSPClient>, settled: 
     let is_short = || received(&socket) <= MOST_BYTES;
     while !is_too_much && begin.elapsed() < LONGEST_VISIT && is_short() {
         glib::timeout_future(LOOK).await;
-        if settled.load(Ordering::Relaxed) || socket.is_closed() {
+        // A client may be there without its socket: in a tunnel it waits for another request by which it would be told more.
+        if settled.load(Ordering::Relaxed) || (socket.is_closed() && client.upgrade().is_none()) {
             return;
         }
     }
+    let client = client.upgrade();
     // One that goes on with a session of before; or, where the client is gone and its socket is not, that of a tunnel through HTTP,
     // which is another client's now.
-    let belongs = || client.upgrade().is_none_or(|client| !client.session_filter(None).is_empty());
-    if !is_too_much && is_short() && belongs() {
+    let belongs = client.as_ref().is_none_or(|client| !client.session_filter(None).is_empty());
+    if !is_too_much && is_short() && belongs {
         return;
     }
     // The client's own thread reads the end of it, and closes it. Closed by another thread, a connection that is just being read would
     // keep its thread busy for ever.
     let _ = socket.shutdown(true, true);
+    // Without this, one of a tunnel waits for another request until the server itself ends it, after a minute.
+    if let Some(answering) = client.as_ref().and_then(answering) {
+        let _ = answering.shutdown(true, true);
+    }
 }
 
 /// How many bytes have come by a socket of TCP; 0 where nobody can tell.

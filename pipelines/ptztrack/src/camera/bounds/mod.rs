@@ -17,8 +17,12 @@ use sizes::{Codec, Size};
 /// The most pixels that are decoded: those of 8K, as cinemas have it.
 const MOST_PIXELS: u64 = 8192 * 4320;
 
-/// The most bytes of one encoded picture: one that large of poorly compressed JPEG.
+/// The most bytes of one encoded picture, with what its buffers take besides: one that large of poorly compressed JPEG.
 const MOST_BYTES: usize = 64 * 1024 * 1024;
+
+/// What a buffer takes beside the bytes in it: its own structure, that of its memory, and its place where it waits. Together they are
+/// half of that to all of it, so a stream of tiny buffers takes far more than it sends.
+pub const BUFFER: usize = 1024;
 
 /// Pictures in a row that cannot be read, of which the network may have broken some: a second or two.
 const MOST_UNREADABLE: usize = 50;
@@ -58,16 +62,21 @@ pub fn size_of(pad: &gst::Pad, picture: &gst::BufferRef) -> Option<(u32, u32)> {
     Some((size.width, size.height))
 }
 
+/// The bytes that a buffer takes of our memory.
+pub fn cost(buffer: &gst::BufferRef) -> usize {
+    buffer.size().saturating_add(BUFFER)
+}
+
 /// What comes is counted until a decoder gets a picture.
 fn count(pad: &gst::Pad, waiting: Arc<AtomicUsize>) {
     pad.add_probe(gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST, move |pad, info| {
         let bytes = match &info.data {
-            Some(gst::PadProbeData::Buffer(buffer)) => buffer.size(),
-            Some(gst::PadProbeData::BufferList(list)) => list.calculate_size(),
+            Some(gst::PadProbeData::Buffer(buffer)) => cost(buffer),
+            Some(gst::PadProbeData::BufferList(list)) => list.iter().map(cost).sum(),
             _ => 0,
         };
         if waiting.fetch_add(bytes, Ordering::Relaxed) + bytes > MOST_BYTES {
-            return refuse(pad, &format!("{MOST_BYTES} bytes came without a picture"));
+            return refuse(pad, &format!("{MOST_BYTES} bytes of memory are taken without a picture"));
         }
         gst::PadProbeReturn::Ok
     });
@@ -215,21 +224,48 @@ mod tests {
         assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
     }
 
-    /// Packets of RTP (RFC 3550), none of which has the marker that ends a picture. They carry the same memory: another test looks at
-    /// how much this process takes.
+    /// What is said of so many packets of RTP (RFC 3550), none of which has the marker that ends a picture.
+    fn error_of_packets(number: usize, carried: impl Fn() -> gst::Memory) -> Option<String> {
+        let packets = (0..number).map(|number| {
+            let [.., high, low] = number.to_be_bytes();
+            let mut packet = gst::Buffer::from_slice([0x80, 96, high, low, 0, 0, 0, 0, 0, 0, 0, 1]);
+            packet.get_mut().unwrap().append_memory(carried());
+            packet
+        });
+        let caps = "application/x-rtp,media=video,clock-rate=90000,encoding-name=MP4V-ES";
+        error_of_buffers("rtpmp4vdepay name=received", caps, packets)
+    }
+
+    /// They carry the same memory: another test looks at how much this process takes.
     #[test]
     fn packets_that_never_become_a_picture_are_not_kept() {
         gst::init().unwrap();
         let carried = gst::Memory::from_slice(vec![b'x'; 1 << 20]);
-        let packets = (0..=MOST_BYTES >> 20).map(|number| {
-            let [high, low] = u16::try_from(number).unwrap().to_be_bytes();
-            let mut packet = gst::Buffer::from_slice([0x80, 96, high, low, 0, 0, 0, 0, 0, 0, 0, 1]);
-            packet.get_mut().unwrap().append_memory(carried.clone());
-            packet
-        });
-        let caps = "application/x-rtp,media=video,clock-rate=90000,encoding-name=MP4V-ES";
-        let error = error_of_buffers("rtpmp4vdepay name=received", caps, packets);
+        let error = error_of_packets((MOST_BYTES >> 20) + 1, || carried.clone());
         assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
+    }
+
+    /// A byte each: what they carry would be millions of them below the bound.
+    #[test]
+    fn packets_with_hardly_anything_in_them_are_not_kept_either() {
+        gst::init().unwrap();
+        let error = error_of_packets(MOST_BYTES / BUFFER, || gst::Memory::from_slice([b'x']));
+        assert!(error.as_ref().is_some_and(|error| error.contains("without a picture")), "{error:?}");
+    }
+
+    #[test]
+    fn a_list_of_buffers_costs_what_each_of_them_does() {
+        gst::init().unwrap();
+        let pad = gst::Pad::new(gst::PadDirection::Src);
+        let waiting = Arc::new(AtomicUsize::new(0));
+        count(&pad, waiting.clone());
+        pad.set_active(true).unwrap();
+        pad.push_event(gst::event::StreamStart::new("packets"));
+        pad.push_event(gst::event::Segment::new(&gst::FormattedSegment::<gst::ClockTime>::new()));
+        let list: gst::BufferList = (0..3).map(|_| gst::Buffer::from_slice([b'x'])).collect();
+        // Nothing is linked that would take them.
+        let _ = pad.push_list(list);
+        assert_eq!(waiting.load(Ordering::Relaxed), 3 * (BUFFER + 1));
     }
 
     #[test]

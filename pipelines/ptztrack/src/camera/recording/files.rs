@@ -21,6 +21,13 @@ const FREE_SHARE: u64 = 20;
 const LEAST_SHARE: u64 = 2 * FREE_SHARE;
 const SHORT: &str = "less than a fortieth of the disk is free";
 
+/// A file has at most one part in so many of the disk, as large as the room that is never written to: only where another begins is
+/// anything deleted for `keep-bytes`, and the newest is never deleted to make room.
+const LARGEST_SHARE: u64 = LEAST_SHARE;
+
+/// A file has at most one part in so many of `keep-bytes`.
+const KEPT_FILES: u64 = 4;
+
 /// The files of a recording that began last, and when, in milliseconds since 1970. They are not looked for: the disk may hang.
 #[derive(Debug, Default)]
 pub struct Segments(Mutex<VecDeque<Segment>>);
@@ -113,10 +120,15 @@ fn now_ms() -> i64 {
     i64::try_from(now.as_millis()).unwrap_or(i64::MAX)
 }
 
-/// Names the files by the time at which they begin, and deletes old ones whenever another begins.
+/// Names the files by the time at which they begin, bounds them, and deletes old ones whenever another begins.
 pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, segments: &Arc<Segments>) {
     let Some(sink) = pipeline.by_name("recording") else { return };
     sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
+    // Where the folder cannot be made, there is no disk to be asked about; the element says so.
+    let _ = fs::create_dir_all(&recording.folder);
+    if let Some(bytes) = largest_file(recording, disk_bytes(&recording.folder)) {
+        sink.set_property("max-size-bytes", bytes);
+    }
     let (recording, camera, segments) = (recording.clone(), camera.to_owned(), segments.clone());
     // Goes with the sink.
     let writer = Arc::new(());
@@ -130,6 +142,20 @@ pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, 
         segments.begin(now_ms(), file.clone(), &writer);
         Some(file.to_value())
     });
+}
+
+/// The bytes after which the next file begins, on a disk of so many. It may still be larger by pictures that need the one before.
+fn largest_file(recording: &Recording, disk: Option<u64>) -> Option<u64> {
+    let of_kept = recording.keep_bytes.map(|most| most / KEPT_FILES);
+    let of_disk = disk.map(|bytes| bytes / LARGEST_SHARE);
+    // To the element, 0 is without a bound.
+    of_kept.into_iter().chain(of_disk).min().map(|bytes| bytes.max(1))
+}
+
+/// How large the disk is. Nothing where nobody can tell: not every network's disk does.
+fn disk_bytes(folder: &Path) -> Option<u64> {
+    let disk = rustix::fs::statvfs(folder).ok()?;
+    Some(disk.f_blocks.saturating_mul(disk.f_frsize)).filter(|bytes| *bytes > 0)
 }
 
 /// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest and what is being
@@ -189,14 +215,18 @@ fn delete_old(recording: &Recording, camera: &str) {
 fn files(folder: &Path, camera: &str) -> Vec<Kept> {
     let now = SystemTime::now();
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    // Looked at first: nearly all files are those of other cameras, and a date takes longer to read.
+    let begins = format!("{camera}-");
     let kept = |entry: fs::DirEntry| {
+        entry.file_name().as_encoded_bytes().starts_with(begins.as_bytes()).then_some(())?;
         let path = entry.path();
         let (of, began_ms) = name_of(&path)?;
         (of == camera).then_some(())?;
         let meta = entry.metadata().ok()?;
         let age = now.duration_since(meta.modified().ok()?).unwrap_or_default();
-        let written =
-            meta.created().ok().and_then(|created| meta.modified().ok()?.duration_since(created).ok());
+        // A disk that does not tell when it was created leaves its name.
+        let named = SystemTime::UNIX_EPOCH + Duration::from_millis(began_ms.max(0).unsigned_abs());
+        let written = meta.modified().ok()?.duration_since(meta.created().unwrap_or(named));
         Some(Kept { path, began_ms, bytes: meta.len(), age, lasts: written.unwrap_or(Duration::MAX) })
     };
     entries.filter_map(kept).collect()
@@ -297,6 +327,41 @@ mod tests {
         delete_while(|| written.exists(), files(), &segments);
         assert_eq!(there(), [false, false, false]);
         fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn a_file_is_a_small_part_of_the_disk_and_of_what_is_kept() {
+        let largest = |keep_bytes, disk| largest_file(&recording(None, keep_bytes), disk);
+        assert_eq!(largest(None, Some(40_000)), Some(1000));
+        assert_eq!(largest(Some(8000), Some(40_000)), Some(1000));
+        assert_eq!(largest(Some(2000), Some(40_000)), Some(500));
+        assert_eq!(largest(Some(2000), None), Some(500));
+        assert_eq!(largest(None, None), None);
+        assert_eq!(largest(Some(3), Some(40_000)), Some(1), "0 would be without a bound");
+        assert!(disk_bytes(&std::env::temp_dir()).unwrap() > 0);
+        assert_eq!(disk_bytes(Path::new("/not/there")), None);
+    }
+
+    /// Noise, as it is large; all of it within a segment.
+    #[test]
+    fn a_stream_that_is_too_large_for_a_file_goes_on_in_others() {
+        gst::init().unwrap();
+        let folder = std::env::temp_dir().join(format!("ptztrack-large-{}", std::process::id()));
+        let recording = Recording { folder: folder.clone(), ..recording(None, Some(KEPT_FILES * 1_000_000)) };
+        let text = "videotestsrc num-buffers=50 pattern=snow ! video/x-raw,width=320,height=240 ! jpegenc \
+                    ! splitmuxsink name=recording muxer-factory=matroskamux";
+        let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
+        configure(&pipeline, &recording, "door", &Arc::default());
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+        let end =
+            pipeline.bus().unwrap().timed_pop_filtered(gst::ClockTime::from_seconds(60), &kinds).unwrap();
+        pipeline.set_state(gst::State::Null).unwrap();
+        let found = files(&folder, "door");
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(end.type_(), gst::MessageType::Eos);
+        assert!(found.len() > 1, "{found:?}");
+        assert!(found.iter().all(|file| file.bytes < 1_100_000), "{found:?}");
     }
 
     #[test]

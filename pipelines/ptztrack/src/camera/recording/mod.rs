@@ -22,6 +22,7 @@ use std::time::{Duration, Instant};
 use gst::prelude::*;
 use ptztrack_contract::lock::lock;
 
+use super::bounds::{self, cost};
 use crate::config::{Codec, Recording};
 use crate::event::{Event, Level};
 use crate::log::Log;
@@ -32,8 +33,11 @@ pub const ENCODER: &str = "x264enc tune=zerolatency speed-preset=superfast key-i
 /// So much waits for a disk that is slow for a moment, in bytes.
 const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
 
-/// Of pictures in a row that need the one before, in bytes: a minute at 32 Mbit/s. Cameras send one that needs no other every few
-/// seconds, or once a minute where nothing moves and little is sent.
+/// So many pictures wait for it at most: small ones take more than their bytes.
+const MOST_QUEUED: u64 = LONGEST_QUEUE / bounds::BUFFER as u64;
+
+/// Of pictures in a row that need the one before, in bytes of memory that they take: a minute at 32 Mbit/s. Cameras send one that needs
+/// no other every few seconds, or once a minute where nothing moves and little is sent.
 const LONGEST_GROUP: usize = 256 * 1024 * 1024;
 
 /// Between two tries; twice as long each time.
@@ -198,7 +202,7 @@ fn description(codec: Codec) -> String {
     };
     format!(
         "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
-         ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
+         max-buffers={MOST_QUEUED} ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
     )
 }
 
@@ -261,13 +265,14 @@ fn bound_groups(source: &gst_app::AppSrc) {
             return gst::PadProbeReturn::Handled;
         };
         let delta = buffer.flags().contains(gst::BufferFlags::DELTA_UNIT);
-        let now = buffer.size().saturating_add(if delta { before } else { 0 });
+        let now = cost(buffer).saturating_add(if delta { before } else { 0 });
         kept.store(now, Ordering::Relaxed);
         if now <= LONGEST_GROUP {
             return gst::PadProbeReturn::Ok;
         }
         if let Some(element) = pad.parent_element() {
-            let why = format!("{LONGEST_GROUP} bytes came without a picture that needs no other");
+            let why =
+                format!("{LONGEST_GROUP} bytes of memory are taken without a picture that needs no other");
             gst::element_error!(element, gst::StreamError::Mux, ("{why}"));
         }
         gst::PadProbeReturn::Handled
@@ -292,34 +297,45 @@ impl Drop for Tap {
 mod tests {
     use super::*;
 
-    /// Pictures of a mebibyte, more than wait for a disk; nothing runs that would write them.
-    #[test]
-    fn what_a_slow_disk_does_not_take_is_dropped_and_not_waited_for() {
-        gst::init().unwrap();
+    /// What waits of so many pictures of this size for a disk, where nothing runs that would write them: how many, and their bytes.
+    fn waiting(number: u64, size: usize) -> (u64, u64) {
         let pipeline = gst::parse::launch(&description(Codec::Mjpeg)).unwrap();
         let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
         let source = source.downcast::<gst_app::AppSrc>().unwrap();
         let feed = Feed::default();
         feed.start(source.clone());
-        let picture = gst::Buffer::from_slice(vec![0; 1 << 20]);
-        let sample = gst::Sample::builder().buffer(&picture).build();
-        for _ in 0..3 * (LONGEST_QUEUE >> 20) {
-            feed.copy(&sample);
+        let picture = picture(size, false);
+        for _ in 0..number {
+            feed.copy(&picture);
         }
-        let waiting = source.current_level_bytes();
-        assert!((LONGEST_QUEUE / 2..=LONGEST_QUEUE).contains(&waiting), "{waiting}");
+        (source.property("current-level-buffers"), source.current_level_bytes())
     }
 
-    /// A picture of a mebibyte.
-    fn picture(delta: bool) -> gst::Sample {
-        let mut picture = gst::Buffer::from_slice(vec![0; 1 << 20]);
+    #[test]
+    fn what_a_slow_disk_does_not_take_is_dropped_and_not_waited_for() {
+        gst::init().unwrap();
+        let (_, bytes) = waiting(3 * (LONGEST_QUEUE >> 20), 1 << 20);
+        assert!((LONGEST_QUEUE / 2..=LONGEST_QUEUE).contains(&bytes), "{bytes}");
+        let (pictures, _) = waiting(3 * MOST_QUEUED, SMALL);
+        assert!((MOST_QUEUED / 2..=MOST_QUEUED).contains(&pictures), "{pictures}");
+    }
+
+    /// A picture of H.264 in which nothing moves has as many bytes.
+    const SMALL: usize = 9;
+
+    /// Takes a mebibyte.
+    const LARGE: usize = (1 << 20) - bounds::BUFFER;
+
+    /// A picture of so many bytes.
+    fn picture(size: usize, delta: bool) -> gst::Sample {
+        let mut picture = gst::Buffer::from_slice(vec![0; size]);
         if delta {
             picture.get_mut().unwrap().set_flags(gst::BufferFlags::DELTA_UNIT);
         }
         gst::Sample::builder().buffer(&picture).build()
     }
 
-    /// What is said of these pictures, and how many bytes of them go on from where a parser stands.
+    /// What is said of these pictures, and what memory those take that go on from where a parser stands.
     fn recorded<'a>(pictures: impl Iterator<Item = &'a gst::Sample>) -> (Option<String>, usize) {
         // Plays before anything comes: after an error it would not begin to, and so not end.
         let text = "appsrc name=feed format=time ! identity ! fakesink name=recording async=false";
@@ -329,7 +345,7 @@ mod tests {
         sink.add_probe(gst::PadProbeType::BUFFER, {
             let written = written.clone();
             move |_, info| {
-                written.fetch_add(info.buffer().map_or(0, |buffer| buffer.size()), Ordering::Relaxed);
+                written.fetch_add(info.buffer().map_or(0, |buffer| cost(buffer)), Ordering::Relaxed);
                 gst::PadProbeReturn::Ok
             }
         });
@@ -353,7 +369,7 @@ mod tests {
     #[test]
     fn pictures_that_all_need_the_one_before_end_the_recording() {
         gst::init().unwrap();
-        let (key, delta) = (picture(false), picture(true));
+        let (key, delta) = (picture(LARGE, false), picture(LARGE, true));
         let most = LONGEST_GROUP >> 20;
         // Also what begins anew comes too late.
         let endless =
@@ -363,6 +379,17 @@ mod tests {
         assert_eq!(written, LONGEST_GROUP);
         let groups = (0..4 * most).map(|number| if number.is_multiple_of(most) { &key } else { &delta });
         assert_eq!(recorded(groups), (None, 4 * LONGEST_GROUP));
+    }
+
+    #[test]
+    fn small_pictures_that_all_need_the_one_before_end_the_recording_as_well() {
+        gst::init().unwrap();
+        let delta = picture(SMALL, true);
+        let endless = std::iter::repeat_n(&delta, LONGEST_GROUP / bounds::BUFFER);
+        let (said, written) = recorded(std::iter::once(&picture(SMALL, false)).chain(endless));
+        assert!(said.as_ref().is_some_and(|said| said.contains("needs no other")), "{said:?}");
+        let one = bounds::BUFFER + SMALL;
+        assert_eq!(written, LONGEST_GROUP / one * one);
     }
 
     #[test]
