@@ -52,11 +52,11 @@ mod tests {
     fn read(hours: &[(u32, u32)]) -> Vec<u32> {
         let (begin, start) = (SystemTime::UNIX_EPOCH + 1000 * HOUR, Instant::now());
         let mut clock = Clock::new(begin, start);
-        let mut read = |&(after, ahead): &(u32, u32)| {
+        let read = |&(after, ahead): &(u32, u32)| {
             let believed = clock.read(begin + (after + ahead) * HOUR, start + after * HOUR);
             u32::try_from(believed.duration_since(begin).unwrap().as_secs() / 3600).unwrap()
         };
-        hours.iter().map(|hours| read(hours)).collect()
+        hours.iter().map(read).collect()
     }
 
     #[test]

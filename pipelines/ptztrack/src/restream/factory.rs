@@ -134,6 +134,9 @@ mod imp {
     }
 }
 
+/// So much waits for a visitor at most, in bytes: a camera may send pictures of any size.
+const LONGEST_QUEUE: u64 = 64 * 1024 * 1024;
+
 /// Packets of the stream as it is, and documents for the payloader that is added.
 fn description(codec: Codec) -> String {
     let payloader = match codec {
@@ -142,7 +145,8 @@ fn description(codec: Codec) -> String {
         Codec::H264 => "rtph264pay config-interval=-1 pt=96",
         Codec::H265 => "rtph265pay config-interval=-1 pt=96",
     };
-    let source =
-        "appsrc is-live=true format=time block=false leaky-type=downstream max-buffers=64 max-bytes=0";
+    let source = format!(
+        "appsrc is-live=true format=time block=false leaky-type=downstream max-buffers=64 max-bytes={LONGEST_QUEUE}"
+    );
     format!("( {source} name=video ! {payloader} name=pay0 {source} name=metadata caps={DOCUMENT} )")
 }
