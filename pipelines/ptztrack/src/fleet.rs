@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::thread::JoinHandle;
+use std::thread::{self, JoinHandle};
 
 use ptztrack_contract::lock::lock;
 
@@ -78,12 +78,12 @@ impl Fleet {
             let camera = Camera::new(settings, control, self.log.clone(), go.remove(&name));
             cameras.insert(name, camera);
         }
-        drop(cameras);
-        self.had.remember(has);
-        self.start_all();
         let mut ending = lock(&self.ending);
         ending.retain(|thread| !thread.is_finished());
         ending.extend(go.into_values().filter_map(Camera::into_thread));
+        drop((ending, cameras));
+        self.had.remember(has);
+        self.start_all();
     }
 
     /// Starts those that have not been started. Where the system has no thread for one, that is said once, and it is not forgotten:
@@ -127,13 +127,20 @@ impl Fleet {
         let ends = std::mem::take(&mut *cameras);
         drop(cameras);
         let (cameras, ending) = (ends, std::mem::take(&mut *lock(&self.ending)));
-        // All at once: each may take seconds. And before the disk is waited for.
+        // All at once: each may take seconds.
         cameras.values().for_each(Camera::end);
-        self.keep(|| Some(control_of(&cameras)));
-        for thread in cameras.into_values().filter_map(Camera::into_thread).chain(ending) {
-            // One that panicked has said so.
-            let _ = thread.join();
-        }
+        let control = control_of(&cameras);
+        thread::scope(|scope| {
+            // A disk that hangs keeps no camera waiting, and a camera that hangs loses no hand-over.
+            let keep = || self.keep(|| Some(control.clone()));
+            if thread::Builder::new().spawn_scoped(scope, keep).is_err() {
+                keep();
+            }
+            for thread in cameras.into_values().filter_map(Camera::into_thread).chain(ending) {
+                // One that panicked has said so.
+                let _ = thread.join();
+            }
+        });
     }
 
     /// What is known of each.

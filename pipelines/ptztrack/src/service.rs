@@ -148,7 +148,10 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
         handing_over.into_iter().for_each(HandingOver::end);
     });
     if tokio::time::timeout(LONGEST_END, ended).await.is_err() {
-        log.error("not-ended", "a camera's pipeline hangs: its watchdog stops the camera");
+        log.error(
+            "not-ended",
+            "a camera's pipeline or a disk hangs: a camera that still moves is stopped by its watchdog",
+        );
     }
     if let Some(passing_on) = passing_on {
         let _ = passing_on.await;

@@ -332,7 +332,12 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         let sent = mailbox.now();
         state.control.sending(&request, sent);
         let stop = state.control.stop();
-        lock(&state.statistics).stop = Some(stop);
+        {
+            let mut statistics = lock(&state.statistics);
+            statistics.stop = Some(stop);
+            // Whoever comes next while it is under way must know of it.
+            statistics.may_yet_move |= is_move(&request);
+        }
         if is_move(&request) {
             dead_man.hold(StopOrder { identity: client.identity(), words: stop, in_doubt: true });
             state.keep_dead_man(dead_man);

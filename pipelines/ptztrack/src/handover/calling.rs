@@ -56,7 +56,8 @@ impl Dispatcher {
                     self.tell(&to, Level::Info, "not-found", format!("{whom} was not found"));
                 }
                 Progress::Refused => self.leave_alone(&to),
-                Progress::Over => {}
+                // One before may have sent it somewhere.
+                Progress::Over => call.cancel(&called.known),
             }
             match progress {
                 Progress::Failed | Progress::Over => {
@@ -228,6 +229,7 @@ fn gives_way(to: &str, call: &Call, wishes: &[HandOver], views: &BTreeMap<String
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
+    use std::sync::atomic::Ordering;
 
     use super::*;
     use crate::camera::{Known, Origin, Steering};
@@ -321,6 +323,19 @@ mod tests {
         site.dispatcher.change(&[], &cameras);
         assert!(matches!(*lock(&site.known("door").steering), Steering::TurnBack(..)));
         assert!(site.dispatcher.calls.is_empty() && lock(&site.known("gate").ignored).is_empty());
+    }
+
+    /// It would look there for half a minute, and follow nobody.
+    #[test]
+    fn what_a_camera_was_told_for_a_call_goes_with_the_one_that_took_its_place() {
+        let mut site = Site::new();
+        assert_eq!(site.called(), ["door"]);
+        assert_eq!(site.called(), ["door"], "it is told where to look");
+        site.dispatcher.calls.insert("door".to_owned(), Call::new(&site.wishes[0], 3));
+        site.known("door").operator.store(true, Ordering::Relaxed);
+        site.dispatcher.advance(&site.wishes, &site.views);
+        assert_eq!(*lock(&site.known("door").steering), Steering::Follow);
+        assert!(site.dispatcher.calls.is_empty());
     }
 
     #[test]

@@ -81,12 +81,13 @@ async fn watch(socket: gio::Socket, client: glib::WeakRef<RTSPClient>, settled: 
     if !is_too_much && is_short() && belongs {
         return;
     }
+    // Without this, one of a tunnel waits for another request until the server itself ends it, after a minute. Asked for first: the
+    // client's own thread may close what was shut down before we look.
+    let answering = client.as_ref().filter(|_| !socket.is_closed()).and_then(answering);
     // The client's own thread reads the end of it, and closes it. Closed by another thread, a connection that is just being read would
     // keep its thread busy for ever.
-    let _ = socket.shutdown(true, true);
-    // Without this, one of a tunnel waits for another request until the server itself ends it, after a minute.
-    if let Some(answering) = client.as_ref().and_then(answering) {
-        let _ = answering.shutdown(true, true);
+    for socket in [Some(socket), answering].into_iter().flatten() {
+        let _ = socket.shutdown(true, true);
     }
 }
 

@@ -115,8 +115,12 @@ impl Processes {
         let heard = self.talk(ours, settings, known, log);
         lock(&self.socket).take();
         lock(&known.running).take();
-        // However long its end takes.
-        lock(&known.state).picture = false;
+        {
+            // However long its end takes.
+            let mut state = lock(&known.state);
+            (state.picture, state.target, state.target_id) = (false, SEARCHING.to_owned(), None);
+            state.trouble = Some("its process ends".to_owned());
+        }
         let status = self.see_end(known, heard.is_ok(), LONGEST_END, |kill| {
             if kill {
                 // It may have ended by now.
