@@ -3,6 +3,7 @@
 //! The task that talks to a camera, over real HTTP.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
+use std::io::{BufRead, BufReader, Write};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
@@ -15,7 +16,7 @@ use session::watchdog::{Armed, Watchdog, WatchdogAddress, serve};
 use session::{LoopEvent, SessionEvent};
 use tokio::runtime::Builder;
 use vapix::Client;
-use virtual_camera::VirtualCamera;
+use virtual_camera::{Fault, VirtualCamera};
 
 /// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -154,6 +155,53 @@ fn one_that_hangs_has_its_camera_stopped_by_the_watchdog() {
     assert!(camera.wait_for(PATIENCE, |status| !status.moving));
     drop(release);
     drop(task);
+    std::fs::remove_file(socket).unwrap();
+}
+
+/// As [`watchdog`], and what it is told.
+fn heard_watchdog(test: &str) -> (Arc<Watchdog>, std::path::PathBuf, Receiver<String>) {
+    let (serving, socket) = watchdog(&format!("{test}-serving"), channel().0, channel().1);
+    drop(serving);
+    let heard_at = socket.with_extension("heard");
+    let _ = std::fs::remove_file(&heard_at);
+    let listener = std::os::unix::net::UnixListener::bind(&heard_at).unwrap();
+    let (hears, heard) = channel();
+    std::thread::spawn(move || {
+        let (mut application, _) = listener.accept().unwrap();
+        let mut serving = std::os::unix::net::UnixStream::connect(&socket).unwrap();
+        std::fs::remove_file(&socket).unwrap();
+        let (mut answers, mut answered) = (serving.try_clone().unwrap(), application.try_clone().unwrap());
+        std::thread::spawn(move || std::io::copy(&mut answers, &mut answered));
+        for line in BufReader::new(&mut application).lines().map_while(Result::ok) {
+            serving.write_all(format!("{line}\n").as_bytes()).unwrap();
+            let _ = hears.send(line);
+        }
+    });
+    (Watchdog::new(WatchdogAddress::Socket(heard_at.clone())), heard_at, heard)
+}
+
+/// Its own lease would have the watchdog stop the camera of the next one.
+#[test]
+fn one_that_makes_way_for_the_next_gives_its_lease_back() {
+    let camera = camera();
+    let (watchdog, socket, heard) = heard_watchdog("makes-way");
+    let first = start_with(&camera, Some(watchdog.clone()), |_| {});
+    see_until(&first, |wait| camera.wait_for(wait, |status| status.moving));
+    camera.set_fault(Fault::Status(503));
+    drop(first);
+    let said: Vec<_> = heard.try_iter().collect();
+    let lease = said[0].strip_prefix(r#"{"hold":{"lease":"#).and_then(|rest| rest.split(',').next()).unwrap();
+    let release = format!(r#"{{"release":{{"lease":{lease}}}}}"#);
+    assert!(!said.contains(&release), "it goes on trying to stop the camera: {said:?}");
+    let next = start_with(&camera, Some(watchdog), |_| {});
+    // The next one renews its own all the time.
+    let begin = Instant::now();
+    while heard.recv_timeout(PATIENCE).unwrap() != release {
+        assert!(begin.elapsed() < PATIENCE, "the lease is not given back");
+    }
+    camera.set_fault(Fault::None);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "the next one has inherited the stop");
+    drop(next);
     std::fs::remove_file(socket).unwrap();
 }
 
