@@ -72,10 +72,7 @@ impl Processes {
         while !self.told_to_end.load(Ordering::SeqCst) {
             let begin = Instant::now();
             let Err(reason) = self.run_one(settings, known, log) else { return };
-            let mut state = lock(&known.state);
-            (state.picture, state.target, state.target_id) = (false, SEARCHING.to_owned(), None);
-            state.trouble = Some(reason.clone());
-            drop(state);
+            sees_nothing(known, &reason);
             known.failures.fetch_add(1, Ordering::Relaxed);
             let detail = format!("{reason}; it is started again");
             log.tell(&Event::new(Level::Error, Some(&known.name), "process-ended", detail));
@@ -115,12 +112,8 @@ impl Processes {
         let heard = self.talk(ours, settings, known, log);
         lock(&self.socket).take();
         lock(&known.running).take();
-        {
-            // However long its end takes.
-            let mut state = lock(&known.state);
-            (state.picture, state.target, state.target_id) = (false, SEARCHING.to_owned(), None);
-            state.trouble = Some("its process ends".to_owned());
-        }
+        // However long its end takes.
+        sees_nothing(known, "its process ends");
         let status = self.see_end(known, heard.is_ok(), LONGEST_END, |kill| {
             if kill {
                 // It may have ended by now.
@@ -226,6 +219,13 @@ pub fn hear(line: &[u8]) -> bool {
 
 fn hangs() -> io::Error {
     io::Error::other("its process hangs")
+}
+
+/// The camera has no process that would see anything, and why.
+fn sees_nothing(known: &Known, why: &str) {
+    let mut state = lock(&known.state);
+    (state.picture, state.target, state.target_id) = (false, SEARCHING.to_owned(), None);
+    state.trouble = Some(why.to_owned());
 }
 
 fn line(value: &impl Serialize) -> io::Result<Vec<u8>> {
