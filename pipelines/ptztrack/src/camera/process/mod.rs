@@ -112,8 +112,10 @@ impl Processes {
         let heard = self.talk(ours, settings, known, log);
         lock(&self.socket).take();
         lock(&known.running).take();
-        // However long its end takes.
-        sees_nothing(known, "its process ends");
+        // However long its end takes. One that was given up has said why.
+        if !lock(&known.state).given_up {
+            sees_nothing(known, "its process ends");
+        }
         let status = self.see_end(known, heard.is_ok(), LONGEST_END, |kill| {
             if kill {
                 // It may have ended by now.
