@@ -161,14 +161,18 @@ fn a_watchdog_that_dies_takes_nobody_along_and_is_replaced() {
 fn an_operator_who_has_the_camera_keeps_it() {
     let Application { camera, mut launch, watchdog } = Application::following("operator", &["-m"]);
     let begin = Instant::now();
-    let taken_over = |line: &String| line.contains("change=(string)taken-over");
+    let told = |line: &String, change: &str| line.contains(&format!("change=(string){change}"));
+    // Whose move it is in is found out after that; until then it may be ours, which is to be stopped.
+    let given_up = |seen: &[String]| {
+        seen.iter().skip_while(|line| !told(line, "taken-over")).any(|line| told(line, "stopped"))
+    };
     // He holds the stick, to and fro, so that no end of the travel is in his way.
     let held = |to| [to; 20];
     let mut turns = [held("continuouspantiltmove=-40,0"), held("continuouspantiltmove=40,0")]
         .concat()
         .into_iter()
         .cycle();
-    while !launch.seen().iter().any(taken_over) {
+    while !given_up(launch.seen()) {
         assert!(begin.elapsed() < PATIENCE, "{:?}", launch.seen());
         assert!(turns.next().is_some_and(|turn| camera.operate(turn)));
         launch.read_for(HELD);
