@@ -187,6 +187,12 @@ fn prepare(path: &Path) -> Result<Connection, Error> {
     if version(&connection).map_err(&said)? != VERSION {
         return Err(Error::OtherVersion { file: path.display().to_string() });
     }
+    // What time it was by a clock that was believed, for whoever deletes by age; files of this version began without.
+    connection
+        .execute_batch(
+            "CREATE TABLE IF NOT EXISTS clock (id INTEGER PRIMARY KEY, believed_ms INTEGER NOT NULL)",
+        )
+        .map_err(&said)?;
     // What was deleted is overwritten; what was written outlives a loss of power.
     connection
         .execute_batch("PRAGMA foreign_keys = ON; PRAGMA secure_delete = ON; PRAGMA synchronous = FULL;")

@@ -76,12 +76,13 @@ impl Store {
     }
 
     /// Deletes what is more than is kept, at this time. No moment of a wrong clock takes what cannot be had again: time goes on from
-    /// the newest that is kept as this process runs, until a clock that is ahead of that has been so for six hours.
+    /// what was believed last as this process runs, until a clock that is ahead of that has been so for six hours.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn retain(&mut self, retention: &Retention, now: SystemTime) -> Result<(), Error> {
-        let oldest = since_1970(self.believed(now)?).saturating_sub(retention.age);
+        let believed = since_1970(self.believed(now)?);
+        let oldest = believed.saturating_sub(retention.age);
         let oldest_ms = i64::try_from(oldest.as_millis()).unwrap_or(i64::MAX);
         self.delete_where("to_ms < ?1", oldest_ms)?;
         while self.bytes()? > retention.bytes {
@@ -90,6 +91,10 @@ impl Store {
                 break;
             }
         }
+        // At last, as a disk that is full has no room for it before.
+        let believed_ms = i64::try_from(believed.as_millis()).unwrap_or(i64::MAX);
+        let sql = "INSERT OR REPLACE INTO clock (id, believed_ms) VALUES (0, ?1)";
+        self.connection.execute(sql, [believed_ms]).map_err(Error::file(&self.file))?;
         Ok(())
     }
 
@@ -98,20 +103,21 @@ impl Store {
         let at = Instant::now();
         let mut clock = match self.clock.take() {
             Some(clock) => clock,
-            None => Clock::new(self.newest(now)?.unwrap_or(now), at),
+            None => Clock::new(self.last_believed(now)?.unwrap_or(now), at),
         };
         let believed = clock.read(now, at);
         self.clock = Some(clock);
         Ok(believed)
     }
 
-    /// When the last of all ended, but for those that a clock which was ahead has in the future.
-    fn newest(&self, now: SystemTime) -> Result<Option<SystemTime>, Error> {
+    /// What time it was last by a clock that was believed: who was kept since by one that is ahead says nothing. Where that was
+    /// never written down, when the last of all ended, but for those that are in the future.
+    fn last_believed(&self, now: SystemTime) -> Result<Option<SystemTime>, Error> {
         let now_ms = i64::try_from(since_1970(now).as_millis()).unwrap_or(i64::MAX);
-        let sql = "SELECT max(to_ms) FROM sighting WHERE to_ms <= ?1";
-        let newest_ms = self.connection.query_row(sql, [now_ms], |row| row.get::<_, Option<i64>>(0));
-        let newest_ms = newest_ms.map_err(Error::file(&self.file))?;
-        let since = newest_ms.and_then(|newest| u64::try_from(newest).ok()).map(Duration::from_millis);
+        let sql = "SELECT coalesce((SELECT believed_ms FROM clock), (SELECT max(to_ms) FROM sighting WHERE to_ms <= ?1))";
+        let last_ms = self.connection.query_row(sql, [now_ms], |row| row.get::<_, Option<i64>>(0));
+        let last_ms = last_ms.map_err(Error::file(&self.file))?;
+        let since = last_ms.and_then(|last| u64::try_from(last).ok()).map(Duration::from_millis);
         Ok(since.map(|since| SystemTime::UNIX_EPOCH + since))
     }
 

@@ -174,6 +174,9 @@ fn a_moment_of_a_clock_that_is_ahead_deletes_nothing() {
     let ahead = store.keep(&ahead).unwrap();
     store.retain(&minutes(60), now + year).unwrap();
     assert_eq!(folder.all(), [&[ahead], &ids[..]].concat());
+    // Nor does who was kept then make it believed, where it is started anew once more.
+    folder.store().retain(&minutes(60), now + year).unwrap();
+    assert_eq!(folder.all(), [&[ahead], &ids[..]].concat());
     // Whoever is in the future keeps the others no longer.
     folder.store().retain(&minutes(5), now).unwrap();
     assert_eq!(folder.all(), [&[ahead], &ids[..6]].concat());

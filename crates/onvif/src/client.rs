@@ -533,9 +533,14 @@ impl Client {
     }
 }
 
-/// Which of two failures to tell: the first, in its own words, but not where the camera may have acted on the second.
+/// Which of two failures to tell: the first, in its own words, but not where the camera may have acted on the second, nor where that
+/// says who is refused: who takes that for a fault of the camera tries the password for ever.
 fn worse(first: Error, second: Error) -> Error {
-    if second.may_have_acted() { second } else { first }
+    let is_refused = matches!(
+        second,
+        Error::NotPermitted { .. } | Error::BadCredentials { .. } | Error::CredentialsMissing
+    );
+    if is_refused || second.may_have_acted() { second } else { first }
 }
 
 /// Where a message goes.
@@ -545,4 +550,19 @@ enum Path {
     Media,
     Media2,
     Ptz,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn who_is_refused_is_told_and_not_what_the_camera_had_against_the_first_form_of_a_move() {
+        let first = || Error::Camera("no such unit".to_owned());
+        let refused = [Error::NotPermitted { user: "root".to_owned() }, Error::CredentialsMissing];
+        for second in refused {
+            assert_eq!(worse(first(), second.clone()), second);
+        }
+        assert_eq!(worse(first(), Error::Camera("no such space".to_owned())), first());
+    }
 }

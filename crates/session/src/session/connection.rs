@@ -131,8 +131,10 @@ impl Connection {
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
         // That it lets anybody ask does not say that it lets anybody move it.
         let kind = FaultKind::of(err, if of_command { self.obeyed } else { self.connected });
-        // But once: a server that restarts between challenge and answer refuses alike.
-        let again = self.fault.as_ref().is_some_and(|fault| fault.kind == kind);
+        // But once: a server that restarts between challenge and answer refuses alike. What a question met is not held against the
+        // first stop.
+        let again =
+            self.fault.as_ref().is_some_and(|fault| fault.kind == kind && (fault.of_command || !of_command));
         let (first, longest) = if again && kind == FaultKind::Forbidden {
             (Self::FORBIDDEN_PAUSE, Self::RARELY)
         } else {
@@ -246,6 +248,18 @@ mod tests {
         assert!(!connection.halted());
         assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
         assert_eq!(connection.retry_at(), Time::ZERO);
+    }
+
+    #[test]
+    fn a_question_that_is_not_permitted_does_not_keep_the_first_stop_waiting() {
+        let mut connection = Connection::default();
+        connection.succeeded(true, true);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        connection.failed(&forbidden, false, ms(0));
+        connection.failed(&forbidden, true, ms(50));
+        assert!(connection.retry_at() <= ms::<Time>(50) + 2 * Connection::FIRST_PAUSE);
+        connection.failed(&forbidden, true, ms(100));
+        assert_eq!(connection.retry_at(), ms::<Time>(100) + Connection::FORBIDDEN_PAUSE);
     }
 
     #[test]

@@ -75,7 +75,8 @@ impl Predecessor {
             while !mailbox.take().quit {
                 match client.exchange(&Request::Command(stop)).await {
                     Ok(_) => {
-                        lock(&self.statistics).status.moving = false;
+                        let mut statistics = lock(&self.statistics);
+                        (statistics.status.moving, statistics.may_yet_move) = (false, false);
                         break;
                     }
                     Err(Error::BadCredentials { .. }) => break,

@@ -145,7 +145,7 @@ async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
     loop {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
-            Err(Error::BadCredentials { .. }) => return None,
+            Err(Error::BadCredentials { .. } | Error::NotPermitted { .. }) => return None,
             // One that asks for a user where none is set was moved without: that may pass, and there is no account to lock.
             Err(_) => sleep(PAUSE).await,
         }
@@ -185,13 +185,15 @@ mod tests {
         }
     }
 
-    /// A camera that is moved without a user is stopped, though it asks for one for a moment; a wrong password is tried once.
+    /// A camera that is moved without a user is stopped, though it asks for one for a moment; a password that is refused is not tried
+    /// again at once, whether it was ever right or not.
     #[test]
-    fn only_a_wrong_password_is_not_tried_again() {
+    fn only_a_refused_password_is_not_tried_again_at_once() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let stop =
             |error| runtime.block_on(until_accepted(&mut Refusing(vec![error]), Stop::PanTilt)).is_some();
         assert!(stop(Error::CredentialsMissing));
         assert!(!stop(Error::BadCredentials { user: "root".to_owned() }));
+        assert!(!stop(Error::NotPermitted { user: "root".to_owned() }));
     }
 }

@@ -242,8 +242,14 @@ impl Known {
     /// Tells the next pipeline how to begin: who is moving the camera has it for as long as they would have had in the last one.
     pub fn steer_at_start(&self, operator_has_it: Duration) {
         self.steer_by(|now| {
-            let moves = now == Steering::Follow && self.operator.swap(false, Ordering::Relaxed);
-            Some(if moves { Steering::Operator(Instant::now() + operator_has_it) } else { now })
+            // The next pipeline tells anew whether somebody moves it.
+            let moves = self.operator.swap(false, Ordering::Relaxed);
+            Some(match now {
+                Steering::HandedOver | Steering::Turned(..) => now,
+                // Whatever it was to do, he took it from us.
+                _ if moves => Steering::Operator(Instant::now() + operator_has_it),
+                _ => now,
+            })
         });
     }
 
@@ -365,13 +371,14 @@ impl Known {
         let camera = self.servo().and_then(|servo| servo.state);
         let camera = match (*lock(&self.steering), camera.as_deref()) {
             (Steering::HandedOver, _) => "the camera is handed over",
+            // Also from us who sent it somewhere.
+            (_, Some("taken-over")) => "an operator has the camera",
             (Steering::GoHome(_), _) => "the camera goes home",
             (Steering::LookAt(..), _) => "the camera turns to whom another one sees",
             (Steering::TurnBack(..), _) => "the camera turns back",
             (Steering::Operator(_) | Steering::Turned(..), _) => "an operator has the camera",
             (_, Some("at-rest")) => "the camera rests",
             (_, Some("moving")) => "the camera turns",
-            (_, Some("taken-over")) => "an operator has the camera",
             (_, Some("refused")) => "the camera refuses to be moved",
             (_, Some("disconnected")) => "the camera does not answer",
             _ => "the camera is not moved",
@@ -396,12 +403,24 @@ mod tests {
         known.operator.store(true, Ordering::Relaxed);
         assert_eq!(known.control(), Control::Operator);
         assert!(matches!(begin(&known), Steering::Operator(_)));
+        // Nor is it moved on in the next one where it was sent somewhere.
+        let gaze = Gaze { pan_deg: 0.0, tilt_deg: 0.0, fov_deg: None };
+        for errand in [Steering::GoHome(Instant::now()), Steering::LookAt(gaze, Instant::now())] {
+            *lock(&known.steering) = errand;
+            assert_eq!(begin(&known), errand);
+            known.operator.store(true, Ordering::Relaxed);
+            assert!(matches!(begin(&known), Steering::Operator(_)), "{errand:?}");
+        }
+        known.operator.store(true, Ordering::Relaxed);
         let next = Known::new("door");
         next.take_control(known.control());
         assert_eq!(next.control(), Control::Operator);
         *lock(&known.steering) = Steering::HandedOver;
         next.take_control(known.control());
         assert_eq!(begin(&next), Steering::HandedOver);
+        // Who moved it before it was handed over has it no more once it is taken back.
+        next.steer(Steering::Follow);
+        assert_eq!(next.control(), Control::Ours);
     }
 
     #[test]

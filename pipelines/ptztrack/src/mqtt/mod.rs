@@ -32,6 +32,9 @@ use crate::shard::Shard;
 const PAUSE: Duration = Duration::from_secs(5);
 /// Between two looks at what is kept by the broker.
 const EVERY: Duration = Duration::from_secs(1);
+/// Between two times that we say that we are there: a broker may tell of the end of a connection that was lost before this one only
+/// now, and that we are gone.
+const REPEATED: Duration = Duration::from_secs(60);
 /// A connection on which nothing was said for so long is tried.
 const KEEP_ALIVE: Duration = Duration::from_secs(20);
 /// So many messages wait for a broker that is away.
@@ -160,8 +163,12 @@ async fn publish(
     let mut events = log.subscribe();
     let mut timer = tokio::time::interval(EVERY);
     let mut kept = BTreeMap::new();
+    let mut repeated = tokio::time::interval(REPEATED);
     loop {
         tokio::select! {
+            _ = repeated.tick() => {
+                kept.remove(&topics.availability());
+            }
             event = events.recv() => match event {
                 Ok(event) => publish_event(&client, &topics, &event),
                 Err(RecvError::Lagged(_)) => {}

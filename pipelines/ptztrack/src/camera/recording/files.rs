@@ -223,11 +223,13 @@ fn files(folder: &Path, camera: &str) -> Vec<Kept> {
         let (of, began_ms) = name_of(&path)?;
         (of == camera).then_some(())?;
         let meta = entry.metadata().ok()?;
-        let age = now.duration_since(meta.modified().ok()?).unwrap_or_default();
-        // A disk that does not tell when it was created leaves its name.
+        let modified = meta.modified().ok()?;
+        let age = now.duration_since(modified).unwrap_or_default();
+        // A disk that does not tell when it was created, or from which it was restored since, leaves its name.
         let named = SystemTime::UNIX_EPOCH + Duration::from_millis(began_ms.max(0).unsigned_abs());
-        let written = meta.modified().ok()?.duration_since(meta.created().unwrap_or(named));
-        Some(Kept { path, began_ms, bytes: meta.len(), age, lasts: written.unwrap_or(Duration::MAX) })
+        let begins = [meta.created().ok(), Some(named)].into_iter().flatten();
+        let lasts = begins.filter_map(|begin| modified.duration_since(begin).ok()).next();
+        Some(Kept { path, began_ms, bytes: meta.len(), age, lasts: lasts.unwrap_or(Duration::MAX) })
     };
     entries.filter_map(kept).collect()
 }
@@ -326,6 +328,20 @@ mod tests {
         drop(writer);
         delete_while(|| written.exists(), files(), &segments);
         assert_eq!(there(), [false, false, false]);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+
+    /// Its bytes are there since now, and it was last written to in 2026.
+    #[test]
+    fn one_that_was_restored_lasts_for_as_long_as_it_was_written() {
+        let folder = std::env::temp_dir().join(format!("ptztrack-restored-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let path = folder.join("door-20260101T000000000.mkv");
+        fs::write(&path, "x").unwrap();
+        let began_ms = name_of(&path).unwrap().1.unsigned_abs();
+        let ended = SystemTime::UNIX_EPOCH + Duration::from_millis(began_ms) + Duration::from_secs(500);
+        fs::File::options().append(true).open(&path).unwrap().set_modified(ended).unwrap();
+        assert_eq!(files(&folder, "door")[0].lasts, Duration::from_secs(500));
         fs::remove_dir_all(&folder).unwrap();
     }
 
