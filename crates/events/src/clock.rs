@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant, SystemTime};
 
-/// A clock that has jumped ahead is believed once this process has run for so long with it: whoever sets clocks, or notices a wrong
+/// A clock that has jumped ahead is believed once we have run for so long with it, in all: whoever sets clocks, or notices a wrong
 /// one, has done so by then, and what is too old is not kept much longer than it should be.
 const BELIEVED_AFTER: Duration = Duration::from_secs(6 * 3600);
 
@@ -18,26 +18,36 @@ pub(crate) struct Clock {
     time: SystemTime,
     /// ... then, by a clock that never jumps.
     at: Instant,
-    /// Since then the system's clock has been ahead of that.
-    ahead_since: Option<Instant>,
+    /// For how long we have run with a clock that is ahead of that ...
+    ahead: Option<Duration>,
+    /// ... until then.
+    read_at: Instant,
 }
 
 impl Clock {
-    /// It was this late before, whenever that was.
-    pub(crate) fn new(time: SystemTime, at: Instant) -> Self {
-        Self { time, at, ahead_since: None }
+    /// It was this late before, whenever that was; for so long others ran with a clock that was ahead of that.
+    pub(crate) fn new(time: SystemTime, at: Instant, ahead: Option<Duration>) -> Self {
+        Self { time, at, ahead, read_at: at }
+    }
+
+    /// For how long we have run with a clock that is ahead.
+    pub(crate) fn ahead(&self) -> Option<Duration> {
+        self.ahead
     }
 
     /// What time it is where the system's clock says `now`: not later than that. One that was set back is believed at once, as
     /// nothing is deleted any sooner by it.
     pub(crate) fn read(&mut self, now: SystemTime, at: Instant) -> SystemTime {
         let expected = self.time + at.saturating_duration_since(self.at);
-        let ahead_since = *self.ahead_since.get_or_insert(at);
-        let jumped = now > expected + ALIKE;
-        if jumped && at.saturating_duration_since(ahead_since) < BELIEVED_AFTER {
-            return expected;
+        if now > expected + ALIKE {
+            let passed = at.saturating_duration_since(self.read_at);
+            let ahead = self.ahead.map_or(Duration::ZERO, |ahead| ahead + passed);
+            (self.ahead, self.read_at) = (Some(ahead), at);
+            if ahead < BELIEVED_AFTER {
+                return expected;
+            }
         }
-        *self = Self::new(now, at);
+        *self = Self::new(now, at, None);
         now
     }
 }
@@ -51,7 +61,7 @@ mod tests {
     /// What a clock that was right at first is believed to say after this many hours, where it is ahead by so many by then.
     fn read(hours: &[(u32, u32)]) -> Vec<u32> {
         let (begin, start) = (SystemTime::UNIX_EPOCH + 1000 * HOUR, Instant::now());
-        let mut clock = Clock::new(begin, start);
+        let mut clock = Clock::new(begin, start, None);
         let read = |&(after, ahead): &(u32, u32)| {
             let believed = clock.read(begin + (after + ahead) * HOUR, start + after * HOUR);
             u32::try_from(believed.duration_since(begin).unwrap().as_secs() / 3600).unwrap()
@@ -73,6 +83,20 @@ mod tests {
     #[test]
     fn one_that_stays_ahead_is_believed_in_the_end() {
         assert_eq!(read(&[(0, 800), (5, 800), (6, 800), (7, 800)]), [0, 5, 806, 807]);
+    }
+
+    #[test]
+    fn what_is_run_in_pieces_counts_together() {
+        let (begin, start) = (SystemTime::UNIX_EPOCH + 1000 * HOUR, Instant::now());
+        let now = begin + 800 * HOUR;
+        let (mut time, mut ahead) = (begin, None);
+        for believed in [false, true, true] {
+            let mut clock = Clock::new(time, start, ahead);
+            clock.read(now, start);
+            time = clock.read(now, start + 4 * HOUR);
+            ahead = clock.ahead();
+            assert_eq!(time == now, believed);
+        }
     }
 
     #[test]

@@ -190,7 +190,7 @@ fn prepare(path: &Path) -> Result<Connection, Error> {
     // What time it was by a clock that was believed, for whoever deletes by age; files of this version began without.
     connection
         .execute_batch(
-            "CREATE TABLE IF NOT EXISTS clock (id INTEGER PRIMARY KEY, believed_ms INTEGER NOT NULL)",
+            "CREATE TABLE IF NOT EXISTS clock (id INTEGER PRIMARY KEY, believed_ms INTEGER NOT NULL, ahead_ms INTEGER)",
         )
         .map_err(&said)?;
     // What was deleted is overwritten; what was written outlives a loss of power.

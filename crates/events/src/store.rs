@@ -76,15 +76,14 @@ impl Store {
     }
 
     /// Deletes what is more than is kept, at this time. No moment of a wrong clock takes what cannot be had again: time goes on from
-    /// what was believed last as this process runs, until a clock that is ahead of that has been so for six hours.
+    /// what was believed last, until we have run for six hours with a clock that is ahead of that.
     ///
     /// # Errors
     /// Where it cannot be written.
     pub fn retain(&mut self, retention: &Retention, now: SystemTime) -> Result<(), Error> {
         let believed = since_1970(self.believed(now)?);
         let oldest = believed.saturating_sub(retention.age);
-        let oldest_ms = i64::try_from(oldest.as_millis()).unwrap_or(i64::MAX);
-        self.delete_where("to_ms < ?1", oldest_ms)?;
+        self.delete_where("to_ms < ?1", to_ms(oldest))?;
         while self.bytes()? > retention.bytes {
             let the_oldest = "id IN (SELECT id FROM sighting ORDER BY from_ms LIMIT ?1)";
             if self.delete_where(the_oldest, BATCH)? == 0 {
@@ -92,9 +91,10 @@ impl Store {
             }
         }
         // At last, as a disk that is full has no room for it before.
-        let believed_ms = i64::try_from(believed.as_millis()).unwrap_or(i64::MAX);
-        let sql = "INSERT OR REPLACE INTO clock (id, believed_ms) VALUES (0, ?1)";
-        self.connection.execute(sql, [believed_ms]).map_err(Error::file(&self.file))?;
+        let believed_ms = to_ms(believed);
+        let ahead_ms = self.clock.as_ref().and_then(Clock::ahead).map(to_ms);
+        let sql = "INSERT OR REPLACE INTO clock (id, believed_ms, ahead_ms) VALUES (0, ?1, ?2)";
+        self.connection.execute(sql, (believed_ms, ahead_ms)).map_err(Error::file(&self.file))?;
         Ok(())
     }
 
@@ -103,22 +103,24 @@ impl Store {
         let at = Instant::now();
         let mut clock = match self.clock.take() {
             Some(clock) => clock,
-            None => Clock::new(self.last_believed(now)?.unwrap_or(now), at),
+            None => self.last_believed(now, at)?,
         };
         let believed = clock.read(now, at);
         self.clock = Some(clock);
         Ok(believed)
     }
 
-    /// What time it was last by a clock that was believed: who was kept since by one that is ahead says nothing. Where that was
-    /// never written down, when the last of all ended, but for those that are in the future.
-    fn last_believed(&self, now: SystemTime) -> Result<Option<SystemTime>, Error> {
-        let now_ms = i64::try_from(since_1970(now).as_millis()).unwrap_or(i64::MAX);
-        let sql = "SELECT coalesce((SELECT believed_ms FROM clock), (SELECT max(to_ms) FROM sighting WHERE to_ms <= ?1))";
-        let last_ms = self.connection.query_row(sql, [now_ms], |row| row.get::<_, Option<i64>>(0));
-        let last_ms = last_ms.map_err(Error::file(&self.file))?;
-        let since = last_ms.and_then(|last| u64::try_from(last).ok()).map(Duration::from_millis);
-        Ok(since.map(|since| SystemTime::UNIX_EPOCH + since))
+    /// What was last believed: who was kept since by a clock that is ahead says nothing. Where that was never written down, the time
+    /// at which the last of all ended, but for those that are in the future.
+    fn last_believed(&self, now: SystemTime, at: Instant) -> Result<Clock, Error> {
+        let sql = "SELECT believed_ms, ahead_ms, 0 AS place FROM clock \
+                   UNION ALL SELECT max(to_ms), NULL, 1 FROM sighting WHERE to_ms <= ?1 ORDER BY place LIMIT 1";
+        let read = |row: &rusqlite::Row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?));
+        let last = self.connection.query_row(sql, [to_ms(since_1970(now))], read);
+        let (believed, ahead) = last.map_err(Error::file(&self.file))?;
+        let duration = |ms: Option<i64>| ms.and_then(|ms| u64::try_from(ms).ok()).map(Duration::from_millis);
+        let believed = duration(believed).map_or(now, |since| SystemTime::UNIX_EPOCH + since);
+        Ok(Clock::new(believed, at, duration(ahead)))
     }
 
     /// Deletes all that is known of somebody: of one track. Whether there was something.
@@ -157,6 +159,10 @@ impl Store {
         };
         delete().map_err(Error::file(&self.file))
     }
+}
+
+fn to_ms(duration: Duration) -> i64 {
+    i64::try_from(duration.as_millis()).unwrap_or(i64::MAX)
 }
 
 fn since_1970(time: SystemTime) -> Duration {

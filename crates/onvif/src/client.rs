@@ -533,14 +533,14 @@ impl Client {
     }
 }
 
-/// Which of two failures to tell: the first, in its own words, but not where the camera may have acted on the second, nor where that
-/// says who is refused: who takes that for a fault of the camera tries the password for ever.
+/// Which of two failures to tell: one on which the camera may have acted, or else who is refused, as whoever takes that for a fault of
+/// the camera tries the password for ever; or else the first, in its own words.
 fn worse(first: Error, second: Error) -> Error {
     let is_refused = matches!(
         second,
         Error::NotPermitted { .. } | Error::BadCredentials { .. } | Error::CredentialsMissing
     );
-    if is_refused || second.may_have_acted() { second } else { first }
+    if second.may_have_acted() || (is_refused && !first.may_have_acted()) { second } else { first }
 }
 
 /// Where a message goes.
@@ -564,5 +564,7 @@ mod tests {
             assert_eq!(worse(first(), second.clone()), second);
         }
         assert_eq!(worse(first(), Error::Camera("no such space".to_owned())), first());
+        let late = || Error::Timeout(Duration::from_secs(1));
+        assert_eq!(worse(late(), Error::CredentialsMissing), late(), "it may be turning");
     }
 }

@@ -164,7 +164,9 @@ fn an_operator_who_has_the_camera_keeps_it() {
     let told = |line: &String, change: &str| line.contains(&format!("change=(string){change}"));
     // Whose move it is in is found out after that; until then it may be ours, which is to be stopped.
     let given_up = |seen: &[String]| {
-        seen.iter().skip_while(|line| !told(line, "taken-over")).any(|line| told(line, "stopped"))
+        let has_ended =
+            seen.iter().rev().take_while(|line| !told(line, "moving")).any(|line| told(line, "stopped"));
+        has_ended && seen.iter().any(|line| told(line, "taken-over"))
     };
     // He holds the stick, to and fro, so that no end of the travel is in his way.
     let held = |to| [to; 20];

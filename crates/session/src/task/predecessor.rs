@@ -75,8 +75,7 @@ impl Predecessor {
             while !mailbox.take().quit {
                 match client.exchange(&Request::Command(stop)).await {
                     Ok(_) => {
-                        let mut statistics = lock(&self.statistics);
-                        (statistics.status.moving, statistics.may_yet_move) = (false, false);
+                        lock(&self.statistics).status.moving = false;
                         break;
                     }
                     Err(Error::BadCredentials { .. }) => break,

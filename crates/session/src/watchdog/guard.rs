@@ -142,10 +142,16 @@ async fn try_to_stop<C: Client>(order: &StopOrder) -> Option<()> {
 
 /// `None`: the camera refuses user or password.
 async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
+    let mut forbidden = PAUSE;
     loop {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
-            Err(Error::BadCredentials { .. } | Error::NotPermitted { .. }) => return None,
+            Err(Error::BadCredentials { .. }) => return None,
+            // Who was let in just before: a moment of a camera that restarts, or an account that is locked, and longer so by each try.
+            Err(Error::NotPermitted { .. }) => {
+                sleep(forbidden).await;
+                forbidden = (2 * forbidden).max(FORBIDDEN_PAUSE);
+            }
             // One that asks for a user where none is set was moved without: that may pass, and there is no account to lock.
             Err(_) => sleep(PAUSE).await,
         }
@@ -185,15 +191,25 @@ mod tests {
         }
     }
 
-    /// A camera that is moved without a user is stopped, though it asks for one for a moment; a password that is refused is not tried
-    /// again at once, whether it was ever right or not.
+    /// A camera that is moved without a user is stopped, though it asks for one for a moment; a wrong password is tried once.
     #[test]
-    fn only_a_refused_password_is_not_tried_again_at_once() {
+    fn only_a_wrong_password_is_not_tried_again() {
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         let stop =
             |error| runtime.block_on(until_accepted(&mut Refusing(vec![error]), Stop::PanTilt)).is_some();
         assert!(stop(Error::CredentialsMissing));
         assert!(!stop(Error::BadCredentials { user: "root".to_owned() }));
-        assert!(!stop(Error::NotPermitted { user: "root".to_owned() }));
+    }
+
+    #[test]
+    fn a_password_that_was_right_is_tried_twice_and_then_rarely() {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let is_stopped = |times| {
+            let forbidden = vec![Error::NotPermitted { user: "root".to_owned() }; times];
+            let stopped =
+                async { timeout(4 * PAUSE, until_accepted(&mut Refusing(forbidden), Stop::PanTilt)).await };
+            runtime.block_on(stopped).is_ok_and(|stopped| stopped.is_some())
+        };
+        assert!(is_stopped(1) && !is_stopped(2));
     }
 }

@@ -245,7 +245,7 @@ impl Known {
             // The next pipeline tells anew whether somebody moves it.
             let moves = self.operator.swap(false, Ordering::Relaxed);
             Some(match now {
-                Steering::HandedOver | Steering::Turned(..) => now,
+                Steering::HandedOver => now,
                 // Whatever it was to do, he took it from us.
                 _ if moves => Steering::Operator(Instant::now() + operator_has_it),
                 _ => now,
@@ -405,7 +405,8 @@ mod tests {
         assert!(matches!(begin(&known), Steering::Operator(_)));
         // Nor is it moved on in the next one where it was sent somewhere.
         let gaze = Gaze { pan_deg: 0.0, tilt_deg: 0.0, fov_deg: None };
-        for errand in [Steering::GoHome(Instant::now()), Steering::LookAt(gaze, Instant::now())] {
+        let now = Instant::now();
+        for errand in [Steering::GoHome(now), Steering::LookAt(gaze, now), Steering::Turned(gaze, now)] {
             *lock(&known.steering) = errand;
             assert_eq!(begin(&known), errand);
             known.operator.store(true, Ordering::Relaxed);

@@ -83,6 +83,8 @@ impl Publisher {
     /// Says that we are gone.
     pub async fn end(self) {
         self.publishing.abort();
+        // Or it may yet say that we are there.
+        let _ = self.publishing.await;
         // For a broker that is away our last will does that.
         let _ = self.client.try_publish(self.availability, QoS::AtLeastOnce, true, OFFLINE);
         let _ = self.client.try_disconnect();
@@ -163,7 +165,7 @@ async fn publish(
     let mut events = log.subscribe();
     let mut timer = tokio::time::interval(EVERY);
     let mut kept = BTreeMap::new();
-    let mut repeated = tokio::time::interval(REPEATED);
+    let mut repeated = tokio::time::interval_at(tokio::time::Instant::now() + REPEATED, REPEATED);
     loop {
         tokio::select! {
             _ = repeated.tick() => {
