@@ -52,6 +52,11 @@ impl Clock {
     }
 }
 
+/// As the file has times, and lengths of time.
+pub(crate) fn milliseconds(time: Duration) -> i64 {
+    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

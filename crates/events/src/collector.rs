@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use crate::clock::milliseconds;
 use crate::sighting::thin;
 use crate::{Crop, Sighting, Step};
 
@@ -117,10 +118,6 @@ impl Followed {
             self.step *= 2;
         }
     }
-}
-
-fn milliseconds(time: Duration) -> i64 {
-    i64::try_from(time.as_millis()).unwrap_or(i64::MAX)
 }
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant, SystemTime};
 
 use rusqlite::{Connection, OptionalExtension, Transaction, TransactionBehavior, params};
 
-use crate::clock::Clock;
+use crate::clock::{Clock, milliseconds};
 use crate::file::{self, Error, Identity};
 use crate::reader::{columns, entry};
 use crate::{Picture, Sighting};
@@ -83,7 +83,7 @@ impl Store {
     pub fn retain(&mut self, retention: &Retention, now: SystemTime) -> Result<(), Error> {
         let believed = since_1970(self.believed(now)?);
         let oldest = believed.saturating_sub(retention.age);
-        self.delete_where("to_ms < ?1", to_ms(oldest))?;
+        self.delete_where("to_ms < ?1", milliseconds(oldest))?;
         while self.bytes()? > retention.bytes {
             let the_oldest = "id IN (SELECT id FROM sighting ORDER BY from_ms LIMIT ?1)";
             if self.delete_where(the_oldest, BATCH)? == 0 {
@@ -91,8 +91,8 @@ impl Store {
             }
         }
         // At last, as a disk that is full has no room for it before.
-        let believed_ms = to_ms(believed);
-        let ahead_ms = self.clock.as_ref().and_then(Clock::ahead).map(to_ms);
+        let believed_ms = milliseconds(believed);
+        let ahead_ms = self.clock.as_ref().and_then(Clock::ahead).map(milliseconds);
         let sql = "INSERT OR REPLACE INTO clock (id, believed_ms, ahead_ms) VALUES (0, ?1, ?2)";
         self.connection.execute(sql, (believed_ms, ahead_ms)).map_err(Error::file(&self.file))?;
         Ok(())
@@ -116,7 +116,7 @@ impl Store {
         let sql = "SELECT believed_ms, ahead_ms, 0 AS place FROM clock \
                    UNION ALL SELECT max(to_ms), NULL, 1 FROM sighting WHERE to_ms <= ?1 ORDER BY place LIMIT 1";
         let read = |row: &rusqlite::Row| Ok((row.get::<_, Option<i64>>(0)?, row.get::<_, Option<i64>>(1)?));
-        let last = self.connection.query_row(sql, [to_ms(since_1970(now))], read);
+        let last = self.connection.query_row(sql, [milliseconds(since_1970(now))], read);
         let (believed, ahead) = last.map_err(Error::file(&self.file))?;
         let duration = |ms: Option<i64>| ms.and_then(|ms| u64::try_from(ms).ok()).map(Duration::from_millis);
         let believed = duration(believed).map_or(now, |since| SystemTime::UNIX_EPOCH + since);
@@ -159,10 +159,6 @@ impl Store {
         };
         delete().map_err(Error::file(&self.file))
     }
-}
-
-fn to_ms(duration: Duration) -> i64 {
-    i64::try_from(duration.as_millis()).unwrap_or(i64::MAX)
 }
 
 fn since_1970(time: SystemTime) -> Duration {

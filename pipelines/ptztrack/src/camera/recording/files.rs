@@ -227,8 +227,8 @@ fn files(folder: &Path, camera: &str) -> Vec<Kept> {
         let age = now.duration_since(modified).unwrap_or_default();
         // A disk that does not tell when it was created, or from which it was restored since, leaves its name.
         let named = SystemTime::UNIX_EPOCH + Duration::from_millis(began_ms.max(0).unsigned_abs());
-        let begins = [meta.created().ok(), Some(named)].into_iter().flatten();
-        let lasts = begins.filter_map(|begin| modified.duration_since(begin).ok()).next();
+        let mut begins = meta.created().into_iter().chain([named]);
+        let lasts = begins.find_map(|begin| modified.duration_since(begin).ok());
         Some(Kept { path, began_ms, bytes: meta.len(), age, lasts: lasts.unwrap_or(Duration::MAX) })
     };
     entries.filter_map(kept).collect()
