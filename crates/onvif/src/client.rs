@@ -89,7 +89,7 @@ impl session::Client for Client {
             abilities: None,
             presets: Vec::new(),
             moves: Moves::default(),
-            login: Login::Open,
+            login: if identity.accepted { Login::Accepted } else { Login::Open },
             late_statuses: 0,
             warning: None,
             inherits: false,

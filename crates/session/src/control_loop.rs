@@ -3,7 +3,7 @@
 //! The whole loop but the network: measurement, estimation, control, session.
 
 use servo::{
-    Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, Time,
+    Access, Actuation, AxisFinding, Estimates, HardLimits, Measurement, Mode, PanTilt, Position, Servo, Time,
 };
 
 use crate::session::{CommandedMotion, Fact, Session, Steering};
@@ -257,8 +257,9 @@ impl ControlLoop {
         if self.session.is_deaf() {
             return true;
         }
-        let homeward = || self.servo.is_homeward(&self.session.actuator(now), now);
-        !self.session.is_taken_over(now) && (self.servo.has_target(now) || homeward())
+        let actuator = self.session.actuator(now);
+        let has_errand = || self.servo.has_target(now) || self.servo.is_homeward(&actuator, now);
+        actuator.access != Access::Others && has_errand()
     }
 
     /// When the target will not have been seen for too long, where there is one.

@@ -10,13 +10,14 @@ use std::time::{Duration, Instant};
 
 use ptztrack_contract::lock::lock;
 use servo::{Measurement, ServoSettings};
-use session::http::{Authentication, ClientSettings, Location, Trust};
+use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::session::ConnectionChange;
 use session::task::{CameraTask, Clock, DeadManState, Event, FINISH_BUDGET};
 use session::watchdog::{Armed, Watchdog, WatchdogAddress, serve};
-use session::{LoopEvent, SessionEvent};
+use session::{Error, LoopEvent, SessionEvent};
 use tokio::runtime::Builder;
 use vapix::Client;
-use virtual_camera::{Fault, VirtualCamera};
+use virtual_camera::{Auth, Fault, Settings, VirtualCamera};
 
 /// Only a failure takes this long.
 const PATIENCE: Duration = Duration::from_secs(60);
@@ -33,11 +34,21 @@ fn start_with(
     watchdog: Option<Arc<Watchdog>>,
     observer: impl Fn(Event) + Clone + Send + Sync + 'static,
 ) -> CameraTask {
+    start_as(None, camera, watchdog, observer)
+}
+
+fn start_as(
+    password: Option<&str>,
+    camera: &VirtualCamera,
+    watchdog: Option<Arc<Watchdog>>,
+    observer: impl Fn(Event) + Clone + Send + Sync + 'static,
+) -> CameraTask {
     let (location, _) = Location::parse(&camera.url()).unwrap();
     let client = ClientSettings {
         location,
         channel: "1".to_owned(),
-        credentials: None,
+        credentials: password
+            .map(|password| Credentials { user: "root".to_owned(), password: Secret::new(password) }),
         authentication: Authentication::default(),
         timeout: Duration::from_secs(2),
         trust: Trust::System,
@@ -63,7 +74,7 @@ fn see_until(task: &CameraTask, mut done: impl FnMut(Duration) -> bool) {
 }
 
 fn camera() -> VirtualCamera {
-    VirtualCamera::start(virtual_camera::Settings::default()).unwrap()
+    VirtualCamera::start(Settings::default()).unwrap()
 }
 
 /// As an element does that is disposed of without having been brought to NULL.
@@ -203,6 +214,51 @@ fn one_that_makes_way_for_the_next_gives_its_lease_back() {
     assert!(camera.wait_for(PATIENCE, |status| !status.moving), "the next one has inherited the stop");
     drop(next);
     std::fs::remove_file(socket).unwrap();
+}
+
+/// Whoever comes next takes the lease and the retries of the one before: with a wrong password he could stop nothing.
+fn next_with_a_wrong_password(meanwhile: impl Fn(&VirtualCamera, &Receiver<()>)) {
+    let auth = Auth::Digest { qop: true };
+    let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
+    let first = start_as(Some("pass"), &camera, None, |_| {});
+    see_until(&first, |wait| camera.wait_for(wait, |status| status.moving));
+    camera.set_fault(Fault::Status(503));
+    drop(first);
+    let (refuse, refused) = channel();
+    let next = start_as(Some("falsch"), &camera, None, move |event| {
+        let why = Error::BadCredentials { user: "root".to_owned() };
+        let change = SessionEvent::Connection(ConnectionChange::Refused(why));
+        if matches!(event, Event::Loop(LoopEvent::Session(event)) if event == change) {
+            refuse.send(()).unwrap();
+        }
+    });
+    let moves = |camera: &VirtualCamera| {
+        let is_move = |query: &str| query.contains("continuouspantiltmove=") && !query.ends_with("=0,0");
+        camera.commands().iter().filter(|command| is_move(&command.query)).count()
+    };
+    let moved = moves(&camera);
+    meanwhile(&camera, &refused);
+    camera.set_fault(Fault::None);
+    see_until(&next, |wait| camera.wait_for(wait, |status| !status.moving));
+    // Once it rests for good he speaks for himself.
+    see_until(&next, |wait| refused.recv_timeout(wait).is_ok());
+    assert!(next.statistics().halted && !next.statistics().may_yet_move);
+    assert_eq!(moves(&camera), moved, "{:?}", camera.commands());
+    drop(next);
+}
+
+#[test]
+fn one_with_a_wrong_password_stops_the_camera_as_the_one_before_and_moves_nothing() {
+    next_with_a_wrong_password(|_, _| {});
+}
+
+/// As somebody has tried passwords: then ours is tried, too, and the right one again.
+#[test]
+fn one_with_a_wrong_password_stops_a_camera_that_lets_nobody_in_for_a_while() {
+    next_with_a_wrong_password(|camera, refused| {
+        camera.set_fault(Fault::Locked);
+        refused.recv_timeout(PATIENCE).unwrap();
+    });
 }
 
 /// Neither the camera goes on, nor does anybody wait for ever.

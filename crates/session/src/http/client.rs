@@ -53,6 +53,23 @@ pub struct Identity {
     pub findings: serde_json::Value,
 }
 
+impl Identity {
+    /// Whether both are the same to a camera: user, password, and the ways on which they may be sent.
+    pub fn is_account_of(&self, other: &Self) -> bool {
+        let account = |identity: &Self| {
+            let settings = identity.settings.clone();
+            (settings.credentials, settings.authentication, settings.trust)
+        };
+        account(self) == account(other)
+    }
+
+    /// The same as this one, whose account the camera knows from another.
+    #[must_use]
+    pub fn known_from(self, other: Self) -> Self {
+        Self { cookies: other.cookies, accepted: other.accepted, ..self }
+    }
+}
+
 impl From<ClientSettings> for Identity {
     fn from(settings: ClientSettings) -> Self {
         Self { settings, cookies: Cookies::default(), accepted: false, findings: serde_json::Value::Null }
@@ -108,7 +125,7 @@ impl HttpClient {
     /// # Errors
     /// [`Error::Tls`] where `trust` cannot be used.
     pub fn in_place_of(identity: Identity) -> Result<Self, Error> {
-        let Identity { settings, cookies, .. } = identity;
+        let Identity { settings, cookies, accepted, .. } = identity;
         Ok(Self {
             http: http_client(&settings, 1)?,
             http_once: http_client(&settings, 0)?,
@@ -116,7 +133,7 @@ impl HttpClient {
             cookies,
             settings,
             locked_out: false,
-            accepted: false,
+            accepted,
             connected: false,
         })
     }

@@ -108,6 +108,11 @@ impl Connection {
         self.fault.is_some()
     }
 
+    /// It moves at our word already.
+    pub fn note_obeyed(&mut self) {
+        self.obeyed = true;
+    }
+
     /// Something was answered as it should be. `idle`: no command is waiting, so that a query may
     /// mend what a command met.
     pub fn succeeded(&mut self, of_command: bool, idle: bool) -> Option<ConnectionChange> {
@@ -130,7 +135,7 @@ impl Connection {
         // Who has waited in vain has paused already; else silence would last longer than the camera's.
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
         // That it lets anybody ask does not say that it lets anybody move it.
-        let kind = FaultKind::of(err, if of_command { self.obeyed } else { self.connected });
+        let kind = FaultKind::of(err, self.obeyed || !of_command && self.connected);
         // But once: a server that restarts between challenge and answer refuses alike. What a question met is not held against the
         // first stop.
         let again =

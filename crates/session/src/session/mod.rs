@@ -18,12 +18,14 @@ mod operator;
 mod requests;
 mod responses;
 mod scheduler;
+mod speaker;
 mod stop_confirmation;
 
 pub use arbitration::ControlOwner;
 pub use connection::ConnectionChange;
 pub use facts::{Fact, Steering};
 pub use operator::CommandedMotion;
+pub use speaker::Speaker;
 
 use std::mem;
 use std::time::Duration;
@@ -50,7 +52,11 @@ pub(crate) const FORBIDDEN_PAUSE: Duration = Connection::FORBIDDEN_PAUSE;
 #[derive(Debug)]
 pub struct Session {
     settings: SessionSettings,
+    /// As whom the camera is spoken to.
+    speaker: Speaker,
     connection: Connection,
+    /// Of whoever else may have to speak.
+    other_connection: Option<Connection>,
     discovery: Discovery,
     description: Description,
     scheduler: Scheduler,
@@ -72,7 +78,9 @@ impl Session {
     pub fn new(mode: Mode, settings: SessionSettings, protocol: &Protocol) -> Self {
         Self {
             settings,
+            speaker: Speaker::Owner,
             connection: Connection::default(),
+            other_connection: None,
             discovery: Discovery::new(protocol.questions),
             description: Description::default(),
             scheduler: Scheduler::new(protocol.keep_alive),
@@ -92,14 +100,6 @@ impl Session {
         self.modes.want(mode);
     }
 
-    /// The camera may be asked anew: who we are has changed.
-    pub fn credentials_changed(&mut self) {
-        self.connection = Connection::default();
-        self.discovery.renew();
-        self.arbitration.queue.permitted();
-        self.next_poll = Time::ZERO;
-    }
-
     /// The axes are known to be otherwise: where the camera was before says nothing of who moved it since.
     pub fn reorient(&mut self) {
         self.arbitration.reorient();
@@ -114,6 +114,7 @@ impl Session {
     /// A predecessor left the camera in a move that this ends.
     pub fn inherit(&mut self, stop: Stop, now: Time) {
         self.scheduler.inherited(stop, now);
+        self.connection.note_obeyed();
     }
 
     /// What ends the last move.
@@ -170,7 +171,7 @@ impl Session {
     }
 
     fn access(&self, now: Time) -> Access {
-        if self.arbitration.owner(now).is_some() {
+        if self.speaker != Speaker::Owner || self.is_taken_over(now) {
             Access::Others
         } else if self.arbitration.is_ours(now) {
             Access::Ours

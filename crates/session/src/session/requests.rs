@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use servo::{Actuation, Time};
 
-use super::{Fact, Session, Steering, StopConfirmation};
+use super::{Fact, Session, Speaker, Steering, StopConfirmation};
 use crate::{Command, Next, Query, Request, SessionEvent};
 
 impl Session {
@@ -75,9 +75,11 @@ impl Session {
     /// What to ask next, and when.
     fn question(&self, presets_due: Option<Time>, now: Time) -> (Query, Time) {
         let poll = (Query::Position, self.next_poll);
+        // What it tells one it may not tell another.
+        let is_owner = self.speaker == Speaker::Owner;
         let presets = presets_due.map(|at| (Query::Presets, at));
         // Of what is due the first; else what will be soonest.
-        let questions = self.discovery.next().into_iter().chain(presets);
+        let questions = self.discovery.next().into_iter().chain(presets).filter(|_| is_owner);
         let (query, at) = questions.chain([poll]).min_by_key(|(_, at)| (*at).max(now)).unwrap_or(poll);
         match self.arbitration.queue.next(self.stays_at_rest()) {
             Some((request, due)) if due <= at.max(now) => (Query::Queue(request), due),

@@ -46,10 +46,24 @@ impl Session {
             self.scheduler.answered(sent, now);
         }
         match (request, response) {
-            (Request::Command(command), Ok(_)) => self.command_accepted(command, steering, (sent, now)),
-            (Request::Command(command), Err(err)) => self.command_failed(command, &err, steering, now),
+            (Request::Command(command), Ok(_)) => {
+                let facts = self.command_accepted(command, steering, (sent, now));
+                self.was_obeyed();
+                facts
+            }
+            (Request::Command(command), Err(err)) => {
+                let facts = self.command_failed(command, &err, steering, now);
+                self.pass_turn();
+                facts
+            }
             (Request::Query(query), Ok(response)) => self.told(*query, response, steering, (sent, now)),
-            (Request::Query(query), Err(err)) => self.not_told(*query, &err, now),
+            (Request::Query(query), Err(err)) => {
+                let facts = self.not_told(*query, &err, now);
+                if self.connection.halted() {
+                    self.pass_turn();
+                }
+                facts
+            }
         }
     }
 

@@ -95,6 +95,11 @@ impl DeadMan {
         self.order.as_ref().is_none_or(|order| order.in_doubt != in_doubt)
     }
 
+    /// The watchdog is to be told anew.
+    pub fn outdate(&mut self) {
+        self.order = None;
+    }
+
     /// Resolves when it is to be renewed, or how it stands may have changed.
     pub async fn due(&self) {
         let Some((lease, at)) = self.lease.as_ref().and_then(|lease| lease.renew_at().map(|at| (lease, at)))

@@ -2,6 +2,7 @@
 
 //! The one task that talks to the camera: takes what the streaming thread left, asks the control loop, sends.
 
+mod account;
 mod clock;
 mod dead_man;
 mod mailbox;
@@ -25,13 +26,15 @@ pub use self::mailbox::Mailbox;
 pub use self::outbox::Outbox;
 pub use self::statistics::Statistics;
 
+use self::account::Account;
 use self::dead_man::DeadMan;
 use self::predecessor::{Address, Predecessor};
 use self::state::TaskState;
 
 use servo::Time;
 
-use crate::http::{ClientSettings, Credentials};
+use crate::http::{ClientSettings, Identity};
+use crate::session::Speaker;
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
 use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
 use ptztrack_contract::lock::lock;
@@ -94,6 +97,8 @@ const WORKERS: usize = 2;
 #[derive(Debug)]
 pub struct CameraTask {
     camera: Address,
+    /// As whom the camera is to be stopped.
+    identity: Arc<Mutex<Identity>>,
     mailbox: Arc<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
     /// When the camera was last asked to rest, while it is to.
@@ -114,37 +119,42 @@ impl CameraTask {
         observer: impl Fn(Event) + Clone + Send + Sync + 'static,
     ) -> Result<Self, String> {
         let camera = (client.location.clone(), client.channel.clone());
-        let spoken_to = Arc::new(Mutex::new(client.clone()));
         let client = C::new(client).map_err(|err| format!("{err}. {}", err.advice()))?;
+        let mut account = Account::new(client);
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let mailbox = Arc::new(Mailbox::new(clock));
-        if let Some(stop) = Predecessor::succeed(&camera) {
-            mailbox.inherit(stop);
+        let mut control = ControlLoop::new(settings, &C::PROTOCOL);
+        let left = Predecessor::succeed(&camera);
+        let (inherited, may_yet_move) = (left.as_ref().map(|left| left.stop), left.is_some());
+        if let Some(left) = left {
+            mailbox.inherit(left.stop);
+            account.succeed(left.identity);
+            if account.stands_in() {
+                control.session_mut().stand_in();
+            }
         }
-        let control = ControlLoop::new(settings, &C::PROTOCOL);
+        let identity = Arc::new(Mutex::new(account.identity()));
         let (status, estimates, stop) =
-            (control.status(Time::ZERO), Some(control.estimates()), Some(control.stop()));
-        let statistics = Statistics { status, estimates, stop, ..Statistics::default() };
+            (control.status(Time::ZERO), Some(control.estimates()), inherited.or(Some(control.stop())));
+        let statistics = Statistics { status, estimates, stop, may_yet_move, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
         let task = Task {
-            client,
-            settings: spoken_to.clone(),
+            account,
+            identity: identity.clone(),
             dead_man: DeadMan::new(watchdog),
             state,
-            former: None,
             move_waits: false,
         };
         let running = runtime.spawn(task.run());
-        let task = Self { camera, mailbox, statistics, paused_at: Mutex::default() };
+        let task = Self { camera, identity, mailbox, statistics, paused_at: Mutex::default() };
         let predecessor = task.predecessor();
         let mailbox = task.mailbox.clone();
         runtime.spawn(async move {
             if let Err(err) = running.await {
                 mailbox.close();
                 observer(Event::Died(err.to_string()));
-                let settings = lock(&spoken_to).clone();
-                predecessor.stop::<C>(settings, &mailbox).await;
+                predecessor.stop::<C>(&mailbox).await;
             }
         });
         Ok(task)
@@ -171,7 +181,7 @@ impl CameraTask {
 
     /// What will be left of it.
     fn predecessor(&self) -> Predecessor {
-        Predecessor::new(self.camera.clone(), &self.mailbox, self.statistics.clone())
+        Predecessor::new(self.camera.clone(), self.identity.clone(), &self.mailbox, self.statistics.clone())
     }
 
     /// The numbers so far.
@@ -205,13 +215,11 @@ pub fn runtime() -> Result<&'static Runtime, std::io::Error> {
 }
 
 struct Task<C, O> {
-    client: C,
+    account: Account<C>,
     /// For whoever must finish what the task has begun.
-    settings: Arc<Mutex<ClientSettings>>,
+    identity: Arc<Mutex<Identity>>,
     dead_man: DeadMan,
     state: TaskState<O>,
-    /// Who we were when the camera last moved, where it has not confirmed a stop since.
-    former: Option<Option<Credentials>>,
     /// A move waits until it is known whether the watchdog would end it.
     move_waits: bool,
 }
@@ -226,7 +234,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             if self.state.credentials.is_some() {
                 self.change_credentials().await;
             }
-            self.fall_back();
+            self.take_turns();
             self.keep_lease();
             self.state.publish();
             if self.state.is_over() {
@@ -239,7 +247,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
                 }
                 Next::Do(request) => {
                     self.perform(request).await;
-                    self.state.warn(self.client.take_warning());
+                    self.state.warn(self.account.client().take_warning());
                 }
                 Next::Wait(until) => {
                     self.state.tell_settled();
@@ -266,13 +274,13 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
 
     /// For as long as the camera may move on our behalf, or is to, the watchdog is to stop it where we cannot.
     fn keep_lease(&mut self) {
-        let Self { client, dead_man, state, move_waits, .. } = self;
+        let Self { account, dead_man, state, move_waits, .. } = self;
         let in_doubt = state.control.session().in_doubt();
         if !std::mem::take(move_waits) {
             if !state.control.session().is_ours_to_stop(state.mailbox.now()) {
                 dead_man.release();
             } else if dead_man.is_outdated(in_doubt) {
-                let (identity, words) = (client.identity(), state.control.stop());
+                let (identity, words) = (account.identity(), state.control.stop());
                 dead_man.hold(StopOrder { identity, words, in_doubt });
             }
         }
@@ -281,10 +289,10 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
 
     /// Whether this would set a camera going that nobody is known to stop yet. One that moves is not left to itself for that.
     fn awaits_lease(&mut self, request: &Request) -> bool {
-        let Self { client, dead_man, state, move_waits, .. } = self;
+        let Self { account, dead_man, state, move_waits, .. } = self;
         if is_move(request) && state.control.session().is_at_rest() {
             if dead_man.is_outdated(true) {
-                let (identity, words) = (client.identity(), state.control.stop());
+                let (identity, words) = (account.identity(), state.control.stop());
                 dead_man.hold(StopOrder { identity, words, in_doubt: true });
             }
             state.keep_dead_man(dead_man);
@@ -293,8 +301,8 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         *move_waits
     }
 
-    /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Tried once: nor
-    /// may it answer.
+    /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Where it does not answer,
+    /// they wait until it does.
     async fn change_credentials(&mut self) {
         if let Some(stop) = self.state.control.session().parting_stop() {
             self.perform(Request::Command(Command::Stop(stop))).await;
@@ -302,32 +310,29 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             self.state.take_mail();
         }
         if let Some(credentials) = self.state.credentials.take() {
-            self.former.get_or_insert(lock(&self.settings).credentials.clone());
-            self.become_known_as(credentials);
+            let session = self.state.control.session();
+            self.account.change(credentials, session.stays_at_rest() || session.halted());
+            let session = self.state.control.session_mut();
+            if self.account.stands_in() && session.speaker() == Speaker::Owner {
+                session.stand_in();
+            }
+            session.owner_changed();
         }
     }
 
-    /// Where the camera refuses us, but moves at our word: then we are again who it knew.
-    fn fall_back(&mut self) {
-        let session = self.state.control.session();
-        if session.stays_at_rest() {
-            self.former = None;
-        } else if session.halted()
-            && let Some(former) = self.former.take()
-        {
-            self.become_known_as(former);
+    /// The session decides whose turn it is to speak.
+    fn take_turns(&mut self) {
+        let now = self.state.mailbox.now();
+        let session = self.state.control.session_mut();
+        session.settle_speaker(now);
+        if self.account.follow(session.speaker()) {
+            self.dead_man.outdate();
         }
-    }
-
-    fn become_known_as(&mut self, credentials: Option<Credentials>) {
-        lock(&self.settings).credentials.clone_from(&credentials);
-        self.client.set_credentials(credentials);
-        self.state.control.session_mut().credentials_changed();
     }
 
     /// One exchange, while mail goes on being taken: the newest target when it ends is the one steered by.
     async fn perform(&mut self, request: Request) {
-        let Self { client, dead_man, state, .. } = self;
+        let Self { account, identity, dead_man, state, .. } = self;
         let mailbox = state.mailbox.clone();
         let sent = mailbox.now();
         state.control.sending(&request, sent);
@@ -338,11 +343,15 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             // Whoever comes next while it is under way must know of it.
             statistics.may_yet_move |= is_move(&request);
         }
+        if matches!(request, Request::Command(_)) {
+            // By now it may have been let in.
+            *lock(identity) = account.identity();
+        }
         if is_move(&request) {
-            dead_man.hold(StopOrder { identity: client.identity(), words: stop, in_doubt: true });
+            dead_man.hold(StopOrder { identity: account.identity(), words: stop, in_doubt: true });
             state.keep_dead_man(dead_man);
         }
-        let mut exchange = pin!(client.exchange(&request));
+        let mut exchange = pin!(account.client().exchange(&request));
         loop {
             let now = mailbox.now();
             let silent_at = state.silent_at(&request, sent);

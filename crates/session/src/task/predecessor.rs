@@ -4,7 +4,7 @@ use std::sync::{Arc, Mutex, Weak};
 use std::time::Duration;
 
 use super::{LAST_RETRIES, Mailbox, Statistics};
-use crate::http::{ClientSettings, Location};
+use crate::http::{Identity, Location};
 use crate::{Client, Command, Error, Request, Stop};
 use ptztrack_contract::lock::lock;
 
@@ -21,14 +21,29 @@ pub type Address = (Location, String);
 #[derive(Debug)]
 pub struct Predecessor {
     camera: Address,
+    identity: Arc<Mutex<Identity>>,
     mailbox: Weak<Mailbox>,
     statistics: Arc<Mutex<Statistics>>,
 }
 
+/// What a camera was not seen to do.
+#[derive(Debug)]
+pub struct UnconfirmedStop {
+    /// The words.
+    pub stop: Stop,
+    /// As whom it was told, and moved.
+    pub identity: Identity,
+}
+
 impl Predecessor {
-    /// Of the task that steers this camera, with this mailbox.
-    pub fn new(camera: Address, mailbox: &Arc<Mailbox>, statistics: Arc<Mutex<Statistics>>) -> Self {
-        Self { camera, mailbox: Arc::downgrade(mailbox), statistics }
+    /// Of the task that steers this camera as this one, with this mailbox.
+    pub fn new(
+        camera: Address,
+        identity: Arc<Mutex<Identity>>,
+        mailbox: &Arc<Mailbox>,
+        statistics: Arc<Mutex<Statistics>>,
+    ) -> Self {
+        Self { camera, identity, mailbox: Arc::downgrade(mailbox), statistics }
     }
 
     /// Leaves it to whoever steers the camera next.
@@ -42,14 +57,16 @@ impl Predecessor {
     }
 
     /// Ends those who were left at this camera; returns the stop that it has not confirmed.
-    pub fn succeed(camera: &Address) -> Option<Stop> {
+    pub fn succeed(camera: &Address) -> Option<UnconfirmedStop> {
         let mut left = lock(&LEFT);
         let ours: Vec<_> = left.extract_if(.., |left| left.camera == *camera).collect();
         drop(left);
         for mailbox in ours.iter().filter_map(|left| left.mailbox.upgrade()) {
             mailbox.quit();
         }
-        ours.iter().rev().find_map(Self::unconfirmed_stop)
+        ours.iter().rev().find_map(|left| {
+            Some(UnconfirmedStop { stop: left.unconfirmed_stop()?, identity: lock(&left.identity).clone() })
+        })
     }
 
     /// Whether there is nothing left to do.
@@ -63,8 +80,9 @@ impl Predecessor {
     }
 
     /// Stops the camera, whatever it does, without the control loop, who broke; for a while.
-    pub async fn stop<C: Client>(&self, settings: ClientSettings, mailbox: &Mailbox) {
-        let Ok(mut client) = C::new(settings) else { return };
+    pub async fn stop<C: Client>(&self, mailbox: &Mailbox) {
+        let identity = lock(&self.identity).clone();
+        let Ok(mut client) = C::in_place_of(identity) else { return };
         let stop = {
             let mut statistics = lock(&self.statistics);
             // For whoever comes next, until it is known better.
@@ -72,6 +90,7 @@ impl Predecessor {
             Command::Stop(statistics.stop.unwrap_or(Stop::Position))
         };
         let tries = async {
+            let mut pause = LAST_RETRIES_PAUSE;
             while !mailbox.take().quit {
                 match client.exchange(&Request::Command(stop)).await {
                     Ok(_) => {
@@ -79,7 +98,11 @@ impl Predecessor {
                         break;
                     }
                     Err(Error::BadCredentials { .. }) => break,
-                    Err(_) => tokio::time::sleep(LAST_RETRIES_PAUSE).await,
+                    Err(err) => {
+                        tokio::time::sleep(pause).await;
+                        // Or the account could be locked.
+                        pause *= if matches!(err, Error::NotPermitted { .. }) { 2 } else { 1 };
+                    }
                 }
             }
         };
@@ -91,6 +114,11 @@ impl Predecessor {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::http::{Authentication, ClientSettings, Trust};
+
+    fn succeed(name: &str) -> Option<Stop> {
+        Predecessor::succeed(&camera(name)).map(|left| left.stop)
+    }
 
     fn camera(name: &str) -> Address {
         (Location::parse(&format!("http://{name}")).unwrap().0, String::new())
@@ -98,8 +126,17 @@ mod tests {
 
     fn left(name: &str, may_yet_move: bool) -> Predecessor {
         let statistics = Statistics { stop: Some(Stop::PanTilt), may_yet_move, ..Statistics::default() };
+        let settings = ClientSettings {
+            location: camera(name).0,
+            channel: String::new(),
+            credentials: None,
+            authentication: Authentication::default(),
+            timeout: LAST_RETRIES_PAUSE,
+            trust: Trust::System,
+        };
         Predecessor {
             camera: camera(name),
+            identity: Arc::new(Mutex::new(settings.into())),
             mailbox: Weak::new(),
             statistics: Arc::new(Mutex::new(statistics)),
         }
@@ -119,10 +156,10 @@ mod tests {
     fn a_stop_is_left_to_the_next_at_the_same_camera_once() {
         left("192.168.0.91", true).leave();
         left("192.168.0.92", false).leave();
-        assert_eq!(Predecessor::succeed(&camera("192.168.0.93")), None);
-        assert_eq!(Predecessor::succeed(&camera("192.168.0.92")), None, "that one rests");
+        assert_eq!(succeed("192.168.0.93"), None);
+        assert_eq!(succeed("192.168.0.92"), None, "that one rests");
         Predecessor::forget_void();
-        assert_eq!(Predecessor::succeed(&camera("192.168.0.91")), Some(Stop::PanTilt));
-        assert_eq!(Predecessor::succeed(&camera("192.168.0.91")), None, "it is seen to");
+        assert_eq!(succeed("192.168.0.91"), Some(Stop::PanTilt));
+        assert_eq!(succeed("192.168.0.91"), None, "it is seen to");
     }
 }

@@ -102,16 +102,8 @@ async fn watch_over<C: Client>(lease: &mut LeaseReceiver) -> End {
 
 /// Stops the camera until it says yes; and again where it may act on a move after that.
 async fn stop<C: Client>(order: &StopOrder) {
-    let tries = async {
-        let mut pause = FORBIDDEN_PAUSE;
-        // Who was let in before may be so again: the account is locked for a while, or somebody answers in the camera's place.
-        while try_to_stop::<C>(order).await.is_none() && order.identity.accepted {
-            sleep(pause).await;
-            pause *= 2;
-        }
-    };
     // Whoever cannot be stopped by then is not to be by us.
-    let _ = timeout(LAST_TRIES, tries).await;
+    let _ = timeout(LAST_TRIES, try_to_stop::<C>(order)).await;
 }
 
 /// `None`: the camera refuses user or password.
@@ -147,7 +139,7 @@ async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
             Err(Error::BadCredentials { .. }) => return None,
-            // Who was let in just before: a moment of a camera that restarts, or an account that is locked, and longer so by each try.
+            // Who was let in before: a moment of a camera that restarts, or an account that is locked, and longer so by each try.
             Err(Error::NotPermitted { .. }) => {
                 sleep(forbidden).await;
                 forbidden = (2 * forbidden).max(FORBIDDEN_PAUSE);

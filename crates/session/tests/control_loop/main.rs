@@ -372,9 +372,27 @@ fn wrong_credentials_end_all_asking_until_they_change() {
         rig.see(0.9, 0.5);
         assert_eq!(rig.after(ms(100)), []);
     }
-    rig.control.session_mut().credentials_changed();
+    rig.control.session_mut().owner_changed();
     rig.see(0.9, 0.5);
     assert_eq!(rig.after(ms(100)).len(), 1);
+}
+
+/// His password is for the end of what he began.
+#[test]
+fn who_stands_in_for_another_stops_the_camera_and_does_not_move_it() {
+    let mut rig = Rig::new(ServoSettings::default());
+    rig.control.session_mut().inherit(Stop::PanTilt, rig.now);
+    rig.control.session_mut().stand_in();
+    let mut sent = Vec::new();
+    for _ in 0..100 {
+        rig.see(0.9, 0.5);
+        sent.extend(rig.after(ms(100)));
+    }
+    assert_eq!(sent, [HALT; 2], "at once, and when the last doubt is over");
+    assert!(rig.control.session().stays_at_rest());
+    rig.control.session_mut().settle_speaker(rig.now);
+    rig.see(0.9, 0.5);
+    assert!(matches!(rig.after(ms(100))[..], [Command::Move { .. }]));
 }
 
 #[test]

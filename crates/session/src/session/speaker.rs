@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! As whom the camera is spoken to where it may move at somebody else's word, or at ours from before our password was changed. It does
+//! not stop for whom it does not know, so whoever moved it stops it, or we where it does not obey him; and nobody moves it until then.
+
+use std::mem;
+
+use servo::Time;
+
+use super::Session;
+use super::connection::Connection;
+
+/// As whom the camera is spoken to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Speaker {
+    /// Who may move it.
+    Owner,
+    /// Who moved it before, to stop it.
+    Mover,
+    /// Who is to be its owner, to stop it in the mover's place.
+    Newcomer,
+}
+
+impl Session {
+    /// As whom the camera is to be spoken to.
+    pub fn speaker(&self) -> Speaker {
+        self.speaker
+    }
+
+    /// The camera moves at the word of whoever speaks, and somebody else is to be its owner.
+    pub fn stand_in(&mut self) {
+        self.connection.note_obeyed();
+        self.speaker = Speaker::Mover;
+        self.other_connection = Some(Connection::default());
+        if self.connection.faulty() {
+            self.pass_turn();
+        }
+    }
+
+    /// The camera may be asked anew: its owner is another.
+    pub fn owner_changed(&mut self) {
+        match &mut self.other_connection {
+            Some(owners) if self.speaker == Speaker::Mover => *owners = Connection::default(),
+            _ => self.connection = Connection::default(),
+        }
+        if self.speaker == Speaker::Owner {
+            self.ask_anew();
+        }
+    }
+
+    /// Where nobody else is needed any more to stop the camera, its owner may move it.
+    pub fn settle_speaker(&mut self, now: Time) {
+        let confirmed_at = self.stop_confirmation.as_ref().and_then(super::StopConfirmation::unseen_at);
+        if self.stays_at_rest() && confirmed_at.is_none_or(|at| at <= now) {
+            self.decide_speaker();
+        }
+    }
+
+    /// It did as whoever speaks has told it.
+    pub(super) fn was_obeyed(&mut self) {
+        if self.speaker == Speaker::Newcomer {
+            self.decide_speaker();
+        }
+    }
+
+    /// It did not: it is the other's turn, but not his whom it has locked out.
+    pub(super) fn pass_turn(&mut self) {
+        let Some(other) = &mut self.other_connection else { return };
+        if !other.halted() {
+            mem::swap(&mut self.connection, other);
+            self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
+        } else if self.connection.halted() {
+            self.decide_speaker();
+        }
+    }
+
+    fn decide_speaker(&mut self) {
+        let Some(other) = self.other_connection.take() else { return };
+        if self.speaker == Speaker::Mover {
+            self.connection = other;
+        }
+        self.speaker = Speaker::Owner;
+        self.ask_anew();
+    }
+
+    fn ask_anew(&mut self) {
+        self.discovery.renew();
+        self.arbitration.queue.permitted();
+        self.next_poll = Time::ZERO;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Error, Protocol, SessionSettings};
+    use servo::Mode;
+    use std::time::Duration;
+
+    const PROTOCOL: Protocol = Protocol {
+        questions: &[],
+        keep_alive: Duration::from_secs(1),
+        confirms_stops: false,
+        has_control_queue: false,
+    };
+
+    /// With a camera that moves.
+    fn session() -> Session {
+        let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
+        session.inherit(crate::Stop::PanTilt, Time::ZERO);
+        session.stand_in();
+        session
+    }
+
+    impl Session {
+        /// What is told fails; returns whose turn it is then.
+        fn fails(&mut self, err: &Error) -> Speaker {
+            self.connection.failed(err, true, Time::ZERO);
+            self.pass_turn();
+            self.speaker()
+        }
+    }
+
+    fn wrong() -> Error {
+        Error::BadCredentials { user: "root".to_owned() }
+    }
+
+    /// Rights or certificates may lack one or the other.
+    #[test]
+    fn who_is_not_obeyed_gives_way_for_as_long_as_somebody_may_be_heard() {
+        for err in [
+            Error::Timeout(Duration::from_secs(2)),
+            Error::Camera("no".to_owned()),
+            Error::Broken("reset".to_owned()),
+        ] {
+            let mut session = session();
+            assert_eq!(session.speaker(), Speaker::Mover);
+            assert_eq!(
+                [0; 4].map(|_| session.fails(&err)),
+                [Speaker::Newcomer, Speaker::Mover].repeat(2)[..]
+            );
+            session.fails(&err);
+            session.was_obeyed();
+            assert_eq!(session.speaker(), Speaker::Owner);
+            assert_eq!(session.fails(&err), Speaker::Owner);
+        }
+    }
+
+    #[test]
+    fn whom_the_camera_locks_out_is_not_heard_again() {
+        let mut session = session();
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
+        assert_eq!(session.fails(&wrong()), Speaker::Mover);
+        assert_eq!([0; 4].map(|_| session.fails(&forbidden)), [Speaker::Mover; 4], "it may pass");
+        session.owner_changed();
+        assert_eq!(session.fails(&forbidden), Speaker::Newcomer, "with another password he is");
+        assert_eq!(session.fails(&wrong()), Speaker::Mover);
+        assert_eq!(session.fails(&wrong()), Speaker::Owner, "nobody is left");
+        assert!(session.halted());
+    }
+
+    #[test]
+    fn the_mover_speaks_until_the_camera_rests_for_good() {
+        let mut session = session();
+        session.was_obeyed();
+        session.settle_speaker(Time::ZERO);
+        assert_eq!(session.speaker(), Speaker::Mover, "it may yet act on what was said before");
+        session.scheduler = super::super::Scheduler::new(PROTOCOL.keep_alive);
+        session.settle_speaker(Time::ZERO);
+        assert_eq!(session.speaker(), Speaker::Owner);
+    }
+
+    #[test]
+    fn who_was_refused_just_before_does_not_begin() {
+        let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
+        session.connection.failed(&Error::CredentialsMissing, true, Time::ZERO);
+        session.stand_in();
+        assert_eq!(session.speaker(), Speaker::Newcomer);
+    }
+}
