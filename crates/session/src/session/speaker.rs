@@ -50,10 +50,14 @@ impl Session {
 
     /// Where nobody else is needed any more to stop the camera, its owner may move it.
     pub fn settle_speaker(&mut self, now: Time) {
-        let confirmed_at = self.stop_confirmation.as_ref().and_then(super::StopConfirmation::unseen_at);
-        if self.stays_at_rest() && confirmed_at.is_none_or(|at| at <= now) {
+        if self.has_stopped(now) {
             self.decide_speaker();
         }
+    }
+
+    /// Whether nothing is left to be told for the camera to rest for good.
+    pub fn has_stopped(&self, now: Time) -> bool {
+        self.stays_at_rest() && !self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(now))
     }
 
     /// It did as whoever speaks has told it.
@@ -63,13 +67,14 @@ impl Session {
         }
     }
 
-    /// It did not: it is the other's turn, but not his whom it has locked out.
+    /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again.
     pub(super) fn pass_turn(&mut self) {
         let Some(other) = &mut self.other_connection else { return };
-        if !other.halted() {
+        let is_sooner = self.connection.halted() || other.retry_at() <= self.connection.retry_at();
+        if !other.halted() && is_sooner {
             mem::swap(&mut self.connection, other);
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
-        } else if self.connection.halted() {
+        } else if self.connection.halted() && other.halted() {
             self.decide_speaker();
         }
     }
@@ -158,6 +163,18 @@ mod tests {
         assert_eq!(session.fails(&wrong()), Speaker::Mover);
         assert_eq!(session.fails(&wrong()), Speaker::Owner, "nobody is left");
         assert!(session.halted());
+    }
+
+    /// Whom it refuses is to ask rarely; that is no reason for the other to wait.
+    #[test]
+    fn who_may_ask_again_first_speaks() {
+        let mut session = session();
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        let broken = Error::Broken("reset".to_owned());
+        session.fails(&forbidden);
+        assert_eq!(session.fails(&broken), Speaker::Mover);
+        assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
+        assert_eq!([0; 8].map(|_| session.fails(&broken)), [Speaker::Newcomer; 8]);
     }
 
     #[test]

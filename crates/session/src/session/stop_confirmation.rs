@@ -94,6 +94,11 @@ impl StopConfirmation {
         self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + after)
     }
 
+    /// Whether it may yet have to be repeated.
+    pub fn is_open(&self, now: Time) -> bool {
+        self.since.is_some_and(|since| self.repeated == 0 || now < since + Self::UNSEEN_AFTER)
+    }
+
     /// Whether it is to be repeated for that now; asked once for each time.
     pub fn repeats_unseen(&mut self, now: Time) -> bool {
         let is_due = self.unseen_at().is_some_and(|at| at <= now);
@@ -156,9 +161,14 @@ mod tests {
         let mut confirmation = StopConfirmation::default();
         confirmation.stopped(ms(1000));
         assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Fine);
-        assert!(!confirmation.repeats_unseen(ms(3999)) && confirmation.repeats_unseen(ms(4000)));
+        assert!(!confirmation.repeats_unseen(ms(3999)) && confirmation.is_open(ms(4000)));
+        assert!(confirmation.repeats_unseen(ms(4000)));
         confirmation.stopped(ms(4000));
         assert_eq!(confirmation.unseen_at(), None);
+        assert!(
+            confirmation.is_open(ms(6999)) && !confirmation.is_open(ms(7000)),
+            "a picture may yet show that it turns"
+        );
     }
 
     #[test]

@@ -304,19 +304,23 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
     /// Before, a camera that moves is stopped by whom it knows: if the new ones are wrong, nobody can. Where it does not answer,
     /// they wait until it does.
     async fn change_credentials(&mut self) {
+        self.take_turns();
         if let Some(stop) = self.state.control.session().parting_stop() {
             self.perform(Request::Command(Command::Stop(stop))).await;
+            self.take_turns();
             // A password often follows on the user's heels.
             self.state.take_mail();
         }
         if let Some(credentials) = self.state.credentials.take() {
             let session = self.state.control.session();
-            self.account.change(credentials, session.stays_at_rest() || session.halted());
+            let is_free = session.has_stopped(self.state.mailbox.now()) || session.halted();
+            self.account.change(credentials, is_free);
             let session = self.state.control.session_mut();
             if self.account.stands_in() && session.speaker() == Speaker::Owner {
                 session.stand_in();
             }
             session.owner_changed();
+            *lock(&self.identity) = self.account.identity();
         }
     }
 
@@ -326,6 +330,7 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         let session = self.state.control.session_mut();
         session.settle_speaker(now);
         if self.account.follow(session.speaker()) {
+            *lock(&self.identity) = self.account.identity();
             self.dead_man.outdate();
         }
     }
