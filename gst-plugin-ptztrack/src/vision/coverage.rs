@@ -17,14 +17,19 @@ const ROOM: usize = 4;
 /// How much of each of some pixels side by side is covered: 0 to 255.
 pub(super) type Block = [u8; TOGETHER];
 
-/// How much of each pixel of an area is covered. Only blocks that something may cover are ever looked at: the outline of a box covers
-/// few of those that lie within it.
+/// A rim, and what lies on it.
+pub(super) const LAYERS: usize = 2;
+/// What has no rim lies here.
+pub(super) const BARE: usize = 0;
+
+/// How much of each pixel of an area each of two layers covers, which cover much the same blocks of pixels. Only blocks that something may
+/// cover are ever looked at: the outline of a box covers few of those that lie within it.
 #[derive(Debug, Default)]
 pub(super) struct Coverage {
     area: Rect,
     /// Blocks from a row to the next.
     stride: usize,
-    blocks: Vec<Block>,
+    blocks: Vec<[Block; LAYERS]>,
     is_touched: Vec<bool>,
     /// Those that may cover something: the others are nought.
     touched: Vec<Place>,
@@ -40,19 +45,20 @@ pub(super) struct Place {
 impl Coverage {
     /// Nothing of `area` is covered.
     pub fn clear(&mut self, area: Rect) {
-        for Place { y, block } in self.touched.drain(..) {
+        for Place { y, block } in &self.touched {
             let index = y * self.stride + block;
-            (self.blocks[index], self.is_touched[index]) = ([0; TOGETHER], false);
+            (self.blocks[index], self.is_touched[index]) = ([[0; TOGETHER]; LAYERS], false);
         }
+        self.touched.clear();
         (self.area, self.stride) = (area, 0);
         self.stride = self.width().div_ceil(TOGETHER).next_multiple_of(ROOM);
         let needed = self.blocks.len().max(self.stride * self.height());
-        self.blocks.resize(needed, [0; TOGETHER]);
+        self.blocks.resize(needed, [[0; TOGETHER]; LAYERS]);
         self.is_touched.resize(needed, false);
     }
 
-    /// Covers `area`.
-    pub fn fill(&mut self, area: Rect) {
+    /// Covers `area` in one layer.
+    pub fn fill(&mut self, area: Rect, layer: usize) {
         let inside = area & self.area;
         if inside.empty() {
             return;
@@ -67,7 +73,7 @@ impl Coverage {
                     },
                 );
             for y in top..top + inside.height as usize {
-                let pixels = self.touch(Place { y, block });
+                let pixels = &mut self.touch(Place { y, block })[layer];
                 pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| *pixel |= covered);
             }
         }
@@ -86,24 +92,17 @@ impl Coverage {
         self.area.height.max(0) as usize
     }
 
-    /// All of its pixels, row after row.
+    /// All of the pixels of a layer, row after row.
     #[cfg(test)]
-    pub fn bytes(&self) -> Vec<u8> {
-        let row = |y: usize| &self.blocks[y * self.stride..][..self.stride].as_flattened()[..self.width()];
-        (0..self.height()).flat_map(row).copied().collect()
-    }
-
-    /// Columns of a row, to be covered.
-    fn part(&mut self, y: usize, columns: Range<usize>) -> &mut [u8] {
-        for block in blocks_of(&columns) {
-            self.touch(Place { y, block });
-        }
-        let first = y * self.stride * TOGETHER;
-        &mut self.blocks.as_flattened_mut()[first + columns.start..first + columns.end]
+    pub fn bytes(&self, layer: usize) -> Vec<u8> {
+        let row = |y: usize| &self.blocks[y * self.stride..][..self.stride];
+        let pixels = |y| row(y).iter().flat_map(|block| block[layer]).take(self.width());
+        (0..self.height()).flat_map(pixels).collect()
     }
 
     /// A block, to be covered.
-    fn touch(&mut self, place: Place) -> &mut Block {
+    #[inline(always)]
+    fn touch(&mut self, place: Place) -> &mut [Block; LAYERS] {
         let index = place.y * self.stride + place.block;
         if !std::mem::replace(&mut self.is_touched[index], true) {
             self.touched.push(place);
@@ -111,16 +110,8 @@ impl Coverage {
         &mut self.blocks[index]
     }
 
-    /// Covers a block at least so much.
-    #[inline(always)]
-    fn cover(&mut self, place: Place, covered: &Block) {
-        for (pixel, covered) in self.touch(place).iter_mut().zip(covered) {
-            *pixel = (*pixel).max(*covered);
-        }
-    }
-
     /// The blocks of which anything may be covered. The last of a row may reach beyond the area, where nothing is.
-    pub fn touched(&self) -> impl Iterator<Item = (Place, &Block)> {
+    pub fn touched(&self) -> impl Iterator<Item = (Place, &[Block; LAYERS])> {
         self.touched.iter().map(|place| (*place, &self.blocks[place.y * self.stride + place.block]))
     }
 
@@ -142,15 +133,16 @@ impl Coverage {
         }
         let shift = SIDE.ilog2() + down;
         for Place { y, block } in &out.touched {
-            let mut sums = [0; TOGETHER];
+            let mut sums = [[0; TOGETHER]; LAYERS];
             for row in (y << down)..((y + 1) << down).min(self.height()) {
-                add_blocks::<SIDE>(&mut sums, &self.blocks[row * self.stride + block * SIDE..][..SIDE]);
+                let blocks = self.blocks[row * self.stride + block * SIDE..].first_chunk::<SIDE>();
+                blocks.into_iter().for_each(|blocks| add_blocks(&mut sums, blocks));
             }
-            out.blocks[y * out.stride + block] = sums.map(|sum| (sum >> shift) as u8);
+            out.blocks[y * out.stride + block] = sums.map(|sums| sums.map(|sum| (sum >> shift) as u8));
         }
     }
 
-    /// Covers what `mask`, of which a row has `width` pixels, covers when its top left pixel lies at (`x`, `y`).
+    /// Covers what `mask`, of which a row has `width` pixels, covers when its top left pixel lies at (`x`, `y`). It has no rim.
     pub fn add_mask(&mut self, mask: &[u8], width: usize, (x, y): (i32, i32)) {
         let (skipped, first) = ((self.area.x - x).max(0) as usize, (x - self.area.x).max(0) as usize);
         for (line, row) in mask.chunks_exact(width.max(1)).zip(y..) {
@@ -159,8 +151,15 @@ impl Coverage {
             if row < self.area.y || row >= self.area.y + self.area.height || columns.is_empty() {
                 continue;
             }
-            let pixels = self.part((row - self.area.y) as usize, columns);
-            pixels.iter_mut().zip(line).for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
+            let y = (row - self.area.y) as usize;
+            for block in blocks_of(&columns) {
+                let left = block * TOGETHER;
+                let inside = columns.start.max(left)..columns.end.min(left + TOGETHER);
+                let covered = &line[inside.start - first..];
+                let pixels =
+                    &mut self.touch(Place { y, block })[BARE][inside.start - left..inside.end - left];
+                pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
+            }
         }
     }
 }
@@ -171,9 +170,17 @@ fn blocks_of(columns: &Range<usize>) -> Range<usize> {
 }
 
 /// Adds what is covered in blocks of `SIDE` pixels beside each other.
-fn add_blocks<const SIDE: usize>(sums: &mut [u16; TOGETHER], covered: &[Block]) {
-    for (sum, block) in sums.iter_mut().zip(covered.as_flattened().as_chunks::<SIDE>().0) {
-        *sum += block.iter().map(|covered| u16::from(*covered)).sum::<u16>();
+#[inline(always)]
+fn add_blocks<const SIDE: usize>(sums: &mut [[u16; TOGETHER]; LAYERS], covered: &[[Block; LAYERS]; SIDE]) {
+    for (layer, sums) in sums.iter_mut().enumerate() {
+        let pixels = covered.map(|block| block[layer]);
+        let pixels = pixels.as_flattened();
+        // Counted out, which the compiler makes into vector code: of chunks it does not.
+        for (index, sum) in sums.iter_mut().enumerate() {
+            for beside in 0..SIDE {
+                *sum += u16::from(pixels[index * SIDE + beside]);
+            }
+        }
     }
 }
 
@@ -227,16 +234,16 @@ impl Stroke {
     }
 }
 
-/// Covers in two layers of the same area what is at most so many `radii`, the larger first, from the line between two places,
+/// Covers in both layers what is at most so many `radii`, the larger first, from the line between two places,
 /// `strength` (0 to 1) of it. What is covered already stays covered as much: strokes that meet in a corner do not show there twice.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn add_stroke(
-    layers: &mut [Coverage; 2],
+    coverage: &mut Coverage,
     (from, to): (Spot, Spot),
-    radii: [f64; 2],
+    radii: [f64; LAYERS],
     strength: f64,
 ) {
-    let (area, width, height) = (layers[0].area, layers[0].width(), layers[0].height());
+    let (area, width, height) = (coverage.area, coverage.width(), coverage.height());
     let reaches = radii.map(|radius| radius + 0.5);
     let [reach, _] = reaches;
     let (dx, dy) = (to.x - from.x, to.y - from.y);
@@ -257,14 +264,16 @@ pub(super) fn add_stroke(
             let mut distances = stroke.distances((origin + first as f64) as f32, down as f32);
             // Nothing is covered beyond the area.
             distances[TOGETHER.min(width - first)..].fill(f32::INFINITY);
-            for (layer, reach) in layers.iter_mut().zip(reaches) {
-                let covered = stroke.covered(&distances, reach as f32);
-                // What reaches less far covers nothing either.
-                if covered.iter().fold(0, |any, covered| any | covered) == 0 {
-                    break;
-                }
-                layer.cover(Place { y, block }, &covered);
+            let covered = reaches.map(|reach| stroke.covered(&distances, reach as f32));
+            // What reaches less far covers nothing either.
+            if covered[0].iter().fold(0, |any, covered| any | covered) == 0 {
+                continue;
             }
+            let pixels = coverage.touch(Place { y, block }).as_flattened_mut();
+            pixels
+                .iter_mut()
+                .zip(covered.as_flattened())
+                .for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
         }
     }
 }
@@ -275,12 +284,12 @@ mod tests {
     use proptest::prelude::*;
 
     fn covered(area: Rect, strokes: &[(Spot, Spot, f64)]) -> Vec<Vec<u8>> {
-        let mut layers = [Coverage::default(), Coverage::default()];
-        layers.iter_mut().for_each(|layer| layer.clear(area));
+        let mut coverage = Coverage::default();
+        coverage.clear(area);
         for (from, to, radius) in strokes {
-            add_stroke(&mut layers, (*from, *to), [radius + 2.0, *radius], 1.0);
+            add_stroke(&mut coverage, (*from, *to), [radius + 2.0, *radius], 1.0);
         }
-        let [rim, inner] = layers.map(|layer| layer.bytes());
+        let [rim, inner] = [0, 1].map(|layer| coverage.bytes(layer));
         assert!(rim.iter().zip(&inner).all(|(rim, inner)| rim >= inner));
         inner.chunks_exact(area.width.max(1) as usize).map(<[u8]>::to_vec).collect()
     }
@@ -310,12 +319,16 @@ mod tests {
         for (area, fill) in [((40, 9), (3, 2, 30, 5)), ((11, 20), (0, 0, 11, 1)), ((90, 4), (70, 3, 1, 1))] {
             let (x, y, width, height) = fill;
             coverage.clear(Rect::new(0, 0, area.0, area.1));
-            coverage.fill(Rect::new(x, y, width, height));
-            coverage.reduce((1, 1), &mut reduced);
-            let sum =
-                |coverage: &Coverage| coverage.bytes().iter().map(|pixel| u32::from(*pixel)).sum::<u32>();
-            assert_eq!(sum(&coverage), 255 * (width * height) as u32);
-            assert!((4 * sum(&reduced)).abs_diff(sum(&coverage)) <= 4 * reduced.bytes().len() as u32);
+            for layer in 0..LAYERS {
+                let sum = |coverage: &Coverage| {
+                    coverage.bytes(layer).iter().map(|pixel| u32::from(*pixel)).sum::<u32>()
+                };
+                assert_eq!(sum(&coverage), 0);
+                coverage.fill(Rect::new(x, y, width, height), layer);
+                coverage.reduce((1, 1), &mut reduced);
+                assert_eq!(sum(&coverage), 255 * (width * height) as u32);
+                assert!((4 * sum(&reduced)).abs_diff(sum(&coverage)) <= 4 * reduced.bytes(0).len() as u32);
+            }
         }
         coverage.clear(Rect::new(0, 0, 90, 4));
         assert_eq!(coverage.touched().count(), 0);
@@ -326,9 +339,9 @@ mod tests {
         let mut coverage = Coverage::default();
         coverage.clear(Rect::new(5, 5, 2, 2));
         coverage.add_mask(&[1, 2, 3, 4, 5, 6, 7, 8, 9], 3, (4, 4));
-        assert_eq!(coverage.bytes(), [5, 6, 8, 9]);
+        assert_eq!(coverage.bytes(BARE), [5, 6, 8, 9]);
         coverage.add_mask(&[200; 9], 3, (6, 6));
-        assert_eq!(coverage.bytes(), [5, 6, 8, 200]);
+        assert_eq!(coverage.bytes(BARE), [5, 6, 8, 200]);
         coverage.add_mask(&[255; 9], 3, (20, -9));
     }
 

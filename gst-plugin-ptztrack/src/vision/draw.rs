@@ -2,7 +2,7 @@
 
 use opencv::core::{Point, Rect};
 
-use super::coverage::{Coverage, TOGETHER, add_stroke};
+use super::coverage::{BARE, Coverage, LAYERS, TOGETHER, add_stroke};
 use super::font::{Font, text_width};
 use super::surface::{ColourSpace, Component, Surface};
 use super::{FrameSize, Spot};
@@ -138,15 +138,16 @@ impl Shape {
                 let (start, end) =
                     (origin.rounded(), Spot { x: origin.x + width, y: origin.y + height }.rounded());
                 let area = Rect::new(start.x, start.y, end.x - start.x, end.y - start.y);
-                pen.layer(bounds, *colour, surface, |coverage| coverage.fill(area));
+                pen.layers(bounds, [*colour; LAYERS], surface, |coverage| coverage.fill(area, BARE));
             }
             Self::Frame { origin, end, width, colour } => {
-                for (width, colour) in stroke_and_rim(*width, *colour) {
-                    let outer = snapped(*origin, *end, width);
-                    pen.layer(bounds, colour, surface, |coverage| {
-                        frame_sides(outer, width).for_each(|side| coverage.fill(side));
-                    });
-                }
+                let both = stroke_and_rim(*width, *colour);
+                pen.layers(bounds, both.map(|(_, colour)| colour), surface, |coverage| {
+                    for (layer, (width, _)) in both.into_iter().enumerate() {
+                        let outer = snapped(*origin, *end, width);
+                        frame_sides(outer, width).for_each(|side| coverage.fill(side, layer));
+                    }
+                });
             }
             Self::Line { points, closed, width, colour } => {
                 let sides = || {
@@ -158,30 +159,29 @@ impl Shape {
                 };
                 let both = stroke_and_rim(*width, *colour);
                 let radii = both.map(|(width, _)| f64::from(width) / 2.0);
-                pen.outlined(bounds, both.map(|(_, colour)| colour), surface, |layers| {
-                    sides().for_each(|side| add_stroke(layers, side, radii, 1.0));
+                pen.layers(bounds, both.map(|(_, colour)| colour), surface, |coverage| {
+                    sides().for_each(|side| add_stroke(coverage, side, radii, 1.0));
                 });
             }
             Self::Fading { points, width, colour } => {
                 let strength = |index: usize| (index + 1) as f64 / points.len() as f64;
                 let radii = [outlined(*width), *width].map(|width| f64::from(width) / 2.0);
-                pen.outlined(bounds, [OUTLINE, *colour], surface, |layers| {
+                pen.layers(bounds, [OUTLINE, *colour], surface, |coverage| {
                     for (index, side) in points.windows(2).enumerate() {
-                        add_stroke(layers, (side[0], side[1]), radii, strength(index));
+                        add_stroke(coverage, (side[0], side[1]), radii, strength(index));
                     }
                 });
             }
             Self::Dot { centre, radius, colour } => {
                 let radii = [radius + outline(*radius), *radius];
-                pen.outlined(bounds, [OUTLINE, *colour], surface, |layers| {
-                    add_stroke(layers, (*centre, *centre), radii, 1.0);
+                pen.layers(bounds, [OUTLINE, *colour], surface, |coverage| {
+                    add_stroke(coverage, (*centre, *centre), radii, 1.0);
                 });
             }
             Self::Text { origin, text, height, colour } => {
-                let [coverage, _] = &mut pen.layers;
-                coverage.clear(bounds);
-                pen.font.write(text, *origin, *height, coverage)?;
-                surface.blend(coverage, *colour, &mut pen.reduced);
+                pen.coverage.clear(bounds);
+                pen.font.write(text, *origin, *height, &mut pen.coverage)?;
+                surface.blend(&pen.coverage, [*colour; LAYERS], &mut pen.reduced);
             }
         }
         Ok(())
@@ -243,8 +243,7 @@ pub struct OverlayRectangle {
 /// Draws shapes, and keeps letters and memory for the next picture.
 #[derive(Debug, Default)]
 pub struct Pen {
-    /// A stroke's rim, or what has none, and the stroke.
-    layers: [Coverage; 2],
+    coverage: Coverage,
     reduced: Coverage,
     font: Font,
 }
@@ -295,33 +294,17 @@ impl Pen {
         })
     }
 
-    /// Lays a colour over what `cover` covers within `bounds`.
-    fn layer(
+    /// Lays the colours of a rim and of what lies on it, one over the other, over what `cover` covers of each within `bounds`.
+    fn layers(
         &mut self,
         bounds: Rect,
-        colour: Colour,
+        colours: [Colour; LAYERS],
         surface: &mut Surface,
         cover: impl FnOnce(&mut Coverage),
     ) {
-        let [coverage, _] = &mut self.layers;
-        coverage.clear(bounds);
-        cover(coverage);
-        surface.blend(coverage, colour, &mut self.reduced);
-    }
-
-    /// Lays the colours of a rim and its stroke, one over the other, over what `cover` covers of each within `bounds`.
-    fn outlined(
-        &mut self,
-        bounds: Rect,
-        colours: [Colour; 2],
-        surface: &mut Surface,
-        cover: impl FnOnce(&mut [Coverage; 2]),
-    ) {
-        self.layers.iter_mut().for_each(|layer| layer.clear(bounds));
-        cover(&mut self.layers);
-        for (layer, colour) in self.layers.iter().zip(colours) {
-            surface.blend(layer, colour, &mut self.reduced);
-        }
+        self.coverage.clear(bounds);
+        cover(&mut self.coverage);
+        surface.blend(&self.coverage, colours, &mut self.reduced);
     }
 }
 

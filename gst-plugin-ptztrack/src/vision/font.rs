@@ -92,6 +92,7 @@ impl Glyph {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::vision::coverage::BARE;
 
     #[test]
     fn text_grows_with_its_height() {
@@ -115,12 +116,13 @@ mod tests {
         Font::default().write(text, Spot { x: 12.0, y: 40.0 }, height, &mut coverage).unwrap();
         let sum = |pixels: &[u8]| pixels.iter().map(|pixel| f64::from(*pixel)).sum::<f64>();
         for (known, ours) in
-            known.chunks_exact(width as usize).zip(coverage.bytes().chunks_exact(width as usize))
+            known.chunks_exact(width as usize).zip(coverage.bytes(BARE).chunks_exact(width as usize))
         {
             assert!((sum(known) - sum(ours)).abs() < 0.1 * sum(known) + 60.0);
         }
         // No letter lies a pixel or more beside its place: half of what is white is white in both.
-        let both = known.iter().zip(coverage.bytes()).filter(|(known, ours)| **known > 128 && *ours > 128);
+        let both =
+            known.iter().zip(coverage.bytes(BARE)).filter(|(known, ours)| **known > 128 && *ours > 128);
         assert!(both.count() * 2 > known.iter().filter(|known| **known > 128).count());
     }
 
@@ -145,7 +147,7 @@ mod tests {
             let mut coverage = Coverage::default();
             coverage.clear(Rect::new(0, 0, 40, 40));
             Font::default().write(text, Spot { x: 10.0, y: 30.0 }, 15.0, &mut coverage).unwrap();
-            coverage.bytes()
+            coverage.bytes(BARE)
         };
         assert_eq!(written("ü"), written("?"));
         assert_ne!(written("u"), written("?"));

@@ -4,7 +4,7 @@
 
 use multiversion::multiversion;
 
-use super::coverage::{Block, Coverage, Place, TOGETHER};
+use super::coverage::{Block, Coverage, LAYERS, Place, TOGETHER};
 use super::draw::Colour;
 
 /// Where a format keeps one component (Y, U, red, ...) of its pixels, eight bits of each.
@@ -69,15 +69,19 @@ impl Surface<'_> {
     /// What is drawn begins at a column and a row that can be divided by this: no component is halved more often.
     pub(super) const GRID: i32 = 4;
 
-    /// Lays `colour` over what `coverage` covers, whose area lies within the surface and begins on the grid. `kept` is
-    /// memory for the next time.
-    pub(super) fn blend(&mut self, coverage: &Coverage, colour: Colour, kept: &mut Coverage) {
-        let alpha = (255.0 * colour.alpha.clamp(0.0, 1.0)).round() as u8;
-        let values = self.colours.components(colour);
+    /// Lays the colour of each layer of `coverage`, one over the other, over what it covers, whose area lies within the surface and
+    /// begins on the grid. `kept` is memory for the next time.
+    pub(super) fn blend(&mut self, coverage: &Coverage, colours: [Colour; LAYERS], kept: &mut Coverage) {
+        let values = colours.map(|colour| self.colours.components(colour));
+        let paint = |layer: usize, component: usize| Paint {
+            value: values[layer][component],
+            alpha: (255.0 * colours[layer].alpha.clamp(0.0, 1.0)).round() as u8,
+        };
         let area = coverage.area();
         let (left, top) = ((area.x - self.origin.0) as usize, (area.y - self.origin.1) as usize);
         let mut reduced = None;
-        for (component, value) in self.components.iter().zip(values) {
+        for (component, index) in self.components.iter().zip(0..values[0].len()) {
+            let paints = std::array::from_fn(|layer| paint(layer, index));
             let Component { plane, offset, step, stride, halvings } = *component;
             if halvings != (0, 0) && reduced != Some(halvings) {
                 coverage.reduce(halvings, kept);
@@ -86,42 +90,56 @@ impl Surface<'_> {
             let coverage = if halvings == (0, 0) { coverage } else { &*kept };
             let start = offset + (left >> halvings.0) * step + (top >> halvings.1) * stride;
             if let Some(pixels) = self.planes[plane].get_mut(start..) {
-                blend_blocks(pixels, (step.max(1), stride), coverage, value, alpha);
+                blend_blocks(pixels, (step.max(1), stride), coverage, paints);
             }
         }
     }
 }
 
-/// Lays `value` over what is covered of one component, which is `steps` from a pixel to the next and from a row to the next.
+/// What is laid over one component of a pixel.
+#[derive(Debug, Clone, Copy)]
+struct Paint {
+    value: u8,
+    alpha: u8,
+}
+
+/// Lays the paint of each layer over what it covers of one component, which is `steps` from a pixel to the next and from a row to the next.
 #[multiversion(targets("x86_64+avx2"))]
 fn blend_blocks(
     component: &mut [u8],
     (step, stride): (usize, usize),
     coverage: &Coverage,
-    value: u8,
-    alpha: u8,
+    paints: [Paint; LAYERS],
 ) {
     for (Place { y, block }, covered) in coverage.touched() {
         let Some(pixels) = component.get_mut(y * stride + block * TOGETHER * step..) else { continue };
         match pixels.first_chunk_mut::<TOGETHER>() {
             // Of a length that is known, the compiler makes vector code.
-            Some(pixels) if step == 1 => lay(pixels.iter_mut(), covered, value, alpha),
-            _ => lay(pixels.iter_mut().step_by(step), covered, value, alpha),
+            Some(pixels) if step == 1 => lay(pixels.iter_mut(), covered, paints),
+            _ => lay(pixels.iter_mut().step_by(step), covered, paints),
         }
     }
 }
 
-/// Lays `value` over pixels beside each other.
+/// Lays the paint of each layer over pixels beside each other.
 #[inline(always)]
-fn lay<'a>(pixels: impl Iterator<Item = &'a mut u8>, covered: &Block, value: u8, alpha: u8) {
-    pixels.zip(covered).for_each(|(pixel, covered)| over(pixel, value, *covered, alpha));
+fn lay<'a>(
+    pixels: impl Iterator<Item = &'a mut u8>,
+    [lower, upper]: &[Block; LAYERS],
+    [under, over]: [Paint; LAYERS],
+) {
+    for (pixel, (lower, upper)) in pixels.zip(lower.iter().zip(upper)) {
+        *pixel = over.on(under.on(*pixel, *lower), *upper);
+    }
 }
 
-/// Lays `value` over a pixel.
-#[inline(always)]
-fn over(pixel: &mut u8, value: u8, covered: u8, alpha: u8) {
-    let part = by_255(u16::from(covered) * u16::from(alpha));
-    *pixel = by_255(u16::from(*pixel) * (255 - part) + u16::from(value) * part) as u8;
+impl Paint {
+    /// A pixel that it covers so much.
+    #[inline(always)]
+    fn on(self, pixel: u8, covered: u8) -> u8 {
+        let part = by_255(u16::from(covered) * u16::from(self.alpha));
+        by_255(u16::from(pixel) * (255 - part) + u16::from(self.value) * part) as u8
+    }
 }
 
 /// Divides a product of two bytes by 255, rounded.
@@ -173,7 +191,7 @@ mod tests {
         ];
         let planes = [&mut luma[..], &mut chroma[..], &mut [], &mut []];
         let mut surface = Surface { planes, components: &components, colours: BT601, origin: (0, 0) };
-        surface.blend(&coverage, Colour::new(255, 0, 0), &mut Coverage::default());
+        surface.blend(&coverage, [Colour::new(255, 0, 0); 2], &mut Coverage::default());
         assert_eq!(luma[4 * 8 + 4..][..4], [81, 100, 81, 100]);
         assert_eq!(chroma[2 * 8 + 4..][..4], [95, 170, 95, 170]);
         let touched = luma.iter().chain(&chroma).filter(|value| **value != 100).count();
@@ -184,13 +202,13 @@ mod tests {
     fn a_surface_that_is_too_small_is_drawn_on_as_far_as_it_goes() {
         let mut coverage = Coverage::default();
         coverage.clear(Rect::new(0, 0, 8, 8));
-        coverage.fill(Rect::new(0, 0, 8, 8));
+        coverage.fill(Rect::new(0, 0, 8, 8), 0);
         let mut bytes = [0; 10];
         let components = [Component { step: 1, stride: 8, ..Component::default() }];
         let planes = [&mut bytes[..], &mut [], &mut [], &mut []];
         Surface { planes, components: &components, colours: ColourSpace::Rgb, origin: (0, 0) }.blend(
             &coverage,
-            Colour::new(9, 9, 9),
+            [Colour::new(9, 9, 9); 2],
             &mut Coverage::default(),
         );
         assert_eq!(bytes, [9; 10]);
