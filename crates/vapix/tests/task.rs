@@ -269,6 +269,31 @@ fn one_with_a_wrong_password_stops_a_camera_that_lets_nobody_in_for_a_while() {
     });
 }
 
+/// The camera answers nobody as they come, and moves at the word of the first one.
+#[test]
+fn two_wrong_passwords_one_after_the_other_leave_the_right_one_to_stop_the_camera() {
+    let auth = Auth::Digest { qop: true };
+    let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
+    let (fail, failed) = channel();
+    let task = start_as(Some("pass"), &camera, None, move |event| {
+        if matches!(event, Event::Exchanged { failure: Some(_), .. }) {
+            let _ = fail.send(());
+        }
+    });
+    see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
+    camera.set_fault(Fault::Status(503));
+    for password in ["falsch", "verkehrt"] {
+        let password = Secret::new(password);
+        task.mailbox().set_credentials(Some(Credentials { user: "root".to_owned(), password }));
+        // As the one whose turn it is, and as the other.
+        for _ in 0..3 {
+            failed.recv_timeout(PATIENCE).unwrap();
+        }
+    }
+    camera.set_fault(Fault::None);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.commands());
+}
+
 /// Neither the camera goes on, nor does anybody wait for ever.
 #[test]
 fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {
