@@ -16,6 +16,8 @@ mod command;
 mod control_loop;
 mod error;
 mod exchange;
+#[cfg(test)]
+mod fixtures;
 pub mod http;
 pub mod session;
 mod settings;

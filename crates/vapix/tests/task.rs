@@ -47,8 +47,7 @@ fn start_as(
     let client = ClientSettings {
         location,
         channel: "1".to_owned(),
-        credentials: password
-            .map(|password| Credentials { user: "root".to_owned(), password: Secret::new(password) }),
+        credentials: password.map(root),
         authentication: Authentication::default(),
         timeout: Duration::from_secs(2),
         trust: Trust::System,
@@ -75,6 +74,16 @@ fn see_until(task: &CameraTask, mut done: impl FnMut(Duration) -> bool) {
 
 fn camera() -> VirtualCamera {
     VirtualCamera::start(Settings::default()).unwrap()
+}
+
+/// `pass`.
+fn camera_with_a_password() -> VirtualCamera {
+    let auth = Auth::Digest { qop: true };
+    VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap()
+}
+
+fn root(password: &str) -> Credentials {
+    Credentials { user: "root".to_owned(), password: Secret::new(password) }
 }
 
 /// As an element does that is disposed of without having been brought to NULL.
@@ -218,8 +227,7 @@ fn one_that_makes_way_for_the_next_gives_its_lease_back() {
 
 /// Whoever comes next takes the lease and the retries of the one before: with a wrong password he could stop nothing.
 fn next_with_a_wrong_password(meanwhile: impl Fn(&VirtualCamera, &dyn Fn() -> usize)) {
-    let auth = Auth::Digest { qop: true };
-    let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
+    let camera = camera_with_a_password();
     let first = start_as(Some("pass"), &camera, None, |_| {});
     see_until(&first, |wait| camera.wait_for(wait, |status| status.moving));
     camera.set_fault(Fault::Status(503));
@@ -272,8 +280,7 @@ fn one_with_a_wrong_password_stops_a_camera_that_lets_nobody_in_for_a_while() {
 /// The camera answers nobody as they come, and moves at the word of the first one.
 #[test]
 fn two_wrong_passwords_one_after_the_other_leave_the_right_one_to_stop_the_camera() {
-    let auth = Auth::Digest { qop: true };
-    let camera = VirtualCamera::start(Settings { auth, ptz_only: true, ..Settings::default() }).unwrap();
+    let camera = camera_with_a_password();
     let (fail, failed) = channel();
     let task = start_as(Some("pass"), &camera, None, move |event| {
         if matches!(event, Event::Exchanged { failure: Some(_), .. }) {
@@ -283,8 +290,7 @@ fn two_wrong_passwords_one_after_the_other_leave_the_right_one_to_stop_the_camer
     see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
     camera.set_fault(Fault::Status(503));
     for password in ["falsch", "verkehrt"] {
-        let password = Secret::new(password);
-        task.mailbox().set_credentials(Some(Credentials { user: "root".to_owned(), password }));
+        task.mailbox().set_credentials(Some(root(password)));
         // As the one whose turn it is, and as the other.
         for _ in 0..3 {
             failed.recv_timeout(PATIENCE).unwrap();

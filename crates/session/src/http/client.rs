@@ -56,11 +56,10 @@ pub struct Identity {
 impl Identity {
     /// Whether both are the same to a camera: user, password, and the ways on which they may be sent.
     pub fn is_account_of(&self, other: &Self) -> bool {
-        let account = |identity: &Self| {
-            let settings = identity.settings.clone();
-            (settings.credentials, settings.authentication, settings.trust)
-        };
-        account(self) == account(other)
+        let (own, others) = (&self.settings, &other.settings);
+        own.credentials == others.credentials
+            && own.authentication == others.authentication
+            && own.trust == others.trust
     }
 
     /// The same as this one, whose account the camera knows from another.

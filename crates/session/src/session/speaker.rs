@@ -98,21 +98,16 @@ impl Session {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{Error, Protocol, SessionSettings};
+    use crate::fixtures::PROTOCOL;
+    use crate::session::scheduler::Scheduler;
+    use crate::{Error, SessionSettings, Stop};
     use servo::Mode;
     use std::time::Duration;
-
-    const PROTOCOL: Protocol = Protocol {
-        questions: &[],
-        keep_alive: Duration::from_secs(1),
-        confirms_stops: false,
-        has_control_queue: false,
-    };
 
     /// With a camera that moves.
     fn session() -> Session {
         let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
-        session.inherit(crate::Stop::PanTilt, Time::ZERO);
+        session.inherit(Stop::PanTilt, Time::ZERO);
         session.stand_in();
         session
     }
@@ -183,7 +178,7 @@ mod tests {
         session.was_obeyed();
         session.settle_speaker(Time::ZERO);
         assert_eq!(session.speaker(), Speaker::Mover, "it may yet act on what was said before");
-        session.scheduler = super::super::Scheduler::new(PROTOCOL.keep_alive);
+        session.scheduler = Scheduler::new(PROTOCOL.keep_alive);
         session.settle_speaker(Time::ZERO);
         assert_eq!(session.speaker(), Speaker::Owner);
     }

@@ -92,21 +92,16 @@ impl<C: Client> Account<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::{Authentication, ClientSettings, Location, Secret, Trust};
+    use crate::fixtures::{PROTOCOL, client_settings, credentials};
+    use crate::http::{ClientSettings, Trust};
     use crate::{Error, Protocol, Request, Response};
-    use std::time::Duration;
 
     /// Sends nothing.
     #[derive(Debug)]
     struct Silent(Identity);
 
     impl Client for Silent {
-        const PROTOCOL: Protocol = Protocol {
-            questions: &[],
-            keep_alive: Duration::from_secs(1),
-            confirms_stops: false,
-            has_control_queue: false,
-        };
+        const PROTOCOL: Protocol = PROTOCOL;
 
         fn in_place_of(identity: Identity) -> Result<Self, Error> {
             Ok(Self(identity))
@@ -125,19 +120,8 @@ mod tests {
         }
     }
 
-    fn credentials(password: &str) -> Option<Credentials> {
-        Some(Credentials { user: "root".to_owned(), password: Secret::new(password) })
-    }
-
     fn settings(password: &str) -> ClientSettings {
-        ClientSettings {
-            location: Location::parse("http://192.168.0.90").unwrap().0,
-            channel: String::new(),
-            credentials: credentials(password),
-            authentication: Authentication::default(),
-            timeout: Duration::from_secs(2),
-            trust: Trust::System,
-        }
+        ClientSettings { credentials: credentials(password), ..client_settings("http://192.168.0.90") }
     }
 
     fn account(password: &str) -> Account<Silent> {

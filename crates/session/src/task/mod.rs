@@ -125,7 +125,7 @@ impl CameraTask {
         let mailbox = Arc::new(Mailbox::new(clock));
         let mut control = ControlLoop::new(settings, &C::PROTOCOL);
         let left = Predecessor::succeed(&camera);
-        let (inherited, may_yet_move) = (left.as_ref().map(|left| left.stop), left.is_some());
+        let inherited = left.as_ref().map(|left| left.stop);
         if let Some(left) = left {
             mailbox.inherit(left.stop);
             account.succeed(left.identity);
@@ -136,6 +136,7 @@ impl CameraTask {
         let identity = Arc::new(Mutex::new(account.identity()));
         let (status, estimates, stop) =
             (control.status(Time::ZERO), Some(control.estimates()), inherited.or(Some(control.stop())));
+        let may_yet_move = inherited.is_some();
         let statistics = Statistics { status, estimates, stop, may_yet_move, ..Statistics::default() };
         let statistics = Arc::new(Mutex::new(statistics));
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
@@ -350,11 +351,12 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
         }
         if matches!(request, Request::Command(_)) {
             // By now it may have been let in.
-            *lock(identity) = account.identity();
-        }
-        if is_move(&request) {
-            dead_man.hold(StopOrder { identity: account.identity(), words: stop, in_doubt: true });
-            state.keep_dead_man(dead_man);
+            let known_as = account.identity();
+            lock(identity).clone_from(&known_as);
+            if is_move(&request) {
+                dead_man.hold(StopOrder { identity: known_as, words: stop, in_doubt: true });
+                state.keep_dead_man(dead_man);
+            }
         }
         let mut exchange = pin!(account.client().exchange(&request));
         loop {

@@ -114,29 +114,25 @@ impl Predecessor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::{Authentication, ClientSettings, Trust};
+    use crate::fixtures::client_settings;
 
     fn succeed(name: &str) -> Option<Stop> {
         Predecessor::succeed(&camera(name)).map(|left| left.stop)
     }
 
+    fn address(name: &str) -> String {
+        format!("http://{name}")
+    }
+
     fn camera(name: &str) -> Address {
-        (Location::parse(&format!("http://{name}")).unwrap().0, String::new())
+        (Location::parse(&address(name)).unwrap().0, String::new())
     }
 
     fn left(name: &str, may_yet_move: bool) -> Predecessor {
         let statistics = Statistics { stop: Some(Stop::PanTilt), may_yet_move, ..Statistics::default() };
-        let settings = ClientSettings {
-            location: camera(name).0,
-            channel: String::new(),
-            credentials: None,
-            authentication: Authentication::default(),
-            timeout: LAST_RETRIES_PAUSE,
-            trust: Trust::System,
-        };
         Predecessor {
             camera: camera(name),
-            identity: Arc::new(Mutex::new(settings.into())),
+            identity: Arc::new(Mutex::new(client_settings(&address(name)).into())),
             mailbox: Weak::new(),
             statistics: Arc::new(Mutex::new(statistics)),
         }

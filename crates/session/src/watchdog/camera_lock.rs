@@ -85,19 +85,12 @@ fn name(camera: &ClientSettings) -> PathBuf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::{Authentication, Location, Trust};
+    use crate::fixtures::client_settings;
 
     fn camera(host: &str) -> ClientSettings {
         // Other tests, of other processes too, have other cameras.
         let location = format!("http://{host}-{}.test", std::process::id());
-        ClientSettings {
-            location: Location::parse(&location).unwrap().0,
-            channel: "1".to_owned(),
-            credentials: None,
-            authentication: Authentication::default(),
-            timeout: Duration::from_secs(1),
-            trust: Trust::System,
-        }
+        ClientSettings { channel: "1".to_owned(), ..client_settings(&location) }
     }
 
     #[tokio::test]

@@ -153,6 +153,7 @@ async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::PROTOCOL;
     use crate::http::{Credentials, Identity};
     use crate::{Protocol, Response};
 
@@ -161,12 +162,7 @@ mod tests {
     struct Refusing(Vec<Error>);
 
     impl Client for Refusing {
-        const PROTOCOL: Protocol = Protocol {
-            questions: &[],
-            keep_alive: Duration::from_secs(1),
-            confirms_stops: false,
-            has_control_queue: false,
-        };
+        const PROTOCOL: Protocol = PROTOCOL;
 
         fn in_place_of(_: Identity) -> Result<Self, Error> {
             Err(Error::NoPtz)

@@ -118,17 +118,17 @@ fn to_line(value: &impl Serialize) -> Result<Vec<u8>, serde_json::Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+    use crate::fixtures::{client_settings, credentials};
+    use crate::http::{ClientSettings, Trust};
     use std::time::Duration;
 
     fn hold(channel: &str) -> Message {
         let settings = ClientSettings {
-            location: Location::parse("https://camera:8443").unwrap().0,
             channel: channel.to_owned(),
-            credentials: Some(Credentials { user: "root".to_owned(), password: Secret::new("geheim") }),
-            authentication: Authentication::default(),
+            credentials: credentials("geheim"),
             timeout: Duration::from_millis(1500),
             trust: Trust::Anyone,
+            ..client_settings("https://camera:8443")
         };
         let identity = settings.into();
         let stop = StopOrder { identity, words: Stop::AllAxes, in_doubt: true };
