@@ -78,6 +78,19 @@ fn halt(client: &mut Client) -> Result<(), Error> {
 
 const ACCEPTED: &str = "HTTP/1.1 204 No Content\r\n\r\n";
 
+/// With any certificate it may be anybody.
+#[test]
+fn the_password_is_sent_in_clear_to_whose_certificate_is_verified_only() {
+    let basic =
+        "HTTP/1.1 401 Unauthorized\r\nWWW-Authenticate: Basic realm=\"AXIS\"\r\nContent-Length: 0\r\n\r\n";
+    for (trust, is_sent) in [(Trust::Authority(certificate("authority.pem")), true), (Trust::Anyone, false)] {
+        let (address, seen) = scripted(true, basic.to_owned());
+        let refused = halt(&mut client(&format!("https://{address}"), trust)).unwrap_err();
+        assert_eq!(refused == Error::BasicRefused, !is_sent, "{refused}");
+        assert_eq!(seen.try_iter().any(|head| head.contains("authorization: Basic")), is_sent);
+    }
+}
+
 #[test]
 fn a_certificate_is_believed_where_its_authority_is() {
     for trust in [Trust::Authority(certificate("authority.pem")), Trust::Anyone] {

@@ -114,7 +114,7 @@ impl Error {
             }
             Self::UnsupportedAuthentication(_) => "Choose Basic or Digest in the camera's settings.",
             Self::BasicRefused => {
-                "Use https, or choose Digest in the camera's settings; `auth=basic` allows it all the same; retrying."
+                "Use https with a certificate that is verified (`ca-file`), or choose Digest in the camera's settings; `auth=basic` allows it all the same; retrying."
             }
             Self::NotPermitted { .. } => {
                 "Give this user the right to control PTZ, or set another `user` and `password`; retrying at growing pauses, up to a minute, so as not to lock the account."

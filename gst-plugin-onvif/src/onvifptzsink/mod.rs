@@ -19,7 +19,7 @@
 //! * A camera is stopped by `Stop`, or where it refuses or does not heed that, by a velocity of zero.
 //! * Tokens carry the camera's own time, whatever this machine's is. A log-in that fails is tried once more with fresh time,
 //!   then left alone, so that no account is locked. The password is never sent in clear: it is used for WS-UsernameToken's
-//!   digest and for HTTP Digest, whichever the camera takes; for Basic only over https, or with `auth=basic`.
+//!   digest and for HTTP Digest, whichever the camera takes; for Basic only over https with a verified certificate, or with `auth=basic`.
 //! * The position is used where the camera tells it in degrees. Without it the limits of pan and tilt cannot be kept, and
 //!   an operator is not noticed. A camera that takes too long to tell it is not asked any more.
 //! * How fast the camera turns at full velocity is learned from the picture, beginning at `camera-speed`.
@@ -62,13 +62,13 @@ pub enum Authentication {
     /// Never in clear.
     #[default]
     #[enum_value(
-        name = "Digest; over https also Basic, if the camera has never asked for Digest",
+        name = "Digest; over https with a verified certificate also Basic, if the camera has never asked for Digest",
         nick = "auto"
     )]
     Auto,
     /// In clear too.
     #[enum_value(
-        name = "Basic over http too: anybody on the network path can then read the password",
+        name = "Basic without that too: anybody on the network path can then read the password",
         nick = "basic"
     )]
     Basic,

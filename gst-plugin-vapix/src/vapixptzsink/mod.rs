@@ -22,8 +22,8 @@
 //! the camera may move, and stops the camera as soon as this process ends, or 2 s after it hangs. It is started with the
 //! first move. `stats` shows its state as `dead-man`; if it cannot be started, one warning says so.
 //!
-//! The password is never sent in clear: it is used for Digest, or, over https, for Basic if the camera has never asked for
-//! Digest. `auth=basic` allows Basic over http too.
+//! The password is never sent in clear: it is used for Digest, or, over https with a verified certificate, for Basic if the camera
+//! has never asked for Digest. `auth=basic` allows Basic without that too.
 //!
 //! User and password are taken from `user` and `password`, from `location` (`http://user:password@host`; they are removed
 //! from it at once), or from the environment variables `VAPIX_USER` and `VAPIX_PASSWORD`, which keep them out of process
@@ -130,13 +130,13 @@ pub enum Authentication {
     /// Never in clear.
     #[default]
     #[enum_value(
-        name = "Digest; over https also Basic, if the camera has never asked for Digest",
+        name = "Digest; over https with a verified certificate also Basic, if the camera has never asked for Digest",
         nick = "auto"
     )]
     Auto,
     /// In clear too.
     #[enum_value(
-        name = "Basic over http too: anybody on the network path can then read the password",
+        name = "Basic without that too: anybody on the network path can then read the password",
         nick = "basic"
     )]
     Basic,

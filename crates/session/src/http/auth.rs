@@ -102,13 +102,13 @@ impl Authenticator {
         Ok(Some(value))
     }
 
-    /// Takes the challenges of a 401, which came over TLS or not. Returns whether the camera calls the old one stale, which means
-    /// that the credentials themselves were right.
+    /// Takes the challenges of a 401, which came over TLS with a certificate that was verified, or not. Returns whether the camera calls
+    /// the old one stale, which means that the credentials themselves were right.
     ///
     /// # Errors
     /// [`Error::CredentialsMissing`], [`Error::UnsupportedAuthentication`] where none is Basic or Digest, or
     /// [`Error::BasicRefused`].
-    pub fn challenged(&mut self, headers: &HeaderMap, over_tls: bool) -> Result<bool, Error> {
+    pub fn challenged(&mut self, headers: &HeaderMap, is_verified: bool) -> Result<bool, Error> {
         if self.credentials.is_none() {
             return Err(Error::CredentialsMissing);
         }
@@ -127,7 +127,7 @@ impl Authenticator {
             return Ok(stale);
         }
         if offers.iter().any(|offer| parameters_of(offer, "Basic").is_some()) {
-            if self.allowed == Authentication::Auto && (!over_tls || self.knows_digest) {
+            if self.allowed == Authentication::Auto && (!is_verified || self.knows_digest) {
                 self.challenge = None;
                 return Err(Error::BasicRefused);
             }
@@ -333,15 +333,15 @@ mod tests {
     }
 
     #[test]
-    fn basic_is_taken_over_tls_or_where_it_is_allowed() {
+    fn basic_is_taken_where_the_camera_is_verified_or_it_is_allowed() {
         let basic = &[r#"Basic realm="x""#];
-        for (allowed, over_tls, taken) in [
+        for (allowed, is_verified, taken) in [
             (Authentication::Auto, false, false),
             (Authentication::Auto, true, true),
             (Authentication::Basic, false, true),
         ] {
             let mut authenticator = Authenticator { allowed, ..authenticator("root", "pass") };
-            assert_eq!(authenticator.challenged(&headers(basic), over_tls).is_ok(), taken);
+            assert_eq!(authenticator.challenged(&headers(basic), is_verified).is_ok(), taken);
             assert_eq!(authenticator.authorization("GET", "/").unwrap().is_some(), taken);
         }
     }

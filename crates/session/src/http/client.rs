@@ -261,8 +261,8 @@ impl HttpClient {
             let status = response.status();
             let challenges = message.is_none() || response.headers().contains_key(WWW_AUTHENTICATE);
             if status == StatusCode::UNAUTHORIZED && challenges {
-                let stale =
-                    self.authenticator.challenged(response.headers(), self.settings.location.is_https())?;
+                let is_verified = self.settings.trust.is_verified(self.settings.location.is_https());
+                let stale = self.authenticator.challenged(response.headers(), is_verified)?;
                 if signed_fresh && !stale {
                     return Err(self.refused());
                 }

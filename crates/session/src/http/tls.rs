@@ -23,11 +23,16 @@ pub enum Trust {
     /// Those signed by an authority in this PEM file, and those in the file themselves, for whatever name
     /// and time: what a camera has signed for itself.
     Authority(PathBuf),
-    /// All: who sits on the wire can take the camera, and with Basic authentication the password.
+    /// All: who sits on the wire can take the camera.
     Anyone,
 }
 
 impl Trust {
+    /// Whether a connection, by TLS or not, is known to be with the camera, so that a password may go over it in clear.
+    pub fn is_verified(&self, over_tls: bool) -> bool {
+        over_tls && *self != Self::Anyone
+    }
+
     /// The configuration for a camera that is spoken to over TLS (`https`), or not.
     ///
     /// # Errors

@@ -50,13 +50,13 @@ pub async fn carry(
     ended: &Ended,
 ) {
     let opened = async {
-        let (connection, over_tls) = connect(settings, camera).await?;
+        let (connection, is_verified) = connect(settings, camera).await?;
         let listener = TcpListener::bind(("127.0.0.1", 0)).await.map_err(Failure::new)?;
         let address = listener.local_addr().map_err(Failure::new)?;
         let own = format!("rtsp://{address}/{}", word().map_err(Failure::new)?);
-        Ok((connection, over_tls, listener, own))
+        Ok((connection, is_verified, listener, own))
     };
-    let (connection, over_tls, listener, own) = match opened.await {
+    let (connection, is_verified, listener, own) = match opened.await {
         Ok(opened) => opened,
         // Who waited for it may have given up.
         Err(failure) => return drop(report.try_send(Err(failure))),
@@ -71,7 +71,7 @@ pub async fn carry(
     let asking = Asking {
         camera: camera.trim_end_matches('/').to_owned(),
         own,
-        over_tls,
+        is_verified,
         login: Authenticator::new(settings.credentials.clone(), settings.authentication),
         last: None,
         challenges: 0,
@@ -110,6 +110,7 @@ fn word() -> io::Result<String> {
     Ok(bytes.iter().map(|byte| format!("{byte:02x}")).collect())
 }
 
+/// A connection to the camera, and whether the camera is known to be at the other end.
 async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Connection>, bool), Failure> {
     let (host, port, over_tls) =
         host(camera).ok_or_else(|| Failure::new(format!("{} names no host", without_user_info(camera))))?;
@@ -125,7 +126,7 @@ async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Con
     let connector = TlsConnector::from(Arc::new(settings.trust.client_config(true)?));
     let name = ServerName::try_from(bare.to_owned()).map_err(Failure::new)?;
     let tls = timeout(LONGEST_START, connector.connect(name, tcp)).await.map_err(late)?.map_err(said)?;
-    Ok((Box::new(tls), true))
+    Ok((Box::new(tls), settings.trust.is_verified(true)))
 }
 
 /// The first connection that knows the word; whoever else of this machine connects is sent away.
@@ -190,7 +191,8 @@ struct Asking {
     camera: String,
     /// What `rtspsrc` takes for that.
     own: String,
-    over_tls: bool,
+    /// Whether the camera is known to be at the other end.
+    is_verified: bool,
     login: Authenticator,
     /// The request that waits for its answer, unsigned.
     last: Option<Message>,
@@ -222,7 +224,7 @@ impl Asking {
         let offers =
             response.headers_of("www-authenticate").filter_map(|offer| HeaderValue::from_str(offer).ok());
         let offers: HeaderMap = offers.map(|offer| (header::WWW_AUTHENTICATE, offer)).collect();
-        let stale = self.login.challenged(&offers, self.over_tls)?;
+        let stale = self.login.challenged(&offers, self.is_verified)?;
         self.challenges += 1;
         let most = if stale { MOST_CHALLENGES } else { 1 };
         if self.challenges > most {
@@ -304,7 +306,7 @@ mod tests {
         Asking {
             camera: "rtsp://camera".to_owned(),
             own: "rtsp://own".to_owned(),
-            over_tls: false,
+            is_verified: false,
             login: Authenticator::new(Some(credentials), Authentication::Auto),
             last: Some(message("OPTIONS rtsp://camera/ RTSP/1.0", &[])),
             challenges: 0,
