@@ -22,6 +22,7 @@ mod point;
 mod report;
 mod restream;
 mod service;
+mod services;
 mod shard;
 mod store;
 mod waiting;
@@ -31,8 +32,8 @@ use std::process::ExitCode;
 use std::sync::Arc;
 
 use clap::{CommandFactory, Parser};
-use cli::{Options, Serving, Task};
-use config::{Config, Http, NotLoaded, Store};
+use cli::{Options, Task};
+use config::{Config, NotLoaded, Store};
 use log::Log;
 use service::Origin;
 
@@ -87,7 +88,7 @@ fn run(options: Options) -> Result<(), Failure> {
     let log = Arc::new(Log::new(options.log_format));
     match options.command {
         Task::Run { file, serving, shard, watchdogs } => {
-            follow(Origin::File { path: file, shard, watchdogs }, &serving, log)
+            follow(Origin::File { path: file, shard, watchdogs, page: serving.http }, log)
         }
         Task::Follow(follow_one) => {
             let cameras = vec![runtime(1)?.block_on(follow_one.camera(&log))?];
@@ -95,13 +96,14 @@ fn run(options: Options) -> Result<(), Failure> {
             let config = Config {
                 cameras,
                 http: None,
-                mqtt: None,
+                mqtt: Ok(None),
                 hand_over: Vec::new(),
                 store,
                 zones: Vec::new(),
-                restream: None,
+                restream: Ok(None),
             };
-            follow(Origin::CommandLine(Box::new(config)), &follow_one.serving, log)
+            let config = config.with_page_at(follow_one.serving.http)?;
+            follow(Origin::CommandLine(Box::new(config)), log)
         }
         Task::Point(point) => {
             print!("{}", runtime(1)?.block_on(point.say())?);
@@ -154,15 +156,8 @@ fn keep_secrets() {
     let _ = rustix::process::setrlimit(rustix::process::Resource::Core, none);
 }
 
-fn follow(origin: Origin, serving: &Serving, log: Arc<Log>) -> Result<(), Failure> {
-    let mut config = origin.read()?;
-    if let Some(listen) = serving.http {
-        let (hosts, credentials) =
-            config.http.map_or((Vec::new(), None), |http| (http.hosts, http.credentials));
-        let http = Http { listen, hosts, credentials };
-        http.check()?;
-        config.http = Some(http);
-    }
+fn follow(origin: Origin, log: Arc<Log>) -> Result<(), Failure> {
+    let config = origin.read()?;
     let runtime = begin()?;
     let result = runtime.block_on(service::run(Arc::new(origin), config, log));
     // Whoever hangs is not waited for.

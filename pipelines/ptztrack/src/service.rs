@@ -3,6 +3,7 @@
 //! What runs until it is told to end.
 
 use std::future::pending;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
@@ -12,27 +13,29 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::task::JoinHandle;
 use tokio::time::{Interval, interval};
 
-use crate::config::{Config, Http, NotLoaded, Watchdogs};
+use crate::config::{Again, Config, NotLoaded, Watchdogs};
 use crate::event::{Event, Level};
 use crate::fleet::Fleet;
 use crate::handover::{Exchange, HandingOver};
-use crate::http::{self, Events};
 use crate::log::Log;
-use crate::mqtt::{Exchanging, Publisher};
-use crate::restream::Restreaming;
+use crate::services::{Saying, Services};
 use crate::shard::Shard;
 use crate::store::Keeper;
 
-/// Between two tries to have the page's address.
-const LISTEN_AGAIN: Duration = Duration::from_secs(5);
 /// For cameras to end: the end of a stream is waited for 10 s, and stopping a camera that does not answer takes some more.
 const LONGEST_END: Duration = Duration::from_secs(20);
-/// Between two looks for a password that could not be read.
+/// Between two looks for a password, or another file that is needed, that could not be read.
 const LOOK_AGAIN: Duration = Duration::from_secs(10);
 
 /// Where the cameras come from, and come from again on SIGHUP.
 pub enum Origin {
-    File { path: PathBuf, shard: Option<Shard>, watchdogs: Watchdogs },
+    /// With the page elsewhere than the file says, where that is said.
+    File {
+        path: PathBuf,
+        shard: Option<Shard>,
+        watchdogs: Watchdogs,
+        page: Option<SocketAddr>,
+    },
     CommandLine(Box<Config>),
 }
 
@@ -49,8 +52,8 @@ impl Origin {
     /// What is wrong with the file.
     pub fn read(&self) -> Result<Config, NotLoaded> {
         match self {
-            Self::File { path, shard, watchdogs } => {
-                let mut config = Config::load(path)?;
+            Self::File { path, shard, watchdogs, page } => {
+                let mut config = Config::load(path)?.with_page_at(*page).map_err(NotLoaded::Mistaken)?;
                 config.cameras.iter_mut().for_each(|camera| camera.use_watchdog(watchdogs));
                 config.cameras.retain(|camera| shard.is_none_or(|shard| shard.has(camera)));
                 Ok(config)
@@ -72,34 +75,20 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     let mut hangup = signal(SignalKind::hangup()).map_err(said)?;
 
     let fleet = Arc::new(Fleet::new(log.clone()).of_share(origin.shard()));
-    if let Some(http) = config.http.clone() {
-        let events = Events::of(&config, log.clone());
-        tokio::spawn(serve(http, fleet.clone(), events, log.clone()));
-    }
-    let publisher = config.mqtt.as_ref().and_then(|mqtt| {
-        let pictures = config.store.what.is_some_and(|kept| kept.pictures);
-        let started = Publisher::start(mqtt, origin.shard(), pictures, fleet.clone(), log.clone());
-        let tell = |err: &session::Error| log.error("mqtt-not-started", format!("no MQTT: {err}"));
-        started.inspect_err(tell).ok()
-    });
+    tell_waiting(&config, None, &log);
+    let (exchange, saying) = exchange(&origin, &config, &log).unzip();
+    let mut services =
+        Services::new(origin.shard(), exchange.clone().zip(saying), fleet.clone(), log.clone());
+    services.start(&config);
     let keeper = Keeper::start(&config.store, &log);
     fleet.apply(config.cameras.clone());
     let tell = |err: &std::io::Error| log.error("not-handing-over", format!("nobody is handed over: {err}"));
-    let (exchange, exchanging) = exchange(&origin, &config, &log).unzip();
     let handing_over =
         HandingOver::start(&config, fleet.clone(), exchange, log.clone()).inspect_err(tell).ok();
-    let restreaming = config.restream.as_ref().and_then(|restream| {
-        let started = Restreaming::start(restream, &config.cameras, fleet.clone(), log.clone());
-        let tell = |reason: &String| {
-            let detail = format!("nothing is passed on by RTSP: {reason}");
-            log.tell(&Event::new(Level::Warning, None, "not-restreaming", detail));
-        };
-        started.inspect_err(tell).ok()
-    });
     notify(&[NotifyState::Ready]);
     let mut alive = alive();
     let mut second = interval(Duration::from_secs(1));
-    let mut passwords = interval(LOOK_AGAIN);
+    let mut looking = interval(LOOK_AGAIN);
     let mut keeping = None;
     let mut current = config;
     // Elsewhere: a disk may hang, and whoever waits for us to be alive waits.
@@ -113,12 +102,12 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
             () = end(&mut terminate, &mut interrupt) => break,
             config = finished(&mut reading) => if let Some(config) = config {
                 handing_over.iter().for_each(|handing_over| handing_over.change(&config));
-                restreaming.iter().for_each(|restreaming| restreaming.change(&config.cameras));
+                services.change(&config);
                 current = config;
             },
             _ = hangup.recv(), if reading.is_none() => reading = read(&current, false),
-            _ = passwords.tick(), if reading.is_none() => {
-                if current.cameras.iter().any(|camera| camera.no_password.is_some()) {
+            _ = looking.tick(), if reading.is_none() => {
+                if current.cameras.iter().any(|camera| camera.no_password.is_some()) || !current.waiting().is_empty() {
                     reading = read(&current, true);
                 }
             }
@@ -141,7 +130,8 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     log.show_status(Vec::new());
     log.info("ending", "ends: every camera is brought to rest");
     // No camera waits for those who watch.
-    let passing_on = restreaming.map(|restreaming| tokio::task::spawn_blocking(|| restreaming.end()));
+    let passing_on = services.restreaming.take();
+    let passing_on = passing_on.map(|restreaming| tokio::task::spawn_blocking(|| restreaming.end()));
     let ending = fleet.clone();
     let ended = tokio::task::spawn_blocking(move || {
         ending.end();
@@ -159,51 +149,33 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     if let Some(keeper) = keeper {
         let _ = tokio::task::spawn_blocking(|| keeper.end()).await;
     }
-    exchanging.iter().for_each(Exchanging::end);
-    if let Some(publisher) = publisher {
-        publisher.end().await;
-    }
+    services.end().await;
     Ok(())
 }
 
 /// With the other processes that share the cameras, where there are any.
-fn exchange(origin: &Origin, config: &Config, log: &Arc<Log>) -> Option<(Arc<Exchange>, Exchanging)> {
+fn exchange(origin: &Origin, config: &Config, log: &Log) -> Option<(Arc<Exchange>, Saying)> {
     origin.shard()?;
-    let Some(mqtt) = &config.mqtt else {
+    if config.mqtt == Ok(None) {
         if config.hands_over_to_others() {
             let detail = "people are handed over to and from other processes only with [mqtt] in the file";
             log.tell(&Event::new(Level::Warning, None, "not-handing-over", detail.to_owned()));
         }
         return None;
-    };
-    let (exchange, saying) = Exchange::new();
-    let started = Exchanging::start(mqtt, exchange.clone(), saying, log.clone());
-    let tell = |err: &session::Error| {
-        log.error("not-handing-over", format!("nobody is handed over to or from other processes: {err}"));
-    };
-    Some((exchange, started.inspect_err(tell).ok()?))
+    }
+    Some(Exchange::new())
 }
 
-/// Nobody is followed the worse for a page that is not there: it is tried again.
-async fn serve(http: Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
-    let mut told = false;
-    let listener = loop {
-        match http::listen(&http).await {
-            Ok(listener) => break listener,
-            Err(err) if !std::mem::replace(&mut told, true) => {
-                log.error(
-                    "not-listening",
-                    format!("cannot listen on {}: {err}; it is tried again", http.listen),
-                );
-            }
-            Err(_) => {}
-        }
-        tokio::time::sleep(LISTEN_AGAIN).await;
-    };
-    if let Ok(address) = listener.local_addr() {
-        log.info("listening", format!("page, /metrics and /healthz at http://{address}/"));
+/// Says of the services that cannot be started yet why they cannot, unless that was said before.
+fn tell_waiting(config: &Config, before: Option<&Config>, log: &Log) {
+    let said = before.map(Config::waiting).unwrap_or_default();
+    for (table, reason) in config.waiting().into_iter().filter(|waiting| !said.contains(waiting)) {
+        let detail = format!(
+            "[{table}] is not started: {reason}; put that right: it is looked at again every {} s, and then started",
+            LOOK_AGAIN.as_secs()
+        );
+        log.tell(&Event::new(Level::Warning, None, "service-waits", detail));
     }
-    http::serve(listener, &http, fleet, events, log).await;
 }
 
 /// Where a disk hangs, it waits for itself and for nobody else.
@@ -233,21 +205,24 @@ fn read_again(
 ) -> Option<Config> {
     // Its reason to fail would be that no plugin can be read, and the cameras say what they lack.
     let _ = gst::Registry::update();
-    match origin.read() {
-        Ok(config) if only_changes && config.cameras == current.cameras => None,
-        Ok(config) => {
+    match origin.read().map(|config| Again::of(config, current)) {
+        Ok(again) if only_changes && again.config == *current => None,
+        Ok(Again { config, needs_restart, lost }) => {
             log.info("read-again", "the configuration was read again");
-            let of_start = |config: &Config| {
-                let Config { http, mqtt, store, zones, restream, .. } = config.clone();
-                (http, mqtt, store, zones, restream)
-            };
-            if of_start(&config) != of_start(current) {
+            if needs_restart {
                 log.error(
                     "restart-needed",
                     "what changed in [http], [mqtt], [events], [zone] and [restream] counts from the next start on",
                 );
             }
-            fleet.apply(config.cameras.clone());
+            for (table, reason) in lost {
+                let detail = format!("[{table}] goes on with what it has: {reason}");
+                log.tell(&Event::new(Level::Warning, None, "service-not-read", detail));
+            }
+            tell_waiting(&config, Some(current), log);
+            if !only_changes || config.cameras != current.cameras {
+                fleet.apply(config.cameras.clone());
+            }
             Some(config)
         }
         Err(_) if only_changes => None,

@@ -155,6 +155,27 @@ fn the_oldest_recordings_make_room_for_the_newest() {
     assert!(!said.contains("nothing is recorded"), "{said}");
 }
 
+/// It takes a little now and then, and keeps whoever writes on it waiting in between.
+#[test]
+fn a_slow_disk_holds_nobody() {
+    let disk = Disk::new("slow", MEBIBYTES);
+    let recorded = Recorded::on(&disk, "slow");
+    wait_until("nothing is recorded", || !recordings(&disk).is_empty());
+    let before = recorded.network.http.video_requests();
+    let steered = recorded.camera.status().commands;
+    for _ in 0..5 {
+        disk.hang();
+        std::thread::sleep(Duration::from_millis(900));
+        disk.go_on();
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    // At ten a second or so: a disk that is waited for leaves a tenth of them.
+    assert!(recorded.camera.status().commands > steered + 20, "not steered");
+    assert_eq!(recorded.network.http.video_requests(), before, "a pipeline is built anew");
+    let said = recorded.end();
+    assert!(!said.contains("door: error"), "{said}");
+}
+
 /// Whoever writes on it cannot be ended; everybody else goes on, through a new pipeline too, and the program can be ended.
 #[test]
 fn a_disk_that_hangs_holds_nobody() {

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use end_to_end::following::Network;
-use end_to_end::{PATIENCE, Program, Way, scene};
+use end_to_end::{Broker, PATIENCE, Program, Way, ask_page, scene};
 use virtual_camera::{Auth, Settings, Tls, VirtualCamera};
 
 /// Whoever answers in a camera's place, always the same; and what it has heard.
@@ -217,6 +217,55 @@ fn a_password_that_cannot_be_read_keeps_no_other_camera_down() {
     [good, other].iter().for_each(scene::assert_left_at_rest);
 }
 
+/// Page, broker and RTSP server wait for theirs, and let nobody in without it; the camera is followed with all the while.
+#[test]
+fn a_password_of_a_service_that_cannot_be_read_keeps_no_camera_down() {
+    let broker = Broker::start();
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let file = |folder: &Path| {
+        let who = format!("user = \"guard\"\npassword-file = {:?}\n", folder.join("later"));
+        Program::entry("door", &camera.url(), &folder.join("password"))
+            + &format!("[http]\n{who}[restream]\nlisten = \"127.0.0.1:0\"\n{who}")
+            + &format!("[mqtt]\nhost = \"127.0.0.1\"\nport = {}\n{who}", broker.port)
+    };
+    let mut program = Program::start("services-later", file, &[]);
+    let later = program.folder().join("later");
+    for service in ["http", "mqtt", "restream"] {
+        program.launch.rewind();
+        let missing =
+            format!("warning: [{service}] is not started: no password: {}: No such", later.display());
+        program.launch.wait_for_line(&missing);
+    }
+    scene::wait_until_following(&camera);
+    assert_eq!(program.ask("GET", "/healthz").0, 200);
+    assert_eq!(program.ask("GET", "/cameras").0, 503);
+    // Nor does reading it again start any, or say the same once more.
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("the configuration was read again");
+    let before = camera.status().commands;
+
+    fs::write(&later, scene::PASSWORD).unwrap();
+    let line = program.launch.wait_for_line("page, /metrics and /healthz at http://");
+    let page = line.split("http://").nth(1).unwrap().trim_end_matches('/');
+    assert_eq!(ask_page(page, page, "GET", "/cameras").0, 401);
+    for started in ["connected to the MQTT broker", "passes the cameras on at rtsp://"] {
+        program.launch.rewind();
+        program.launch.wait_for_line(started);
+    }
+    assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 20), "not steered");
+
+    // One that runs keeps what it has.
+    fs::remove_file(&later).unwrap();
+    program.launch.signal("HUP");
+    program.launch.wait_for_line("warning: [http] goes on with what it has: no password: ");
+    assert_eq!(ask_page(page, page, "GET", "/cameras").0, 401);
+    let said = program.end("TERM");
+    assert_eq!(said.matches("is not started").count(), 3, "{said}");
+    assert_eq!(said.matches("door: the picture is there").count(), 1, "{said}");
+    assert!(!said.contains("restart-needed") && !said.contains("from the next start on"), "{said}");
+    scene::assert_left_at_rest(&camera);
+}
+
 /// Whoever answers in a camera's place claims a picture of gigabytes, progressive: a decoder takes the memory for it at once.
 #[test]
 fn a_picture_that_claims_to_be_huge_takes_nothing_from_anybody() {
@@ -308,6 +357,35 @@ fn pictures_and_commands_go_over_verified_tls() {
         scene::wait_until_following(&camera);
         program.end("TERM");
         scene::assert_left_at_rest(&camera);
+    }
+}
+
+/// Whoever shows any certificate is believed, and may be anybody: they get the password in clear where that is allowed only.
+#[test]
+fn one_who_is_believed_unverified_does_not_get_the_password_in_clear() {
+    let certificates =
+        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
+    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
+    let tls = Tls { certificate: of("camera.pem"), key: of("camera.key.pem") };
+    for codec in ["mjpeg", "h264"] {
+        let settings = Settings { tls: Some(tls.clone()), auth: Auth::Basic, ..scene::walking_person() };
+        let stranger = VirtualCamera::start(settings).unwrap();
+        let [https, rtsps] = stranger.tls_urls().unwrap();
+        let file = |auth: &'static str| {
+            let more = format!("codec = {codec:?}\nrtsp = {rtsps:?}\ninsecure = true\n{auth}");
+            let https = https.clone();
+            move |folder: &Path| Program::entry("door", &https, &folder.join("password")) + &more
+        };
+        let mut program = Program::start(&format!("unverified-{codec}"), file(""), &[]);
+        program.launch.wait_for_line("Basic authentication, which shows the password");
+        let said = program.end("TERM");
+        assert!(!said.contains("door: the picture is there"), "{said}");
+        assert_eq!(stranger.status().commands, 0);
+
+        let program = Program::start(&format!("allowed-{codec}"), file("auth = \"basic\"\n"), &[]);
+        scene::wait_until_following(&stranger);
+        program.end("TERM");
+        scene::assert_left_at_rest(&stranger);
     }
 }
 

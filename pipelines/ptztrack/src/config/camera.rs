@@ -179,7 +179,7 @@ impl CameraSettings {
         camera.rate = table.get_with("rate", "pictures per second, a whole number from 1 to 60", |value| {
             whole(value).and_then(|rate| u32::try_from(rate).ok()).filter(|rate| (1..=60).contains(rate))
         });
-        match credentials::read_as_far(&mut table) {
+        match credentials::read(&mut table) {
             Ok(credentials) => camera.credentials = credentials,
             Err(reason) => camera.no_password = Some(reason),
         }

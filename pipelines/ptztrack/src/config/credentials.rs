@@ -44,19 +44,11 @@ pub struct Credentials {
     pub password: Secret,
 }
 
-/// The user and the password of a table, which must have both or neither; that it cannot be had is a mistake.
-pub fn read(table: &mut Table) -> Option<Credentials> {
-    read_as_far(table).unwrap_or_else(|reason| {
-        table.wrong(reason);
-        None
-    })
-}
-
-/// The same, where it may be had later.
+/// The user and the password of a table, which must have both or neither. A password that cannot be had now may be had later.
 ///
 /// # Errors
 /// Why the password cannot be had.
-pub fn read_as_far(table: &mut Table) -> Result<Option<Credentials>, String> {
+pub fn read(table: &mut Table) -> Result<Option<Credentials>, String> {
     let user: Option<String> = table.get("user");
     let password = password(table);
     Ok(match (user, password) {
@@ -71,6 +63,19 @@ pub fn read_as_far(table: &mut Table) -> Result<Option<Credentials>, String> {
         }
         (None, None) => None,
     })
+}
+
+/// The same, of a service that lets in whoever says them. An empty password, as of a file that is just being written, would keep
+/// nobody out.
+///
+/// # Errors
+/// Why there is none yet.
+pub fn read_for_visitors(table: &mut Table) -> Result<Option<Credentials>, String> {
+    let credentials = read(table)?;
+    if credentials.as_ref().is_some_and(|credentials| credentials.password.reveal().is_empty()) {
+        return Err("no password: it is empty".to_owned());
+    }
+    Ok(credentials)
 }
 
 /// The password of a table, from where the file says it is.

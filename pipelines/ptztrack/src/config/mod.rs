@@ -2,6 +2,7 @@
 
 //! The file of cameras: what is in it, read whole before anything starts, every mistake named with its line.
 
+mod again;
 mod camera;
 mod choices;
 mod credentials;
@@ -22,6 +23,7 @@ use std::path::Path;
 
 use toml::de::DeTable;
 
+pub use again::Again;
 pub use camera::{CameraSettings, RTSP_PORT, Recording, size};
 pub use choices::{Codec, Isolation, Kind};
 pub use credentials::{Credentials, Secret};
@@ -42,12 +44,14 @@ pub const EXAMPLE: &str = include_str!("example.toml");
 pub struct Config {
     pub cameras: Vec<CameraSettings>,
     pub http: Option<Http>,
-    pub mqtt: Option<Mqtt>,
+    /// Or why there is none yet.
+    pub mqtt: Result<Option<Mqtt>, String>,
     pub hand_over: Vec<HandOver>,
     pub store: Store,
     /// By whose names events are asked for.
     pub zones: Vec<Zone>,
-    pub restream: Option<Restream>,
+    /// Or why there is none yet.
+    pub restream: Result<Option<Restream>, String>,
 }
 
 /// Why a file is of no use, in words.
@@ -73,7 +77,8 @@ pub struct Http {
     pub listen: SocketAddr,
     /// Names by which the page may be asked for, besides its address.
     pub hosts: Vec<String>,
-    pub credentials: Option<Credentials>,
+    /// Or why they cannot be had yet: until then it lets nobody in.
+    pub credentials: Result<Option<Credentials>, String>,
 }
 
 impl Config {
@@ -102,7 +107,8 @@ impl Config {
         config.filter(|_| problems.is_empty()).ok_or(problems)
     }
 
-    /// What this machine has not got, a line for each camera that cannot start without, and for a certificate that is of no use.
+    /// What this machine has not got, a line for each camera and each service that cannot start without, and for a certificate that
+    /// is of no use.
     ///
     /// # Errors
     /// Those lines.
@@ -111,11 +117,35 @@ impl Config {
             let reason = camera.no_password.clone().or_else(|| camera.lacks())?;
             Some(format!("camera `{}`: {reason}", camera.name))
         };
-        let certificate = self.restream.as_ref().and_then(|restream| restream.tls.as_ref());
+        let restream = self.restream.as_ref().ok().and_then(Option::as_ref);
+        let certificate = restream.and_then(|restream| restream.tls.as_ref());
         let useless = certificate.and_then(|certificate| certificate.load().err());
         let useless = useless.map(|reason| format!("[restream]: {reason}"));
-        let lacks: Vec<String> = self.cameras.iter().filter_map(lack).chain(useless).collect();
+        let waiting = self.waiting().into_iter().map(|(table, reason)| format!("[{table}]: {reason}"));
+        let lacks: Vec<String> = self.cameras.iter().filter_map(lack).chain(waiting).chain(useless).collect();
         if lacks.is_empty() { Ok(()) } else { Err(lacks.join("\n")) }
+    }
+
+    /// The services that are wanted and cannot be started yet, by their tables, and why.
+    pub fn waiting(&self) -> Vec<(&'static str, &str)> {
+        let http = self.http.as_ref().and_then(|http| http.credentials.as_ref().err());
+        let (mqtt, restream) = (self.mqtt.as_ref().err(), self.restream.as_ref().err());
+        let all = [("http", http), ("mqtt", mqtt), ("restream", restream)];
+        all.into_iter().filter_map(|(table, reason)| Some((table, reason?.as_str()))).collect()
+    }
+
+    /// The same with the page there, where somewhere is said.
+    ///
+    /// # Errors
+    /// Where others would get at it without a password.
+    pub fn with_page_at(mut self, listen: Option<SocketAddr>) -> Result<Self, String> {
+        let Some(listen) = listen else { return Ok(self) };
+        let (hosts, credentials) =
+            self.http.map_or((Vec::new(), Ok(None)), |http| (http.hosts, http.credentials));
+        let http = Http { listen, hosts, credentials };
+        http.check()?;
+        self.http = Some(http);
+        Ok(self)
     }
 
     /// Whether a camera that is not among these calls one of these, or is called by one.
@@ -125,10 +155,10 @@ impl Config {
     }
 
     fn read(mut root: Table) -> Self {
-        let http = root.table("http").and_then(Http::read);
-        let mqtt = root.table("mqtt").and_then(Mqtt::read);
+        let http = root.table("http").map(Http::read);
+        let mqtt = root.table("mqtt").and_then(Mqtt::read).transpose();
         let store = root.table("events").map(Store::read).unwrap_or_default();
-        let restream = root.table("restream").map(Restream::read);
+        let restream = root.table("restream").map(Restream::read).transpose();
         let cameras = root.tables("camera");
         if cameras.is_empty() {
             root.wrong("there is no camera: [camera.door] begins one that is called door");
@@ -147,18 +177,18 @@ impl Config {
 }
 
 impl Http {
-    fn read(mut table: Table) -> Option<Self> {
+    fn read(mut table: Table) -> Self {
         let listen = table.get_with("listen", "an address and a port, as \"127.0.0.1:9100\"", |value| {
             value.as_str()?.parse().ok()
         });
         let hosts = table.get("hosts").unwrap_or_default();
-        let credentials = credentials::read(&mut table);
+        let credentials = credentials::read_for_visitors(&mut table);
         let this = Self { listen: listen.unwrap_or(Self::LISTEN), hosts, credentials };
         if let Err(reason) = this.check() {
             table.wrong(reason);
         }
         table.no_more();
-        Some(this)
+        this
     }
 
     /// Where it listens by default.
@@ -166,7 +196,7 @@ impl Http {
 
     /// Nobody elsewhere sees and steers without a password.
     pub fn check(&self) -> Result<(), String> {
-        if self.listen.ip().is_loopback() || self.credentials.is_some() {
+        if self.listen.ip().is_loopback() || self.credentials != Ok(None) {
             return Ok(());
         }
         let listen = self.listen;

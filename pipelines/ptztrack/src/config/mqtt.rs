@@ -24,7 +24,8 @@ impl Mqtt {
     const PORT: u16 = 1883;
     const TLS_PORT: u16 = 8883;
 
-    pub(super) fn read(mut table: Table) -> Option<Self> {
+    /// `None` where it is mistaken.
+    pub(super) fn read(mut table: Table) -> Option<Result<Self, String>> {
         let host: Option<String> = table.need("host");
         let port = table.get_with("port", "a port, a whole number from 1 to 65535", |value| {
             whole(value).and_then(|port| u16::try_from(port).ok()).filter(|port| *port > 0)
@@ -37,7 +38,16 @@ impl Mqtt {
         let discovery = table.get("discovery").unwrap_or(true).then_some(prefix);
         table.no_more();
         let port = port.unwrap_or(if tls.is_some() { Self::TLS_PORT } else { Self::PORT });
-        Some(Self { host: host?, port, tls, credentials, topic, discovery })
+        let host = host?;
+        let this = credentials.map(|credentials| Self { host, port, tls, credentials, topic, discovery });
+        Some(this.and_then(|this| this.check_certificates().map(|()| this)))
+    }
+
+    /// # Errors
+    /// Why the certificates that are to be believed are of no use; they may be later.
+    fn check_certificates(&self) -> Result<(), String> {
+        let Some(trust) = &self.tls else { return Ok(()) };
+        trust.client_config(true).map(|_| ()).map_err(|err| err.to_string())
     }
 }
 

@@ -28,11 +28,13 @@ impl Restream {
     /// IANA's alternative to 554, which only root may listen on.
     const LISTEN: SocketAddr = SocketAddr::new(IpAddr::V4(Ipv4Addr::LOCALHOST), 8554);
 
-    pub(super) fn read(mut table: Table) -> Self {
+    /// # Errors
+    /// Why the password cannot be had.
+    pub(super) fn read(mut table: Table) -> Result<Self, String> {
         let listen = table.get_with("listen", "an address and a port, as \"127.0.0.1:8554\"", |value| {
             value.as_str()?.parse().ok()
         });
-        let credentials = credentials::read(&mut table);
+        let credentials = credentials::read_for_visitors(&mut table);
         let certificate: Option<String> = table.get("certificate-file");
         let key: Option<String> = table.get("key-file");
         if certificate.is_some() != key.is_some() {
@@ -42,13 +44,13 @@ impl Restream {
             .zip(key)
             .map(|(certificate, key)| Certificate { certificate: certificate.into(), key: key.into() });
         let listen = listen.unwrap_or(Self::LISTEN);
-        if !listen.ip().is_loopback() && credentials.is_none() {
+        if !listen.ip().is_loopback() && credentials == Ok(None) {
             table.wrong(format!(
                 "to listen on {listen}, beyond this machine, it needs `user` and `password-file` in [restream]"
             ));
         }
         table.no_more();
-        Self { listen, credentials, tls }
+        Ok(Self { listen, credentials: credentials?, tls })
     }
 }
 

@@ -77,6 +77,89 @@ fn passwords_come_from_a_file_and_are_never_printed() {
     assert!(wrong.starts_with("camera `a`: no password: ") && wrong.contains("No such file"), "{wrong}");
 }
 
+/// A file that is not there.
+fn missing() -> std::path::PathBuf {
+    std::env::temp_dir().join(format!("ptztrack-missing-{}", std::process::id()))
+}
+
+/// All services, with their password there.
+fn services(password: &Path) -> String {
+    let who = format!("user = \"u\"\npassword-file = {password:?}\n");
+    format!(
+        "[http]\nlisten = \"0.0.0.0:9100\"\n{who}[mqtt]\nhost = \"broker\"\n{who}[restream]\nlisten = \"0.0.0.0:8554\"\n{who}\
+         [camera.a]\naddress = \"http://a\"\n"
+    )
+}
+
+#[test]
+fn services_wait_for_what_they_cannot_read_and_the_check_names_it() {
+    let config = parse(&services(&missing())).unwrap();
+    assert_eq!(config.cameras.len(), 1);
+    let tables: Vec<_> = config.waiting().into_iter().map(|(table, _)| table).collect();
+    assert_eq!(tables, ["http", "mqtt", "restream"]);
+    assert!(config.http.as_ref().unwrap().credentials.is_err(), "it would let everybody in");
+    let wrong = config.check_machine().unwrap_err();
+    for table in tables {
+        let expected = format!("[{table}]: no password: {}: No such file", missing().display());
+        assert!(wrong.lines().any(|line| line.starts_with(&expected)), "{expected} is not in:\n{wrong}");
+    }
+    // What is mistaken is so all the same.
+    let wrong = parse(&services(&missing()).replace("host", "hots")).unwrap_err();
+    assert!(wrong.contains("`host` is missing") && wrong.contains("`hots` is not known here"), "{wrong}");
+}
+
+#[test]
+fn an_empty_password_lets_nobody_in() {
+    let config = parse(&services(Path::new("/dev/null"))).unwrap();
+    let empty = "no password: it is empty";
+    assert_eq!(config.waiting(), [("http", empty), ("restream", empty)]);
+}
+
+#[test]
+fn a_broker_waits_for_the_certificates_that_are_to_be_believed() {
+    let file = missing();
+    let text = format!(
+        "[mqtt]\nhost = \"broker\"\ntls = true\nca-file = {file:?}\n[camera.a]\naddress = \"http://a\"\n"
+    );
+    let wrong = parse(&text).unwrap().check_machine().unwrap_err();
+    assert!(wrong.starts_with("[mqtt]: ") && wrong.contains(file.to_str().unwrap()), "{wrong}");
+}
+
+#[test]
+fn the_page_elsewhere_needs_the_same_password() {
+    let elsewhere = Some("0.0.0.0:80".parse().unwrap());
+    let config = parse(&services(&missing())).unwrap().with_page_at(elsewhere).unwrap();
+    assert_eq!(config.waiting().len(), 3);
+    assert_eq!(config.http.map(|http| http.listen), elsewhere);
+    let camera = "[camera.a]\naddress = \"http://a\"\n";
+    let wrong = parse(camera).unwrap().with_page_at(elsewhere).unwrap_err();
+    assert!(wrong.starts_with("to listen on 0.0.0.0:80, beyond this machine"), "{wrong}");
+}
+
+#[test]
+fn of_a_file_that_is_read_again_services_that_wait_count_and_others_stay() {
+    let waits = parse(&services(&missing())).unwrap();
+    let password = std::env::temp_dir().join(format!("ptztrack-again-{}", std::process::id()));
+    std::fs::write(&password, "xyzzy\n").unwrap();
+    let text = services(&password);
+    let [runs, elsewhere] = [text.clone(), text.replace("\"broker\"", "\"other\"")].map(|text| parse(&text));
+    std::fs::remove_file(&password).unwrap();
+    let (runs, elsewhere) = (runs.unwrap(), elsewhere.unwrap());
+    let bare = parse("[camera.a]\naddress = \"http://a\"\n").unwrap();
+    let again = |read: &Config, current: &Config| Again::of(read.clone(), current);
+    let nothing = |config: &Config| Again { config: config.clone(), needs_restart: false, lost: Vec::new() };
+
+    assert_eq!(again(&waits, &waits), nothing(&waits));
+    assert_eq!(again(&runs, &waits), nothing(&runs));
+    assert_eq!(again(&bare, &waits), nothing(&bare));
+    let Again { config, needs_restart, lost } = again(&waits, &runs);
+    assert_eq!((config, needs_restart, lost.len()), (runs.clone(), false, 3));
+    for (read, current) in [(&elsewhere, &runs), (&bare, &runs), (&runs, &bare), (&waits, &bare)] {
+        let expected = Again { needs_restart: true, ..nothing(current) };
+        assert_eq!(again(read, current), expected);
+    }
+}
+
 #[test]
 fn an_address_is_a_camera_and_nothing_more() {
     for (address, right) in [
@@ -110,7 +193,7 @@ fn the_page_is_for_this_machine_unless_it_has_a_password() {
 #[test]
 fn a_broker_has_a_host_and_topics_without_wildcards() {
     let camera = "[camera.a]\naddress = \"http://a\"\n";
-    let mqtt = parse(&format!("[mqtt]\nhost = \"broker\"\n{camera}")).unwrap().mqtt.unwrap();
+    let mqtt = parse(&format!("[mqtt]\nhost = \"broker\"\n{camera}")).unwrap().mqtt.unwrap().unwrap();
     assert_eq!(
         (mqtt.port, mqtt.topic.as_str(), mqtt.discovery.as_deref()),
         (1883, "ptztrack", Some("homeassistant"))
@@ -128,7 +211,7 @@ fn a_broker_has_a_host_and_topics_without_wildcards() {
 #[test]
 fn streams_are_passed_on_within_this_machine_unless_there_is_a_password() {
     let camera = "[camera.a]\naddress = \"http://a\"\n";
-    let restream = parse(&format!("[restream]\n{camera}")).unwrap().restream.unwrap();
+    let restream = parse(&format!("[restream]\n{camera}")).unwrap().restream.unwrap().unwrap();
     assert_eq!((restream.listen.to_string().as_str(), restream.tls), ("127.0.0.1:8554", None));
     let wrong = "[restream]\nlisten = \"[::]:8554\"\ncertificate-file = \"/etc/a.pem\"\n";
     let wrong = parse(&format!("{wrong}{camera}")).unwrap_err();

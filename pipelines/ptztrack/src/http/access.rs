@@ -32,7 +32,7 @@ const TELL_EVERY: Duration = Duration::from_secs(60);
 #[derive(Debug)]
 pub struct Access {
     hosts: Vec<String>,
-    credentials: Option<Credentials>,
+    credentials: Result<Option<Credentials>, String>,
     refused: Mutex<Refused>,
     log: Arc<Log>,
 }
@@ -103,10 +103,14 @@ impl Access {
             return Some((StatusCode::FORBIDDEN, "asked for by a page of somebody else\n"));
         }
         match &self.credentials {
-            Some(credentials) if !is(credentials, headers) => {
+            Ok(Some(credentials)) if !is(credentials, headers) => {
                 Some((StatusCode::UNAUTHORIZED, "user and password are needed\n"))
             }
-            _ => None,
+            Ok(_) => None,
+            Err(_) => Some((
+                StatusCode::SERVICE_UNAVAILABLE,
+                "nobody is let in before the password in [http] can be read: the log says why it cannot\n",
+            )),
         }
     }
 }
@@ -136,6 +140,10 @@ pub async fn check(State(access): State<Arc<Access>>, request: Request, next: Ne
             }
             let ask = [(header::WWW_AUTHENTICATE, "Basic realm=\"ptztrack\", charset=\"UTF-8\"")];
             (StatusCode::UNAUTHORIZED, ask, reason).into_response()
+        }
+        Some(refusal @ (StatusCode::SERVICE_UNAVAILABLE, _)) => {
+            // Whoever stays connected is answered by this page, and not by the one that lets them in.
+            ([(header::CONNECTION, "close")], refusal).into_response()
         }
         Some(refusal) => refusal.into_response(),
     }
@@ -173,7 +181,7 @@ fn is(credentials: &Credentials, headers: &HeaderMap) -> bool {
 mod tests {
     use super::*;
 
-    fn access(credentials: Option<Credentials>) -> Access {
+    fn access(credentials: Result<Option<Credentials>, String>) -> Access {
         let http = Http {
             listen: "127.0.0.1:9100".parse().unwrap(),
             hosts: vec!["cameras.example".to_owned()],
@@ -190,7 +198,7 @@ mod tests {
 
     #[test]
     fn it_answers_to_its_own_names_only() {
-        let access = access(None);
+        let access = access(Ok(None));
         for host in ["127.0.0.1:9100", "localhost:9100", "[::1]:9100", "cameras.example", "192.0.2.7:9100"] {
             assert_eq!(answer(&access, Method::GET, &[(header::HOST, host)]), None, "{host}");
         }
@@ -201,7 +209,7 @@ mod tests {
 
     #[test]
     fn only_its_own_page_steers() {
-        let access = access(None);
+        let access = access(Ok(None));
         let from = |method, origin| {
             answer(&access, method, &[(header::HOST, "localhost:9100"), (header::ORIGIN, origin)])
         };
@@ -214,6 +222,15 @@ mod tests {
     }
 
     #[test]
+    fn without_the_password_that_there_should_be_nobody_is_let_in() {
+        let access = access(Err("no password: it is not there".to_owned()));
+        let basic = format!("Basic {}", BASE64_STANDARD.encode("guard:"));
+        let headers = [(header::HOST, "localhost"), (header::AUTHORIZATION, &basic)];
+        assert_eq!(answer(&access, Method::GET, &headers[..1]), Some(503));
+        assert_eq!(answer(&access, Method::GET, &headers), Some(503));
+    }
+
+    #[test]
     fn refused_log_ins_are_told_once_a_minute_with_how_many_there_were() {
         let (begin, mut refused) = (Instant::now(), Refused::default());
         let told = (0..150).filter_map(|second| refused.one_more(begin + Duration::from_secs(second)));
@@ -223,7 +240,7 @@ mod tests {
     #[test]
     fn a_password_is_asked_for_where_there_is_one() {
         let credentials = Credentials { user: "guard".to_owned(), password: Secret::new("xyzzy") };
-        let access = access(Some(credentials));
+        let access = access(Ok(Some(credentials)));
         let with = |text: &str| {
             let basic = format!("Basic {}", BASE64_STANDARD.encode(text));
             answer(&access, Method::GET, &[(header::HOST, "localhost"), (header::AUTHORIZATION, &basic)])

@@ -153,7 +153,7 @@ impl Empty {
 
     /// With these cameras.
     fn of(fleet: Fleet) -> std::io::Result<Self> {
-        let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: None };
+        let http = Http { listen: Http::LISTEN, hosts: Vec::new(), credentials: Ok(None) };
         let router = router(&http, Arc::new(fleet), Events::default(), Arc::default());
         Ok(Self { router, runtime: tokio::runtime::Builder::new_current_thread().enable_time().build()? })
     }
