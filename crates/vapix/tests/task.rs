@@ -300,6 +300,27 @@ fn two_wrong_passwords_one_after_the_other_leave_the_right_one_to_stop_the_camer
     assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.commands());
 }
 
+/// A camera that has locked the account says of any password that it is wrong.
+#[test]
+fn back_at_the_right_password_while_everybody_is_locked_out_the_camera_is_stopped_and_moved_again() {
+    let camera = camera_with_a_password();
+    let (refuse, refused) = channel();
+    let task = start_as(Some("pass"), &camera, None, move |event| {
+        if matches!(event, Event::Exchanged { failure: Some(Error::BadCredentials { .. }), .. }) {
+            let _ = refuse.send(());
+        }
+    });
+    see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
+    camera.set_fault(Fault::Locked);
+    task.mailbox().set_credentials(Some(root("falsch")));
+    refused.recv_timeout(PATIENCE).unwrap();
+    task.mailbox().set_credentials(Some(root("pass")));
+    camera.set_fault(Fault::None);
+    assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.commands());
+    see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
+    assert!(refused.try_recv().is_err(), "it was asked in vain once more");
+}
+
 /// Neither the camera goes on, nor does anybody wait for ever.
 #[test]
 fn one_that_breaks_stops_the_camera_and_keeps_nobody_waiting() {

@@ -43,6 +43,14 @@ impl ControlQueue {
     /// A camera that names no time, or does not answer, is asked again after this.
     const PAUSE: Duration = Duration::from_secs(5);
 
+    /// Of somebody else at the same camera, who has not asked for a place.
+    pub fn of_another(&self) -> Self {
+        match self.state {
+            State::Absent => Self::absent(),
+            _ => Self::default(),
+        }
+    }
+
     /// The protocol has none.
     pub fn absent() -> Self {
         Self { state: State::Absent, ..Self::default() }

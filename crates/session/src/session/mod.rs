@@ -37,6 +37,7 @@ use discovery::Discovery;
 use mode_support::ModeSupport;
 use scheduler::Scheduler;
 use servo::{Access, ActuatorStatus, Mode, Position, Time};
+use speaker::Standing;
 pub(crate) use stop_confirmation::StopConfirmation;
 use stop_confirmation::StopFinding;
 
@@ -56,7 +57,7 @@ pub struct Session {
     speaker: Speaker,
     connection: Connection,
     /// Of whoever else may have to speak.
-    other_connection: Option<Connection>,
+    other: Option<Standing>,
     discovery: Discovery,
     description: Description,
     scheduler: Scheduler,
@@ -80,7 +81,7 @@ impl Session {
             settings,
             speaker: Speaker::Owner,
             connection: Connection::default(),
-            other_connection: None,
+            other: None,
             discovery: Discovery::new(protocol.questions),
             description: Description::default(),
             scheduler: Scheduler::new(protocol.keep_alive),
@@ -106,8 +107,9 @@ impl Session {
     }
 
     /// What to send before we are somebody else to the camera: whom it does not know it does not stop for.
-    pub fn parting_stop(&self) -> Option<Stop> {
-        let is_heard = !self.connection.halted() && !self.arbitration.queue.is_deaf();
+    pub fn parting_stop(&self, now: Time) -> Option<Stop> {
+        let may_ask = !self.connection.halted() && self.connection.retry_at() <= now;
+        let is_heard = may_ask && !self.arbitration.queue.is_deaf();
         (is_heard && !self.is_at_rest()).then_some(self.stop())
     }
 

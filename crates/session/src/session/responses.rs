@@ -10,7 +10,7 @@ use super::arbitration::Finding;
 use super::connection::Connection;
 use super::mode_support::Refusal;
 use super::scheduler::Scheduler;
-use super::{Fact, Session, Steering};
+use super::{Fact, Session, Speaker, Steering};
 use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent, Stop};
 
 impl Session {
@@ -53,14 +53,14 @@ impl Session {
             }
             (Request::Command(command), Err(err)) => {
                 let facts = self.command_failed(command, &err, steering, now);
-                self.pass_turn();
+                self.pass_turn(now);
                 facts
             }
             (Request::Query(query), Ok(response)) => self.told(*query, response, steering, (sent, now)),
             (Request::Query(query), Err(err)) => {
                 let facts = self.not_told(*query, &err, now);
                 if self.connection.halted() {
-                    self.pass_turn();
+                    self.pass_turn(now);
                 }
                 facts
             }
@@ -100,6 +100,10 @@ impl Session {
         let queue = &mut self.arbitration.queue;
         if queue.refused_command() || queue.refused(now) {
             return true;
+        }
+        if self.speaker == Speaker::Newcomer {
+            // Perhaps only to him: the words of others stay as they are.
+            return false;
         }
         if let Command::Move { motion: Motion::Velocity { .. }, free } = command {
             // It may be refused only for being free of proportional speed: then it is sent again without. Where it is refused

@@ -9,6 +9,7 @@ use servo::Time;
 
 use super::Session;
 use super::connection::Connection;
+use super::control_queue::ControlQueue;
 
 /// As whom the camera is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -21,6 +22,13 @@ pub enum Speaker {
     Newcomer,
 }
 
+/// Where one stands with the camera.
+#[derive(Debug)]
+pub(super) struct Standing {
+    connection: Connection,
+    queue: ControlQueue,
+}
+
 impl Session {
     /// As whom the camera is to be spoken to.
     pub fn speaker(&self) -> Speaker {
@@ -28,19 +36,35 @@ impl Session {
     }
 
     /// The camera moves at the word of whoever speaks, and somebody else is to be its owner.
-    pub fn stand_in(&mut self) {
+    pub fn stand_in(&mut self, now: Time) {
         self.connection.note_obeyed();
         self.speaker = Speaker::Mover;
-        self.other_connection = Some(Connection::default());
+        self.other =
+            Some(Standing { connection: Connection::default(), queue: self.arbitration.queue.of_another() });
         if self.connection.faulty() {
-            self.pass_turn();
+            self.pass_turn(now);
         }
     }
 
-    /// The camera may be asked anew: its owner is another.
-    pub fn owner_changed(&mut self) {
-        match &mut self.other_connection {
-            Some(owners) if self.speaker == Speaker::Mover => *owners = Connection::default(),
+    /// Whoever moved the camera is its owner after all.
+    pub fn mover_stays(&mut self) {
+        if self.speaker == Speaker::Newcomer {
+            self.exchange();
+        }
+        self.other = None;
+        self.speaker = Speaker::Owner;
+        self.ask_anew();
+    }
+
+    /// The camera may be asked anew: its owner is another. He need not wait for whom it does not hear.
+    pub fn owner_changed(&mut self, now: Time) {
+        match &mut self.other {
+            Some(owner) if self.speaker == Speaker::Mover => {
+                owner.connection = Connection::default();
+                if self.connection.faulty() {
+                    self.pass_turn(now);
+                }
+            }
             _ => self.connection = Connection::default(),
         }
         if self.speaker == Speaker::Owner {
@@ -48,10 +72,12 @@ impl Session {
         }
     }
 
-    /// Where nobody else is needed any more to stop the camera, its owner may move it.
+    /// Where nobody else is needed any more to stop the camera, its owner may move it. Whoever would not be heard leaves it to the other.
     pub fn settle_speaker(&mut self, now: Time) {
         if self.has_stopped(now) {
             self.decide_speaker();
+        } else if self.is_deaf() {
+            self.pass_turn(now);
         }
     }
 
@@ -60,32 +86,42 @@ impl Session {
         self.stays_at_rest() && !self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(now))
     }
 
-    /// It did as whoever speaks has told it.
+    /// It did as whoever speaks has told it; where its yes is not to be trusted, that shows later.
     pub(super) fn was_obeyed(&mut self) {
-        if self.speaker == Speaker::Newcomer {
+        if self.speaker == Speaker::Newcomer && self.stop_confirmation.is_none() {
             self.decide_speaker();
         }
     }
 
-    /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again.
-    pub(super) fn pass_turn(&mut self) {
-        let Some(other) = &mut self.other_connection else { return };
-        let is_sooner = self.connection.halted() || other.retry_at() <= self.connection.retry_at();
-        if !other.halted() && is_sooner {
-            mem::swap(&mut self.connection, other);
+    /// It did not: it is the other's turn, but not his whom it has locked out or would not hear, nor sooner than he may ask again.
+    pub(super) fn pass_turn(&mut self, now: Time) {
+        let Some(other) = &self.other else { return };
+        let retry_at = self.connection.retry_at().max(now);
+        let is_heard = !other.connection.halted() && !other.queue.is_deaf();
+        if is_heard && (self.connection.halted() || other.connection.retry_at() <= retry_at) {
+            self.exchange();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
-        } else if self.connection.halted() && other.halted() {
+        } else if self.connection.halted() && other.connection.halted() {
             self.decide_speaker();
+        }
+    }
+
+    /// Has the other speak.
+    fn exchange(&mut self) {
+        if let Some(other) = &mut self.other {
+            mem::swap(&mut self.connection, &mut other.connection);
+            mem::swap(&mut self.arbitration.queue, &mut other.queue);
         }
     }
 
     fn decide_speaker(&mut self) {
-        let Some(other) = self.other_connection.take() else { return };
         if self.speaker == Speaker::Mover {
-            self.connection = other;
+            self.exchange();
         }
-        self.speaker = Speaker::Owner;
-        self.ask_anew();
+        if self.other.take().is_some() {
+            self.speaker = Speaker::Owner;
+            self.ask_anew();
+        }
     }
 
     fn ask_anew(&mut self) {
@@ -108,7 +144,7 @@ mod tests {
     fn session() -> Session {
         let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
         session.inherit(Stop::PanTilt, Time::ZERO);
-        session.stand_in();
+        session.stand_in(Time::ZERO);
         session
     }
 
@@ -116,7 +152,7 @@ mod tests {
         /// What is told fails; returns whose turn it is then.
         fn fails(&mut self, err: &Error) -> Speaker {
             self.connection.failed(err, true, Time::ZERO);
-            self.pass_turn();
+            self.pass_turn(Time::ZERO);
             self.speaker()
         }
     }
@@ -153,8 +189,8 @@ mod tests {
         assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
         assert_eq!(session.fails(&wrong()), Speaker::Mover);
         assert_eq!([0; 4].map(|_| session.fails(&forbidden)), [Speaker::Mover; 4], "it may pass");
-        session.owner_changed();
-        assert_eq!(session.fails(&forbidden), Speaker::Newcomer, "with another password he is");
+        session.owner_changed(Time::ZERO);
+        assert_eq!(session.speaker(), Speaker::Newcomer, "with another password he is, and at once");
         assert_eq!(session.fails(&wrong()), Speaker::Mover);
         assert_eq!(session.fails(&wrong()), Speaker::Owner, "nobody is left");
         assert!(session.halted());
@@ -172,6 +208,41 @@ mod tests {
         assert_eq!([0; 8].map(|_| session.fails(&broken)), [Speaker::Newcomer; 8]);
     }
 
+    /// A pause that is over is none, however long ago the other's was.
+    #[test]
+    fn who_is_refused_without_a_pause_gives_way_to_who_may_ask_again() {
+        let mut session = session();
+        session.fails(&Error::Broken("reset".to_owned()));
+        let later = Time::from_millis(5000);
+        session.pass_turn(later);
+        assert_eq!(session.speaker(), Speaker::Mover);
+    }
+
+    /// Each has a place of his own in the camera's queue.
+    #[test]
+    fn who_is_out_of_turn_in_the_queue_leaves_the_stop_to_who_is_not() {
+        let mut session = session();
+        session.arbitration.queue = ControlQueue::default();
+        session.fails(&Error::Broken("reset".to_owned()));
+        session.arbitration.queue.told(Some(true));
+        assert!(session.arbitration.queue.refused_command() && session.is_deaf());
+        session.settle_speaker(Time::from_millis(5000));
+        assert_eq!((session.speaker(), session.is_deaf()), (Speaker::Mover, false));
+        session.fails(&Error::Broken("reset".to_owned()));
+        assert_eq!(session.speaker(), Speaker::Mover, "he would not be heard");
+    }
+
+    #[test]
+    fn the_movers_own_password_given_again_makes_him_the_owner() {
+        let mut session = session();
+        session.fails(&Error::Broken("reset".to_owned()));
+        session.fails(&wrong());
+        assert_eq!(session.speaker(), Speaker::Mover);
+        session.mover_stays();
+        assert_eq!(session.speaker(), Speaker::Owner);
+        assert!(session.connection.faulty() && !session.halted(), "what was his is");
+    }
+
     #[test]
     fn the_mover_speaks_until_the_camera_rests_for_good() {
         let mut session = session();
@@ -187,7 +258,7 @@ mod tests {
     fn who_was_refused_just_before_does_not_begin() {
         let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
         session.connection.failed(&Error::CredentialsMissing, true, Time::ZERO);
-        session.stand_in();
+        session.stand_in(Time::ZERO);
         assert_eq!(session.speaker(), Speaker::Newcomer);
     }
 }

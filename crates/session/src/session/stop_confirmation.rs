@@ -96,7 +96,7 @@ impl StopConfirmation {
 
     /// Whether it may yet have to be repeated.
     pub fn is_open(&self, now: Time) -> bool {
-        self.since.is_some_and(|since| self.repeated == 0 || now < since + Self::UNSEEN_AFTER)
+        self.unseen_at().is_some() || self.since.is_some_and(|since| now < since + Self::UNSEEN_AFTER)
     }
 
     /// Whether it is to be repeated for that now; asked once for each time.

@@ -52,19 +52,41 @@ impl<C: Client> Account<C> {
         self.other.is_some()
     }
 
-    /// The owner is somebody else from here on. `is_free`: who it was is not needed any more to stop the camera, or cannot.
-    pub fn change(&mut self, credentials: Option<Credentials>, is_free: bool) {
-        match &mut self.other {
-            Some(owner) if self.speaker == Speaker::Mover => owner.set_credentials(credentials),
-            None if !is_free => self.await_rest(credentials),
-            _ => self.client.set_credentials(credentials),
+    /// The owner has these credentials from here on. `is_free`: who it was is not needed any more to stop the camera, or cannot. Whether
+    /// somebody else is the owner now, or the same who may be asked anew.
+    pub fn change(&mut self, credentials: Option<Credentials>, is_free: bool) -> bool {
+        if !is_free && self.is_mover(&credentials) {
+            self.follow(Speaker::Mover);
+            (self.other, self.speaker) = (None, Speaker::Owner);
+            return false;
+        }
+        match (&mut self.other, self.speaker) {
+            (Some(owner), Speaker::Mover) => {
+                owner.set_credentials(credentials);
+                true
+            }
+            (None, _) if !is_free => self.await_rest(credentials),
+            _ => {
+                self.client.set_credentials(credentials);
+                true
+            }
         }
     }
 
-    fn await_rest(&mut self, credentials: Option<Credentials>) {
+    /// Whether the owner, with these credentials, is who moved the camera.
+    fn is_mover(&self, credentials: &Option<Credentials>) -> bool {
+        let Some(other) = &self.other else { return false };
+        let [spoken, silent] = [self.client.identity(), other.identity()];
+        let (mover, mut owner) =
+            if self.speaker == Speaker::Mover { (spoken, silent) } else { (silent, spoken) };
+        owner.settings.credentials.clone_from(credentials);
+        owner.is_account_of(&mover)
+    }
+
+    fn await_rest(&mut self, credentials: Option<Credentials>) -> bool {
         let mover = self.client.identity();
         if mover.settings.credentials == credentials {
-            return;
+            return false;
         }
         match C::in_place_of(mover) {
             Ok(mut owner) => {
@@ -73,6 +95,7 @@ impl<C: Client> Account<C> {
             }
             Err(_) => self.client.set_credentials(credentials),
         }
+        true
     }
 
     /// Has this one speak, one of those who may have to. Whether it is another than before.
@@ -205,9 +228,21 @@ mod tests {
     fn a_password_that_stays_the_same_changes_nothing() {
         let mut account = account("pass");
         account.succeed(mover("pass"));
-        account.change(credentials("pass"), false);
+        assert!(!account.change(credentials("pass"), false));
         assert!(!account.stands_in() && account.client().identity().accepted);
-        account.change(credentials("neu"), true);
+        assert!(account.change(credentials("neu"), true));
         assert_eq!(account.speaks_as(), credentials("neu"));
+    }
+
+    #[test]
+    fn the_movers_own_password_given_again_makes_him_the_owner() {
+        for speaker in [Speaker::Mover, Speaker::Newcomer] {
+            let mut account = account("falsch");
+            account.succeed(mover("pass"));
+            account.follow(speaker);
+            assert!(!account.change(credentials("pass"), false));
+            assert!(!account.stands_in() && account.client().identity().accepted);
+            assert_eq!(account.speaks_as(), credentials("pass"));
+        }
     }
 }

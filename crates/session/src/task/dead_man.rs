@@ -38,15 +38,17 @@ impl DeadManState {
 pub struct DeadMan {
     lease: Option<Lease>,
     state: DeadManState,
-    /// What the watchdog was told last.
+    /// What the watchdog was told last ...
     order: Option<StopOrder>,
+    /// ... which does not hold any more.
+    is_outdated: bool,
 }
 
 impl DeadMan {
     /// Nothing is held yet, nor started. Without a watchdog there is nothing to be held.
     pub fn new(watchdog: Option<Arc<Watchdog>>) -> Self {
         let state = if watchdog.is_some() { DeadManState::Ready } else { DeadManState::Off };
-        Self { lease: watchdog.map(Lease::new), state, order: None }
+        Self { lease: watchdog.map(Lease::new), state, order: None, is_outdated: false }
     }
 
     /// What is to be said of it.
@@ -64,7 +66,7 @@ impl DeadMan {
     pub fn hold(&mut self, order: StopOrder) {
         if let Some(lease) = &mut self.lease {
             lease.hold(order.clone());
-            self.order = Some(order);
+            (self.order, self.is_outdated) = (Some(order), false);
         }
     }
 
@@ -92,12 +94,12 @@ impl DeadMan {
 
     /// Whether the watchdog knows something else of what is in doubt, or nothing.
     pub fn is_outdated(&self, in_doubt: bool) -> bool {
-        self.order.as_ref().is_none_or(|order| order.in_doubt != in_doubt)
+        self.is_outdated || self.order.as_ref().is_none_or(|order| order.in_doubt != in_doubt)
     }
 
-    /// The watchdog is to be told anew.
+    /// The watchdog is to be told anew; until then what it was told is renewed.
     pub fn outdate(&mut self) {
-        self.order = None;
+        self.is_outdated = true;
     }
 
     /// Resolves when it is to be renewed, or how it stands may have changed.

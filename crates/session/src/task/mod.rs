@@ -130,7 +130,7 @@ impl CameraTask {
             mailbox.inherit(left.stop);
             account.succeed(left.identity);
             if account.stands_in() {
-                control.session_mut().stand_in();
+                control.session_mut().stand_in(Time::ZERO);
             }
         }
         let identity = Arc::new(Mutex::new(account.identity()));
@@ -306,22 +306,28 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
     /// they wait until it does.
     async fn change_credentials(&mut self) {
         self.take_turns();
-        if let Some(stop) = self.state.control.session().parting_stop() {
+        if let Some(stop) = self.state.control.session().parting_stop(self.state.mailbox.now()) {
             self.perform(Request::Command(Command::Stop(stop))).await;
             self.take_turns();
             // A password often follows on the user's heels.
             self.state.take_mail();
         }
         if let Some(credentials) = self.state.credentials.take() {
-            let session = self.state.control.session();
-            let is_free = session.has_stopped(self.state.mailbox.now()) || session.halted();
-            self.account.change(credentials, is_free);
+            let now = self.state.mailbox.now();
             let session = self.state.control.session_mut();
-            if self.account.stands_in() && session.speaker() == Speaker::Owner {
-                session.stand_in();
+            let is_free = session.has_stopped(now) || session.halted();
+            let is_another = self.account.change(credentials, is_free);
+            match (self.account.stands_in(), session.speaker()) {
+                (true, Speaker::Owner) => session.stand_in(now),
+                (false, Speaker::Mover | Speaker::Newcomer) => session.mover_stays(),
+                _ => {}
             }
-            session.owner_changed();
+            if is_another {
+                session.owner_changed(now);
+            }
+            self.account.follow(session.speaker());
             *lock(&self.identity) = self.account.identity();
+            self.dead_man.outdate();
         }
     }
 

@@ -245,7 +245,7 @@ fn another_user_may_ask_what_the_last_might_not() {
     meeting.run((10, ms(0)), nobody, queueing);
     assert_eq!(asked_for_control(&meeting), 1, "who may not does not try again: it counts as a wrong login");
     meeting.reports.clear();
-    meeting.control.session_mut().owner_changed();
+    meeting.control.session_mut().owner_changed(meeting.now);
     meeting.run((10, ms(0)), nobody, queueing);
     assert_eq!((meeting.asked(Query::Limits), asked_for_control(&meeting)), (3, 3));
 }

@@ -318,14 +318,14 @@ fn what_a_predecessor_left_is_stopped_twice() {
 #[test]
 fn a_camera_that_hears_is_stopped_before_we_are_somebody_else() {
     let mut rig = Rig::new(ServoSettings::default());
-    assert_eq!(rig.control.session().parting_stop(), None);
+    assert_eq!(rig.control.session().parting_stop(rig.now), None);
     rig.see(0.9, 0.5);
     rig.after(ms(0));
-    assert_eq!(rig.control.session().parting_stop(), Some(Stop::PanTilt));
+    assert_eq!(rig.control.session().parting_stop(rig.now), Some(Stop::PanTilt));
     rig.see(0.1, 0.5);
     rig.now += ms(200);
     rig.run(|_| Err(Error::BadCredentials { user: "root".to_owned() }));
-    assert_eq!(rig.control.session().parting_stop(), None, "nor would it listen");
+    assert_eq!(rig.control.session().parting_stop(rig.now), None, "nor would it listen");
 }
 
 #[test]
@@ -372,7 +372,7 @@ fn wrong_credentials_end_all_asking_until_they_change() {
         rig.see(0.9, 0.5);
         assert_eq!(rig.after(ms(100)), []);
     }
-    rig.control.session_mut().owner_changed();
+    rig.control.session_mut().owner_changed(rig.now);
     rig.see(0.9, 0.5);
     assert_eq!(rig.after(ms(100)).len(), 1);
 }
@@ -382,7 +382,7 @@ fn wrong_credentials_end_all_asking_until_they_change() {
 fn who_stands_in_for_another_stops_the_camera_and_does_not_move_it() {
     let mut rig = Rig::new(ServoSettings::default());
     rig.control.session_mut().inherit(Stop::PanTilt, rig.now);
-    rig.control.session_mut().stand_in();
+    rig.control.session_mut().stand_in(rig.now);
     let mut sent = Vec::new();
     for _ in 0..100 {
         rig.see(0.9, 0.5);
