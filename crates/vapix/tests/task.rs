@@ -315,9 +315,16 @@ fn back_at_the_right_password_while_everybody_is_locked_out_the_camera_is_stoppe
     task.mailbox().set_credentials(Some(root("falsch")));
     refused.recv_timeout(PATIENCE).unwrap();
     task.mailbox().set_credentials(Some(root("pass")));
+    // The right one would be refused as well.
+    assert!(refused.recv_timeout(Duration::from_millis(100)).is_err(), "it was asked in vain");
     camera.set_fault(Fault::None);
     assert!(camera.wait_for(PATIENCE, |status| !status.moving), "{:?}", camera.commands());
-    see_until(&task, |wait| camera.wait_for(wait, |status| status.moving));
+    // By now it may be at its limit: the other way.
+    let begin = Instant::now();
+    while !camera.wait_for(PICTURE, |status| status.moving) {
+        assert!(begin.elapsed() < PATIENCE, "the camera was not moved");
+        task.mailbox().see(Measurement::at(0.1, 0.5, task.mailbox().now()));
+    }
     assert!(refused.try_recv().is_err(), "it was asked in vain once more");
 }
 

@@ -45,10 +45,8 @@ impl ControlQueue {
 
     /// Of somebody else at the same camera, who has not asked for a place.
     pub fn of_another(&self) -> Self {
-        match self.state {
-            State::Absent => Self::absent(),
-            _ => Self::default(),
-        }
+        let state = if self.state == State::Absent { State::Absent } else { State::Unknown };
+        Self { state, leaving: self.leaving, ..Self::default() }
     }
 
     /// The protocol has none.
@@ -89,6 +87,11 @@ impl ControlQueue {
     /// Whether commands are pointless until the next answer, a stop too.
     pub fn is_deaf(&self) -> bool {
         self.deaf
+    }
+
+    /// When commands are worth a try again: where they are pointless now, once it was asked where we stand.
+    pub fn heard_at(&self) -> Time {
+        if self.deaf { self.ask_at } else { Time::ZERO }
     }
 
     /// The camera did as it was told.

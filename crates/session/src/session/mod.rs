@@ -127,6 +127,9 @@ impl Session {
     /// It is the end: with the stop, what is ours is given back.
     pub fn leave(&mut self, now: Time) {
         self.arbitration.queue.leave();
+        if let Some(other) = &mut self.other {
+            other.leave();
+        }
         if let Some(confirmation) = &mut self.stop_confirmation {
             confirmation.leave();
         }
@@ -144,6 +147,7 @@ impl Session {
         }
         if finding != StopFinding::Fine {
             self.scheduler.found_moving(self.scheduler.stop());
+            self.pass_turn(now);
         }
     }
 

@@ -29,6 +29,23 @@ pub(super) struct Standing {
     queue: ControlQueue,
 }
 
+impl Standing {
+    /// Of somebody who was not heard of yet, where another stands so in its queue.
+    fn of_another(queue: &ControlQueue) -> Self {
+        Self { connection: Connection::default(), queue: queue.of_another() }
+    }
+
+    /// It is the end: his place is given up.
+    pub fn leave(&mut self) {
+        self.queue.leave();
+    }
+
+    /// When he may speak again.
+    fn heard_at(&self) -> Time {
+        self.connection.retry_at().max(self.queue.heard_at())
+    }
+}
+
 impl Session {
     /// As whom the camera is to be spoken to.
     pub fn speaker(&self) -> Speaker {
@@ -39,8 +56,7 @@ impl Session {
     pub fn stand_in(&mut self, now: Time) {
         self.connection.note_obeyed();
         self.speaker = Speaker::Mover;
-        self.other =
-            Some(Standing { connection: Connection::default(), queue: self.arbitration.queue.of_another() });
+        self.other = Some(Standing::of_another(&self.arbitration.queue));
         if self.connection.faulty() {
             self.pass_turn(now);
         }
@@ -58,17 +74,21 @@ impl Session {
 
     /// The camera may be asked anew: its owner is another. He need not wait for whom it does not hear.
     pub fn owner_changed(&mut self, now: Time) {
-        match &mut self.other {
-            Some(owner) if self.speaker == Speaker::Mover => {
-                owner.connection = Connection::default();
+        match (&mut self.other, self.speaker) {
+            (Some(owner), Speaker::Mover) => {
+                *owner = Standing::of_another(&owner.queue);
                 if self.connection.faulty() {
                     self.pass_turn(now);
                 }
             }
-            _ => self.connection = Connection::default(),
-        }
-        if self.speaker == Speaker::Owner {
-            self.ask_anew();
+            (Some(_), _) => {
+                self.connection = Connection::default();
+                self.arbitration.queue = self.arbitration.queue.of_another();
+            }
+            (None, _) => {
+                self.connection = Connection::default();
+                self.ask_anew();
+            }
         }
     }
 
@@ -76,7 +96,7 @@ impl Session {
     pub fn settle_speaker(&mut self, now: Time) {
         if self.has_stopped(now) {
             self.decide_speaker();
-        } else if self.is_deaf() {
+        } else if self.arbitration.queue.heard_at() > now {
             self.pass_turn(now);
         }
     }
@@ -93,12 +113,11 @@ impl Session {
         }
     }
 
-    /// It did not: it is the other's turn, but not his whom it has locked out or would not hear, nor sooner than he may ask again.
+    /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again.
     pub(super) fn pass_turn(&mut self, now: Time) {
         let Some(other) = &self.other else { return };
-        let retry_at = self.connection.retry_at().max(now);
-        let is_heard = !other.connection.halted() && !other.queue.is_deaf();
-        if is_heard && (self.connection.halted() || other.connection.retry_at() <= retry_at) {
+        let heard_at = self.connection.retry_at().max(self.arbitration.queue.heard_at()).max(now);
+        if !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at) {
             self.exchange();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
         } else if self.connection.halted() && other.connection.halted() {
@@ -218,18 +237,48 @@ mod tests {
         assert_eq!(session.speaker(), Speaker::Mover);
     }
 
-    /// Each has a place of his own in the camera's queue.
-    #[test]
-    fn who_is_out_of_turn_in_the_queue_leaves_the_stop_to_who_is_not() {
+    /// Whom the camera does not hear in its queue, who is to ask again where he stands in five seconds.
+    fn with_newcomer_out_of_turn() -> Session {
         let mut session = session();
         session.arbitration.queue = ControlQueue::default();
         session.fails(&Error::Broken("reset".to_owned()));
+        session.arbitration.queue = ControlQueue::default();
         session.arbitration.queue.told(Some(true));
+        session.arbitration.queue.failed(Time::ZERO);
         assert!(session.arbitration.queue.refused_command() && session.is_deaf());
-        session.settle_speaker(Time::from_millis(5000));
+        session
+    }
+
+    /// Each has a place of his own in the camera's queue.
+    #[test]
+    fn who_is_out_of_turn_in_the_queue_leaves_the_stop_to_who_is_not() {
+        let mut session = with_newcomer_out_of_turn();
+        session.settle_speaker(Time::from_millis(1000));
         assert_eq!((session.speaker(), session.is_deaf()), (Speaker::Mover, false));
         session.fails(&Error::Broken("reset".to_owned()));
         assert_eq!(session.speaker(), Speaker::Mover, "he would not be heard");
+        session.pass_turn(Time::from_millis(5000));
+        assert_eq!(session.speaker(), Speaker::Newcomer, "by now he may be");
+        session.settle_speaker(Time::from_millis(5000));
+        assert_eq!(session.speaker(), Speaker::Newcomer, "he asks first");
+    }
+
+    #[test]
+    fn who_is_out_of_turn_speaks_where_nobody_else_may() {
+        let mut session = with_newcomer_out_of_turn();
+        session.settle_speaker(Time::from_millis(1000));
+        assert_eq!(session.fails(&wrong()), Speaker::Newcomer);
+        assert!(!session.halted());
+    }
+
+    #[test]
+    fn another_password_is_heard_though_the_one_before_was_out_of_turn() {
+        let mut session = with_newcomer_out_of_turn();
+        session.settle_speaker(Time::from_millis(1000));
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(session.fails(&forbidden), Speaker::Mover);
+        session.owner_changed(Time::from_millis(1000));
+        assert_eq!((session.speaker(), session.is_deaf()), (Speaker::Newcomer, false));
     }
 
     #[test]

@@ -11,6 +11,8 @@ pub struct StopConfirmation {
     since: Option<Time>,
     /// Pictures in a row that showed it to turn since.
     turning: u32,
+    /// When the last of them was taken.
+    turned_at: Time,
     /// How often it was told again.
     repeated: u32,
     /// No more pictures are to come.
@@ -80,7 +82,7 @@ impl StopConfirmation {
             self.forget();
             return StopFinding::Fine;
         }
-        self.turning += 1;
+        (self.turning, self.turned_at) = (self.turning + 1, taken_at);
         if self.turning < Self::PICTURES {
             return StopFinding::Fine;
         }
@@ -96,7 +98,10 @@ impl StopConfirmation {
 
     /// Whether it may yet have to be repeated.
     pub fn is_open(&self, now: Time) -> bool {
-        self.unseen_at().is_some() || self.since.is_some_and(|since| now < since + Self::UNSEEN_AFTER)
+        let Some(since) = self.since else { return false };
+        // Pictures may be rare and late.
+        let last = if self.turning > 0 { self.turned_at + Self::UNSEEN_AFTER } else { since };
+        self.unseen_at().is_some() || now < last + Self::UNSEEN_AFTER
     }
 
     /// Whether it is to be repeated for that now; asked once for each time.
@@ -169,6 +174,17 @@ mod tests {
             confirmation.is_open(ms(6999)) && !confirmation.is_open(ms(7000)),
             "a picture may yet show that it turns"
         );
+    }
+
+    #[test]
+    fn one_that_some_pictures_show_to_turn_is_open_for_the_next_but_not_for_ever() {
+        let mut confirmation = StopConfirmation::default();
+        confirmation.stopped(ms(1000));
+        for picture in 3..6 {
+            assert_eq!(confirmation.see(Some(0.5), ms(1000 * picture)), StopFinding::Fine);
+            assert!(confirmation.is_open(ms(1000 * picture + 2500)));
+        }
+        assert!(!confirmation.is_open(ms(11_000)), "no picture comes any more");
     }
 
     #[test]

@@ -316,11 +316,15 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
             let now = self.state.mailbox.now();
             let session = self.state.control.session_mut();
             let is_free = session.has_stopped(now) || session.halted();
-            let is_another = self.account.change(credentials, is_free);
+            let mut is_another = self.account.change(credentials.clone(), is_free);
             match (self.account.stands_in(), session.speaker()) {
                 (true, Speaker::Owner) => session.stand_in(now),
                 (false, Speaker::Mover | Speaker::Newcomer) => session.mover_stays(),
                 _ => {}
+            }
+            if session.halted() && !is_another {
+                // Whoever stays is asked anew all the same.
+                is_another = self.account.change(credentials, true);
             }
             if is_another {
                 session.owner_changed(now);
