@@ -428,14 +428,19 @@ fn a_flush_relearns() {
     assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
 }
 
+/// An empty picture that does not follow on the one before.
+fn see_discont(detector: &mut Detector) -> Option<usize> {
+    let mut buffer = detector.buffer(&[]);
+    buffer.get_mut().unwrap().set_flags(gst::BufferFlags::DISCONT);
+    regions(&detector.push(buffer))
+}
+
 #[test]
 fn an_interruption_relearns_where_it_was_long() {
     let mut detector = Detector::learned(&grey());
     let discont = |detector: &mut Detector, lost: u64| {
         detector.frame += lost;
-        let mut buffer = detector.buffer(&[]);
-        buffer.get_mut().unwrap().set_flags(gst::BufferFlags::DISCONT);
-        regions(&detector.push(buffer))
+        see_discont(detector)
     };
     // As a leaky queue marks it.
     assert_eq!(discont(&mut detector, 2), Some(0));
@@ -459,12 +464,18 @@ fn a_gap_relearns_where_it_was_long_and_holds_no_picture() {
 }
 
 #[test]
-fn time_that_runs_backwards_relearns_and_time_that_jumps_does_not() {
+fn another_stream_relearns_and_timestamps_that_are_of_no_use_do_not() {
     let mut detector = Detector::learned(&grey());
     detector.frame += 1000;
     assert_eq!(detector.see(&[], 1), [Some(0)]);
+    for frame in [2000, 700, 1400, 100, 99, 98, 500] {
+        detector.frame = frame;
+        assert_eq!(detector.see(&[], 1), [Some(0)], "{frame}");
+    }
+    assert_eq!(detector.see(&[BOX], 2), [Some(0), Some(1)]);
     detector.frame = 0;
-    assert_eq!(detector.see(&[], 3), [None, None, Some(0)]);
+    assert_eq!(see_discont(&mut detector), None);
+    assert_eq!(detector.see(&[], 2), [None, Some(0)]);
 }
 
 #[test]

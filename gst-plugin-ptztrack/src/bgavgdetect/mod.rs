@@ -14,9 +14,9 @@
 //! is learned within four frames. What stays the same becomes background after 6 s, except where a tracker says that its
 //! target is.
 //!
-//! Where the camera's motion cannot be seen and the picture shows another place, and after: start, new caps, a flush, time
-//! that runs backwards, a DISCONT or gap of more than `max-gap` (a leaky queue marks whatever follows a dropped frame as
-//! DISCONT, which is no reason to learn anew), the background is learned anew. Nothing is reported in the first `warm-up`
+//! Where the camera's motion cannot be seen and the picture shows another place, and after: start, new caps, a flush, a
+//! DISCONT or gap of more than `max-gap` (a leaky queue marks whatever follows a dropped frame as DISCONT, which is no
+//! reason to learn anew) or into the past, the background is learned anew. Nothing is reported in the first `warm-up`
 //! frames of a stream.
 //!
 //! ## Regions

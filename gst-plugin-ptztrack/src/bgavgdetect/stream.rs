@@ -116,24 +116,15 @@ impl Stream {
 
     /// Time since the last picture. Forgets the background where too much of it passed unseen.
     pub fn advance(&mut self, pts: Option<gst::ClockTime>, max_gap: Duration) -> Duration {
-        let since = self.last_pts.zip(pts).map(|(last, pts)| pts.nseconds().checked_sub(last.nseconds()));
+        let since = self.last_pts.zip(pts).map(|(last, pts)| pts.checked_sub(last).map(Duration::from));
         let interrupted = std::mem::take(&mut self.interrupted);
-        let (relearn, elapsed) = match since {
-            Some(Some(since)) => {
-                let since = Duration::from_nanos(since);
-                (interrupted && since > max_gap, self.cadence.elapsed(since))
-            }
-            // Time runs backwards: another stream.
-            Some(None) => (true, self.nominal_distance()),
-            // Nobody can tell how much is missing. A leaky queue may mark every other frame: learning anew
-            // each time, nothing would ever be found.
-            None => (false, self.nominal_distance()),
-        };
-        if relearn {
+        // Into the past it is another stream. Where there are no timestamps nobody can tell how much is missing, and a leaky queue may
+        // mark every other frame: learning anew each time, nothing would ever be found.
+        if interrupted && since.is_some_and(|since| since.is_none_or(|since| since > max_gap)) {
             self.forget();
         }
         self.last_pts = pts;
-        elapsed
+        since.and_then(|since| self.cadence.elapsed(since)).unwrap_or_else(|| self.nominal_distance())
     }
 
     fn nominal_distance(&self) -> Duration {

@@ -151,9 +151,11 @@ impl Stream {
     /// The time since the last frame.
     fn step(&mut self, now: Option<gst::ClockTime>) -> gst::ClockTime {
         let last = std::mem::replace(&mut self.last_time, now);
-        let measured = now.zip(last).and_then(|(now, last)| now.checked_sub(last));
-        let Some(measured) = measured.filter(|step| !step.is_zero()) else { return self.frame_duration() };
-        self.cadence.elapsed(measured.into()).try_into().unwrap_or(measured)
+        let Some((now, last)) = now.zip(last).filter(|(now, last)| now != last) else {
+            return self.frame_duration();
+        };
+        let elapsed = self.cadence.elapsed(now.checked_sub(last).map(std::time::Duration::from));
+        elapsed.and_then(|elapsed| elapsed.try_into().ok()).unwrap_or_else(|| self.frame_duration())
     }
 
     fn frame_duration(&self) -> gst::ClockTime {

@@ -16,6 +16,8 @@ pub struct Cadence {
     ahead: Duration,
     /// The same of the one furthest ahead lately, which was held back least.
     furthest: Duration,
+    /// Pictures whose timestamps tell nothing, from the next one on.
+    disordered: usize,
 }
 
 impl Cadence {
@@ -39,8 +41,21 @@ impl Cadence {
     /// What is further ahead is no network's delay, but a camera that takes pictures faster from now on.
     const LONGEST_AHEAD: Duration = Duration::from_secs(1);
 
-    /// How long after the picture before one was taken whose timestamp is so much later.
-    pub fn elapsed(&mut self, interval: Duration) -> Duration {
+    /// How long after the picture before one was taken whose timestamp is so much later; `None` of one that is earlier, and while such
+    /// are among the last: then timestamps tell nothing.
+    pub fn elapsed(&mut self, interval: Option<Duration>) -> Option<Duration> {
+        let Some(interval) = interval else {
+            *self = Self { disordered: Self::INTERVALS, ..Self::default() };
+            return None;
+        };
+        if self.disordered > 0 {
+            self.disordered -= 1;
+            return None;
+        }
+        Some(self.spaced(interval))
+    }
+
+    fn spaced(&mut self, interval: Duration) -> Duration {
         let usual = self.usual();
         self.remember(interval);
         let elapsed = if self.ahead.is_zero() && interval >= usual / Self::BUNCHED {
@@ -87,7 +102,8 @@ mod tests {
 
     fn elapsed(intervals_ms: impl IntoIterator<Item = u64>) -> Vec<u64> {
         let mut cadence = Cadence::default();
-        let elapsed = |interval| cadence.elapsed(Duration::from_millis(interval)).as_millis() as u64;
+        let elapsed =
+            |interval| cadence.elapsed(Some(Duration::from_millis(interval))).unwrap().as_millis() as u64;
         intervals_ms.into_iter().map(elapsed).collect()
     }
 
@@ -127,7 +143,7 @@ mod tests {
         let mut cadence = Cadence::default();
         let bunch = [160, 1, 1, 1, 37];
         let held_back = |interval| {
-            cadence.elapsed(Duration::from_millis(interval));
+            cadence.elapsed(Some(Duration::from_millis(interval)));
             cadence.held_back().as_millis() as u64
         };
         let held_back: Vec<u64> = usual().chain(bunch).chain(bunch).map(held_back).collect();
@@ -136,6 +152,15 @@ mod tests {
         for (late, really) in held_back[45..].iter().zip([120, 80, 40, 0, 0]) {
             assert!(late.abs_diff(really) <= 12, "{held_back:?}");
         }
+    }
+
+    #[test]
+    fn timestamps_tell_nothing_until_all_of_the_last_were_in_order() {
+        let mut cadence = Cadence::default();
+        let mut told = |interval: Option<u64>| cadence.elapsed(interval.map(Duration::from_millis)).is_some();
+        assert!(told(Some(40)) && !told(None));
+        assert!((1..Cadence::INTERVALS).all(|_| !told(Some(2900))) && !told(None));
+        assert!((0..Cadence::INTERVALS).all(|_| !told(Some(40))) && told(Some(40)));
     }
 
     #[test]
