@@ -22,7 +22,7 @@ use super::{Output, Profile, RegionSelection, Test, caps};
 use crate::allocation::refuse_crop;
 use crate::duration;
 use crate::lock::lock;
-use crate::luma_source;
+use crate::luma_source::{self, shows_nothing};
 use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Duty, Zones};
@@ -387,7 +387,7 @@ impl BgAvgDetect {
             stream.interrupt();
         }
         let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));
-        if buffer.flags().contains(gst::BufferFlags::GAP) {
+        if shows_nothing(buffer) {
             return Seen::default();
         }
         let seen = match settings.profile {

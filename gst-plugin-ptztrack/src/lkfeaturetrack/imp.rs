@@ -21,7 +21,7 @@ use crate::allocation::refuse_crop;
 use crate::analytics::Analytics;
 use crate::duration;
 use crate::lock::lock;
-use crate::luma_source::{self, LumaSource};
+use crate::luma_source::{self, LumaSource, shows_nothing};
 use crate::pad_templates;
 use crate::vision::{self, CameraMoves, Observation, TargetRequest};
 
@@ -349,7 +349,7 @@ impl BaseTransformImpl for LkFeatureTrack {
 
     /// In place of the base class's, which would map the pixels writable and so copy a shared frame.
     fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
-        if buffer.flags().contains(gst::BufferFlags::GAP) {
+        if shows_nothing(buffer) {
             // No picture; what was asked for waits for the next one.
             return Ok(gst::FlowSuccess::Ok);
         }
