@@ -11,18 +11,22 @@
 use std::thread;
 use std::time::Duration;
 
-use end_to_end::{GstLaunch, InView, PATIENCE, Running, scene};
+use end_to_end::{GstLaunch, InView, PATIENCE, Running, Watchdog, scene, signal, tool};
 use gst::prelude::*;
 use ptztrack_contract::{TargetMessage, TargetState};
-use virtual_camera::{Fault, VirtualCamera};
+use virtual_camera::{Fault, Status, VirtualCamera};
 
-/// Somebody is followed for so long with each fault.
-const WATCHED: Duration = Duration::from_secs(12);
+/// Somebody is followed for so long with each fault: long enough for them to be lost by a camera that is not steered any more.
+const WATCHED: Duration = scene::FAR_LAP;
 /// And so long before it.
 const BEFORE: Duration = Duration::from_secs(3);
 const HOUR: gst::ClockTime = gst::ClockTime::from_seconds(3600);
-/// The machine is suspended for so long.
+/// The machine is suspended for so long: longer than a lease lasts.
 const SUSPENDED: Duration = Duration::from_secs(10);
+/// So fast the camera turns at most that is suspended, °/s: whom it followed is before it still where it comes to rest.
+const SLOW: f64 = 2.0;
+/// What is said of a picture that freezes.
+const FROZEN: &str = "the picture stays the same";
 /// Whoever is so far off the middle, in parts of the picture, has the camera turn for long.
 const FAR: f64 = 0.25;
 
@@ -56,8 +60,11 @@ fn main() {
     });
     let rtsp = |camera: &VirtualCamera| scene::rtsp(camera, "h264");
     follows("RTP's timestamp and sequence wrap", &rtsp, |_, _| ());
-    println!("\n| the machine is suspended for {SUSPENDED:?} | it rests after |\n|---|---|");
-    println!("| and goes on | {:.1} s |", suspended().as_secs_f64());
+    println!(
+        "\n| the machine is suspended for {SUSPENDED:?} | it rests after | somebody is followed again after |\n|---|---|---|"
+    );
+    let (rests, follows) = suspended();
+    println!("| and goes on | {:.1} s | {:.1} s |", rests.as_secs_f64(), follows.as_secs_f64());
     println!(
         "\n| the picture freezes, by | noticed after | it stands after | and moves again before the picture does |\n|---|---|---|---|"
     );
@@ -75,7 +82,7 @@ fn follow(camera: &VirtualCamera, source: Source, more: &str) -> Running {
 }
 
 fn follows(what: &str, source: Source, goes_wrong: impl FnOnce(&VirtualCamera, &Running)) {
-    let camera = VirtualCamera::start(scene::near_person()).unwrap();
+    let camera = VirtualCamera::start(scene::far_person()).unwrap();
     let mut running = follow(&camera, source, "");
     scene::wait_until_following(&camera);
     thread::sleep(BEFORE);
@@ -109,20 +116,29 @@ fn jump(running: &Running, base: fn(gst::ClockTime) -> gst::ClockTime) {
     pipeline.set_base_time(base);
 }
 
-/// How soon after it goes on the camera rests, which was turning when it was suspended.
-fn suspended() -> Duration {
+/// How soon after it goes on the camera rests, which was turning all the while, and somebody is followed again.
+fn suspended() -> (Duration, Duration) {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let launch = GstLaunch::start(&[], &scene::follow(&camera));
-    assert!(camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > 3.0), "it never turned");
+    let watchdog = Watchdog::new("suspended");
+    let mut command = watchdog.of(tool("gst-launch-1.0"));
+    command.args(scene::follow(&camera).split_whitespace()).arg(format!("max-speed={SLOW}"));
+    let launch = GstLaunch::spawn(command);
+    let turns = |status: &Status| status.pan_rate_deg_s.abs() > SLOW / 2.0;
+    assert!(camera.wait_for(PATIENCE, turns), "it never turned");
     // A machine stops its watchdog too: what would stop the camera is away as long as what moves it.
-    let watchdogs = end_to_end::children_of(launch.id());
+    let watchdogs = watchdog.processes();
+    assert_eq!(watchdogs.len(), 1, "there is no watchdog to be suspended");
     let all = || watchdogs.iter().copied().chain([launch.id()]);
-    all().for_each(|process| end_to_end::signal(process, "STOP"));
+    all().for_each(|process| signal(process, "STOP"));
     thread::sleep(SUSPENDED);
-    all().for_each(|process| end_to_end::signal(process, "CONT"));
-    let begin = camera.now();
+    let (begin, last) = (camera.now(), camera.status());
+    // First, or they would stay where this fails.
+    all().for_each(|process| signal(process, "CONT"));
+    assert!(turns(&last), "somebody stopped it while all were suspended");
     assert!(camera.wait_for(PATIENCE, |status| !status.moving), "it turns on");
-    camera.now() - begin
+    let rests = camera.now() - begin;
+    scene::wait_until_following(&camera);
+    (rests, camera.now() - begin)
 }
 
 /// The picture freezes while somebody far off the middle has the camera turn.
@@ -136,7 +152,10 @@ fn freezes(by: &str, source: Source) {
     running.element("servo").set_property_from_str("steering", "follow");
     scene::wait_until_following(&camera);
     let begin = camera.now();
-    running.wait_for("a warning", |message| (message.type_() == gst::MessageType::Warning).then_some(()));
+    running.wait_for("a warning of the picture", |message| match message.view() {
+        gst::MessageView::Warning(warning) => warning.error().message().contains(FROZEN).then_some(()),
+        _ => None,
+    });
     let noticed = camera.now() - begin;
     let stands = scene::rests(&camera, begin);
     let moves = camera.wait_for(Duration::from_secs(5), |status| status.moving);

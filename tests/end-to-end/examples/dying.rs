@@ -4,8 +4,9 @@
 //! and how soon:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run --example dying > docs/dying.md
+//! cargo build --workspace --lib --bins && cargo run --example dying [WAY] > docs/dying.md
 //! ```
+//! With a part of its name, one way only.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs::File;
@@ -14,7 +15,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use end_to_end::following::script;
 use end_to_end::{GstLaunch, PATIENCE, plugin_folder, scene, signal, tool};
@@ -31,7 +32,9 @@ end of that) until the camera is at rest. In the last column the watchdog could 
 
 const FOOTER: &str = "
 `vapix-watchdog` notices at once that a process has ended; that a process is stopped or hangs, it notices when the lease runs out,
-after 2 s. A watchdog that is slow to start stops the camera as soon as it runs. In an outage it retries twice a second, for a minute.
+after 2 s. A camera at rest waits 2 s for a watchdog that is slow to start, then one warning says that there is none, and it is moved: if
+the application dies then, the camera turns on until the watchdog runs, which stops it as soon as that, or 2 s later where the application
+is stopped or hangs. In an outage it retries twice a second, for a minute.
 
 What is not covered: loss of power or of the network for longer than that minute, and everything that ends the watchdog together with
 the application, such as the end of PID 1 of a container. Run the watchdog outside that container, with `vapix-watchdog --listen` and
@@ -41,8 +44,13 @@ the application, such as the end of PID 1 of a container. Run the watchdog outsi
 const TURNS: f64 = 3.0;
 /// A process that asks for memory without end gets no more.
 const MEMORY: u64 = 400 << 20;
-/// So long a slow watchdog takes to start: longer than the camera is held at rest for it.
-const SLOW_START_S: u32 = 3;
+/// So long a slow watchdog takes to start: far longer than the camera is held at rest for it, so that it turns before that. Who takes
+/// 10 s is given up.
+const SLOW_START_S: u32 = 8;
+/// So long nothing moves the camera once that has begun, of the 2 s that it is held at rest.
+const HELD: Duration = Duration::from_secs(1);
+/// What is said then.
+const GIVEN_UP: &str = "no answer for 2 s";
 /// Stops that a camera refuses before it takes one.
 const REFUSED_STOPS: u64 = 3;
 /// A camera that nobody tried to stop for so long is left alone.
@@ -72,7 +80,7 @@ enum Application {
 enum Death {
     /// It gets this signal, ...
     Signal(&'static str),
-    /// ... while its watchdog takes long to start, ...
+    /// ... while its watchdog takes long to start, and the camera turns without one, ...
     SlowWatchdog(&'static str),
     /// ... while nobody can reach the camera, which answers again when the process has ended, ...
     Outage(&'static str),
@@ -103,7 +111,7 @@ const FORKED: Application = Application::Program("fork");
 const UNAVAILABLE: fn() -> Fault = || Fault::Status(503);
 const ERROR: fn() -> Fault = || Fault::ErrorBody("Error: busy".to_owned());
 
-const CASES: [Case; 20] = [
+const CASES: [Case; 21] = [
     case("Ctrl-C", Application::Script, Signal("INT")),
     case(
         "Ctrl-C, the first stops are answered by 503",
@@ -119,7 +127,8 @@ const CASES: [Case; 20] = [
     case(OUT_OF_MEMORY, Application::Confined("hoard"), Death::Killed),
     case("SIGKILL, the first stops are answered by 503", PLAIN, Death::Refused(UNAVAILABLE, "KILL")),
     case("SIGKILL, the first stops are answered by `Error:`", PLAIN, Death::Refused(ERROR, "KILL")),
-    case("SIGKILL while a watchdog starts that takes 3 s", PLAIN, Death::SlowWatchdog("KILL")),
+    case("SIGKILL while a watchdog starts that takes 8 s", PLAIN, Death::SlowWatchdog("KILL")),
+    case("SIGSTOP while a watchdog starts that takes 8 s", PLAIN, Death::SlowWatchdog("STOP")),
     case("SIGSEGV", PLAIN, Signal("SEGV")),
     case("SIGABRT", PLAIN, Signal("ABRT")),
     case("SIGSTOP", PLAIN, Signal("STOP")),
@@ -139,7 +148,8 @@ const OUT_OF_MEMORY: &str = "the out-of-memory killer, in a cgroup";
 
 fn main() {
     println!("{HEADER}");
-    for case in &CASES {
+    let only = std::env::args().nth(1).unwrap_or_default();
+    for case in CASES.iter().filter(|case| case.name.contains(&only)) {
         if case.application.is_confined() && Confinement::new("probe").is_none() {
             println!("| {} | | not run: memory cgroups cannot be made here | |", case.name);
             continue;
@@ -150,7 +160,7 @@ fn main() {
             (with.map(|run| run.join().unwrap()), without.join().unwrap())
         });
         // `None` is the worst.
-        let worst = with.into_iter().max_by_key(|rests| rests.unwrap_or(Duration::MAX)).flatten();
+        let worst = with.into_iter().reduce(|a, b| Some(a?.or_worse(b?))).flatten();
         println!(
             "| {} | {} | {} | {} |",
             case.name,
@@ -162,13 +172,31 @@ fn main() {
     println!("{FOOTER}");
 }
 
-fn text(rests: Option<Duration>) -> String {
-    rests.map_or_else(|| "it turns on".to_owned(), |time| format!("{:.1} s", time.as_secs_f64()))
+/// How soon a camera came to rest.
+#[derive(Clone, Copy)]
+struct Rests {
+    /// The death.
+    after: Duration,
+    /// The watchdog ran, where it only started at that time.
+    after_start: Option<Duration>,
+}
+
+impl Rests {
+    /// The worse of two, in each.
+    fn or_worse(self, other: Self) -> Self {
+        Self { after: self.after.max(other.after), after_start: self.after_start.max(other.after_start) }
+    }
+}
+
+fn text(rests: Option<Rests>) -> String {
+    let Some(Rests { after, after_start }) = rests else { return "it turns on".to_owned() };
+    let started = after_start.map(|time| format!(", {:.1} s after the watchdog ran", time.as_secs_f64()));
+    format!("{:.1} s{}", after.as_secs_f64(), started.unwrap_or_default())
 }
 
 impl Case {
     /// What only happens with the watchdog is its doing.
-    fn stopped_by(&self, with: Option<Duration>, without: Option<Duration>) -> &'static str {
+    fn stopped_by(&self, with: Option<Rests>, without: Option<Rests>) -> &'static str {
         match (with, without, self.application) {
             (None, ..) => "nothing",
             (Some(_), None, _) => "`vapix-watchdog`",
@@ -180,36 +208,39 @@ impl Case {
     }
 
     /// How long the camera takes to rest, where it does.
-    fn run(&self, run: usize, watchdog: bool) -> Option<Duration> {
-        let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    fn run(&self, run: usize, watchdog: bool) -> Option<Rests> {
+        let is_slow = matches!(self.death, Death::SlowWatchdog(_));
+        // Who is in view all the time has the camera wait for the watchdog once, and turn before that is there.
+        let scene = if is_slow { scene::near_person() } else { scene::walking_person() };
+        let camera = VirtualCamera::start(scene).unwrap();
         let id = format!("{}-{run}", std::process::id());
         let socket = std::env::temp_dir().join(format!("ptztrack-dying-{id}"));
         let elsewhere = self.application == Application::ContainerOnly && watchdog;
         let _elsewhere = elsewhere.then(|| listen(&socket));
         let confinement = self.application.is_confined().then(|| Confinement::new(&id).unwrap());
         let mut command = self.application.command(&camera, &socket, confinement.as_ref());
-        let slow = slow_watchdog(&id);
+        let slow = (is_slow && watchdog).then(|| SlowWatchdog::new(&id));
         if !watchdog {
             command.env("VAPIX_WATCHDOG", "/nonexistent/vapix-watchdog");
-        } else if matches!(self.death, Death::SlowWatchdog(_)) {
-            command.env("VAPIX_WATCHDOG", &slow);
+        } else if let Some(slow) = &slow {
+            command.env("VAPIX_WATCHDOG", &slow.script);
         }
         let mut launch = GstLaunch::spawn(command);
         let child = (self.application == FORKED)
             .then(|| launch.wait_for_line("child ").trim_start_matches("child ").parse().unwrap());
-        // Before a slow watchdog is there the camera has only begun to turn.
-        let least = if matches!(self.death, Death::SlowWatchdog(_)) { 0.0 } else { TURNS };
-        let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > least);
+        if let Some(slow) = &slow {
+            slow.is_awaited(&camera, &mut launch);
+        }
+        let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > TURNS);
         assert!(turns, "{}: the camera never turned", self.name);
         let (since, _alive) = self.die(&camera, launch);
+        let ran = slow.as_ref().map(|slow| slow.runs(&camera));
         let rests = scene::rests(&camera, since);
         if let Some(child) = child {
             signal(child, "KILL");
         }
-        for file in [socket, slow] {
-            let _ = std::fs::remove_file(file);
-        }
-        rests
+        let _ = std::fs::remove_file(socket);
+        rests.map(|after| Rests { after, after_start: ran.map(|ran| (since + after).saturating_sub(ran)) })
     }
 
     /// When it was dead, or the camera could be stopped again; and what may live on.
@@ -303,20 +334,66 @@ fn listen(socket: &Path) -> GstLaunch {
     let mut command = Command::new(plugin_folder().join("vapix-watchdog"));
     command.arg("--listen").arg(socket);
     let watchdog = GstLaunch::spawn(command);
-    while !socket.exists() {
-        thread::sleep(LOOK);
-    }
+    wait_for_file(socket);
     watchdog
 }
 
-/// A watchdog that takes long to start.
-fn slow_watchdog(id: &str) -> PathBuf {
-    let program = end_to_end::scratch(&format!("slow-watchdog-{id}"));
-    let watchdog = plugin_folder().join("vapix-watchdog");
-    let script = format!("#!/bin/sh\nsleep {SLOW_START_S}\nexec {} \"$@\"\n", watchdog.display());
-    std::fs::write(&program, script).unwrap();
-    std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
-    program
+/// A watchdog that takes long to start, until this is dropped.
+struct SlowWatchdog {
+    /// Started in its place.
+    script: PathBuf,
+    /// There once it is.
+    begun: PathBuf,
+    /// There once it runs: by itself it is soon gone again.
+    ran: PathBuf,
+}
+
+impl SlowWatchdog {
+    fn new(id: &str) -> Self {
+        let script = end_to_end::scratch(&format!("slow-watchdog-{id}"));
+        let [begun, ran] = ["begun", "ran"].map(|what| script.with_extension(what));
+        let watchdog = plugin_folder().join("vapix-watchdog");
+        let (begin, run) = (begun.display(), ran.display());
+        let text = format!(
+            "#!/bin/sh\n: > {begin}\nsleep {SLOW_START_S}\n: > {run}\nexec {} \"$@\"\n",
+            watchdog.display()
+        );
+        std::fs::write(&script, text).unwrap();
+        std::fs::set_permissions(&script, std::fs::Permissions::from_mode(0o755)).unwrap();
+        Self { script, begun, ran }
+    }
+
+    /// The camera is not moved before this is given up in words.
+    fn is_awaited(&self, camera: &VirtualCamera, launch: &mut GstLaunch) {
+        wait_for_file(&self.begun);
+        assert!(!camera.wait_for(HELD, |status| status.moving), "moved before there was a watchdog");
+        launch.wait_for_line(GIVEN_UP);
+    }
+
+    /// When it runs, which it did not before.
+    fn runs(&self, camera: &VirtualCamera) -> Duration {
+        assert!(!self.ran.exists(), "it ran before the death");
+        wait_for_file(&self.ran);
+        camera.now()
+    }
+}
+
+impl Drop for SlowWatchdog {
+    fn drop(&mut self) {
+        for file in [&self.script, &self.begun, &self.ran] {
+            // It may not have been started.
+            let _ = std::fs::remove_file(file);
+        }
+    }
+}
+
+/// As it must come soon.
+fn wait_for_file(file: &Path) {
+    let begin = Instant::now();
+    while !file.exists() {
+        assert!(begin.elapsed() < PATIENCE, "{} never came", file.display());
+        thread::sleep(LOOK);
+    }
 }
 
 /// A cgroup that gives its processes so much memory, until this is dropped.

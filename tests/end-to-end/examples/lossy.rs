@@ -49,7 +49,7 @@ fn main() {
 
 /// H.264 by RTSP over UDP, of which so many packets in a thousand are lost.
 fn by_udp(network: &str, lost: u64) {
-    let camera = VirtualCamera::start(scene::near_person()).unwrap();
+    let camera = VirtualCamera::start(scene::far_person()).unwrap();
     let source = scene::rtsp(&camera, "h264").replace("latency=0", "latency=0 protocols=udp");
     let follow = format!("{source} ! bgavgdetect ! lkfeaturetrack ! {}", scene::servo(&camera));
     let mut running = Running::parse(&follow);
@@ -75,7 +75,7 @@ fn lose(socket: &gst::Element, lost: u64) {
 
 /// MJPEG and control by HTTP, over a network that is like this for so long and free again.
 fn by_tcp(what: &str, way: Way, lasts: Duration) {
-    let camera = VirtualCamera::start(scene::near_person()).unwrap();
+    let camera = VirtualCamera::start(scene::far_person()).unwrap();
     let front = Front::new(camera.http_address());
     let follow =
         scene::follow(&camera).replace(&camera.http_address().to_string(), &front.address().to_string());

@@ -49,6 +49,24 @@ pub fn near_person() -> Settings {
     world((0..60).flat_map(lap).map(point).collect())
 }
 
+/// How far to either side they walk who leave the view, wherever a camera stands still, degrees.
+const FAR_DEG: f64 = 30.0;
+/// From one side to the other.
+const CROSSED: Duration = Duration::from_secs(12);
+
+/// A camera before a person who walks so far to and fro that a camera which does not turn sees nothing of them for 4.8 s and more, once
+/// within [`FAR_LAP`].
+pub fn far_person() -> Settings {
+    let point = |crossing: u32| {
+        let pan_deg = if crossing.is_multiple_of(2) { -FAR_DEG } else { FAR_DEG };
+        Waypoint { time: CROSSED * crossing, pan_deg, tilt_deg: -2.0 }
+    };
+    world((0..60).map(point).collect())
+}
+
+/// There and back again.
+pub const FAR_LAP: Duration = Duration::from_secs(24);
+
 /// A camera before a person who stands still, whom nobody notices who looks for what moves.
 pub fn standing_person() -> Settings {
     world(vec![Waypoint { time: Duration::ZERO, pan_deg: 0.0, tilt_deg: -2.0 }])
