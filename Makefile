@@ -185,7 +185,7 @@ fuzz: packages-build
 ##       only, scripts/prove --list lists them; DURATION=600 s of soak, INPUTS=10000000 for each parser, INPUTS_SECONDS for each at most)
 prove: export DURATION := 600
 prove: packages-test
-	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --component miri,rust-src
+	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --component miri
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
 	@scripts/install-packages iproute2 systemd
 	$(CARGO) build --workspace --all-targets
