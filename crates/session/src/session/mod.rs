@@ -56,6 +56,8 @@ pub struct Session {
     /// As whom the camera is spoken to.
     speaker: Speaker,
     connection: Connection,
+    /// What was said by whoever speaks, and answered with yes, had no effect: it is the other's turn once nothing is under way.
+    gives_way: bool,
     /// Of whoever else may have to speak.
     other: Option<Standing>,
     discovery: Discovery,
@@ -81,6 +83,7 @@ impl Session {
             settings,
             speaker: Speaker::Owner,
             connection: Connection::default(),
+            gives_way: false,
             other: None,
             discovery: Discovery::new(protocol.questions),
             description: Description::default(),
@@ -147,7 +150,7 @@ impl Session {
         }
         if finding != StopFinding::Fine {
             self.scheduler.found_moving(self.scheduler.stop());
-            self.pass_turn(now);
+            self.gives_way = true;
         }
     }
 
@@ -157,6 +160,8 @@ impl Session {
         let confirmation = self.stop_confirmation.as_mut().filter(|_| is_at_rest);
         if confirmation.is_some_and(|confirmation| confirmation.repeats_unseen(now)) {
             self.scheduler.found_moving(self.scheduler.stop());
+            // Who moved the camera need not have it said by somebody else.
+            self.gives_way = self.speaker == Speaker::Newcomer;
         }
     }
 

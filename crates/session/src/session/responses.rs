@@ -59,7 +59,8 @@ impl Session {
             (Request::Query(query), Ok(response)) => self.told(*query, response, steering, (sent, now)),
             (Request::Query(query), Err(err)) => {
                 let facts = self.not_told(*query, &err, now);
-                if self.connection.halted() {
+                // Who asks in vain where he stands in the queue is not heard either.
+                if self.connection.halted() || self.is_deaf() {
                     self.pass_turn(now);
                 }
                 facts

@@ -96,7 +96,7 @@ impl Session {
     pub fn settle_speaker(&mut self, now: Time) {
         if self.has_stopped(now) {
             self.decide_speaker();
-        } else if self.arbitration.queue.heard_at() > now {
+        } else if mem::take(&mut self.gives_way) || self.arbitration.queue.heard_at() > now {
             self.pass_turn(now);
         }
     }
@@ -154,6 +154,7 @@ impl Session {
 mod tests {
     use super::*;
     use crate::fixtures::PROTOCOL;
+    use crate::session::StopConfirmation;
     use crate::session::scheduler::Scheduler;
     use crate::{Error, SessionSettings, Stop};
     use servo::Mode;
@@ -261,6 +262,26 @@ mod tests {
         assert_eq!(session.speaker(), Speaker::Newcomer, "by now he may be");
         session.settle_speaker(Time::from_millis(5000));
         assert_eq!(session.speaker(), Speaker::Newcomer, "he asks first");
+    }
+
+    /// What is under way is answered to whoever asked.
+    #[test]
+    fn who_was_told_yes_in_vain_gives_way_once_nothing_is_under_way() {
+        let mut session = session();
+        session.stop_confirmation = Some(StopConfirmation::default());
+        session.fails(&Error::Broken("reset".to_owned()));
+        session.scheduler = Scheduler::new(PROTOCOL.keep_alive);
+        session.stop_confirmation.as_mut().unwrap().stopped(Time::ZERO);
+        for picture in 0..5 {
+            let at = Time::from_millis(2000 + 40 * picture);
+            session.see_background(Some(0.5), at, at);
+        }
+        assert!(!session.is_at_rest());
+        assert_eq!(session.speaker(), Speaker::Newcomer);
+        session.settle_speaker(Time::from_millis(3000));
+        assert_eq!(session.speaker(), Speaker::Mover);
+        session.settle_speaker(Time::from_millis(3000));
+        assert_eq!(session.speaker(), Speaker::Mover, "once");
     }
 
     #[test]

@@ -93,15 +93,14 @@ impl StopConfirmation {
     /// When the stop is to be repeated if no picture tells of it by then.
     pub fn unseen_at(&self) -> Option<Time> {
         let after = if self.leaving { Duration::ZERO } else { Self::UNSEEN_AFTER };
-        self.since.filter(|_| self.repeated == 0 && self.turning == 0).map(|since| since + after)
+        // Too few to tell are none.
+        self.since.filter(|_| self.repeated == 0).map(|since| since.max(self.turned_at) + after)
     }
 
     /// Whether it may yet have to be repeated.
     pub fn is_open(&self, now: Time) -> bool {
-        let Some(since) = self.since else { return false };
-        // Pictures may be rare and late.
-        let last = if self.turning > 0 { self.turned_at + Self::UNSEEN_AFTER } else { since };
-        self.unseen_at().is_some() || now < last + Self::UNSEEN_AFTER
+        let last = |since: Time| since.max(self.turned_at) + Self::UNSEEN_AFTER;
+        self.since.is_some_and(|since| self.repeated == 0 || now < last(since))
     }
 
     /// Whether it is to be repeated for that now; asked once for each time.
@@ -182,9 +181,14 @@ mod tests {
         confirmation.stopped(ms(1000));
         for picture in 3..6 {
             assert_eq!(confirmation.see(Some(0.5), ms(1000 * picture)), StopFinding::Fine);
-            assert!(confirmation.is_open(ms(1000 * picture + 2500)));
+            assert!(!confirmation.repeats_unseen(ms(1000 * picture + 2500)));
         }
-        assert!(!confirmation.is_open(ms(11_000)), "no picture comes any more");
+        assert!(
+            confirmation.is_open(ms(8000)) && confirmation.repeats_unseen(ms(8000)),
+            "no picture comes any more"
+        );
+        confirmation.stopped(ms(8000));
+        assert!(confirmation.is_open(ms(10_000)) && !confirmation.is_open(ms(11_000)));
     }
 
     #[test]
