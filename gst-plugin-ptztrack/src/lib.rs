@@ -19,6 +19,7 @@ pub mod luma_source;
 mod pad_templates;
 pub mod ptzoverlay;
 mod region_of_interest;
+mod unseen;
 pub mod vision;
 
 /// What GStreamer asks of a plugin; private, as nobody calls it from Rust.

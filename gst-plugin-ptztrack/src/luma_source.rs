@@ -10,12 +10,6 @@ use opencv::prelude::*;
 
 use crate::vision::{Chroma, Luma, LumaError, Picture, Samples};
 
-/// Whether there is nothing to be seen in a buffer: no picture at all (GAP), or one of which a decoder made up what was lost on the way
-/// (CORRUPTED).
-pub(crate) fn shows_nothing(buffer: &gst::BufferRef) -> bool {
-    buffer.flags().intersects(gst::BufferFlags::GAP | gst::BufferFlags::CORRUPTED)
-}
-
 /// Every format that [`LumaSource`] reads. Those that need no conversion stand first, as caps
 /// negotiation prefers what stands first.
 pub const FORMATS: &[VideoFormat] = &[

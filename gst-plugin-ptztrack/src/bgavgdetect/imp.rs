@@ -22,7 +22,7 @@ use super::{Output, Profile, RegionSelection, Test, caps};
 use crate::allocation::refuse_crop;
 use crate::duration;
 use crate::lock::lock;
-use crate::luma_source::{self, shows_nothing};
+use crate::luma_source;
 use crate::pad_templates;
 use crate::region_of_interest::remove_regions_of_interest;
 use crate::vision::{Duty, Zones};
@@ -386,10 +386,10 @@ impl BgAvgDetect {
         if buffer.flags().contains(gst::BufferFlags::DISCONT) {
             stream.interrupt();
         }
-        let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));
-        if shows_nothing(buffer) {
+        if stream.unseen.is_next(buffer) {
             return Seen::default();
         }
+        let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));
         let seen = match settings.profile {
             Profile::Robust => {
                 let heard = {

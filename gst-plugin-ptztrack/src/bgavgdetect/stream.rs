@@ -9,6 +9,7 @@ use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta
 use super::Output;
 use super::settings::Settings;
 use crate::luma_source::{LumaSource, LumaSourceError};
+use crate::unseen::Unseen;
 use crate::vision::{
     Cadence, CameraMoves, CarriedZones, Detector, DetectorError, Luma, Presence, SceneModel,
 };
@@ -67,6 +68,7 @@ pub(super) struct Stream {
     cadence: Cadence,
     /// Something is missing before the next picture.
     interrupted: bool,
+    pub unseen: Unseen,
     /// Whether a fault of this stream was already reported, so that one fault is not a flood.
     pub warned: bool,
 }
@@ -86,6 +88,7 @@ impl Stream {
             last_pts: None,
             cadence: Cadence::default(),
             interrupted: false,
+            unseen: Unseen::default(),
             warned: false,
         }
     }
@@ -106,6 +109,7 @@ impl Stream {
     pub fn flush(&mut self) {
         self.forget();
         self.last_pts = None;
+        self.cadence = Cadence::default();
         self.interrupted = false;
     }
 
@@ -118,9 +122,11 @@ impl Stream {
     pub fn advance(&mut self, pts: Option<gst::ClockTime>, max_gap: Duration) -> Duration {
         let since = self.last_pts.zip(pts).map(|(last, pts)| pts.checked_sub(last).map(Duration::from));
         let interrupted = std::mem::take(&mut self.interrupted);
-        // Into the past it is another stream. Where there are no timestamps nobody can tell how much is missing, and a leaky queue may
-        // mark every other frame: learning anew each time, nothing would ever be found.
-        if interrupted && since.is_some_and(|since| since.is_none_or(|since| since > max_gap)) {
+        // Into the past it is another stream, unless timestamps are in no order. Where there are none nobody can tell how much is
+        // missing, and a leaky queue may mark every other frame: learning anew each time, nothing would ever be found.
+        let is_long =
+            |since: Option<Duration>| since.map_or(!self.cadence.is_disordered(), |since| since > max_gap);
+        if interrupted && since.is_some_and(is_long) {
             self.forget();
         }
         self.last_pts = pts;

@@ -21,8 +21,9 @@ use crate::allocation::refuse_crop;
 use crate::analytics::Analytics;
 use crate::duration;
 use crate::lock::lock;
-use crate::luma_source::{self, LumaSource, shows_nothing};
+use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
+use crate::unseen::Unseen;
 use crate::vision::{self, CameraMoves, Observation, TargetRequest};
 
 mod operator;
@@ -125,6 +126,7 @@ struct Stream {
     /// Running time of the last frame.
     last_time: Option<gst::ClockTime>,
     cadence: vision::Cadence,
+    unseen: Unseen,
     since_message: gst::ClockTime,
     /// Whether a fault of this stream was already reported, so that one fault is not a flood.
     warned: bool,
@@ -143,6 +145,7 @@ impl Stream {
             state: TargetState::Searching,
             last_time: None,
             cadence: vision::Cadence::default(),
+            unseen: Unseen::default(),
             since_message: gst::ClockTime::ZERO,
             warned: false,
         }
@@ -349,13 +352,14 @@ impl BaseTransformImpl for LkFeatureTrack {
 
     /// In place of the base class's, which would map the pixels writable and so copy a shared frame.
     fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
-        if shows_nothing(buffer) {
-            // No picture; what was asked for waits for the next one.
+        let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
+        if stream.unseen.is_next(buffer) {
+            // What was asked for waits for the next one.
+            *lock(&self.stream) = Some(stream);
             return Ok(gst::FlowSuccess::Ok);
         }
         let settings = lock(&self.settings).clone();
         let request = lock(&self.request).take();
-        let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
         stream.tracker.configure(settings.config());
         stream.tracker.ignore(settings.ignored_tracks.clone());
         stream.tracker.set_camera_rests(!lock(&self.camera).is_moving());

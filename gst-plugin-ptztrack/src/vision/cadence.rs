@@ -41,18 +41,23 @@ impl Cadence {
     /// What is further ahead is no network's delay, but a camera that takes pictures faster from now on.
     const LONGEST_AHEAD: Duration = Duration::from_secs(1);
 
-    /// How long after the picture before one was taken whose timestamp is so much later; `None` of one that is earlier, and while such
-    /// are among the last: then timestamps tell nothing.
+    /// How long after the picture before one was taken whose timestamp is so much later. Of one that is earlier (`None`), and while such
+    /// are among the last, timestamps tell nothing: then it is what was usual before; `None` where nothing was.
     pub fn elapsed(&mut self, interval: Option<Duration>) -> Option<Duration> {
-        let Some(interval) = interval else {
-            *self = Self { disordered: Self::INTERVALS, ..Self::default() };
-            return None;
-        };
-        if self.disordered > 0 {
-            self.disordered -= 1;
-            return None;
+        match interval {
+            None => {
+                (self.disordered, self.ahead, self.furthest) =
+                    (Self::INTERVALS, Duration::ZERO, Duration::ZERO)
+            }
+            Some(interval) if self.disordered == 0 => return Some(self.spaced(interval)),
+            Some(_) => self.disordered -= 1,
         }
-        Some(self.spaced(interval))
+        Some(self.usual()).filter(|usual| !usual.is_zero())
+    }
+
+    /// Whether timestamps tell nothing.
+    pub fn is_disordered(&self) -> bool {
+        self.disordered > 0
     }
 
     fn spaced(&mut self, interval: Duration) -> Duration {
@@ -157,10 +162,18 @@ mod tests {
     #[test]
     fn timestamps_tell_nothing_until_all_of_the_last_were_in_order() {
         let mut cadence = Cadence::default();
-        let mut told = |interval: Option<u64>| cadence.elapsed(interval.map(Duration::from_millis)).is_some();
-        assert!(told(Some(40)) && !told(None));
-        assert!((1..Cadence::INTERVALS).all(|_| !told(Some(2900))) && !told(None));
-        assert!((0..Cadence::INTERVALS).all(|_| !told(Some(40))) && told(Some(40)));
+        let mut told = |interval: Option<u64>| {
+            let elapsed = cadence.elapsed(interval.map(Duration::from_millis));
+            elapsed.map(|elapsed| elapsed.as_millis())
+        };
+        assert_eq!([told(Some(40)), told(None), told(Some(900))], [Some(40), None, None]);
+        assert!((0..Cadence::INTERVALS).all(|_| told(Some(100)).is_none_or(|told| told == 100)));
+        assert_eq!([told(Some(100)); 5], [Some(100); 5]);
+        assert_eq!((0..9).map(|_| told(Some(100))).last(), Some(Some(100)));
+        assert_eq!(told(None), Some(95), "as usual: once it was 40");
+        assert!((1..Cadence::INTERVALS).all(|_| told(Some(2900)) == Some(95)) && told(None) == Some(95));
+        assert!((0..Cadence::INTERVALS).all(|_| told(Some(40)) == Some(95)));
+        assert_eq!(told(Some(40)), Some(40));
     }
 
     #[test]
