@@ -13,7 +13,7 @@ impl Unseen {
     const MOST: u32 = 31;
 
     /// Whether this buffer, the next of the stream, is not to be looked at.
-    pub fn is_next(&mut self, buffer: &gst::BufferRef) -> bool {
+    pub fn skips(&mut self, buffer: &gst::BufferRef) -> bool {
         let is_made_up = buffer.flags().contains(gst::BufferFlags::CORRUPTED);
         self.made_up = if is_made_up { self.made_up.saturating_add(1) } else { 0 };
         buffer.flags().contains(gst::BufferFlags::GAP) || (1..=Self::MOST).contains(&self.made_up)
@@ -31,7 +31,7 @@ mod tests {
         let mut seen = |flags: gst::BufferFlags| {
             let mut buffer = gst::Buffer::new();
             buffer.get_mut().unwrap().set_flags(flags);
-            !unseen.is_next(&buffer)
+            !unseen.skips(&buffer)
         };
         assert!(seen(gst::BufferFlags::empty()) && !seen(gst::BufferFlags::GAP));
         let made_up = gst::BufferFlags::CORRUPTED;

@@ -386,7 +386,7 @@ impl BgAvgDetect {
         if buffer.flags().contains(gst::BufferFlags::DISCONT) {
             stream.interrupt();
         }
-        if stream.unseen.is_next(buffer) {
+        if stream.unseen.skips(buffer) {
             return Seen::default();
         }
         let elapsed = stream.advance(buffer.pts(), Duration::from_nanos(settings.max_gap_ns));

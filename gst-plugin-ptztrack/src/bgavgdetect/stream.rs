@@ -124,9 +124,9 @@ impl Stream {
         let interrupted = std::mem::take(&mut self.interrupted);
         // Into the past it is another stream, unless timestamps are in no order. Where there are none nobody can tell how much is
         // missing, and a leaky queue may mark every other frame: learning anew each time, nothing would ever be found.
-        let is_long =
+        let is_another =
             |since: Option<Duration>| since.map_or(!self.cadence.is_disordered(), |since| since > max_gap);
-        if interrupted && since.is_some_and(is_long) {
+        if interrupted && since.is_some_and(is_another) {
             self.forget();
         }
         self.last_pts = pts;

@@ -353,7 +353,7 @@ impl BaseTransformImpl for LkFeatureTrack {
     /// In place of the base class's, which would map the pixels writable and so copy a shared frame.
     fn transform_ip(&self, buffer: &mut gst::BufferRef) -> Result<gst::FlowSuccess, gst::FlowError> {
         let mut stream = lock(&self.stream).take().ok_or(gst::FlowError::NotNegotiated)?;
-        if stream.unseen.is_next(buffer) {
+        if stream.unseen.skips(buffer) {
             // What was asked for waits for the next one.
             *lock(&self.stream) = Some(stream);
             return Ok(gst::FlowSuccess::Ok);

@@ -5,8 +5,8 @@
 //! Follows one target by its feature points (thesis 3.5), also while the camera turns. Takes what
 //! `bgavgdetect` saw, or the `GstVideoRegionOfInterestMeta`s of any other detector (`roi-type`), keeps a track of everybody who is
 //! seen, chooses one of them as the target (`selection`), and attaches to every frame that holds a picture (neither to gaps
-//! nor to what a decoder marks as corrupted) a `PtzTracksMeta` of everybody, a `PtzTargetMeta`, and a region of interest named
-//! `target` where there is one. Pixels pass untouched and uncopied.
+//! nor to what a decoder marks as corrupted, up to 31 in a row) a `PtzTracksMeta` of everybody, a `PtzTargetMeta`, and a region
+//! of interest named `target` where there is one. Pixels pass untouched and uncopied.
 //!
 //! ## Tracks
 //! Every track has a number, which is the target's number while it is the target. Of several people in one region each keeps their

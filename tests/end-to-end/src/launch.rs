@@ -32,6 +32,13 @@ pub fn scratch(name: &str) -> PathBuf {
     folder.join(format!("{}-{name}", std::process::id()))
 }
 
+/// A file that has to do with a certificate: `camera.pem` and its key `camera.key.pem`, which `authority.pem` has signed, or
+/// `self-signed.pem`.
+pub fn certificate(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
+    folder.join(name).canonicalize().unwrap()
+}
+
 /// A GStreamer or other tool with the plugins and a registry of our own, so that a user's stays as it is.
 pub fn tool(program: &str) -> Command {
     let folder = plugin_folder();
@@ -48,15 +55,6 @@ pub fn tool(program: &str) -> Command {
 pub fn signal(process: u32, name: &str) {
     let status = Command::new("kill").args(["-s", name, &process.to_string()]).status().unwrap();
     assert!(status.success());
-}
-
-/// The processes that this one has started, and that run.
-pub fn children_of(process: u32) -> Vec<u32> {
-    let tasks = std::fs::read_dir(format!("/proc/{process}/task")).unwrap().map_while(Result::ok);
-    let children = tasks.filter_map(|task| std::fs::read_to_string(task.path().join("children")).ok());
-    children
-        .flat_map(|list| list.split_whitespace().filter_map(|id| id.parse().ok()).collect::<Vec<_>>())
-        .collect()
 }
 
 /// A running `gst-launch-1.0` (or a script that ends in one) whose output can be waited for.

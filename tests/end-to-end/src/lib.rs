@@ -27,7 +27,7 @@ pub use chance::Chance;
 pub use disk::Disk;
 pub use front::{Front, Way};
 pub use in_view::InView;
-pub use launch::{GstLaunch, children_of, plugin_folder, scratch, signal, tool};
+pub use launch::{GstLaunch, certificate, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
 pub use program::{Program, ask_page};
 pub use recording::pictures_in;

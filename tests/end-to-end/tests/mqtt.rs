@@ -5,7 +5,7 @@
 
 use std::path::Path;
 
-use end_to_end::{Broker, PATIENCE, Program, scene, signal};
+use end_to_end::{Broker, PATIENCE, Program, certificate, scene, signal};
 use serde_json::{Value, json};
 use virtual_camera::VirtualCamera;
 
@@ -106,12 +106,8 @@ fn a_camera_that_is_gone_from_the_file_is_gone_from_the_broker() {
 /// One whose certificate is believed is told, and nobody else.
 #[test]
 fn a_broker_is_spoken_to_over_tls() {
-    let certificates =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
-    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
-    let (certificate, key) = (of("camera.pem"), of("camera.key.pem"));
-    let broker =
-        Broker::start_with(&format!("certfile {}\nkeyfile {}\n", certificate.display(), key.display()));
+    let [shown, key] = ["camera.pem", "camera.key.pem"].map(certificate);
+    let broker = Broker::start_with(&format!("certfile {}\nkeyfile {}\n", shown.display(), key.display()));
     let camera = VirtualCamera::start(scene::nobody()).unwrap();
     for (authority, said) in [
         ("authority.pem", "connected to the MQTT broker 127.0.0.1"),
@@ -119,7 +115,7 @@ fn a_broker_is_spoken_to_over_tls() {
     ] {
         let file = |folder: &Path| {
             let door = Program::entry("door", &camera.url(), &folder.join("password"));
-            let (port, authority) = (broker.port, of(authority));
+            let (port, authority) = (broker.port, certificate(authority));
             format!(
                 "{door}[mqtt]\nhost = \"127.0.0.1\"\nport = {port}\ntls = true\nca-file = {authority:?}\n"
             )

@@ -6,13 +6,13 @@
 use std::fs;
 use std::io::{ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use chrono::DateTime;
-use end_to_end::{GstLaunch, PATIENCE, Program, Times, Viewer, scene, scratch};
+use end_to_end::{GstLaunch, PATIENCE, Program, Times, Viewer, certificate, scene, scratch};
 use gst_rtsp_server::gio::TlsFileDatabase;
 use gst_rtsp_server::prelude::*;
 use serde_json::Value;
@@ -237,22 +237,16 @@ fn who_does_not_know_the_password_sees_nothing() {
     assert!(!said.contains("sesame"), "{said}");
 }
 
-/// A file that has to do with a camera's certificate.
-fn of_camera(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
-    folder.join(name).canonicalize().unwrap()
-}
-
 #[test]
 fn who_believes_its_certificate_sees_and_nobody_else_does() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let (certificate, key) = (of_camera("camera.pem"), of_camera("camera.key.pem"));
-    let restream = format!("certificate-file = {certificate:?}\nkey-file = {key:?}");
+    let [shown, key] = ["camera.pem", "camera.key.pem"].map(certificate);
+    let restream = format!("certificate-file = {shown:?}\nkey-file = {key:?}");
     let mut program = start("tls", &camera, "codec = \"h264\"", &restream);
     let url = address(&mut program);
     assert!(url.starts_with("rtsps://127.0.0.1:"), "{url}");
     let believing = |authority: &str| {
-        let database = TlsFileDatabase::new(of_camera(authority)).unwrap();
+        let database = TlsFileDatabase::new(certificate(authority)).unwrap();
         Viewer::start(&url, |source| source.set_property("tls-database", &database))
     };
     let (text, _) = believing("authority.pem").document();
@@ -390,17 +384,17 @@ fn a_port_that_is_taken_is_said_once_and_nobody_is_followed_the_worse_for_it() {
 #[test]
 fn a_certificate_that_is_none_is_said_once_and_nobody_is_followed_the_worse_for_it() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let (certificate, key) = (scratch("certificate.pem"), scratch("certificate.key.pem"));
-    fs::write(&certificate, "").unwrap();
-    let restream = format!("certificate-file = {certificate:?}\nkey-file = {key:?}");
+    let (shown, key) = (scratch("certificate.pem"), scratch("certificate.key.pem"));
+    fs::write(&shown, "").unwrap();
+    let restream = format!("certificate-file = {shown:?}\nkey-file = {key:?}");
     let mut program = start("no-certificate", &camera, "", &restream);
     let line = program.launch.wait_for_line("nothing is passed on at 127.0.0.1:0: no TLS by ");
     assert!(line.ends_with("it is tried again"), "{line}");
     is_steered(&camera);
-    fs::copy(of_camera("camera.key.pem"), &key).unwrap();
-    fs::copy(of_camera("camera.pem"), &certificate).unwrap();
+    fs::copy(certificate("camera.key.pem"), &key).unwrap();
+    fs::copy(certificate("camera.pem"), &shown).unwrap();
     program.launch.wait_for_line("passes the cameras on at rtsps://127.0.0.1:");
-    [certificate, key].iter().for_each(|file| fs::remove_file(file).unwrap());
+    [shown, key].iter().for_each(|file| fs::remove_file(file).unwrap());
     let said = program.end("TERM");
     assert_eq!(said.matches("nothing is passed on").count(), 1, "{said}");
 }

@@ -11,7 +11,7 @@ use std::sync::mpsc::{Receiver, channel};
 use std::time::{Duration, Instant};
 
 use end_to_end::following::Network;
-use end_to_end::{Broker, PATIENCE, Program, Way, ask_page, scene};
+use end_to_end::{Broker, PATIENCE, Program, Way, ask_page, certificate, scene};
 use virtual_camera::{Auth, Settings, Tls, VirtualCamera};
 
 /// Whoever answers in a camera's place, always the same; and what it has heard.
@@ -332,19 +332,21 @@ fn a_camera_with_a_process_of_its_own_dies_alone_and_comes_back() {
     [good, door].iter().for_each(scene::assert_left_at_rest);
 }
 
+/// What the camera shows.
+fn tls() -> Tls {
+    Tls { certificate: certificate("camera.pem"), key: certificate("camera.key.pem") }
+}
+
 /// The password goes in clear over TLS, to whom we believe; who shows another certificate gets nothing.
 #[test]
 fn pictures_and_commands_go_over_verified_tls() {
-    let certificates =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
-    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
-    let tls = Tls { certificate: of("camera.pem"), key: of("camera.key.pem") };
     for (codec, auth) in [("mjpeg", Auth::Basic), ("h264", Auth::Digest { qop: true })] {
-        let settings = Settings { tls: Some(tls.clone()), auth, ..scene::walking_person() };
+        let settings = Settings { tls: Some(tls()), auth, ..scene::walking_person() };
         let camera = VirtualCamera::start(settings).unwrap();
         let [https, rtsps] = camera.tls_urls().unwrap();
         let file = |authority: &str| {
-            let more = format!("codec = {codec:?}\nrtsp = {rtsps:?}\nca-file = {:?}\n", of(authority));
+            let more =
+                format!("codec = {codec:?}\nrtsp = {rtsps:?}\nca-file = {:?}\n", certificate(authority));
             let https = https.clone();
             move |folder: &Path| Program::entry("door", &https, &folder.join("password")) + &more
         };
@@ -363,12 +365,8 @@ fn pictures_and_commands_go_over_verified_tls() {
 /// Whoever shows any certificate is believed, and may be anybody: they get the password in clear where that is allowed only.
 #[test]
 fn one_who_is_believed_unverified_does_not_get_the_password_in_clear() {
-    let certificates =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../gst-plugin-vapix/tests/certificates");
-    let of = |name: &str| certificates.join(name).canonicalize().unwrap();
-    let tls = Tls { certificate: of("camera.pem"), key: of("camera.key.pem") };
     for codec in ["mjpeg", "h264"] {
-        let settings = Settings { tls: Some(tls.clone()), auth: Auth::Basic, ..scene::walking_person() };
+        let settings = Settings { tls: Some(tls()), auth: Auth::Basic, ..scene::walking_person() };
         let stranger = VirtualCamera::start(settings).unwrap();
         let [https, rtsps] = stranger.tls_urls().unwrap();
         let file = |auth: &'static str| {

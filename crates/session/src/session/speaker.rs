@@ -42,8 +42,13 @@ impl Standing {
 
     /// When he may speak again.
     fn heard_at(&self) -> Time {
-        self.connection.retry_at().max(self.queue.heard_at())
+        heard_at(&self.connection, &self.queue)
     }
+}
+
+/// When whoever stands so may speak again.
+fn heard_at(connection: &Connection, queue: &ControlQueue) -> Time {
+    connection.retry_at().max(queue.heard_at())
 }
 
 impl Session {
@@ -116,7 +121,7 @@ impl Session {
     /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again.
     pub(super) fn pass_turn(&mut self, now: Time) {
         let Some(other) = &self.other else { return };
-        let heard_at = self.connection.retry_at().max(self.arbitration.queue.heard_at()).max(now);
+        let heard_at = heard_at(&self.connection, &self.arbitration.queue).max(now);
         if !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at) {
             self.exchange();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
