@@ -36,6 +36,8 @@ struct Options {
 
 /// From one look at the program to the next.
 const EVERY: Duration = Duration::from_secs(10);
+/// Of so many looks one is shown.
+const OFTEN: usize = 12;
 /// A camera rests by then.
 const AT_REST: Duration = Duration::from_secs(10);
 
@@ -82,6 +84,10 @@ fn main() -> ExitCode {
     println!("| ms that it took: at most | {} |", took_ms[took_ms.len() - 1]);
     println!("| cameras that were never steered | {unsteered} |");
     println!("| cameras left turning | {turning} |");
+    // A step has another cause than a slope.
+    let memory: Vec<_> =
+        moments.iter().step_by(OFTEN).map(|usage| format!("{:.1}", usage.memory_mb)).collect();
+    println!("\nmemory, MB, every {} s: {}", (EVERY * OFTEN as u32).as_secs(), memory.join(", "));
     let well = growths.iter().filter_map(Growth::fault).count() == 0 && unsteered + turning == 0;
     if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
