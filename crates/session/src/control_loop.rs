@@ -254,7 +254,7 @@ impl ControlLoop {
 
     /// Whether there is something to do that a stop need not hurry for.
     pub fn has_errand(&self, now: Time) -> bool {
-        if self.session.is_deaf() {
+        if self.session.withholds_stop() {
             return true;
         }
         let actuator = self.session.actuator(now);

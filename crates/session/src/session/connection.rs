@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use servo::Time;
 
+use super::Forbidden;
 use crate::Error;
 
 /// What became of the connection to the camera.
@@ -29,6 +30,8 @@ pub struct Connection {
     /// When which kind was last reported.
     told: Vec<(FaultKind, Time)>,
     pause: Duration,
+    /// Has pauses of its own: what else fails in between neither ends nor shortens them.
+    forbidden: Option<Forbidden>,
     retry_at: Time,
 }
 
@@ -72,20 +75,14 @@ impl Connection {
     /// Short enough for control to be back within two seconds of the camera's return.
     const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
-    /// Where it refuses user and password that it accepted before, for the second time; twice as long each time: to ask again
-    /// could lock the account.
-    pub const FORBIDDEN_PAUSE: Duration = Duration::from_secs(10);
-
-    /// At most.
-    pub const RARELY: Duration = Duration::from_secs(60);
-
     /// A fault that comes again within this time is reported only if it lasts longer.
     const QUIET: Duration = Duration::from_secs(10);
 
     /// What holds at any time.
     pub fn check_invariants(&self) {
-        assert!(self.pause <= Self::RARELY, "{self:?}");
-        assert!(self.fault.is_some() || self.retry_at == Time::ZERO, "a pause without a fault: {self:?}");
+        assert!(self.pause <= Self::LONGEST_PAUSE, "{self:?}");
+        let pauses = self.retry_at != Time::ZERO || self.forbidden.is_some();
+        assert!(self.fault.is_some() || !pauses, "a pause without a fault: {self:?}");
     }
 
     /// Nothing may be sent before.
@@ -136,17 +133,16 @@ impl Connection {
         let waited = if let Error::Timeout(waited) = err { *waited } else { Duration::ZERO };
         // That it lets anybody ask does not say that it lets anybody move it.
         let kind = FaultKind::of(err, self.obeyed || !of_command && self.connected);
-        // But once: a server that restarts between challenge and answer refuses alike. What a question met is not held against the
-        // first stop.
-        let again =
-            self.fault.as_ref().is_some_and(|fault| fault.kind == kind && (fault.of_command || !of_command));
-        let (first, longest) = if again && kind == FaultKind::Forbidden {
-            (Self::FORBIDDEN_PAUSE, Self::RARELY)
-        } else {
-            (Self::FIRST_PAUSE, Self::LONGEST_PAUSE)
+        if of_command && !self.fault.as_ref().is_some_and(|fault| fault.of_command) {
+            // What a question met is not held against the first stop.
+            (self.forbidden, self.retry_at) = (None, Time::ZERO);
+        }
+        self.pause = (self.pause * 2).clamp(Self::FIRST_PAUSE, Self::LONGEST_PAUSE);
+        let pause = match kind {
+            FaultKind::Forbidden => Forbidden::again(&mut self.forbidden, err, self.pause),
+            _ => self.pause.saturating_sub(waited),
         };
-        self.pause = (self.pause * 2).clamp(first, longest);
-        self.retry_at = now + self.pause.saturating_sub(waited);
+        self.retry_at = self.retry_at.max(now + pause);
         let fault = self.fault.get_or_insert_with(|| Fault { kind, of_command, reported: Vec::new() });
         fault.kind = kind;
         fault.of_command |= of_command;
@@ -163,6 +159,23 @@ impl Connection {
                 ConnectionChange::Refused(err.clone())
             }
         })
+    }
+
+    /// What whoever speaks next as the same user is to know: how he is refused, and how long he is to wait.
+    pub fn forbidden(&self, now: Time) -> Option<(Forbidden, Duration)> {
+        let wait = self.retry_at - now;
+        self.forbidden.clone().filter(|_| !wait.is_zero()).map(|forbidden| (forbidden, wait))
+    }
+
+    /// Whoever spoke before as the same user was refused so, and is to wait so long.
+    pub fn inherit(
+        &mut self,
+        (forbidden, wait): (Forbidden, Duration),
+        now: Time,
+    ) -> Option<ConnectionChange> {
+        let change = self.failed(&forbidden.error, true, now);
+        (self.forbidden, self.retry_at) = (Some(forbidden), now + wait);
+        change
     }
 }
 
@@ -264,7 +277,62 @@ mod tests {
         connection.failed(&forbidden, true, ms(50));
         assert!(connection.retry_at() <= ms::<Time>(50) + 2 * Connection::FIRST_PAUSE);
         connection.failed(&forbidden, true, ms(100));
-        assert_eq!(connection.retry_at(), ms::<Time>(100) + Connection::FORBIDDEN_PAUSE);
+        assert_eq!(connection.retry_at(), ms::<Time>(100) + Forbidden::PAUSE);
+        let mut connection = Connection::default();
+        connection.succeeded(true, true);
+        connection.failed(&forbidden, false, ms(0));
+        connection.failed(&forbidden, false, ms(125));
+        assert_eq!(
+            connection.retry_at(),
+            ms::<Time>(125) + Forbidden::PAUSE,
+            "it is not asked so soon again"
+        );
+        connection.failed(&forbidden, true, ms(200));
+        assert!(connection.retry_at() <= ms::<Time>(200) + Connection::LONGEST_PAUSE);
+    }
+
+    /// As of a camera that reboots, or a network that comes and goes, while the account is locked.
+    #[test]
+    fn outages_in_between_do_not_have_what_is_not_permitted_tried_more_often() {
+        let mut connection = Connection::default();
+        connection.succeeded(true, false);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        let (mut now, mut refused_at) = (ms(0), Vec::new());
+        for _ in 0..5 {
+            refused_at.push(now);
+            connection.failed(&forbidden, true, now);
+            // Said all the same, as the first stop of a move is.
+            connection.failed(&broken(), true, now + ms(100));
+            connection.failed(&Error::Timeout(ms(200)), true, now + ms(300));
+            now = connection.retry_at();
+            connection.failed(&broken(), true, now);
+            now = connection.retry_at();
+        }
+        let pauses = refused_at.windows(2).map(|pair| pair[1] - pair[0]);
+        for (pause, least_s) in pauses.zip([0, 10, 20, 40]) {
+            assert!(pause >= Duration::from_secs(least_s), "{refused_at:?}");
+        }
+    }
+
+    #[test]
+    fn who_is_refused_as_who_spoke_before_waits_as_long_and_says_so() {
+        let mut before = Connection::default();
+        before.succeeded(true, false);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(before.forbidden(ms(0)), None);
+        before.failed(&forbidden, true, ms(0));
+        before.failed(&forbidden, true, ms(200));
+        let (handed_on, wait) = before.forbidden(ms(4200)).unwrap();
+        assert_eq!(wait, ms(6000));
+        assert_eq!(before.forbidden(ms(10_200)), None, "he might ask again");
+        let mut connection = Connection::default();
+        let change = connection.inherit((handed_on, wait), ms(100));
+        assert_eq!(change, Some(ConnectionChange::Refused(forbidden.clone())));
+        assert_eq!(connection.retry_at(), ms(6100));
+        connection.check_invariants();
+        assert_eq!(connection.failed(&forbidden, true, ms(6100)), None, "that is known");
+        assert_eq!(connection.retry_at(), ms(26_100), "he is not let off with a short pause");
+        assert_eq!(connection.succeeded(true, false), Some(ConnectionChange::Connected));
     }
 
     #[test]

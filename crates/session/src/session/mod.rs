@@ -13,6 +13,7 @@ mod control_queue;
 mod description;
 mod discovery;
 mod facts;
+mod forbidden;
 mod mode_support;
 mod operator;
 mod requests;
@@ -24,6 +25,7 @@ mod stop_confirmation;
 pub use arbitration::ControlOwner;
 pub use connection::ConnectionChange;
 pub use facts::{Fact, Steering};
+pub use forbidden::Forbidden;
 pub use operator::CommandedMotion;
 pub use speaker::Speaker;
 
@@ -41,12 +43,10 @@ use speaker::Standing;
 pub(crate) use stop_confirmation::StopConfirmation;
 use stop_confirmation::StopFinding;
 
-use crate::{Protocol, SessionEvent, SessionSettings, Stop};
+use crate::{Command, Protocol, SessionEvent, SessionSettings, Stop};
 
 /// A camera that did not answer a move is not expected to act on it later than this.
 pub(crate) const DOUBT: Duration = Scheduler::DOUBT;
-/// From one try to the next where the camera refuses user and password that it accepted before; twice as long each time.
-pub(crate) const FORBIDDEN_PAUSE: Duration = Connection::FORBIDDEN_PAUSE;
 
 /// Speaks with one camera: says what to send, hears what is answered. Sends nothing itself, and has no clock: both are the
 /// caller's.
@@ -56,8 +56,6 @@ pub struct Session {
     /// As whom the camera is spoken to.
     speaker: Speaker,
     connection: Connection,
-    /// What was said by whoever speaks, and answered with yes, had no effect: it is the other's turn once nothing is under way.
-    gives_way: bool,
     /// Of whoever else may have to speak.
     other: Option<Standing>,
     discovery: Discovery,
@@ -83,7 +81,6 @@ impl Session {
             settings,
             speaker: Speaker::Owner,
             connection: Connection::default(),
-            gives_way: false,
             other: None,
             discovery: Discovery::new(protocol.questions),
             description: Description::default(),
@@ -122,6 +119,12 @@ impl Session {
         self.connection.note_obeyed();
     }
 
+    /// He was refused when he tried to, as the same user, and was to wait so long before he tried again.
+    pub fn inherit_refusal(&mut self, refusal: (Forbidden, Duration), now: Time) {
+        self.scheduler.attempted(&Command::Stop(self.stop()), now);
+        self.events.extend(self.connection.inherit(refusal, now).map(SessionEvent::Connection));
+    }
+
     /// What ends the last move.
     pub fn stop(&self) -> Stop {
         self.scheduler.stop()
@@ -150,19 +153,27 @@ impl Session {
         }
         if finding != StopFinding::Fine {
             self.scheduler.found_moving(self.scheduler.stop());
-            self.gives_way = true;
+            self.is_told_in_vain();
         }
     }
 
     /// A stop that no picture tells of is repeated.
     fn repeat_unseen_stop(&mut self, now: Time) {
-        let is_at_rest = self.is_at_rest();
+        // Even where somebody else seems to have the camera: one that turns on looks as if somebody moved it.
+        let (is_at_rest, most) = (self.is_at_rest(), self.unseen_repeats());
         let confirmation = self.stop_confirmation.as_mut().filter(|_| is_at_rest);
-        if confirmation.is_some_and(|confirmation| confirmation.repeats_unseen(now)) {
+        if confirmation.is_some_and(|confirmation| confirmation.repeats_unseen(most, now)) {
             self.scheduler.found_moving(self.scheduler.stop());
-            // Who moved the camera need not have it said by somebody else.
-            self.gives_way = self.speaker == Speaker::Newcomer;
+            if self.speaker == Speaker::Newcomer {
+                // Who moved the camera need not have it said by somebody else.
+                self.is_told_in_vain();
+            }
         }
+    }
+
+    /// How often a stop that no picture tells of is repeated. The mover's own may fail in between, and he is to have the last word.
+    fn unseen_repeats(&self) -> u32 {
+        if self.speaker == Speaker::Newcomer { StopConfirmation::IN_VAIN } else { 1 }
     }
 
     /// What is to be known of the camera to decide what it is to do.
@@ -209,6 +220,11 @@ impl Session {
     /// Whether a stop would not be heard; the answer under way may make it so.
     pub fn is_deaf(&self) -> bool {
         self.arbitration.queue.is_deaf()
+    }
+
+    /// Whether no stop is to be said for the time being: it would not be heard, or could end somebody else's move.
+    pub fn withholds_stop(&self) -> bool {
+        self.is_deaf() || self.scheduler.is_contested()
     }
 
     /// Whether the camera does not move on our behalf, as far as can be known.

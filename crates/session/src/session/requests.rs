@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use servo::{Actuation, Time};
 
-use super::{Fact, Session, Speaker, Steering, StopConfirmation};
+use super::{Fact, Session, Speaker, Steering};
 use crate::{Command, Next, Query, Request, SessionEvent};
 
 impl Session {
@@ -38,8 +38,8 @@ impl Session {
             return Next::Do(Request::Query(query));
         }
         let operator_until = self.arbitration.operator_until(now);
-        let unseen_at = self.stop_confirmation.as_ref().and_then(StopConfirmation::unseen_at);
-        let unseen_at = unseen_at.filter(|_| self.is_at_rest());
+        let confirmation = self.stop_confirmation.as_ref().filter(|_| self.is_at_rest());
+        let unseen_at = confirmation.and_then(|stop| stop.unseen_at(self.unseen_repeats()));
         Next::Wait([due, Some(query_due), operator_until, unseen_at].into_iter().flatten().min())
     }
 

@@ -7,10 +7,9 @@ use std::time::Duration;
 use servo::{Actuation, Mode, Motion, PanTilt, Position, Presets, Time};
 
 use super::arbitration::Finding;
-use super::connection::Connection;
 use super::mode_support::Refusal;
 use super::scheduler::Scheduler;
-use super::{Fact, Session, Speaker, Steering};
+use super::{Fact, Forbidden, Session, Speaker, Steering};
 use crate::{Command, Error, Query, QueueRequest, Request, Response, SessionEvent, Stop};
 
 impl Session {
@@ -59,8 +58,7 @@ impl Session {
             (Request::Query(query), Ok(response)) => self.told(*query, response, steering, (sent, now)),
             (Request::Query(query), Err(err)) => {
                 let facts = self.not_told(*query, &err, now);
-                // Who asks in vain where he stands in the queue is not heard either.
-                if self.connection.halted() || self.is_deaf() {
+                if self.connection.halted() {
                     self.pass_turn(now);
                 }
                 facts
@@ -102,8 +100,8 @@ impl Session {
         if queue.refused_command() || queue.refused(now) {
             return true;
         }
-        if self.speaker == Speaker::Newcomer {
-            // Perhaps only to him: the words of others stay as they are.
+        if self.speaker != Speaker::Owner {
+            // Perhaps only to him: the owner's words stay as they are.
             return false;
         }
         if let Command::Move { motion: Motion::Velocity { .. }, free } = command {
@@ -262,7 +260,7 @@ impl Session {
                 return self.may_tell_later(query, now);
             }
         } else if matches!(err, Error::NotPermitted { .. }) {
-            self.next_poll = now + Connection::RARELY;
+            self.next_poll = now + Forbidden::RARELY;
         } else if matches!(err, Error::Camera(_)) && self.arbitration.queue.refused(now) {
             return Vec::new();
         } else if self.will_not_tell_position(err) {

@@ -4,12 +4,13 @@
 //! not stop for whom it does not know, so whoever moved it stops it, or we where it does not obey him; and nobody moves it until then.
 
 use std::mem;
+use std::time::Duration;
 
 use servo::Time;
 
-use super::Session;
 use super::connection::Connection;
 use super::control_queue::ControlQueue;
+use super::{Forbidden, Session};
 
 /// As whom the camera is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,12 +28,14 @@ pub enum Speaker {
 pub(super) struct Standing {
     connection: Connection,
     queue: ControlQueue,
+    /// What the one who speaks said, and the camera answered with yes, had no effect: this one speaks once nothing is under way.
+    is_next: bool,
 }
 
 impl Standing {
     /// Of somebody who was not heard of yet, where another stands so in its queue.
     fn of_another(queue: &ControlQueue) -> Self {
-        Self { connection: Connection::default(), queue: queue.of_another() }
+        Self { connection: Connection::default(), queue: queue.of_another(), is_next: false }
     }
 
     /// It is the end: his place is given up.
@@ -86,7 +89,8 @@ impl Session {
                     self.pass_turn(now);
                 }
             }
-            (Some(_), _) => {
+            (Some(mover), _) => {
+                mover.is_next = false;
                 self.connection = Connection::default();
                 self.arbitration.queue = self.arbitration.queue.of_another();
             }
@@ -99,16 +103,34 @@ impl Session {
 
     /// Where nobody else is needed any more to stop the camera, its owner may move it. Whoever would not be heard leaves it to the other.
     pub fn settle_speaker(&mut self, now: Time) {
+        let gives_way = self.other.as_mut().is_some_and(|other| mem::take(&mut other.is_next));
         if self.has_stopped(now) {
             self.decide_speaker();
-        } else if mem::take(&mut self.gives_way) || self.arbitration.queue.heard_at() > now {
+        } else if gives_way {
+            self.give_way(now);
+        } else if self.arbitration.queue.heard_at() > now {
             self.pass_turn(now);
+        }
+    }
+
+    /// What whoever speaks has told the camera, and it said yes to, had no effect.
+    pub(super) fn is_told_in_vain(&mut self) {
+        if let Some(other) = &mut self.other {
+            other.is_next = true;
+        }
+    }
+
+    /// The other tells it, even where it has said yes once more meanwhile: that is worth no more than the yes before.
+    fn give_way(&mut self, now: Time) {
+        if self.pass_turn(now) {
+            self.scheduler.found_moving(self.stop());
         }
     }
 
     /// Whether nothing is left to be told for the camera to rest for good.
     pub fn has_stopped(&self, now: Time) -> bool {
-        self.stays_at_rest() && !self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(now))
+        let most = self.unseen_repeats();
+        self.stays_at_rest() && !self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(most, now))
     }
 
     /// It did as whoever speaks has told it; where its yes is not to be trusted, that shows later.
@@ -118,16 +140,19 @@ impl Session {
         }
     }
 
-    /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again.
-    pub(super) fn pass_turn(&mut self, now: Time) {
-        let Some(other) = &self.other else { return };
+    /// It did not: it is the other's turn, but not his whom it has locked out, nor sooner than he may ask again. Whether it is.
+    pub(super) fn pass_turn(&mut self, now: Time) -> bool {
+        let Some(other) = &self.other else { return false };
         let heard_at = heard_at(&self.connection, &self.arbitration.queue).max(now);
-        if !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at) {
+        let is_heard =
+            !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at);
+        if is_heard {
             self.exchange();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
         } else if self.connection.halted() && other.connection.halted() {
             self.decide_speaker();
         }
+        is_heard
     }
 
     /// Has the other speak.
@@ -135,7 +160,14 @@ impl Session {
         if let Some(other) = &mut self.other {
             mem::swap(&mut self.connection, &mut other.connection);
             mem::swap(&mut self.arbitration.queue, &mut other.queue);
+            other.is_next = false;
         }
+    }
+
+    /// How whoever moved the camera is refused, and how long he is to wait.
+    pub fn refusal(&self, now: Time) -> Option<(Forbidden, Duration)> {
+        let mover = self.other.as_ref().filter(|_| self.speaker == Speaker::Newcomer);
+        mover.map_or(&self.connection, |mover| &mover.connection).forbidden(now)
     }
 
     fn decide_speaker(&mut self) {
@@ -161,9 +193,9 @@ mod tests {
     use crate::fixtures::PROTOCOL;
     use crate::session::StopConfirmation;
     use crate::session::scheduler::Scheduler;
-    use crate::{Error, SessionSettings, Stop};
-    use servo::Mode;
-    use std::time::Duration;
+    use crate::session::{CommandedMotion, Fact, Steering};
+    use crate::{Command, Error, Next, Query, Request, Response, SessionSettings, Stop};
+    use servo::{Actuation, CommandHistory, Mode, Position};
 
     /// With a camera that moves.
     fn session() -> Session {
@@ -180,6 +212,92 @@ mod tests {
             self.pass_turn(Time::ZERO);
             self.speaker()
         }
+    }
+
+    /// Nobody is followed.
+    fn with_steering<T>(act: impl FnOnce(&Steering) -> T) -> T {
+        let history = CommandHistory::default();
+        act(&Steering {
+            commands: CommandedMotion { pan_tilt: &history, zoom: None },
+            holds_target: false,
+            is_under_way: false,
+            is_zooming: false,
+            leads_home: false,
+            presets_due: None,
+        })
+    }
+
+    const HALT: Request = Request::Command(Command::Stop(Stop::PanTilt));
+    const ASK: Request = Request::Query(Query::Position);
+
+    impl Session {
+        /// What is sent at this time, if anything.
+        fn sends(&mut self, now: Time) -> Option<Request> {
+            self.settle_speaker(now);
+            self.catch_up(now);
+            let next = with_steering(|steering| self.next_request(Actuation::Rest, steering, now));
+            let Next::Do(request) = next else { return None };
+            self.sending(&request, now);
+            Some(request)
+        }
+
+        fn hears(&mut self, request: &Request, answer: Result<Response, Error>, now: Time) {
+            with_steering(|steering| {
+                for fact in self.on_response(request, answer, steering, (now, now)) {
+                    if matches!(fact, Fact::Position { .. }) {
+                        self.positioned(steering, now);
+                    }
+                }
+            });
+        }
+
+        /// Everything that is sent at this time is answered with yes; returns who said a stop.
+        fn obeyed_at(&mut self, now: Time) -> Vec<Speaker> {
+            self.answered_at(now, |_| Ok(Response::Accepted))
+        }
+
+        /// A stop of whoever speaks is answered so.
+        fn answered_at(
+            &mut self,
+            now: Time,
+            mut answer: impl FnMut(Speaker) -> Result<Response, Error>,
+        ) -> Vec<Speaker> {
+            let mut said = Vec::new();
+            while let Some(request) = self.sends(now) {
+                let answer = match request {
+                    Request::Command(_) => {
+                        said.push(self.speaker());
+                        answer(self.speaker())
+                    }
+                    Request::Query(_) => Ok(Response::Position(Position::default())),
+                };
+                self.hears(&request, answer, now);
+            }
+            said
+        }
+
+        /// Pictures from then on show it to turn.
+        fn seen_turning(&mut self, from: Time) {
+            for picture in 0..5 {
+                let at = from + Duration::from_millis(40 * picture);
+                self.see_background(Some(0.5), at, at);
+            }
+        }
+    }
+
+    /// The same, whose yes to a stop is not to be trusted; in doubt, or not.
+    fn untrusted(in_doubt: bool) -> Session {
+        let mut session = session();
+        session.stop_confirmation = Some(StopConfirmation::default());
+        if !in_doubt {
+            session.scheduler = Scheduler::new(PROTOCOL.keep_alive);
+            session.scheduler.found_moving(Stop::PanTilt);
+        }
+        session
+    }
+
+    fn broken() -> Error {
+        Error::Broken("reset".to_owned())
     }
 
     fn wrong() -> Error {
@@ -287,6 +405,128 @@ mod tests {
         assert_eq!(session.speaker(), Speaker::Mover);
         session.settle_speaker(Time::from_millis(3000));
         assert_eq!(session.speaker(), Speaker::Mover, "once");
+    }
+
+    /// Of a camera that says yes to whom it does not know, and turns on.
+    #[test]
+    fn whoever_moved_the_camera_has_the_last_word_where_no_picture_tells() {
+        let mut session = untrusted(false);
+        assert_eq!(session.fails(&broken()), Speaker::Newcomer);
+        let said: Vec<_> =
+            (0..16).flat_map(|half_second| session.obeyed_at(Time::from_millis(500 * half_second))).collect();
+        assert_eq!(said.first(), Some(&Speaker::Newcomer));
+        assert_eq!(said.last(), Some(&Speaker::Mover), "{said:?}");
+        assert!(said.len() <= 3, "once: {said:?}");
+        assert_eq!(session.speaker(), Speaker::Owner);
+    }
+
+    #[test]
+    fn a_stop_of_the_movers_that_is_lost_is_not_his_last_word() {
+        let mut session = untrusted(false);
+        assert_eq!(session.fails(&broken()), Speaker::Newcomer);
+        let (mut said, mut is_lost) = (Vec::new(), false);
+        for half_second in 0..40 {
+            said.extend(session.answered_at(Time::from_millis(500 * half_second), |speaker| {
+                let lost = speaker == Speaker::Mover && !is_lost;
+                is_lost |= lost;
+                if lost { Err(broken()) } else { Ok(Response::Accepted) }
+            }));
+        }
+        assert!(is_lost && said.len() <= 6, "{said:?}");
+        assert_eq!(said.last(), Some(&Speaker::Mover), "{said:?}");
+        assert_eq!(session.speaker(), Speaker::Owner);
+    }
+
+    #[test]
+    fn a_yes_that_comes_after_pictures_have_shown_it_to_be_worth_nothing_is_worth_no_more() {
+        let mut session = untrusted(true);
+        session.fails(&broken());
+        assert_eq!(session.obeyed_at(Time::from_millis(4000)), [Speaker::Newcomer]);
+        let now = Time::from_millis(6000);
+        assert_eq!(session.sends(now), Some(HALT), "it may have acted on something since");
+        session.seen_turning(now);
+        session.hears(&HALT, Ok(Response::Accepted), now);
+        assert_eq!(session.obeyed_at(Time::from_millis(6200)), [Speaker::Mover]);
+    }
+
+    /// Says a stop, to which the camera says yes, and turns on.
+    fn told_in_vain(session: &mut Session) {
+        session.obeyed_at(Time::from_millis(1000));
+        session.seen_turning(Time::from_millis(2500));
+        assert!(!session.is_at_rest());
+    }
+
+    #[test]
+    fn a_yes_in_vain_is_held_against_nobody_but_who_was_told_it() {
+        let later = Time::from_millis(3000);
+        let mut session = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
+        session.stop_confirmation = Some(StopConfirmation::default());
+        session.scheduler.found_moving(Stop::PanTilt);
+        told_in_vain(&mut session);
+        session.stand_in(later);
+        session.settle_speaker(later);
+        assert_eq!(session.speaker(), Speaker::Mover, "nobody else was there then");
+
+        let newcomer_in_vain = || {
+            let mut session = untrusted(false);
+            session.fails(&broken());
+            told_in_vain(&mut session);
+            assert_eq!(session.speaker(), Speaker::Newcomer);
+            session
+        };
+        let mut session = newcomer_in_vain();
+        session.owner_changed(later);
+        session.settle_speaker(later);
+        assert_eq!(session.speaker(), Speaker::Newcomer, "it is another");
+
+        let mut session = newcomer_in_vain();
+        session.pass_turn(later);
+        assert_eq!(session.speaker(), Speaker::Mover);
+        session.settle_speaker(later);
+        assert_eq!(session.speaker(), Speaker::Mover, "he has given way already");
+    }
+
+    /// It is only to the mover that the camera says no, as far as anybody knows.
+    #[test]
+    fn what_is_refused_to_the_mover_says_nothing_of_the_mode() {
+        let mut session = session();
+        session.fails(&broken());
+        assert_eq!(session.fails(&wrong()), Speaker::Mover);
+        let refusal = || Err(Error::Camera("no".to_owned()));
+        session.hears(&HALT, refusal(), Time::from_millis(1000));
+        session.hears(&ASK, Ok(Response::Position(Position::default())), Time::from_millis(2000));
+        session.hears(&HALT, refusal(), Time::from_millis(3000));
+        assert!(!session.modes.lacks(Mode::Velocity, Time::from_millis(3000)));
+        assert_eq!(session.stop(), Stop::PanTilt);
+    }
+
+    /// It is by the queue's answer that he is heard or not.
+    #[test]
+    fn a_position_that_is_not_told_passes_no_turn() {
+        let mut session = with_newcomer_out_of_turn();
+        let now = Time::from_millis(5000);
+        session.hears(&ASK, Err(Error::Camera("no".to_owned())), now);
+        assert_eq!((session.speaker(), session.is_deaf()), (Speaker::Newcomer, true));
+    }
+
+    #[test]
+    fn how_the_mover_is_refused_is_known_whoever_speaks_and_heeded_by_who_comes_next() {
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        let mut session = session();
+        assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
+        assert!(session.refusal(Time::ZERO).is_some());
+        assert_eq!(session.fails(&broken()), Speaker::Mover);
+        session.fails(&forbidden);
+        let refusal = session.refusal(Time::from_millis(4000)).unwrap();
+        assert_eq!(refusal.1, Duration::from_secs(6));
+
+        let mut next = Session::new(Mode::Velocity, SessionSettings::default(), &PROTOCOL);
+        next.inherit(Stop::PanTilt, Time::ZERO);
+        next.inherit_refusal(refusal, Time::ZERO);
+        assert_eq!([0, 100, 5900].map(|at| next.sends(Time::from_millis(at))), [None; 3]);
+        assert_eq!(next.sends(Time::from_millis(6000)), Some(HALT));
+        next.stand_in(Time::ZERO);
+        assert_eq!(next.speaker(), Speaker::Newcomer, "with another password he need not wait");
     }
 
     #[test]

@@ -34,7 +34,7 @@ impl StopConfirmation {
     /// By then a stop shows in the picture, whatever the latency is.
     const SHOWN_AFTER: Duration = Duration::from_millis(1200);
 
-    /// A stop that no picture tells of by then is repeated, once.
+    /// A stop that no picture tells of by then is repeated.
     const UNSEEN_AFTER: Duration = Duration::from_secs(3);
 
     /// Pictures that have to agree.
@@ -44,7 +44,7 @@ impl StopConfirmation {
     const NOISE_FIELDS_S: f64 = 0.02;
 
     /// After so many stops in vain somebody is to know; and after twice as many it may be somebody else who moves it.
-    const IN_VAIN: u32 = 3;
+    pub const IN_VAIN: u32 = 3;
 
     /// The camera accepted a stop.
     pub fn stopped(&mut self, now: Time) {
@@ -90,24 +90,24 @@ impl StopConfirmation {
         if self.repeated == Self::IN_VAIN { StopFinding::RepeatInVain } else { StopFinding::Repeat }
     }
 
-    /// When the stop is to be repeated if no picture tells of it by then.
-    pub fn unseen_at(&self) -> Option<Time> {
+    /// When the stop is to be repeated if no picture tells of it by then, and it was so no more often than that.
+    pub fn unseen_at(&self, most: u32) -> Option<Time> {
         let after = if self.leaving { Duration::ZERO } else { Self::UNSEEN_AFTER };
         // Too few to tell are none.
-        self.since.filter(|_| self.repeated == 0).map(|since| since.max(self.turned_at) + after)
+        self.since.filter(|_| self.repeated < most).map(|since| since.max(self.turned_at) + after)
     }
 
     /// Whether it may yet have to be repeated.
-    pub fn is_open(&self, now: Time) -> bool {
+    pub fn is_open(&self, most: u32, now: Time) -> bool {
         let last = |since: Time| since.max(self.turned_at) + Self::UNSEEN_AFTER;
-        self.since.is_some_and(|since| self.repeated == 0 || now < last(since))
+        self.since.is_some_and(|since| self.repeated < most || now < last(since))
     }
 
     /// Whether it is to be repeated for that now; asked once for each time.
-    pub fn repeats_unseen(&mut self, now: Time) -> bool {
-        let is_due = self.unseen_at().is_some_and(|at| at <= now);
+    pub fn repeats_unseen(&mut self, most: u32, now: Time) -> bool {
+        let is_due = self.unseen_at(most).is_some_and(|at| at <= now);
         if is_due {
-            (self.since, self.repeated) = (None, 1);
+            (self.since, self.repeated) = (None, self.repeated + 1);
         }
         is_due
     }
@@ -139,7 +139,7 @@ mod tests {
             !pictures(&mut confirmation, 3000, 0.5).contains(&StopFinding::Repeat),
             "somebody else moves it"
         );
-        assert_eq!(confirmation.unseen_at(), None);
+        assert_eq!(confirmation.unseen_at(1), None);
     }
 
     #[test]
@@ -165,12 +165,12 @@ mod tests {
         let mut confirmation = StopConfirmation::default();
         confirmation.stopped(ms(1000));
         assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Fine);
-        assert!(!confirmation.repeats_unseen(ms(3999)) && confirmation.is_open(ms(4000)));
-        assert!(confirmation.repeats_unseen(ms(4000)));
+        assert!(!confirmation.repeats_unseen(1, ms(3999)) && confirmation.is_open(1, ms(4000)));
+        assert!(confirmation.repeats_unseen(1, ms(4000)));
         confirmation.stopped(ms(4000));
-        assert_eq!(confirmation.unseen_at(), None);
+        assert_eq!(confirmation.unseen_at(1), None);
         assert!(
-            confirmation.is_open(ms(6999)) && !confirmation.is_open(ms(7000)),
+            confirmation.is_open(1, ms(6999)) && !confirmation.is_open(1, ms(7000)),
             "a picture may yet show that it turns"
         );
     }
@@ -181,14 +181,14 @@ mod tests {
         confirmation.stopped(ms(1000));
         for picture in 3..6 {
             assert_eq!(confirmation.see(Some(0.5), ms(1000 * picture)), StopFinding::Fine);
-            assert!(!confirmation.repeats_unseen(ms(1000 * picture + 2500)));
+            assert!(!confirmation.repeats_unseen(1, ms(1000 * picture + 2500)));
         }
         assert!(
-            confirmation.is_open(ms(8000)) && confirmation.repeats_unseen(ms(8000)),
+            confirmation.is_open(1, ms(8000)) && confirmation.repeats_unseen(1, ms(8000)),
             "no picture comes any more"
         );
         confirmation.stopped(ms(8000));
-        assert!(confirmation.is_open(ms(10_000)) && !confirmation.is_open(ms(11_000)));
+        assert!(confirmation.is_open(1, ms(10_000)) && !confirmation.is_open(1, ms(11_000)));
     }
 
     #[test]
@@ -198,9 +198,9 @@ mod tests {
         confirmation.moved();
         for mut confirmation in [confirmation, StopConfirmation::without_pictures()] {
             confirmation.stopped(ms(1000));
-            assert!(confirmation.repeats_unseen(ms(1000)));
+            assert!(confirmation.repeats_unseen(1, ms(1000)));
             confirmation.stopped(ms(1100));
-            assert!(!confirmation.repeats_unseen(ms(9000)));
+            assert!(!confirmation.repeats_unseen(1, ms(9000)));
         }
     }
 }

@@ -22,18 +22,20 @@ impl<C: Client> Account<C> {
         Self { client, other: None, speaker: Speaker::Owner }
     }
 
-    /// The camera moves at the word of this one. If it cannot be spoken to as him, it is as us.
-    pub fn succeed(&mut self, predecessor: Identity) {
+    /// The camera moves at the word of this one. If it cannot be spoken to as him, it is as us. Whether it is spoken to as him.
+    pub fn succeed(&mut self, predecessor: Identity) -> bool {
         let own = self.client.identity();
         if own.is_account_of(&predecessor) {
             // That he was let in holds for us.
             if let Ok(client) = C::in_place_of(own.known_from(predecessor)) {
                 self.client = client;
             }
-        } else if let Ok(mover) = C::in_place_of(predecessor) {
-            self.other = Some(mem::replace(&mut self.client, mover));
-            self.speaker = Speaker::Mover;
+            return true;
         }
+        let Ok(mover) = C::in_place_of(predecessor) else { return false };
+        self.other = Some(mem::replace(&mut self.client, mover));
+        self.speaker = Speaker::Mover;
+        true
     }
 
     /// Whose turn it is.

@@ -14,16 +14,14 @@ use ptztrack_contract::lock::lock;
 use servo::{Measurement, Time};
 
 use super::Clock;
+use crate::LoopSettings;
 use crate::http::Credentials;
-use crate::{LoopSettings, Stop};
 
 /// What was left since the last look, each the newest of its kind. In the order in which it is to be done.
 #[derive(Debug, Default)]
 pub struct Mail {
     pub credentials: Option<Option<Credentials>>,
     pub settings: Option<LoopSettings>,
-    /// What ends the move in which a predecessor left the camera.
-    pub orphan: Option<Stop>,
     /// Forget the target and stop; before `measurement`.
     pub rest: bool,
     pub measurement: Option<Measurement>,
@@ -126,12 +124,6 @@ impl Mailbox {
     /// Asks for an end at once, stop or not: another camera task is about to see to the camera.
     pub fn quit(&self) {
         self.mail().quit = true;
-        self.arrived.notify_one();
-    }
-
-    /// A predecessor left the camera in a move that this ends.
-    pub fn inherit(&self, stop: Stop) {
-        self.mail().orphan = Some(stop);
         self.arrived.notify_one();
     }
 

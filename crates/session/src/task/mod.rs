@@ -28,13 +28,13 @@ pub use self::statistics::Statistics;
 
 use self::account::Account;
 use self::dead_man::DeadMan;
-use self::predecessor::{Address, Predecessor};
+use self::predecessor::{Address, Predecessor, UnconfirmedStop};
 use self::state::TaskState;
 
 use servo::Time;
 
 use crate::http::{ClientSettings, Identity};
-use crate::session::Speaker;
+use crate::session::{Session, Speaker};
 use crate::watchdog::{StopOrder, Unavailable, Watchdog};
 use crate::{Client, Command, ControlLoop, Error, LoopEvent, LoopSettings, Next, Request, Status};
 use ptztrack_contract::lock::lock;
@@ -124,22 +124,14 @@ impl CameraTask {
         let runtime = runtime().map_err(|err| format!("no thread for the camera's connection: {err}"))?;
         let mailbox = Arc::new(Mailbox::new(clock));
         let mut control = ControlLoop::new(settings, &C::PROTOCOL);
-        let left = Predecessor::succeed(&camera);
-        let inherited = left.as_ref().map(|left| left.stop);
-        if let Some(left) = left {
-            mailbox.inherit(left.stop);
-            account.succeed(left.identity);
-            if account.stands_in() {
-                control.session_mut().stand_in(Time::ZERO);
-            }
+        if let Some(left) = Predecessor::succeed(&camera) {
+            inherit(left, &mut account, control.session_mut(), mailbox.now());
         }
         let identity = Arc::new(Mutex::new(account.identity()));
-        let (status, estimates, stop) =
-            (control.status(Time::ZERO), Some(control.estimates()), inherited.or(Some(control.stop())));
-        let may_yet_move = inherited.is_some();
-        let statistics = Statistics { status, estimates, stop, may_yet_move, ..Statistics::default() };
-        let statistics = Arc::new(Mutex::new(statistics));
+        let statistics = Arc::new(Mutex::default());
         let state = TaskState::new(control, mailbox.clone(), statistics.clone(), observer.clone());
+        // Whoever comes next may come before the task begins.
+        state.note_statistics();
         let task = Task {
             account,
             identity: identity.clone(),
@@ -213,6 +205,18 @@ pub fn runtime() -> Result<&'static Runtime, std::io::Error> {
         builder.worker_threads(WORKERS).thread_name("ptz-camera").on_thread_start(|| IS_OURS.set(true));
         builder.enable_all().build()
     })
+}
+
+/// Goes on where whoever steered the camera before has left off.
+fn inherit<C: Client>(left: UnconfirmedStop, account: &mut Account<C>, session: &mut Session, now: Time) {
+    session.inherit(left.stop, now);
+    let speaks_as_him = account.succeed(left.identity);
+    if let Some(refusal) = left.refusal.filter(|_| speaks_as_him) {
+        session.inherit_refusal(refusal, now);
+    }
+    if account.stands_in() {
+        session.stand_in(now);
+    }
 }
 
 struct Task<C, O> {
@@ -394,4 +398,64 @@ impl<C: Client, O: Fn(Event) + Send + Sync> Task<C, O> {
 
 fn is_move(request: &Request) -> bool {
     matches!(request, Request::Command(command) if !command.is_stop())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fixtures::{Locked, client_settings, credentials};
+    use servo::{Measurement, ServoSettings};
+
+    /// Only a failure takes this long.
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    fn start(location: &str, password: &str) -> CameraTask {
+        let client = ClientSettings { credentials: credentials(password), ..client_settings(location) };
+        let observer = |event| {
+            if let Event::Settled(waiting) = event {
+                let _ = waiting.try_send(());
+            }
+        };
+        CameraTask::start::<Locked>(client, ServoSettings::default(), Clock::running(), None, observer)
+            .unwrap()
+    }
+
+    fn wait_until(mut done: impl FnMut() -> bool) {
+        let begin = Instant::now();
+        while !done() {
+            assert!(begin.elapsed() < PATIENCE);
+            std::thread::sleep(Duration::from_millis(10));
+        }
+    }
+
+    /// One after the other at a camera that has locked the account while it moved; returns the second, who has this password.
+    fn restarted(location: &str, password: &str) -> CameraTask {
+        let first = start(location, "pass");
+        wait_until(|| {
+            first.mailbox().see(Measurement::at(0.9, 0.5, first.mailbox().now()));
+            first.statistics().sent > 0
+        });
+        drop(first);
+        wait_until(|| Locked::refused(location, "pass") == 2);
+        let next = start(location, password);
+        next.mailbox().settled().0.recv_timeout(PATIENCE).unwrap();
+        next
+    }
+
+    /// Else a service manager that starts the application again and again would keep it locked.
+    #[test]
+    fn an_account_that_is_locked_is_not_tried_anew_at_each_restart() {
+        let location = "http://restarted.test";
+        let _next = restarted(location, "pass");
+        assert_eq!(Locked::refused(location, "pass"), 2);
+    }
+
+    #[test]
+    fn nor_where_the_next_one_has_another_password_which_is_tried_at_once() {
+        let location = "http://restarted-otherwise.test";
+        let next = restarted(location, "falsch");
+        wait_until(|| Locked::refused(location, "falsch") == 1);
+        next.mailbox().settled().0.recv_timeout(PATIENCE).unwrap();
+        assert_eq!(["pass", "falsch"].map(|password| Locked::refused(location, password)), [2, 1]);
+    }
 }

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::sync::{Arc, Mutex, Weak};
-use std::time::Duration;
+use std::time::{Duration, Instant};
+
+use tokio::time::{sleep, sleep_until, timeout};
 
 use super::{LAST_RETRIES, Mailbox, Statistics};
 use crate::http::{Identity, Location};
+use crate::session::Forbidden;
 use crate::{Client, Command, Error, Request, Stop};
 use ptztrack_contract::lock::lock;
 
@@ -33,6 +36,8 @@ pub struct UnconfirmedStop {
     pub stop: Stop,
     /// As whom it was told, and moved.
     pub identity: Identity,
+    /// How he was refused, and how long he is to wait before he tries again.
+    pub refusal: Option<(Forbidden, Duration)>,
 }
 
 impl Predecessor {
@@ -65,8 +70,15 @@ impl Predecessor {
             mailbox.quit();
         }
         ours.iter().rev().find_map(|left| {
-            Some(UnconfirmedStop { stop: left.unconfirmed_stop()?, identity: lock(&left.identity).clone() })
+            let stop = left.unconfirmed_stop()?;
+            Some(UnconfirmedStop { stop, identity: lock(&left.identity).clone(), refusal: left.refusal() })
         })
+    }
+
+    fn refusal(&self) -> Option<(Forbidden, Duration)> {
+        let (forbidden, until) = lock(&self.statistics).forbidden.clone()?;
+        let wait = until.saturating_duration_since(Instant::now());
+        (!wait.is_zero()).then_some((forbidden, wait))
     }
 
     /// Whether there is nothing left to do.
@@ -83,14 +95,14 @@ impl Predecessor {
     pub async fn stop<C: Client>(&self, mailbox: &Mailbox) {
         let identity = lock(&self.identity).clone();
         let Ok(mut client) = C::in_place_of(identity) else { return };
-        let stop = {
+        let (stop, mut forbidden) = {
             let mut statistics = lock(&self.statistics);
             // For whoever comes next, until it is known better.
             statistics.status.moving = true;
-            Command::Stop(statistics.stop.unwrap_or(Stop::Position))
+            let forbidden = statistics.forbidden.clone().map(|(forbidden, _)| forbidden);
+            (Command::Stop(statistics.stop.unwrap_or(Stop::Position)), forbidden)
         };
         let tries = async {
-            let mut pause = LAST_RETRIES_PAUSE;
             while !mailbox.take().quit {
                 match client.exchange(&Request::Command(stop)).await {
                     Ok(_) => {
@@ -98,23 +110,27 @@ impl Predecessor {
                         break;
                     }
                     Err(Error::BadCredentials { .. }) => break,
-                    Err(err) => {
-                        tokio::time::sleep(pause).await;
-                        // Or the account could be locked.
-                        pause *= if matches!(err, Error::NotPermitted { .. }) { 2 } else { 1 };
+                    Err(err @ Error::NotPermitted { .. }) => {
+                        let pause = Forbidden::again(&mut forbidden, &err, LAST_RETRIES_PAUSE);
+                        let until = Instant::now() + pause;
+                        lock(&self.statistics).forbidden =
+                            forbidden.clone().map(|forbidden| (forbidden, until));
+                        sleep_until(until.into()).await;
                     }
+                    Err(_) => sleep(LAST_RETRIES_PAUSE).await,
                 }
             }
         };
         // Whoever cannot be stopped by then is not to be by us.
-        let _ = tokio::time::timeout(LAST_RETRIES, tries).await;
+        let _ = timeout(LAST_RETRIES, tries).await;
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::client_settings;
+    use crate::fixtures::{Locked, client_settings, credentials};
+    use crate::task::Clock;
 
     fn succeed(name: &str) -> Option<Stop> {
         Predecessor::succeed(&camera(name)).map(|left| left.stop)
@@ -157,5 +173,31 @@ mod tests {
         Predecessor::forget_void();
         assert_eq!(succeed("192.168.0.91"), Some(Stop::PanTilt));
         assert_eq!(succeed("192.168.0.91"), None, "it is seen to");
+    }
+    #[test]
+    fn how_it_was_refused_is_handed_on_until_it_might_ask_again() {
+        let mut refused = None;
+        Forbidden::again(&mut refused, &Error::NotPermitted { user: "root".to_owned() }, Duration::ZERO);
+        let now = Instant::now();
+        for (until, is_handed_on) in [(now + Duration::from_secs(3600), true), (now, false)] {
+            let predecessor = left("192.168.0.94", true);
+            lock(&predecessor.statistics).forbidden = refused.clone().map(|forbidden| (forbidden, until));
+            predecessor.leave();
+            let left = Predecessor::succeed(&camera("192.168.0.94")).unwrap();
+            assert_eq!(left.refusal.is_some(), is_handed_on);
+        }
+    }
+
+    /// The watchdog tries, too, as nobody has given the lease back.
+    #[test]
+    fn who_is_refused_twice_does_not_try_again_soon() {
+        let predecessor = left("192.168.0.95", true);
+        lock(&predecessor.identity).settings.credentials = credentials("pass");
+        lock(&predecessor.identity).accepted = true;
+        let mailbox = Mailbox::new(Clock::running());
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let tries = async { timeout(4 * LAST_RETRIES_PAUSE, predecessor.stop::<Locked>(&mailbox)).await };
+        assert!(runtime.block_on(tries).is_err(), "nothing came of it");
+        assert_eq!(Locked::refused(&address("192.168.0.95"), "pass"), 2);
     }
 }

@@ -5,7 +5,7 @@
 use std::mem;
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use servo::Time;
 
@@ -83,15 +83,12 @@ impl<O: Fn(Event)> TaskState<O> {
     }
 
     pub fn take_mail(&mut self) {
-        let Mail { credentials, settings, orphan, rest, measurement, waiting, settling, finish, quit } =
+        let Mail { credentials, settings, rest, measurement, waiting, settling, finish, quit } =
             self.mailbox.take();
         let now = self.mailbox.now();
         self.credentials = credentials.or(self.credentials.take());
         if let Some(settings) = settings {
             self.control.configure(settings);
-        }
-        if let Some(stop) = orphan {
-            self.control.session_mut().inherit(stop, now);
         }
         if rest {
             self.control.release();
@@ -195,19 +192,27 @@ impl<O: Fn(Event)> TaskState<O> {
         (self.observer)(Event::Exchanged { request: *request, failure, round_trip });
     }
 
-    /// Tells what has changed: reports and status; and those who wait for rest.
-    pub fn publish(&mut self) {
-        let status = self.control.status(self.mailbox.now());
+    /// Notes how it stands for whoever asks, or comes next.
+    pub fn note_statistics(&self) -> Status {
+        let now = self.mailbox.now();
+        let status = self.control.status(now);
         let (estimates, stop) = (Some(self.control.estimates()), Some(self.control.stop()));
         let (may_yet_move, halted) =
             (!self.control.session().stays_at_rest(), self.control.session().halted());
+        let refusal = self.control.session().refusal(now);
         let coalesced = self.control.overtaken() + self.mailbox.overtaken();
-        {
-            let mut statistics = lock(&self.statistics);
-            (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
-            (statistics.may_yet_move, statistics.halted) = (may_yet_move, halted);
-            statistics.coalesced = coalesced;
-        }
+        let mut statistics = lock(&self.statistics);
+        (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
+        (statistics.may_yet_move, statistics.halted) = (may_yet_move, halted);
+        // Whoever comes next has another clock.
+        statistics.forbidden = refusal.map(|(forbidden, wait)| (forbidden, Instant::now() + wait));
+        statistics.coalesced = coalesced;
+        status
+    }
+
+    /// Tells what has changed: reports and status; and those who wait for rest.
+    pub fn publish(&mut self) {
+        let status = self.note_statistics();
         for event in self.control.take_events() {
             (self.observer)(Event::Loop(event));
         }
@@ -269,6 +274,7 @@ mod tests {
         free: false,
     });
     const HALT: Command = Command::Stop(Stop::PanTilt);
+    const ASK: Request = Request::Query(Query::Position);
 
     fn ms<T: From<Duration>>(ms: u64) -> T {
         Duration::from_millis(ms).into()
@@ -414,7 +420,7 @@ mod tests {
                     3 => waiting.push(state.mailbox.rest()),
                     4 => state.mailbox.accept_measurements(false),
                     5 => state.mailbox.accept_measurements(true),
-                    6 => state.mailbox.inherit(Stop::Position),
+                    6 => state.control.session_mut().inherit(Stop::Position, now),
                     7 => state.mailbox.configure(LoopSettings { session: SessionSettings { max_rate_hz: 5.0, ..SessionSettings::default() }, ..LoopSettings::default() }),
                     8 => state.mailbox.set_credentials(None),
                     _ => waiting.push(state.mailbox.finish(FINISH_BUDGET)),
@@ -467,6 +473,34 @@ mod tests {
         assert_eq!(state.give_up_at(&Request::Command(HALT), sent, ms(1450)), None);
     }
 
+    impl<O: Fn(Event)> TaskState<O> {
+        /// The camera tells at this time that it looks there.
+        fn tell(&mut self, pan_deg: f64, at: Time) {
+            self.mailbox.hold_at(at.since_zero());
+            let position = Position { pan_deg: Some(pan_deg), tilt_deg: Some(0.0), zoom: None };
+            self.answered(&ASK, Ok(Response::Position(position)), at);
+        }
+    }
+
+    /// Were the question given up for the stop that waits for its answer, it would be asked and given up for ever.
+    #[test]
+    fn whose_move_the_camera_is_in_is_waited_for_however_slow_it_answers() {
+        let (mut state, _told) = state();
+        state.see(Visibility::Seen);
+        assert_eq!(state.serve_at(ms(1000), |_| Ok(Response::Accepted)).len(), 1, "it turns to the right");
+        for (pan_deg, at) in [(0.0, 1100), (0.0, 1600), (-20.0, 2100), (-20.0, 2200)] {
+            state.tell(pan_deg, ms(at));
+        }
+        let session = state.control.session();
+        assert!(session.is_taken_over(ms(2200)) && !session.is_at_rest(), "by a hand it turned to the left");
+        assert_eq!(state.serve_at(ms(2200), |_| panic!("it may be his move that it is in")), []);
+        assert_eq!(state.give_up_at(&ASK, ms(2700), ms(2700)), None);
+        // To the right again.
+        state.tell(-17.0, ms(3500));
+        assert_eq!(state.give_up_at(&ASK, ms(3500), ms(3500)), Some(Time::from_millis(3500) + STOP_GRACE));
+        assert_eq!(state.serve_at(ms(3500), |_| Ok(Response::Accepted)), [HALT]);
+    }
+
     #[test]
     fn a_target_is_lost_for_silence_where_neither_pictures_nor_answers_come() {
         let (mut state, _) = state();
@@ -474,11 +508,10 @@ mod tests {
         state.see(Visibility::Seen);
         assert_eq!(state.silent_at(&MOVE, ms(900)), Some(ms(1500)), "the picture is of 1000 ms");
         assert_eq!(state.silent_at(&MOVE, ms(1200)), Some(ms(1700)));
-        let ask = Request::Query(Query::Position);
-        assert_eq!([Request::Command(HALT), ask].map(|it| state.silent_at(&it, ms(900))), [None; 2]);
+        assert_eq!([Request::Command(HALT), ASK].map(|it| state.silent_at(&it, ms(900))), [None; 2]);
         assert_eq!(state.serve_at(ms(1000), |_| Ok(Response::Accepted)).len(), 1, "it turns");
-        assert_eq!(state.silent_at(&ask, ms(900)), Some(ms(1500)));
+        assert_eq!(state.silent_at(&ASK, ms(900)), Some(ms(1500)));
         state.control.lose_target();
-        assert_eq!(state.give_up_at(&ask, ms(900), ms(1500)), Some(ms(1400)), "a stop is due");
+        assert_eq!(state.give_up_at(&ASK, ms(900), ms(1500)), Some(ms(1400)), "a stop is due");
     }
 }

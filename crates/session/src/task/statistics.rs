@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use servo::Estimates;
 
 use super::DeadManState;
+use crate::session::Forbidden;
 use crate::{Status, Stop};
 
 /// What was exchanged with the camera, and what it is known to do.
@@ -32,6 +33,8 @@ pub struct Statistics {
     pub last_error: Option<String>,
     /// Nothing more may be sent until a setting changes.
     pub halted: bool,
+    /// How whoever moved the camera is refused, and until when he is to wait: whoever speaks next as the same user waits, too.
+    pub forbidden: Option<(Forbidden, Instant)>,
     /// How it stands with the watchdog.
     pub dead_man: DeadManState,
 }

@@ -9,7 +9,7 @@ use tokio::time::{Instant, sleep, sleep_until, timeout};
 use super::camera_lock::CameraLock;
 use super::protocol::StopOrder;
 use super::{Armed, LAST_TRIES};
-use crate::session::{DOUBT, FORBIDDEN_PAUSE, StopConfirmation};
+use crate::session::{DOUBT, Forbidden, StopConfirmation};
 use crate::{Client, Command, Error, Request, Stop};
 
 /// From one try to stop a camera to the next.
@@ -121,7 +121,7 @@ async fn try_to_stop<C: Client>(order: &StopOrder) -> Option<()> {
         until_accepted(&mut client, order.words).await?;
         let Some(confirmation) = &mut confirmation else { break };
         confirmation.stopped(Time::ZERO);
-        if !confirmation.repeats_unseen(Time::ZERO) {
+        if !confirmation.repeats_unseen(1, Time::ZERO) {
             break;
         }
     }
@@ -134,15 +134,14 @@ async fn try_to_stop<C: Client>(order: &StopOrder) -> Option<()> {
 
 /// `None`: the camera refuses user or password.
 async fn until_accepted(client: &mut impl Client, stop: Stop) -> Option<()> {
-    let mut forbidden = PAUSE;
+    let mut forbidden = None;
     loop {
         match client.exchange(&Request::Command(Command::Stop(stop))).await {
             Ok(_) => return Some(()),
             Err(Error::BadCredentials { .. }) => return None,
             // Who was let in before: a moment of a camera that restarts, or an account that is locked, and longer so by each try.
-            Err(Error::NotPermitted { .. }) => {
-                sleep(forbidden).await;
-                forbidden = (2 * forbidden).max(FORBIDDEN_PAUSE);
+            Err(err @ Error::NotPermitted { .. }) => {
+                sleep(Forbidden::again(&mut forbidden, &err, PAUSE)).await;
             }
             // One that asks for a user where none is set was moved without: that may pass, and there is no account to lock.
             Err(_) => sleep(PAUSE).await,

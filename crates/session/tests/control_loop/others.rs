@@ -4,7 +4,7 @@
 
 use super::*;
 use servo::Access;
-use session::{Parameters, QueuePlace};
+use session::{Parameters, Protocol, QueuePlace};
 
 type Said = Option<Result<Response, Error>>;
 
@@ -215,4 +215,26 @@ fn a_queue_that_may_not_be_asked_any_more_does_not_keep_the_stop() {
     rig.control.release();
     rig.run_jobs(not_permitted);
     assert!(rig.control.session().is_at_rest());
+}
+
+/// A camera that turns on after its yes looks as one does that somebody else moves.
+#[test]
+fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera() {
+    let protocol = Protocol { confirms_stops: true, ..vapix::Client::PROTOCOL };
+    let control = ControlLoop::new(ServoSettings::default(), &protocol);
+    let mut rig = Rig { control, now: ms(1000), sent: Vec::new() };
+    for _ in 0..10 {
+        rig.after(ms(5000));
+    }
+    rig.aside(ms(500), |_| None);
+    rig.control.release();
+    assert_eq!(rig.after(ms(10)), [HALT]);
+    let mut pan_deg = 0.0;
+    for _ in 0..8 {
+        pan_deg -= 5.0;
+        rig.now += ms(500);
+        rig.run_jobs(positioned(|| at(pan_deg)));
+    }
+    assert!(rig.control.session().is_taken_over(rig.now));
+    assert_eq!(rig.sent, [HALT]);
 }
