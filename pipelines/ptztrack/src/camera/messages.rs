@@ -12,6 +12,9 @@ use super::known::{Known, SEARCHING};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
+/// What elements call a property of theirs, and what the file calls it.
+const LOCATION: &str = "`location`";
+const ADDRESS: &str = "`address`";
 /// How much of what was said is remembered: a camera may put anything into words that are told on.
 const MOST_SAID: usize = 64;
 
@@ -78,6 +81,8 @@ impl Listener {
     }
 
     fn picture_gone(&mut self, reason: String) {
+        // An element's own sentence ends here; what is retried is said once.
+        let reason = reason.trim_end_matches('.').trim_end_matches("; retrying").to_owned();
         self.trouble(Level::Error, "picture-gone", reason, "; it is tried again until it is back");
     }
 
@@ -138,6 +143,7 @@ impl Listener {
 
     /// Told once, until a picture is there again.
     fn trouble(&mut self, level: Level, event: &str, text: String, what_now: &str) {
+        let text = text.replace(LOCATION, ADDRESS);
         if level > Level::Info {
             lock(&self.known.state).trouble = Some(text.clone());
         }
@@ -182,6 +188,15 @@ mod tests {
         }
         let told: Vec<_> = std::iter::from_fn(|| events.try_recv().ok()).map(|event| event.event).collect();
         assert_eq!(told, ["camera-disconnected", "camera-connected"].repeat(2));
+    }
+
+    #[test]
+    fn what_to_do_is_said_once_and_by_the_names_of_the_file() {
+        let log = Arc::new(Log::unwritten());
+        let (mut events, mut listener) = (log.subscribe(), listener(&log));
+        listener.out_of_reach("cannot connect. Check `location`, the cable; retrying.".to_owned());
+        let told = events.try_recv().unwrap().detail;
+        assert_eq!(told, "cannot connect. Check `address`, the cable; it is tried again until it is back");
     }
 
     #[test]
