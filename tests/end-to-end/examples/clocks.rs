@@ -4,27 +4,39 @@
 //! of it:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run --example clocks
+//! cargo build --workspace --lib --bins --examples && cargo run --example clocks
 //! ```
+//! The machine's own clock is not touched: a program has another one, by a library that is loaded before it. The pipelines' clock, which
+//! never jumps by itself, is made to jump apart from that.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::fs;
+use std::iter;
+use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
 
-use end_to_end::{GstLaunch, InView, PATIENCE, Running, Watchdog, scene, signal, tool};
+use chrono::DateTime;
+use end_to_end::{
+    GstLaunch, InView, PATIENCE, Program, Running, Viewer, Watchdog, plugin_folder, scene, scratch, signal,
+    tool,
+};
 use gst::prelude::*;
 use ptztrack_contract::{TargetMessage, TargetState};
-use virtual_camera::{Fault, Status, VirtualCamera};
+use virtual_camera::{Fault, OnvifSettings, Quirk, Settings, Status, VirtualCamera};
 
 /// Somebody is followed for so long with each fault: long enough for them to be lost by a camera that is not steered any more.
 const WATCHED: Duration = scene::FAR_LAP;
 /// And so long before it.
 const BEFORE: Duration = Duration::from_secs(3);
-const HOUR: gst::ClockTime = gst::ClockTime::from_seconds(3600);
+const HOUR_S: i64 = 3600;
+const HOUR: gst::ClockTime = gst::ClockTime::from_seconds(HOUR_S.unsigned_abs());
 /// The machine is suspended for so long: longer than a lease lasts.
 const SUSPENDED: Duration = Duration::from_secs(10);
 /// So fast the camera turns at most that is suspended, °/s: whom it followed is before it still where it comes to rest.
 const SLOW: f64 = 2.0;
+/// More documents than come while somebody is watched.
+const MOST_DOCUMENTS: usize = 1000;
 /// What is said of a picture that freezes.
 const FROZEN: &str = "the picture stays the same";
 /// Whoever is so far off the middle, in parts of the picture, has the camera turn for long.
@@ -55,9 +67,24 @@ fn main() {
     follows("the pipeline's clock jumps an hour back", &scene::mjpeg, |_, running| {
         jump(running, |base| base + HOUR)
     });
-    follows("the camera's clock jumps by an hour", &scene::mjpeg, |camera, _| {
-        camera.set_fault(Fault::ClockAhead(HOUR.into()));
+    let ahead = || Fault::ClockAhead(HOUR.into());
+    follows("the camera's clock jumps an hour ahead", &scene::mjpeg, |camera, _| camera.set_fault(ahead()));
+    follows("the camera's clock jumps an hour back", &scene::mjpeg, |camera, _| {
+        camera.set_fault(ahead());
+        // What it has handed out by then is of the future.
+        thread::sleep(BEFORE);
+        camera.set_fault(Fault::None);
     });
+    for (protocol, camera) in [("vapix", scene::far_person as fn() -> Settings), ("onvif", strict_person)] {
+        for (to, off_s) in [("ahead", HOUR_S), ("back", -HOUR_S)] {
+            machine_jumps(
+                &format!("the machine's clock jumps an hour {to}, {protocol}"),
+                camera(),
+                protocol,
+                off_s,
+            );
+        }
+    }
     let rtsp = |camera: &VirtualCamera| scene::rtsp(camera, "h264");
     follows("RTP's timestamp and sequence wrap", &rtsp, |_, _| ());
     println!(
@@ -88,8 +115,86 @@ fn follows(what: &str, source: Source, goes_wrong: impl FnOnce(&VirtualCamera, &
     thread::sleep(BEFORE);
     goes_wrong(&camera, &running);
     let seen = InView::watch(&camera, WATCHED);
+    print(what, seen, &running.complaints());
+}
+
+fn print(what: &str, seen: InView, warnings: &[String]) {
     let out = seen.longest_out.as_secs_f64();
-    println!("| {what} | {:.1} % | {out:.1} s | {} |", 100.0 * seen.share, running.complaints().join("; "));
+    println!("| {what} | {:.1} % | {out:.1} s | {} |", 100.0 * seen.share, warnings.join("; "));
+}
+
+/// The same person before a camera by ONVIF, which lets nobody in whose log-in is not of this moment by its own clock; that is an hour
+/// behind.
+fn strict_person() -> Settings {
+    let onvif = OnvifSettings::with(&[Quirk::ClockBehind]);
+    Settings { world: scene::far_person().world, ..scene::any_make(onvif) }
+}
+
+/// The program follows, and passes the camera on, while the machine's clock jumps. The camera's stays as it is.
+fn machine_jumps(what: &str, settings: Settings, protocol: &str, off_s: i64) {
+    let camera = VirtualCamera::start(settings).unwrap();
+    let clock = MachineClock::new();
+    let file = |folder: &Path| {
+        let door = Program::entry("door", &camera.url(), &folder.join("password"));
+        format!("{door}protocol = {protocol:?}\n[restream]\nlisten = \"127.0.0.1:0\"\n")
+    };
+    let mut program = Program::start_in("machine-jumps", file, &[], &clock.environment());
+    let line = program.launch.wait_for_line("passes the cameras on at ");
+    scene::wait_until_following(&camera);
+    let viewer = Viewer::start(&line.rsplit(' ').next().unwrap().replace("NAME", "door"), |_| ());
+    let before_s = told_s(&viewer.document().0);
+    thread::sleep(BEFORE);
+    clock.set(off_s);
+    let seen = InView::watch(&camera, WATCHED);
+    // Or nothing has jumped. Those from before come first.
+    let has_jumped = |document: &String| (told_s(document) - before_s - off_s).abs() < HOUR_S / 2;
+    let newest = iter::repeat_with(|| viewer.document().0).take(MOST_DOCUMENTS).find(has_jumped);
+    assert!(newest.is_some(), "{what}: it tells of the same time as before");
+    drop(viewer);
+    let said = program.end("TERM");
+    let is_complaint = |line: &&str| line.contains("warning: ") || line.contains("error: ");
+    let complaints: Vec<_> = said.lines().filter(is_complaint).map(str::to_owned).collect();
+    print(what, seen, &complaints);
+}
+
+/// When what a document tells of was, in seconds since 1970.
+fn told_s(document: &str) -> i64 {
+    let time = document.split("UtcTime=\"").nth(1).and_then(|rest| rest.split('"').next()).unwrap();
+    DateTime::parse_from_rfc3339(time).unwrap().timestamp()
+}
+
+/// The machine's clock, as one program sees it.
+struct MachineClock {
+    /// Loaded before the program.
+    library: PathBuf,
+    /// By how much it is off.
+    file: PathBuf,
+}
+
+impl MachineClock {
+    fn new() -> Self {
+        let library = plugin_folder().join("examples/libwall_clock.so");
+        // Where there is no such library the linker only warns.
+        assert!(library.is_file(), "{}", library.display());
+        let clock = Self { library, file: scratch("machine-clock") };
+        clock.set(0);
+        clock
+    }
+
+    fn set(&self, off_s: i64) {
+        fs::write(&self.file, off_s.to_ne_bytes()).unwrap();
+    }
+
+    fn environment(&self) -> [(&str, &Path); 2] {
+        [("LD_PRELOAD", &self.library), ("WALL_CLOCK", &self.file)]
+    }
+}
+
+impl Drop for MachineClock {
+    fn drop(&mut self) {
+        // Nothing depends on it any more.
+        let _ = fs::remove_file(&self.file);
+    }
 }
 
 /// Gives every picture another timestamp.

@@ -18,7 +18,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use end_to_end::following::script;
-use end_to_end::{GstLaunch, PATIENCE, plugin_folder, scene, signal, tool};
+use end_to_end::{GstLaunch, Held, PATIENCE, plugin_folder, scene, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
@@ -88,6 +88,8 @@ enum Death {
     Refused(fn() -> Fault, &'static str),
     /// It hangs by itself when the camera first moves, and says `dying` just before.
     Hang,
+    /// The threads of this name hang, as in a driver that never returns, and all others go on.
+    ThreadsHang(&'static str),
     /// It is killed for what it does when the camera first moves.
     Killed,
 }
@@ -106,12 +108,14 @@ const fn case(name: &'static str, application: Application, death: Death) -> Cas
 use Death::Signal;
 
 const PLAIN: Application = Application::Launch("");
+/// What talks to cameras is done in threads of this name.
+const CAMERA_TASK: Death = Death::ThreadsHang("ptz-camera");
 /// It has a child that holds what it had open.
 const FORKED: Application = Application::Program("fork");
 const UNAVAILABLE: fn() -> Fault = || Fault::Status(503);
 const ERROR: fn() -> Fault = || Fault::ErrorBody("Error: busy".to_owned());
 
-const CASES: [Case; 21] = [
+const CASES: [Case; 22] = [
     case("Ctrl-C", Application::Script, Signal("INT")),
     case(
         "Ctrl-C, the first stops are answered by 503",
@@ -133,6 +137,7 @@ const CASES: [Case; 21] = [
     case("SIGABRT", PLAIN, Signal("ABRT")),
     case("SIGSTOP", PLAIN, Signal("STOP")),
     case("its streaming thread hangs", Application::Program("hang"), Death::Hang),
+    case("its camera task hangs", PLAIN, CAMERA_TASK),
     case("`exit()` right after NULL in an outage", PLAIN, Death::Outage("INT")),
     case("SIGKILL, a forked child holds its descriptors", FORKED, Signal("KILL")),
     case("SIGKILL of PID 1 of a container, the watchdog in it", Application::Container, Signal("KILL")),
@@ -244,12 +249,12 @@ impl Case {
     }
 
     /// When it was dead, or the camera could be stopped again; and what may live on.
-    fn die(&self, camera: &VirtualCamera, mut launch: GstLaunch) -> (Duration, Option<GstLaunch>) {
+    fn die(&self, camera: &VirtualCamera, mut launch: GstLaunch) -> (Duration, Option<Alive>) {
         match self.death {
             Signal(name) | Death::SlowWatchdog(name) => {
                 let now = camera.now();
                 launch.signal(name);
-                (now, Some(launch))
+                (now, Some((None, launch)))
             }
             Death::Outage(name) => {
                 camera.set_fault(Fault::BlackHole);
@@ -264,11 +269,16 @@ impl Case {
                 launch.signal(name);
                 camera.wait_for(LEFT_ALONE, |status| status.commands >= before + REFUSED_STOPS);
                 camera.set_fault(Fault::None);
-                (camera.now(), Some(launch))
+                (camera.now(), Some((None, launch)))
             }
             Death::Hang => {
                 launch.wait_for_line("dying");
-                (camera.now(), Some(launch))
+                (camera.now(), Some((None, launch)))
+            }
+            Death::ThreadsHang(name) => {
+                let now = camera.now();
+                let held = Held::threads(launch.id(), name);
+                (now, Some((Some(held), launch)))
             }
             Death::Killed => {
                 launch.finish();
@@ -277,6 +287,9 @@ impl Case {
         }
     }
 }
+
+/// What lives on, in the order in which it ends: whoever is held cannot be waited for.
+type Alive = (Option<Held>, GstLaunch);
 
 impl Application {
     fn is_confined(self) -> bool {

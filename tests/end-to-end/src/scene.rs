@@ -33,6 +33,12 @@ pub fn walking_person_for(time: Duration) -> Settings {
     world(path)
 }
 
+/// The same by so many pictures a second, and for so long that it is not over before what is measured is.
+pub fn walking_person_at(frame_rate: f64, time: Duration) -> Settings {
+    let settings = walking_person_for(time + Duration::from_secs(600));
+    Settings { video: Video { frame_rate: Some(frame_rate), ..settings.video }, ..settings }
+}
+
 /// A camera of any make before the same person: it speaks ONVIF, and is as fast as it is told to be.
 pub fn any_make(onvif: OnvifSettings) -> Settings {
     let proportional_speed = ProportionalSpeed { enabled: false, ..Kinematics::default().proportional_speed };
@@ -134,6 +140,23 @@ const MOMENT: Duration = Duration::from_millis(100);
 #[track_caller]
 pub fn wait_until_following(camera: &VirtualCamera) {
     assert!(camera.wait_for(PATIENCE, |status| status.moving), "the camera never moved");
+}
+
+/// Its next move that it accepts, after so many commands: one that moves may have been told to before.
+#[track_caller]
+pub fn wait_for_move(camera: &VirtualCamera, commands: u64) -> ReceivedCommand {
+    let is_move = |command: &ReceivedCommand| {
+        command.status == 204 && command.query.contains("move=") && !command.query.contains("move=0,0")
+    };
+    let (until, mut seen) = (Instant::now() + PATIENCE, commands);
+    loop {
+        if let Some(first) = camera.commands_after(commands).into_iter().find(is_move) {
+            return first;
+        }
+        let left = until.saturating_duration_since(Instant::now());
+        assert!(camera.wait_for(left, |status| status.commands > seen), "it is not moved any more");
+        seen = camera.status().commands;
+    }
 }
 
 /// The camera stops, and its last order is the reason; for a moment it may rest between two others.

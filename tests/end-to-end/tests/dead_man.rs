@@ -7,7 +7,7 @@ use std::os::unix::fs::PermissionsExt;
 use std::time::{Duration, Instant};
 
 use end_to_end::scene::{assert_left_at_rest, wait_until_following};
-use end_to_end::{GstLaunch, PATIENCE, Watchdog, scene, scratch, signal, tool};
+use end_to_end::{GstLaunch, Held, PATIENCE, Watchdog, scene, scratch, signal, tool};
 use virtual_camera::{Fault, VirtualCamera};
 
 /// How often the stick that an operator holds says where to.
@@ -72,6 +72,20 @@ fn suspended() {
     launch.signal("STOP");
     assert_left_at_rest(&camera);
     launch.signal("CONT");
+    wait_until_following(&camera);
+    launch.signal("INT");
+    launch.finish();
+    assert_left_at_rest(&camera);
+    watchdog.wait_for("it has nothing more to do", <[u32]>::is_empty);
+}
+
+/// As in a driver that never returns: pictures go on, and nobody is left who would stop the camera.
+#[test]
+fn a_camera_task_that_hangs_and_goes_on() {
+    let Application { camera, launch, watchdog } = Application::following("task-hangs", &[]);
+    let held = Held::threads(launch.id(), "ptz-camera");
+    assert_left_at_rest(&camera);
+    drop(held);
     wait_until_following(&camera);
     launch.signal("INT");
     launch.finish();

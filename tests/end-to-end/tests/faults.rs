@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::sync::mpsc;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use end_to_end::{PATIENCE, Running, scene};
 use gst::prelude::*;
 use ptztrack_contract::{CameraChange, CameraMessage};
-use virtual_camera::{Fault, ReceivedCommand, VirtualCamera};
+use virtual_camera::{Fault, VirtualCamera};
 
 /// Frames that must come while the fault lasts: four seconds of video.
 const FRAMES: usize = 60;
@@ -49,24 +49,9 @@ fn survives(fault: Fault, told: CameraChange) {
 
     camera.set_fault(Fault::None);
     camera_message(&mut running, CameraChange::Connected);
-    wait_for_a_move(&camera);
+    scene::wait_for_move(&camera, camera.status().commands);
     let told = running.complaints();
     assert_eq!(told.len(), 1, "recovery is no warning: {told:?}");
-}
-
-/// Accepted from now on: a camera that moves may have been told to before.
-#[track_caller]
-fn wait_for_a_move(camera: &VirtualCamera) {
-    let is_move = |command: &ReceivedCommand| {
-        command.status == 204 && command.query.contains("move=") && !command.query.contains("move=0,0")
-    };
-    let (before, mut seen) = (camera.status().commands, 0);
-    let until = Instant::now() + PATIENCE;
-    while !camera.commands_after(before).iter().any(is_move) {
-        let left = until.saturating_duration_since(Instant::now());
-        assert!(camera.wait_for(left, |status| status.commands > seen), "control did not resume");
-        seen = camera.status().commands;
-    }
 }
 
 /// Something for each frame that passes the pad.

@@ -4,7 +4,11 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs;
+use std::io::{Read, Write};
+use std::net::{SocketAddr, TcpListener};
 use std::path::Path;
+use std::sync::mpsc::{Receiver, channel};
+use std::time::{Duration, Instant};
 
 use end_to_end::following::Network;
 use end_to_end::{PATIENCE, Program, plugin_folder, scene, signal};
@@ -26,6 +30,59 @@ fn a_camera_that_refuses_an_account_that_worked_is_tried_again() {
     program.wait_for("/cameras", |cameras| cameras.contains("no picture"));
     camera.set_fault(Fault::None);
     program.launch.wait_for_line("door: the picture is there");
+    scene::wait_until_following(&camera);
+    program.end("TERM");
+    scene::assert_left_at_rest(&camera);
+}
+
+/// Somebody in a camera's place who, by RTSP, takes no user and password for right; and when whom he has refused went away.
+fn locked() -> (SocketAddr, Receiver<Instant>) {
+    const CHALLENGE: &[u8] =
+        b"RTSP/1.0 401 Unauthorized\r\nCSeq: 1\r\nWWW-Authenticate: Digest realm=\"AXIS\", nonce=\"17\"\r\n\r\n";
+    let listener = TcpListener::bind(("127.0.0.1", 0)).unwrap();
+    let address = listener.local_addr().unwrap();
+    let (tells, refused) = channel();
+    std::thread::spawn(move || {
+        for mut client in listener.incoming().map_while(Result::ok) {
+            let (mut bytes, mut said) = ([0; 4096], Vec::new());
+            while let Ok(read @ 1..) = client.read(&mut bytes) {
+                said.extend_from_slice(&bytes[..read]);
+                // Who goes away before that is no matter.
+                let _ = client.write_all(CHALLENGE);
+            }
+            if String::from_utf8_lossy(&said).contains("Authorization: Digest")
+                && tells.send(Instant::now()).is_err()
+            {
+                return;
+            }
+        }
+    });
+    (address, refused)
+}
+
+/// The same by RTSP, while the camera lets us steer: after 10 s, then after 20 s, as whoever tries on and on keeps an account locked.
+#[test]
+fn video_by_rtsp_that_refuses_an_account_that_worked_is_tried_again_at_growing_pauses() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let network = Network::before(&camera);
+    let file = |folder: &Path| {
+        Program::entry("door", &network.url(), &folder.join("password"))
+            + &format!("codec = \"h264\"\nrtsp = \"rtsp://{}\"\n", network.rtsp.address())
+    };
+    let mut program = Program::start("locked-rtsp", file, &[]);
+    scene::wait_until_following(&camera);
+    program.launch.wait_for_line("door: the picture is there");
+
+    let (address, refused) = locked();
+    network.rtsp.lead_to(address);
+    let line = program.launch.wait_for_line("the camera refuses user");
+    assert!(line.contains("tried again"), "{line}");
+    let [first, second] = [(); 2].map(|()| refused.recv_timeout(PATIENCE).unwrap());
+    network.rtsp.lead_to(camera.rtsp_address());
+    program.launch.wait_for_line("door: the picture is there");
+    // Whoever saw it late saw it too short: half of each is left for that.
+    let pauses = [second - first, second.elapsed()];
+    assert!(pauses[0] > Duration::from_secs(5) && pauses[1] > Duration::from_secs(15), "{pauses:?}");
     scene::wait_until_following(&camera);
     program.end("TERM");
     scene::assert_left_at_rest(&camera);
@@ -103,6 +160,39 @@ fn a_camera_whose_own_process_hangs_is_given_another() {
     assert_ne!(program.process_of("door"), process);
     scene::wait_until_following(&door);
     assert_eq!(program.ask("GET", "/healthz"), (200, "ok\n".to_owned()));
+    program.end("TERM");
+    [good, door].iter().for_each(scene::assert_left_at_rest);
+}
+
+/// Takes 50 MB more five times a second, without writing there, and gives none back.
+const LEAK: &str = "fakesrc sizetype=fixed sizemax=50000000 ! identity sleep-time=200000 \
+    ! queue max-size-buffers=0 max-size-bytes=0 max-size-time=0 min-threshold-buffers=100000 ! fakesink async=false";
+
+/// In its own process that ends at 2 GiB, and not where the machine does.
+#[test]
+fn a_camera_that_leaks_memory_loses_its_own_process_and_no_other_camera() {
+    let [good, door] = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    let network = Network::before(&good);
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        let pipeline = format!(
+            "appsrc name=source is-live=true do-timestamp=true format=time ! multipartdemux ! jpegdec \
+             ! queue leaky=downstream max-size-buffers=1 ! bgavgdetect ! lkfeaturetrack ! vapixptzsink {LEAK}"
+        );
+        Program::entry("good", &network.url(), &password)
+            + &Program::entry("door", &door.url(), &password)
+            + &format!("isolation = \"process\"\npipeline = {pipeline:?}\n")
+    };
+    let mut program = Program::start("leaks", file, &[]);
+    let process = program.process_of("door");
+    scene::wait_until_following(&good);
+    let (requests, commands) = (network.http.video_requests(), good.status().commands);
+    let line = program.launch.wait_for_line("door: error: its process ended: signal: ");
+    assert!(line.contains("it is started again"), "{line}");
+    program.launch.wait_for_line("door: the picture is there");
+    assert_ne!(program.process_of("door"), process);
+    assert_eq!(network.http.video_requests(), requests, "the other one is touched");
+    assert!(good.wait_for(PATIENCE, |status| status.commands > commands + 20), "not steered");
     program.end("TERM");
     [good, door].iter().for_each(scene::assert_left_at_rest);
 }

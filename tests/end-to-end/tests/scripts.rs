@@ -3,6 +3,7 @@
 //! What the Makefile calls, on systems that lack something: in a folder with nothing in PATH but what each needs.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
@@ -37,6 +38,29 @@ impl System {
             .unwrap()
     }
 
+    /// Has a program that does this.
+    fn program(&self, name: &str, what: &str) {
+        let file = self.0.join("bin").join(name);
+        fs::write(&file, format!("#!/bin/bash\n{what}\n")).unwrap();
+        fs::set_permissions(&file, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    }
+
+    /// What systemd, which runs where this system has a folder of that name, is told by a maintainer script of the package.
+    fn told_by(&self, script: &str, arguments: &[&str]) -> Vec<String> {
+        let told = self.0.join("told");
+        fs::write(&told, "").unwrap();
+        self.program("systemctl", &format!("echo \"$*\" >>{}", told.display()));
+        let of_system = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/debian").join(script);
+        let text = fs::read_to_string(of_system).unwrap();
+        assert!(text.contains(SYSTEMD_RUNS), "{text}");
+        let here = self.0.join(script);
+        fs::write(&here, text.replace(SYSTEMD_RUNS, self.0.join("systemd").to_str().unwrap())).unwrap();
+        let mut command = Command::new("/bin/sh");
+        let output = command.arg(here).args(arguments).env("PATH", self.0.join("bin")).output().unwrap();
+        assert!(output.status.success(), "{output:?}");
+        fs::read_to_string(told).unwrap().lines().map(str::to_owned).collect()
+    }
+
     /// What was built, as far as it has a name.
     fn build(&self, files: &[&str]) -> String {
         let build = self.0.join("build");
@@ -52,6 +76,9 @@ impl Drop for System {
     }
 }
 
+/// There where systemd runs (sd_booted(3)).
+const SYSTEMD_RUNS: &str = "/run/systemd/system";
+
 fn said(output: &Output) -> String {
     [&output.stdout, &output.stderr].map(|text| String::from_utf8_lossy(text)).concat()
 }
@@ -62,9 +89,7 @@ const BUILT: [&str; 5] =
 
 /// `pkg-config` that puts the plugins into the system's folder.
 fn pkg_config(system: &System) {
-    let file = system.0.join("bin/pkg-config");
-    fs::write(&file, format!("#!/bin/bash\necho {}\n", system.0.join("plugins").display())).unwrap();
-    fs::set_permissions(&file, std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
+    system.program("pkg-config", &format!("echo {}", system.0.join("plugins").display()));
 }
 
 #[test]
@@ -111,4 +136,23 @@ fn installing_builds_nothing() {
         !said(&output).contains("build --release") && !said(&output).contains("install-rust"),
         "{output:?}"
     );
+}
+
+/// All services, those that run and no others: what is not started by hand waits for its file of cameras.
+#[test]
+fn an_upgrade_restarts_the_services_that_run_once_their_new_units_are_known() {
+    let system = System::with("upgrade", &[]);
+    let none: [&str; 0] = [];
+    assert_eq!(system.told_by("postinst", &["configure", "1.0"]), none, "there is no systemd");
+    fs::create_dir(system.0.join("systemd")).unwrap();
+    assert_eq!(system.told_by("postinst", &["abort-upgrade", "1.0"]), none, "nothing is new");
+    let told = system.told_by("postinst", &["configure", "1.0"]);
+    let [reload, restart] = &told[..] else { panic!("{told:?}") };
+    assert_eq!(reload, "daemon-reload");
+    let (how, services) = restart.split_once(' ').unwrap();
+    assert_eq!(how, "try-restart");
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../deploy/systemd");
+    let units = fs::read_dir(folder).unwrap().map(|unit| unit.unwrap().file_name().into_string().unwrap());
+    let restarted: BTreeSet<_> = services.split(' ').map(str::to_owned).collect();
+    assert_eq!(restarted, units.collect::<BTreeSet<_>>());
 }
