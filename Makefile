@@ -175,7 +175,8 @@ deny: packages-build
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
 	$(CARGO) deny check advisories licenses bans sources
 
-## fuzz: feed INPUTS=10000000 inputs to each parser of what others say, under AddressSanitizer; those of earlier runs count
+## fuzz: feed INPUTS=10000000 inputs to each parser of what others say, under AddressSanitizer; those of earlier runs count until
+##       what reads them changes, and the least that reaches all code is kept in tests/fuzz/kept
 ##       (SANITIZER=none: four times as fast  INPUTS_SECONDS=number, for each parser at most)
 fuzz: packages-build
 	$(CARGO) build --workspace --lib

@@ -95,6 +95,11 @@ impl Program {
         }
     }
 
+    /// What the page counts by this name, of all cameras together.
+    pub fn metric(&self, name: &str) -> f64 {
+        sum_of(&self.ask("GET", "/metrics").1, name)
+    }
+
     /// The process of a camera that has one of its own.
     #[track_caller]
     pub fn process_of(&self, camera: &str) -> u32 {
@@ -135,6 +140,13 @@ impl Program {
     }
 }
 
+/// Of the lines `name{labels} value` of OpenMetrics.
+fn sum_of(metrics: &str, name: &str) -> f64 {
+    let labels = |line: &str| line.strip_prefix(name).is_some_and(|rest| rest.starts_with('{'));
+    let value = |line: &str| line.rsplit(' ').next()?.parse::<f64>().ok();
+    metrics.lines().filter(|line| labels(line)).filter_map(value).sum()
+}
+
 /// Status and body of what is asked of a page, host and port, by a name of it.
 pub fn ask_page(page: &str, name: &str, method: &str, path: &str) -> (u16, Vec<u8>) {
     let mut stream = TcpStream::connect(page).unwrap();
@@ -149,4 +161,17 @@ pub fn ask_page(page: &str, name: &str, method: &str, path: &str) -> (u16, Vec<u
     let end = answer.windows(4).position(|four| four == b"\r\n\r\n").unwrap();
     let head = String::from_utf8_lossy(&answer[..end]);
     (head.split(' ').nth(1).unwrap().parse().unwrap(), answer[end + 4..].to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_metric_is_that_of_all_cameras_and_no_other() {
+        let metrics = "# HELP p_total Pictures.\np_total{camera=\"a b\"} 3.0\np_total{camera=\"c\"} 4.0\n\
+                       p_dropped_total{camera=\"c\"} 8.0\n# EOF\n";
+        assert_eq!(sum_of(metrics, "p_total"), 7.0);
+        assert_eq!(sum_of(metrics, "q_total"), 0.0);
+    }
 }

@@ -15,6 +15,7 @@ use end_to_end::{Broker, Chance, Program, Watchdog, Way};
 use virtual_camera::{Fault, VirtualCamera};
 
 use crate::account::Account;
+use crate::counter::Counter;
 use crate::fault::Happening;
 use crate::known::{Known, OF_RTSPSRC};
 
@@ -27,7 +28,7 @@ const RESTS: Duration = Duration::from_secs(10);
 
 /// How often somebody asks the page for everything.
 const VISITS: Duration = Duration::from_secs(1);
-const PAGES: [&str; 4] = ["/", "/cameras", "/cameras/door/picture", "/metrics"];
+const PAGES: [&str; 3] = ["/", "/cameras", "/cameras/door/picture"];
 /// What a picture may be as large as.
 const SIZES: [&str; 2] = ["320x240", "240x180"];
 
@@ -41,6 +42,8 @@ pub struct Camera {
     broker: u16,
     watchdog: PathBuf,
     process: Arc<AtomicU32>,
+    /// That its programs have built.
+    pipelines: Counter,
 }
 
 /// How the picture of this camera comes.
@@ -70,6 +73,7 @@ impl Camera {
             broker: broker.port,
             watchdog: watchdog.program().to_owned(),
             process: Arc::default(),
+            pipelines: Counter::default(),
         };
         this.start_program();
         this
@@ -144,20 +148,23 @@ impl Camera {
     }
 
     fn end(mut self, mut account: Account) -> Account {
+        self.visit_page(Duration::ZERO);
         if let Some(program) = self.program.take() {
             let (status, output) = program.end_somehow("TERM");
             account.ended(status.success(), &output);
         }
         account.rests(left_at_rest(&self.camera, RESTS));
+        account.built(self.pipelines.total());
         account
     }
 
-    /// Somebody looks at the page for so long.
-    fn visit_page(&self, lasts: Duration) {
+    /// Somebody looks at the page, and at what it counts, for so long.
+    fn visit_page(&mut self, lasts: Duration) {
         let Some(program) = &self.program else { return };
         let begin = Instant::now();
         loop {
             PAGES.iter().for_each(|page| drop(program.ask("GET", page)));
+            self.pipelines.is(program.metric("ptztrack_pipelines_total") as u64);
             if begin.elapsed() >= lasts {
                 return;
             }

@@ -12,6 +12,7 @@
 
 mod account;
 mod camera;
+mod counter;
 mod fault;
 mod known;
 mod sample;

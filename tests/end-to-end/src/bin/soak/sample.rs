@@ -49,7 +49,9 @@ impl Samples {
     /// As a table, and as a plot of it.
     pub fn write(&self, out: &Path) {
         let mut table = "# time_s,camera,process,memory_mb,threads,files,requests_per_s\n".to_owned();
-        for camera in 0..4 {
+        // The plot shows the first four, whether they are there or not.
+        let cameras = self.0.iter().map(|sample| sample.camera + 1).max().unwrap_or(0).max(4);
+        for camera in 0..cameras {
             let samples = self.of(camera);
             for pair in samples.windows(2) {
                 let (a, b) = (pair[0], pair[1]);
