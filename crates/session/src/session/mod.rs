@@ -153,7 +153,7 @@ impl Session {
         }
         if finding != StopFinding::Fine {
             self.scheduler.found_moving(self.scheduler.stop());
-            self.is_told_in_vain();
+            self.was_told_in_vain();
         }
     }
 
@@ -166,7 +166,7 @@ impl Session {
             self.scheduler.found_moving(self.scheduler.stop());
             if self.speaker == Speaker::Newcomer {
                 // Who moved the camera need not have it said by somebody else.
-                self.is_told_in_vain();
+                self.was_told_in_vain();
             }
         }
     }

@@ -114,7 +114,7 @@ impl Session {
     }
 
     /// What whoever speaks has told the camera, and it said yes to, had no effect.
-    pub(super) fn is_told_in_vain(&mut self) {
+    pub(super) fn was_told_in_vain(&mut self) {
         if let Some(other) = &mut self.other {
             other.is_next = true;
         }
@@ -392,13 +392,10 @@ mod tests {
     fn who_was_told_yes_in_vain_gives_way_once_nothing_is_under_way() {
         let mut session = session();
         session.stop_confirmation = Some(StopConfirmation::default());
-        session.fails(&Error::Broken("reset".to_owned()));
+        session.fails(&broken());
         session.scheduler = Scheduler::new(PROTOCOL.keep_alive);
         session.stop_confirmation.as_mut().unwrap().stopped(Time::ZERO);
-        for picture in 0..5 {
-            let at = Time::from_millis(2000 + 40 * picture);
-            session.see_background(Some(0.5), at, at);
-        }
+        session.seen_turning(Time::from_millis(2000));
         assert!(!session.is_at_rest());
         assert_eq!(session.speaker(), Speaker::Newcomer);
         session.settle_speaker(Time::from_millis(3000));

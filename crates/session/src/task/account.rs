@@ -117,40 +117,15 @@ impl<C: Client> Account<C> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::fixtures::{PROTOCOL, client_settings, credentials};
+    use crate::fixtures::{Locked, client_settings, credentials};
     use crate::http::{ClientSettings, Trust};
-    use crate::{Error, Protocol, Request, Response};
-
-    /// Sends nothing.
-    #[derive(Debug)]
-    struct Silent(Identity);
-
-    impl Client for Silent {
-        const PROTOCOL: Protocol = PROTOCOL;
-
-        fn in_place_of(identity: Identity) -> Result<Self, Error> {
-            Ok(Self(identity))
-        }
-
-        fn identity(&self) -> Identity {
-            self.0.clone()
-        }
-
-        fn set_credentials(&mut self, credentials: Option<Credentials>) {
-            (self.0.settings.credentials, self.0.accepted) = (credentials, false);
-        }
-
-        async fn exchange(&mut self, _: &Request) -> Result<Response, Error> {
-            Err(Error::NoPtz)
-        }
-    }
 
     fn settings(password: &str) -> ClientSettings {
         ClientSettings { credentials: credentials(password), ..client_settings("http://192.168.0.90") }
     }
 
-    fn account(password: &str) -> Account<Silent> {
-        Account::new(Silent::new(settings(password)).unwrap())
+    fn account(password: &str) -> Account<Locked> {
+        Account::new(Locked::new(settings(password)).unwrap())
     }
 
     /// Whom the camera has let in.
@@ -160,7 +135,7 @@ mod tests {
         mover
     }
 
-    impl Account<Silent> {
+    impl Account<Locked> {
         fn speaks_as(&mut self) -> Option<Credentials> {
             self.client().identity().settings.credentials
         }

@@ -174,6 +174,7 @@ mod tests {
         assert_eq!(succeed("192.168.0.91"), Some(Stop::PanTilt));
         assert_eq!(succeed("192.168.0.91"), None, "it is seen to");
     }
+
     #[test]
     fn how_it_was_refused_is_handed_on_until_it_might_ask_again() {
         let mut refused = None;
