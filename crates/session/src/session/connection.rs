@@ -73,7 +73,7 @@ impl Connection {
     const FIRST_PAUSE: Duration = Duration::from_millis(125);
 
     /// Short enough for control to be back within two seconds of the camera's return.
-    const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+    pub const LONGEST_PAUSE: Duration = Duration::from_secs(1);
 
     /// A fault that comes again within this time is reported only if it lasts longer.
     const QUIET: Duration = Duration::from_secs(10);
@@ -115,7 +115,7 @@ impl Connection {
     pub fn succeeded(&mut self, of_command: bool, idle: bool) -> Option<ConnectionChange> {
         self.obeyed |= of_command;
         let mended = match &self.fault {
-            Some(fault) => of_command || !fault.of_command || (idle && fault.kind == FaultKind::Silent),
+            Some(fault) => of_command || !fault.of_command || idle && self.is_silence_only(fault),
             None => !self.connected,
         };
         if !mended {
@@ -125,6 +125,11 @@ impl Connection {
         let told = mem::take(&mut self.told);
         *self = Self { connected: true, obeyed: self.obeyed, told, ..Self::default() };
         news.then_some(ConnectionChange::Connected)
+    }
+
+    /// Whether nobody was refused in it.
+    fn is_silence_only(&self, fault: &Fault) -> bool {
+        fault.kind == FaultKind::Silent && self.forbidden.is_none()
     }
 
     /// Something failed. Reports the first failure of each kind in a row only, and none that was just told.
@@ -161,10 +166,9 @@ impl Connection {
         })
     }
 
-    /// What whoever speaks next as the same user is to know: how he is refused, and how long he is to wait.
+    /// What whoever speaks next as the same user is to know: how he was refused, and how long he is to wait yet.
     pub fn forbidden(&self, now: Time) -> Option<(Forbidden, Duration)> {
-        let wait = self.retry_at - now;
-        self.forbidden.clone().filter(|_| !wait.is_zero()).map(|forbidden| (forbidden, wait))
+        self.forbidden.clone().map(|forbidden| (forbidden, self.retry_at - now))
     }
 
     /// Whoever spoke before as the same user was refused so, and is to wait so long.
@@ -315,6 +319,20 @@ mod tests {
     }
 
     #[test]
+    fn a_question_answered_after_an_outage_does_not_have_what_is_not_permitted_tried_sooner() {
+        let mut connection = Connection::default();
+        connection.succeeded(true, false);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        connection.failed(&forbidden, true, ms(0));
+        connection.failed(&forbidden, true, ms(200));
+        connection.failed(&broken(), true, ms(300));
+        let retry_at = connection.retry_at();
+        connection.succeeded(false, true);
+        assert_eq!(connection.retry_at(), retry_at);
+        assert!(retry_at >= ms::<Time>(200) + Forbidden::PAUSE);
+    }
+
+    #[test]
     fn who_is_refused_as_who_spoke_before_waits_as_long_and_says_so() {
         let mut before = Connection::default();
         before.succeeded(true, false);
@@ -324,7 +342,8 @@ mod tests {
         before.failed(&forbidden, true, ms(200));
         let (handed_on, wait) = before.forbidden(ms(4200)).unwrap();
         assert_eq!(wait, ms(6000));
-        assert_eq!(before.forbidden(ms(10_200)), None, "he might ask again");
+        let (_, wait_by_then) = before.forbidden(ms(10_200)).unwrap();
+        assert_eq!(wait_by_then, Duration::ZERO, "he might ask again, and was refused all the same");
         let mut connection = Connection::default();
         let change = connection.inherit((handed_on, wait), ms(100));
         assert_eq!(change, Some(ConnectionChange::Refused(forbidden.clone())));

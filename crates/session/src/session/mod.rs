@@ -121,7 +121,9 @@ impl Session {
 
     /// He was refused when he tried to, as the same user, and was to wait so long before he tried again.
     pub fn inherit_refusal(&mut self, refusal: (Forbidden, Duration), now: Time) {
-        self.scheduler.attempted(&Command::Stop(self.stop()), now);
+        if !refusal.1.is_zero() {
+            self.scheduler.attempted(&Command::Stop(self.stop()), now);
+        }
         self.events.extend(self.connection.inherit(refusal, now).map(SessionEvent::Connection));
     }
 
@@ -145,15 +147,21 @@ impl Session {
     /// A picture shows the background to move so many fields of view a second, or does not tell: whether a camera that said
     /// yes to a stop has stopped. Nothing else of a picture matters here.
     pub fn see_background(&mut self, fields_s: Option<f64>, taken_at: Time, now: Time) {
-        let is_ours = self.is_at_rest() && !self.is_taken_over(now);
-        let Some(confirmation) = self.stop_confirmation.as_mut().filter(|_| is_ours) else { return };
+        let (is_at_rest, is_taken_over) = (self.is_at_rest(), self.is_taken_over(now));
+        // It may be somebody else who turns it, but nobody else who stops it.
+        let fields_s = fields_s.filter(|fields_s| !is_taken_over || StopConfirmation::is_rest(*fields_s));
+        let Some(confirmation) = self.stop_confirmation.as_mut().filter(|_| is_at_rest) else { return };
         let finding = confirmation.see(fields_s, taken_at);
         if finding == StopFinding::RepeatInVain {
             self.events.push(SessionEvent::StopInVain);
         }
-        if finding != StopFinding::Fine {
-            self.scheduler.found_moving(self.scheduler.stop());
-            self.was_told_in_vain();
+        match finding {
+            StopFinding::Unknown => {}
+            StopFinding::Rests => self.had_effect(),
+            StopFinding::Repeat | StopFinding::RepeatInVain => {
+                self.scheduler.found_moving(self.scheduler.stop());
+                self.was_told_in_vain();
+            }
         }
     }
 

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use servo::{Actuation, Time};
 
+use super::connection::Connection;
 use super::{Fact, Session, Speaker, Steering};
 use crate::{Command, Next, Query, Request, SessionEvent};
 
@@ -40,14 +41,20 @@ impl Session {
         let operator_until = self.arbitration.operator_until(now);
         let confirmation = self.stop_confirmation.as_ref().filter(|_| self.is_at_rest());
         let unseen_at = confirmation.and_then(|stop| stop.unseen_at(self.unseen_repeats()));
-        Next::Wait([due, Some(query_due), operator_until, unseen_at].into_iter().flatten().min())
+        let open_until = confirmation.and_then(|stop| stop.open_until().filter(|at| *at > now));
+        let reasons = [due, Some(query_due), operator_until, unseen_at, open_until, self.last_word_at()];
+        Next::Wait(reasons.into_iter().flatten().min())
     }
 
     /// The words for that, and when to say them.
     fn command(&self, actuation: Actuation, interval: Duration, now: Time) -> (Command, Option<Time>) {
         let retry_at = self.connection.retry_at();
         let stop = Command::Stop(self.stop());
-        let stop_due = || self.scheduler.stop_due(now, interval, retry_at).filter(|_| !self.is_deaf());
+        let stop_due = || {
+            let due = self.scheduler.stop_due(now, interval, retry_at).filter(|_| !self.is_deaf());
+            let is_soon = |at: &Time| *at <= now + Connection::LONGEST_PAUSE;
+            due.max(due.and(self.last_word_at().filter(is_soon)))
+        };
         match actuation {
             Actuation::Continue => (stop, None),
             Actuation::Rest => (stop, stop_due()),

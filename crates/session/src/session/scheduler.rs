@@ -140,9 +140,10 @@ impl Scheduler {
 
     /// Somebody else has moved the camera. Where it may be moving at our word too, what it does next tells whose move it
     /// is; but a zoom of ours goes on whatever pan and tilt do, and what looks like somebody else may be a move of ours that
-    /// went unanswered.
+    /// went unanswered. Where it has said yes to a stop and turns on, it is to be stopped, whoever moves it.
     pub fn contest(&mut self) {
-        self.contested = self.may_move && self.stop != Stop::AllAxes && !self.in_doubt();
+        let turns_on = self.accepted.as_ref().is_some_and(|(command, _)| command.is_stop());
+        self.contested = self.may_move && self.stop != Stop::AllAxes && !self.in_doubt() && !turns_on;
     }
 
     /// Whether that is being found out.
@@ -277,6 +278,11 @@ mod tests {
         scheduler.contest();
         assert!(!scheduler.is_contested(), "an unanswered move may be what turns it");
         assert!(scheduler.stop_due(ms(100), INTERVAL, ms(0)).is_some());
+        let mut scheduler = Scheduler::new(Duration::from_secs(2));
+        accept(&mut scheduler, HALT, ms(0));
+        scheduler.found_moving(Stop::PanTilt);
+        scheduler.contest();
+        assert!(!scheduler.is_contested(), "it turns on after its yes");
     }
 
     #[test]

@@ -82,6 +82,7 @@ impl Session {
 
     /// The camera may be asked anew: its owner is another. He need not wait for whom it does not hear.
     pub fn owner_changed(&mut self, now: Time) {
+        let at_rest = self.is_at_rest();
         match (&mut self.other, self.speaker) {
             (Some(owner), Speaker::Mover) => {
                 *owner = Standing::of_another(&owner.queue);
@@ -90,7 +91,8 @@ impl Session {
                 }
             }
             (Some(mover), _) => {
-                mover.is_next = false;
+                // Who is new tells it himself, unless nothing is left to be told but what the mover says.
+                mover.is_next &= at_rest;
                 self.connection = Connection::default();
                 self.arbitration.queue = self.arbitration.queue.of_another();
             }
@@ -103,11 +105,12 @@ impl Session {
 
     /// Where nobody else is needed any more to stop the camera, its owner may move it. Whoever would not be heard leaves it to the other.
     pub fn settle_speaker(&mut self, now: Time) {
-        let gives_way = self.other.as_mut().is_some_and(|other| mem::take(&mut other.is_next));
+        let is_next = self.other.as_ref().is_some_and(|other| other.is_next);
+        if is_next && self.pass_turn(now) {
+            return;
+        }
         if self.has_stopped(now) {
             self.decide_speaker();
-        } else if gives_way {
-            self.give_way(now);
         } else if self.arbitration.queue.heard_at() > now {
             self.pass_turn(now);
         }
@@ -120,17 +123,26 @@ impl Session {
         }
     }
 
-    /// The other tells it, even where it has said yes once more meanwhile: that is worth no more than the yes before.
-    fn give_way(&mut self, now: Time) {
-        if self.pass_turn(now) {
-            self.scheduler.found_moving(self.stop());
+    /// It had.
+    pub(super) fn had_effect(&mut self) {
+        if let Some(other) = &mut self.other {
+            other.is_next = false;
         }
+    }
+
+    /// When whoever moved the camera may stop it, where he is next.
+    pub(super) fn last_word_at(&self) -> Option<Time> {
+        let is_heard = |mover: &&Standing| mover.is_next && !mover.connection.halted();
+        let mover = self.other.as_ref().filter(|_| self.speaker == Speaker::Newcomer).filter(is_heard)?;
+        Some(mover.heard_at())
     }
 
     /// Whether nothing is left to be told for the camera to rest for good.
     pub fn has_stopped(&self, now: Time) -> bool {
         let most = self.unseen_repeats();
-        self.stays_at_rest() && !self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(most, now))
+        let is_open = self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(most, now));
+        let waits = self.last_word_at().is_some_and(|at| at <= now + Forbidden::PAUSE);
+        self.stays_at_rest() && !is_open && !waits
     }
 
     /// It did as whoever speaks has told it; where its yes is not to be trusted, that shows later.
@@ -147,6 +159,10 @@ impl Session {
         let is_heard =
             !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at);
         if is_heard {
+            if other.is_next {
+                // Even where it has said yes once more meanwhile: that is worth no more than the yes before.
+                self.scheduler.found_moving(self.stop());
+            }
             self.exchange();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
         } else if self.connection.halted() && other.connection.halted() {
@@ -231,12 +247,16 @@ mod tests {
     const ASK: Request = Request::Query(Query::Position);
 
     impl Session {
-        /// What is sent at this time, if anything.
-        fn sends(&mut self, now: Time) -> Option<Request> {
+        /// What is done at this time.
+        fn next(&mut self, now: Time) -> Next {
             self.settle_speaker(now);
             self.catch_up(now);
-            let next = with_steering(|steering| self.next_request(Actuation::Rest, steering, now));
-            let Next::Do(request) = next else { return None };
+            with_steering(|steering| self.next_request(Actuation::Rest, steering, now))
+        }
+
+        /// What is sent at this time, if anything.
+        fn sends(&mut self, now: Time) -> Option<Request> {
+            let Next::Do(request) = self.next(now) else { return None };
             self.sending(&request, now);
             Some(request)
         }
@@ -414,6 +434,74 @@ mod tests {
         assert_eq!(said.first(), Some(&Speaker::Newcomer));
         assert_eq!(said.last(), Some(&Speaker::Mover), "{said:?}");
         assert!(said.len() <= 3, "once: {said:?}");
+        assert_eq!(session.speaker(), Speaker::Owner);
+    }
+
+    /// What the newcomer said is repeated without a pause then, and the mover's pause has grown.
+    #[test]
+    fn whoever_moved_the_camera_has_the_last_word_at_the_end_too() {
+        let mut session = untrusted(false);
+        assert_eq!([0; 3].map(|_| session.fails(&broken())).last(), Some(&Speaker::Newcomer));
+        session.leave(Time::ZERO);
+        let said: Vec<_> =
+            (1..10).flat_map(|tenth| session.obeyed_at(Time::from_millis(100 * tenth))).collect();
+        assert_eq!(said.last(), Some(&Speaker::Mover), "{said:?}");
+        assert!(said.len() <= 3, "{said:?}");
+        assert!(session.stays_at_rest());
+    }
+
+    /// The mover was refused, and may ask again only after twenty seconds.
+    fn with_refused_mover() -> Session {
+        let mut session = untrusted(false);
+        let forbidden = Error::NotPermitted { user: "root".to_owned() };
+        assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
+        for _ in 0..2 {
+            session.other.as_mut().unwrap().connection.failed(&forbidden, true, Time::ZERO);
+        }
+        session
+    }
+
+    impl Session {
+        /// Everything is answered with yes up to that time, and nobody asks for the position; returns who said a stop, and when.
+        fn obeyed_until(&mut self, from: Time, until: Time) -> Vec<(Speaker, Time)> {
+            let (mut said, mut now) = (Vec::new(), from);
+            while now < until {
+                said.extend(self.obeyed_at(now).into_iter().map(|speaker| (speaker, now)));
+                self.next_poll = until;
+                let Next::Wait(Some(wake)) = self.next(now) else { panic!("all is said") };
+                assert!(wake > now);
+                now = wake;
+            }
+            said
+        }
+    }
+
+    #[test]
+    fn whoever_moved_the_camera_has_the_last_word_however_long_he_is_to_wait() {
+        let second = |seconds: u64| Time::from_millis(1000 * seconds);
+        let mut session = with_refused_mover();
+        let said = session.obeyed_until(Time::ZERO, second(15));
+        assert!(
+            said.iter().all(|(speaker, at)| *speaker == Speaker::Newcomer && *at < second(10)),
+            "{said:?}"
+        );
+        assert!(session.stays_at_rest() && !session.has_stopped(second(15)));
+        // Another password is no reason to forget him.
+        session.owner_changed(second(15));
+        assert_eq!(session.obeyed_until(second(15), second(22)), [(Speaker::Mover, second(20))]);
+        session.obeyed_until(second(22), second(40));
+        assert_eq!(session.speaker(), Speaker::Owner);
+    }
+
+    #[test]
+    fn nobody_waits_for_the_mover_where_the_camera_is_seen_to_rest() {
+        let mut session = with_refused_mover();
+        told_in_vain(&mut session);
+        let later = Time::from_millis(3000);
+        assert_eq!(session.obeyed_at(later), [Speaker::Newcomer]);
+        let shown = Time::from_millis(4500);
+        session.see_background(Some(0.0), shown, shown);
+        session.settle_speaker(shown);
         assert_eq!(session.speaker(), Speaker::Owner);
     }
 

@@ -15,6 +15,8 @@ pub struct StopConfirmation {
     turned_at: Time,
     /// How often it was told again.
     repeated: u32,
+    /// How often of these no picture had told of it.
+    unseen: u32,
     /// No more pictures are to come.
     leaving: bool,
 }
@@ -22,8 +24,10 @@ pub struct StopConfirmation {
 /// What is to be done about a stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StopFinding {
-    /// Nothing.
-    Fine,
+    /// Nothing: it is too early, or does not tell.
+    Unknown,
+    /// Nothing: the camera rests.
+    Rests,
     /// The camera is to be told again.
     Repeat,
     /// The same, and somebody is to know that it was told often enough.
@@ -72,42 +76,52 @@ impl StopConfirmation {
         *self = Self { leaving: self.leaving, ..Self::default() };
     }
 
+    /// Whether a camera rests whose background moves so many fields of view a second.
+    pub fn is_rest(fields_s: f64) -> bool {
+        fields_s <= Self::NOISE_FIELDS_S
+    }
+
     /// A picture shows the background to move so many fields of view a second, or does not tell.
     pub fn see(&mut self, fields_s: Option<f64>, taken_at: Time) -> StopFinding {
-        let Some((since, fields_s)) = self.since.zip(fields_s) else { return StopFinding::Fine };
+        let Some((since, fields_s)) = self.since.zip(fields_s) else { return StopFinding::Unknown };
         if taken_at < since + Self::SHOWN_AFTER {
-            return StopFinding::Fine;
+            return StopFinding::Unknown;
         }
-        if fields_s <= Self::NOISE_FIELDS_S {
+        if Self::is_rest(fields_s) {
             self.forget();
-            return StopFinding::Fine;
+            return StopFinding::Rests;
         }
         (self.turning, self.turned_at) = (self.turning + 1, taken_at);
         if self.turning < Self::PICTURES {
-            return StopFinding::Fine;
+            return StopFinding::Unknown;
         }
         (self.since, self.repeated) = (None, self.repeated + 1);
-        if self.repeated == Self::IN_VAIN { StopFinding::RepeatInVain } else { StopFinding::Repeat }
+        let shown = self.repeated - self.unseen;
+        if shown == Self::IN_VAIN { StopFinding::RepeatInVain } else { StopFinding::Repeat }
     }
 
     /// When the stop is to be repeated if no picture tells of it by then, and it was so no more often than that.
     pub fn unseen_at(&self, most: u32) -> Option<Time> {
         let after = if self.leaving { Duration::ZERO } else { Self::UNSEEN_AFTER };
         // Too few to tell are none.
-        self.since.filter(|_| self.repeated < most).map(|since| since.max(self.turned_at) + after)
+        self.since.filter(|_| self.unseen < most).map(|since| since.max(self.turned_at) + after)
     }
 
     /// Whether it may yet have to be repeated.
     pub fn is_open(&self, most: u32, now: Time) -> bool {
-        let last = |since: Time| since.max(self.turned_at) + Self::UNSEEN_AFTER;
-        self.since.is_some_and(|since| self.repeated < most || now < last(since))
+        self.since.is_some() && self.unseen < most || self.open_until().is_some_and(|until| now < until)
+    }
+
+    /// When no picture will tell of it any more.
+    pub fn open_until(&self) -> Option<Time> {
+        self.since.map(|since| since.max(self.turned_at) + Self::UNSEEN_AFTER)
     }
 
     /// Whether it is to be repeated for that now; asked once for each time.
     pub fn repeats_unseen(&mut self, most: u32, now: Time) -> bool {
         let is_due = self.unseen_at(most).is_some_and(|at| at <= now);
         if is_due {
-            (self.since, self.repeated) = (None, self.repeated + 1);
+            (self.since, self.repeated, self.unseen) = (None, self.repeated + 1, self.unseen + 1);
         }
         is_due
     }
@@ -150,7 +164,9 @@ mod tests {
             let at = 10_000 * round;
             confirmation.stopped(ms(at));
             told.extend(
-                pictures(&mut confirmation, at + 1300, 0.3).into_iter().filter(|it| *it != StopFinding::Fine),
+                pictures(&mut confirmation, at + 1300, 0.3)
+                    .into_iter()
+                    .filter(|it| *it != StopFinding::Unknown),
             );
         }
         assert_eq!(told.len(), 6);
@@ -161,10 +177,36 @@ mod tests {
     }
 
     #[test]
+    fn what_pictures_have_shown_does_not_count_where_none_tell_any_more() {
+        let mut confirmation = StopConfirmation::default();
+        for at in [0, 10_000] {
+            confirmation.stopped(ms(at));
+            assert!(pictures(&mut confirmation, at + 1300, 0.3).contains(&StopFinding::Repeat));
+        }
+        confirmation.stopped(ms(20_000));
+        assert!(confirmation.repeats_unseen(1, ms(23_000)));
+    }
+
+    #[test]
+    fn somebody_knows_of_three_that_pictures_have_shown_to_be_in_vain_whatever_none_told_of_in_between() {
+        let mut confirmation = StopConfirmation::default();
+        let mut told = Vec::new();
+        for (at, is_seen) in [(0, true), (10_000, true), (20_000, false), (30_000, true)] {
+            confirmation.stopped(ms(at));
+            if is_seen {
+                told.extend(pictures(&mut confirmation, at + 1300, 0.3));
+            } else {
+                assert!(confirmation.repeats_unseen(1, ms(at + 3000)));
+            }
+        }
+        assert!(told.contains(&StopFinding::RepeatInVain));
+    }
+
+    #[test]
     fn a_stop_that_no_picture_tells_of_is_repeated_once() {
         let mut confirmation = StopConfirmation::default();
         confirmation.stopped(ms(1000));
-        assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Fine);
+        assert_eq!(confirmation.see(None, ms(3000)), StopFinding::Unknown);
         assert!(!confirmation.repeats_unseen(1, ms(3999)) && confirmation.is_open(1, ms(4000)));
         assert!(confirmation.repeats_unseen(1, ms(4000)));
         confirmation.stopped(ms(4000));
@@ -180,7 +222,7 @@ mod tests {
         let mut confirmation = StopConfirmation::default();
         confirmation.stopped(ms(1000));
         for picture in 3..6 {
-            assert_eq!(confirmation.see(Some(0.5), ms(1000 * picture)), StopFinding::Fine);
+            assert_eq!(confirmation.see(Some(0.5), ms(1000 * picture)), StopFinding::Unknown);
             assert!(!confirmation.repeats_unseen(1, ms(1000 * picture + 2500)));
         }
         assert!(

@@ -442,7 +442,7 @@ mod tests {
         next
     }
 
-    /// Else a service manager that starts the application again and again would keep it locked.
+    /// Else whoever builds the pipeline again and again would keep it locked.
     #[test]
     fn an_account_that_is_locked_is_not_tried_anew_at_each_restart() {
         let location = "http://restarted.test";

@@ -77,8 +77,7 @@ impl Predecessor {
 
     fn refusal(&self) -> Option<(Forbidden, Duration)> {
         let (forbidden, until) = lock(&self.statistics).forbidden.clone()?;
-        let wait = until.saturating_duration_since(Instant::now());
-        (!wait.is_zero()).then_some((forbidden, wait))
+        Some((forbidden, until.saturating_duration_since(Instant::now())))
     }
 
     /// Whether there is nothing left to do.
@@ -95,13 +94,13 @@ impl Predecessor {
     pub async fn stop<C: Client>(&self, mailbox: &Mailbox) {
         let identity = lock(&self.identity).clone();
         let Ok(mut client) = C::in_place_of(identity) else { return };
-        let (stop, mut forbidden) = {
+        let (stop, refused) = {
             let mut statistics = lock(&self.statistics);
             // For whoever comes next, until it is known better.
             statistics.status.moving = true;
-            let forbidden = statistics.forbidden.clone().map(|(forbidden, _)| forbidden);
-            (Command::Stop(statistics.stop.unwrap_or(Stop::Position)), forbidden)
+            (Command::Stop(statistics.stop.unwrap_or(Stop::Position)), statistics.forbidden.clone())
         };
+        let (mut forbidden, not_before) = refused.unzip();
         let tries = async {
             while !mailbox.take().quit {
                 match client.exchange(&Request::Command(stop)).await {
@@ -121,6 +120,7 @@ impl Predecessor {
                 }
             }
         };
+        sleep_until(not_before.unwrap_or_else(Instant::now).into()).await;
         // Whoever cannot be stopped by then is not to be by us.
         let _ = timeout(LAST_RETRIES, tries).await;
     }
@@ -154,6 +154,16 @@ mod tests {
         }
     }
 
+    /// The same, whom the camera has refused, and who is to wait so long before he asks again.
+    fn refused(name: &str, wait: Duration) -> Predecessor {
+        let mut refused = None;
+        Forbidden::again(&mut refused, &Error::NotPermitted { user: "root".to_owned() }, Duration::ZERO);
+        let predecessor = left(name, true);
+        let until = Instant::now() + wait;
+        lock(&predecessor.statistics).forbidden = refused.map(|forbidden| (forbidden, until));
+        predecessor
+    }
+
     /// Whoever comes next stops the camera again.
     #[test]
     fn an_unanswered_move_is_handed_over_even_where_the_camera_is_at_rest() {
@@ -176,17 +186,26 @@ mod tests {
     }
 
     #[test]
-    fn how_it_was_refused_is_handed_on_until_it_might_ask_again() {
-        let mut refused = None;
-        Forbidden::again(&mut refused, &Error::NotPermitted { user: "root".to_owned() }, Duration::ZERO);
-        let now = Instant::now();
-        for (until, is_handed_on) in [(now + Duration::from_secs(3600), true), (now, false)] {
-            let predecessor = left("192.168.0.94", true);
-            lock(&predecessor.statistics).forbidden = refused.clone().map(|forbidden| (forbidden, until));
+    fn how_it_was_refused_and_for_how_long_yet_is_handed_on() {
+        let hour = Duration::from_secs(3600);
+        for (after, is_to_wait) in [(hour, true), (Duration::ZERO, false)] {
+            let predecessor = refused("192.168.0.94", after);
             predecessor.leave();
             let left = Predecessor::succeed(&camera("192.168.0.94")).unwrap();
-            assert_eq!(left.refusal.is_some(), is_handed_on);
+            let (_, wait) = left.refusal.unwrap();
+            assert_eq!(wait > Duration::ZERO, is_to_wait);
         }
+    }
+
+    #[test]
+    fn who_is_to_wait_before_it_asks_again_waits_without_a_control_loop_too() {
+        let predecessor = refused("192.168.0.96", Duration::from_secs(3600));
+        lock(&predecessor.identity).settings.credentials = credentials("pass");
+        let mailbox = Mailbox::new(Clock::running());
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let tries = async { timeout(LAST_RETRIES_PAUSE, predecessor.stop::<Locked>(&mailbox)).await };
+        assert!(runtime.block_on(tries).is_err());
+        assert_eq!(Locked::refused(&address("192.168.0.96"), "pass"), 0);
     }
 
     /// The watchdog tries, too, as nobody has given the lease back.

@@ -3,6 +3,7 @@
 //! The camera in others' hands, or perhaps in others' hands.
 
 use super::*;
+use ptztrack_contract::Vector;
 use servo::Access;
 use session::{Parameters, Protocol, QueuePlace};
 
@@ -237,4 +238,31 @@ fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera(
     }
     assert!(rig.control.session().is_taken_over(rig.now));
     assert_eq!(rig.sent, [HALT]);
+}
+
+/// Nobody else stops it for us.
+#[test]
+fn a_stop_that_pictures_show_is_not_repeated_whoever_seems_to_move_the_camera() {
+    let protocol = Protocol { confirms_stops: true, ..vapix::Client::PROTOCOL };
+    let control = ControlLoop::new(ServoSettings::default(), &protocol);
+    let mut rig = Rig { control, now: ms(1000), sent: Vec::new() };
+    for _ in 0..10 {
+        rig.after(ms(5000));
+    }
+    rig.aside(ms(500), |_| None);
+    rig.control.release();
+    assert_eq!(rig.after(ms(10)), [HALT]);
+    let mut pan_deg = 0.0;
+    while !rig.control.session().is_taken_over(rig.now) {
+        pan_deg -= 5.0;
+        rig.now += ms(250);
+        rig.run_jobs(positioned(|| at(pan_deg)));
+    }
+    for _ in 0..8 {
+        rig.now += ms(500);
+        let nobody = Measurement { visibility: Visibility::Gone, ..Measurement::at(0.5, 0.5, rig.now) };
+        rig.control.measure(Measurement { ego_velocity: Some(Vector::default()), ..nobody }, rig.now);
+        rig.run_jobs(positioned(|| at(pan_deg)));
+    }
+    assert_eq!(rig.sent, []);
 }
