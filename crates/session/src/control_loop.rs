@@ -100,10 +100,7 @@ impl ControlLoop {
 
     /// Takes the newest picture of the target.
     pub fn measure(&mut self, measurement: Measurement, now: Time) {
-        // A zoom moves the picture's edges by half as much as it grows.
-        let zoom = measurement.ego_zoom.map_or(0.0, |zoom| zoom.abs() / 2.0);
-        let shown = measurement.ego_velocity.map(|ego| ego.x.hypot(ego.y).max(zoom));
-        self.session.see_background(shown, measurement.taken_at, now);
+        self.session.see_background(measurement.background_fields_s(), measurement.taken_at, now);
         let actuator = self.session.actuator(now);
         let overtakes = self.servo.is_behind();
         if !self.session.is_connected() {

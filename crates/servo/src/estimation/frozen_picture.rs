@@ -11,6 +11,10 @@ use crate::model::{CommandHistory, Delays};
 #[derive(Debug, Default)]
 pub struct FrozenPictureDetector {
     frozen: bool,
+    /// Pictures in a row that showed the background to move.
+    moving: u32,
+    /// When the last of enough of them was taken.
+    moved_at: Time,
     /// When the camera was first sent to a position since the picture changed.
     sent_off: Option<Time>,
     /// When the camera last did not answer.
@@ -20,6 +24,9 @@ pub struct FrozenPictureDetector {
 impl FrozenPictureDetector {
     /// By then a command shows in the picture, or after the delay that was learned.
     const SHOWN_AFTER: Duration = Duration::from_millis(1200);
+
+    /// Pictures that have to agree on the background's motion: one may be made anew by the encoder.
+    const PICTURES: u32 = 5;
 
     /// Delays are tried in steps of this.
     const STEP: Duration = Duration::from_millis(100);
@@ -44,7 +51,12 @@ impl FrozenPictureDetector {
 
     /// Takes a picture `fov_deg` wide, and the rates that the camera was told.
     pub fn see(&mut self, picture: &Measurement, fov_deg: f64, history: &CommandHistory, delays: &Delays) {
-        let Some(unchanged_for) = picture.unchanged_for else { return };
+        self.heed_background(picture);
+        let Some(mut unchanged_for) = picture.unchanged_for else { return };
+        // Before a dull wall hardly a pixel tells of a turn; but nobody turns for so long and nothing tells of it.
+        if unchanged_for < Self::SHOWN_AFTER {
+            unchanged_for = unchanged_for.min(picture.taken_at - self.moved_at);
+        }
         let shown_after = Self::SHOWN_AFTER.max(delays.sum() + delays.uncertainty);
         let (taken_at, unchanged_since) = (picture.taken_at, picture.taken_at - unchanged_for);
         self.sent_off = self.sent_off.filter(|sent| *sent >= unchanged_since);
@@ -61,6 +73,14 @@ impl FrozenPictureDetector {
         self.frozen = !unchanged_for.is_zero() && (self.frozen || in_touch && has_moved);
     }
 
+    fn heed_background(&mut self, picture: &Measurement) {
+        let Some(fields_s) = picture.background_fields_s() else { return };
+        self.moving = if fields_s > Measurement::NOISE_FIELDS_S { self.moving + 1 } else { 0 };
+        if self.moving >= Self::PICTURES {
+            self.moved_at = picture.taken_at;
+        }
+    }
+
     /// Whether the last picture was.
     pub fn is_frozen(&self) -> bool {
         self.frozen
@@ -71,6 +91,7 @@ impl FrozenPictureDetector {
 mod tests {
     use super::*;
     use crate::model::PanTilt;
+    use ptztrack_contract::Vector;
 
     const FOV_DEG: f64 = 55.0;
 
@@ -109,6 +130,28 @@ mod tests {
         assert_eq!(noticed(2.0, 0, &delays(200)), None, "some cameras do not turn so slowly");
         assert_eq!(noticed(0.0, 0, &delays(200)), None);
         assert_eq!(noticed(20.0, 6000, &delays(200)), None);
+    }
+
+    /// As by somebody who fills much of the view, before a wall without marks.
+    #[test]
+    fn a_picture_of_which_hardly_anything_changes_is_not_frozen_while_its_background_is_seen_to_move() {
+        // A pixel in a hundred changes every so many pictures.
+        let frozen = |changes: u64, fields_s: fn(u64) -> f64| {
+            let (mut detector, mut history) = (FrozenPictureDetector::default(), CommandHistory::default());
+            history.push(ms(0), PanTilt::new(10.0, 0.0));
+            (1..200).any(|picture| {
+                let unchanged_for = Some(ms::<Duration>(40 * (picture % changes)));
+                let ego_velocity = Some(Vector { x: fields_s(picture), y: 0.0 });
+                let at = Measurement::at(0.9, 0.5, ms(40 * picture));
+                let measurement = Measurement { unchanged_for, ego_velocity, ..at };
+                detector.see(&measurement, FOV_DEG, &history, &delays(200));
+                detector.is_frozen()
+            })
+        };
+        assert!(!frozen(25, |_| -10.0 / FOV_DEG));
+        assert!(frozen(25, |_| 0.002), "that is noise");
+        assert!(frozen(25, |picture| if picture % 25 < 4 { 0.1 } else { 0.0 }), "an encoder's");
+        assert!(frozen(1000, |_| -10.0 / FOV_DEG), "nothing has changed for too long");
     }
 
     /// It may be at the end of its range by now, or have stopped by itself.

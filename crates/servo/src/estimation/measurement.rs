@@ -56,6 +56,16 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// What a background at rest seems to move in a second, in fields of view.
+    pub const NOISE_FIELDS_S: f64 = 0.02;
+
+    /// How many fields of view a second the background moves, where it was seen.
+    pub fn background_fields_s(&self) -> Option<f64> {
+        // A zoom moves the picture's edges by half as much as it grows.
+        let zoom = self.ego_zoom.map_or(0.0, |zoom| zoom.abs() / 2.0);
+        self.ego_velocity.map(|ego| ego.x.hypot(ego.y).max(zoom))
+    }
+
     /// What the background would show had the camera only turned; `None` where it was not seen.
     pub fn without_zoom(&self) -> Option<Self> {
         let (turned, zoom) = self.ego_velocity.zip(self.ego_zoom)?;

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use servo::Time;
+use servo::{Measurement, Time};
 
 /// Whether a camera that was told to stop, and said yes, is seen to do so: some say yes and turn on.
 #[derive(Debug, Default)]
@@ -44,9 +44,6 @@ impl StopConfirmation {
     /// Pictures that have to agree.
     const PICTURES: u32 = 5;
 
-    /// What a background at rest seems to move in a second, in fields of view.
-    const NOISE_FIELDS_S: f64 = 0.02;
-
     /// After so many stops in vain somebody is to know; and after twice as many it may be somebody else who moves it.
     pub const IN_VAIN: u32 = 3;
 
@@ -78,7 +75,7 @@ impl StopConfirmation {
 
     /// Whether a camera rests whose background moves so many fields of view a second.
     pub fn is_rest(fields_s: f64) -> bool {
-        fields_s <= Self::NOISE_FIELDS_S
+        fields_s <= Measurement::NOISE_FIELDS_S
     }
 
     /// A picture shows the background to move so many fields of view a second, or does not tell.
