@@ -10,7 +10,7 @@ use std::time::Instant;
 
 use common::{FRAME, Heard, PATIENCE, Rig, camera, moves, target};
 use gst::prelude::*;
-use ptztrack_contract::{BufferMeta, CameraChange, CameraEvent, TargetMeta, TargetState};
+use ptztrack_contract::{BufferMeta, CameraChange, CameraEvent, Rect, TargetMeta, TargetState, Vector};
 use virtual_camera::{Auth, Settings, VirtualCamera};
 
 const STATES_WITHOUT_TARGET: [TargetState; 2] = [TargetState::Searching, TargetState::Lost];
@@ -155,6 +155,43 @@ fn pictures_without_target_meta_stop_the_camera() {
             assert_eq!(rig.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
         }
     });
+}
+
+/// Somebody who walks out of the picture, followed.
+fn with_somebody_leaving(camera: &VirtualCamera) -> (Rig, TargetMeta) {
+    let mut rig = Rig::ready(&camera.url()).with("search-time", 60_000_000_000u64).play();
+    let leaving = TargetMeta {
+        bounds: Rect { x: 0.8, y: 0.2, width: 0.2, height: 0.4 },
+        velocity: Vector { x: 0.1, y: 0.0 },
+        ..target(TargetState::Tracking, 0.9, 0.4)
+    };
+    rig.push_until(&leaving, camera, |status| status.moving);
+    (rig, leaving)
+}
+
+#[test]
+fn whoever_is_let_go_as_they_leave_is_not_gone_after() {
+    let camera = camera(Auth::None);
+    let (mut rig, leaving) = with_somebody_leaving(&camera);
+    rig.push(&TargetMeta { state: TargetState::Searching, ..leaving });
+    rig.push_until(&TargetMeta::default(), &camera, |status| !status.moving);
+}
+
+#[test]
+fn whoever_leaves_is_not_gone_after_on_the_way_home() {
+    let camera = camera(Auth::None);
+    let (mut rig, leaving) = with_somebody_leaving(&camera);
+    rig.sink.set_property_from_str("steering", "home");
+    rig.push_until(&TargetMeta { state: TargetState::Lost, ..leaving }, &camera, |status| !status.moving);
+}
+
+#[test]
+fn whoever_leaves_is_gone_after_only_as_long_as_that_is_wanted() {
+    let camera = camera(Auth::None);
+    let (mut rig, leaving) = with_somebody_leaving(&camera);
+    rig.push(&TargetMeta { state: TargetState::Lost, ..leaving });
+    rig.sink.set_property("search-time", 0u64);
+    rig.push_until(&TargetMeta::default(), &camera, |status| !status.moving);
 }
 
 #[test]

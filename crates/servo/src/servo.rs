@@ -51,6 +51,8 @@ struct Target {
     considered: bool,
     /// Since when it is not known whether the camera is ours to follow it.
     undecided_since: Option<Time>,
+    /// When the newest picture was taken after it went out of view; `None`: it did not.
+    missed_at: Option<Time>,
 }
 
 impl Servo {
@@ -121,7 +123,10 @@ impl Servo {
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => measurement.taken_at.min(now),
             (Visibility::Predicted, Some(target)) => target.last_seen,
-            (Visibility::Predicted, None) | (Visibility::Gone, _) => {
+            (Visibility::Predicted, None) | (Visibility::Gone | Visibility::Released, _) => {
+                if self.goes_after(&measurement, actuator.mode, now) {
+                    return None;
+                }
                 self.lose();
                 self.home.alone(now, now + self.settings.stale_timeout);
                 return None;
@@ -138,8 +143,22 @@ impl Servo {
         self.estimator.see(&measurement, &view, &self.camera.history, &self.delays());
         let oscillates = self.oscillates(&measurement, &view);
         let undecided_since = self.target.as_ref().and_then(|target| target.undecided_since);
-        self.target = Some(Target { measurement, last_seen, considered: false, undecided_since });
+        let missed_at = None;
+        self.target = Some(Target { measurement, last_seen, considered: false, undecided_since, missed_at });
         oscillates.then(|| self.controller.oscillation.gain_scale())
+    }
+
+    /// Takes a picture without the target. Returns whether the camera turns on to where it must be by now, as it went out of view.
+    fn goes_after(&mut self, picture: &Measurement, mode: Mode, now: Time) -> bool {
+        let Some(target) = &mut self.target else { return false };
+        let was_lost = picture.visibility != Visibility::Released;
+        let left = was_lost && (target.missed_at.is_some() || target.measurement.leaves_view());
+        // A move to a position is over before anybody could tell where that is.
+        let goes_after = left && mode == Mode::Velocity && now < target.last_seen + self.settings.search_time;
+        if goes_after {
+            target.missed_at = Some(picture.taken_at.min(now));
+        }
+        goes_after
     }
 
     /// Whether nobody can steer by this picture, as it stays the same though the camera was told to turn.
@@ -278,6 +297,11 @@ impl Servo {
         self.stale_at().is_some_and(|at| now < at)
     }
 
+    /// Whether there is one that went out of view.
+    fn is_out_of_view(&self) -> bool {
+        self.target.as_ref().is_some_and(|target| target.missed_at.is_some())
+    }
+
     /// Whether there is one, seen lately or not.
     pub fn holds_target(&self) -> bool {
         self.target.is_some()
@@ -295,7 +319,11 @@ impl Servo {
 
     /// When the target will not have been seen for too long, where there is one.
     pub fn stale_at(&self) -> Option<Time> {
-        self.target.as_ref().map(|target| target.last_seen + self.settings.stale_timeout)
+        let ServoSettings { stale_timeout, search_time, .. } = self.settings;
+        self.target.as_ref().map(|target| match target.missed_at {
+            Some(missed_at) => (missed_at + stale_timeout).min(target.last_seen + search_time),
+            None => target.last_seen + stale_timeout,
+        })
     }
 
     /// Until when the camera goes on as it was last told, while it is found out whether it is ours.

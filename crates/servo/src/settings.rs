@@ -29,6 +29,8 @@ pub struct ServoSettings {
     pub prediction: Prediction,
     /// The camera is stopped when the target was not seen for this long.
     pub stale_timeout: Duration,
+    /// For how long after it was last seen the camera goes after a target that went out of view; zero: not at all.
+    pub search_time: Duration,
     /// Degrees per second of the camera's fastest.
     pub camera_speed_deg_s: f64,
     /// How its speed grows up to there.
@@ -71,6 +73,7 @@ impl Default for ServoSettings {
             mounting: Mounting::default(),
             prediction: Prediction::default(),
             stale_timeout: Duration::from_secs(1),
+            search_time: Duration::from_secs(3),
             camera_speed_deg_s: 450.0,
             speed_curve: SpeedCurve::default(),
             limits: SoftLimits::default(),

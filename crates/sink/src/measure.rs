@@ -7,7 +7,7 @@ use std::time::Duration;
 use gst::prelude::*;
 use gst::subclass::prelude::*;
 use ptztrack_contract::lock::lock;
-use ptztrack_contract::{BufferMeta, TargetMeta};
+use ptztrack_contract::{BufferMeta, TargetMeta, TargetState};
 use servo::{Measurement, Visibility};
 
 use crate::plumbing::{Plumbing, PtzSink};
@@ -50,9 +50,10 @@ pub trait Measuring: PtzSink {
             });
         }
         let visibility = match steering {
+            Steering::Follow if is_released(target) => Visibility::Released,
             Steering::Follow => target.state.into(),
             // On the way there it does not matter who is there.
-            Steering::Home | Steering::LookAt => Visibility::Gone,
+            Steering::Home | Steering::LookAt => Visibility::Released,
             Steering::Off => return,
         };
         self.with_task(|task| {
@@ -126,3 +127,8 @@ pub trait Measuring: PtzSink {
 }
 
 impl<S: PtzSink> Measuring for S {}
+
+/// Whether somebody was let go on purpose in this picture: who is lost is called so.
+fn is_released(target: &TargetMeta) -> bool {
+    target.state == TargetState::Searching && target.id != 0
+}

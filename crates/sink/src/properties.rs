@@ -176,6 +176,7 @@ impl<'a> Table<'a> {
             t.one_of("rotation", AtOnce, "Clockwise rotation of the arriving picture relative to the pan axis, in degrees: 0, 90, 180 or 270", &[0, 90, 180, 270], |s| &mut s.servo.mounting.rotation_deg),
             t.choice::<P, _>("prediction", AtOnce, "How the target's motion is extrapolated", |s| &mut s.servo.prediction),
             t.duration("stale-timeout", AtOnce, "The camera is stopped when the target has not been seen for this long, in nanoseconds, from 50 ms to 60 s", millis(50)..=millis(60_000), |s| &mut s.servo.stale_timeout),
+            t.duration("search-time", AtOnce, "The camera turns on towards where a target went that left the picture, until this long after the target was last seen, in nanoseconds, up to 60 s (0: it is stopped at once)", Duration::ZERO..=millis(60_000), |s| &mut s.servo.search_time),
             t.number("camera-speed", AtOnce, "Speed at speed step 100, in degrees per second, of a camera that does not report its speeds", 1.0..=1000.0, |s| &mut s.servo.camera_speed_deg_s),
             t.choice::<C, _>("speed-curve", AtOnce, "How speed grows with the speed step for a camera that does not report its speeds", |s| &mut s.servo.speed_curve),
             t.switch("learn", AtOnce, "Learn latency, field of view and speed map while following, starting from the values that are set or reported", |s| &mut s.servo.learn),

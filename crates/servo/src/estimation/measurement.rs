@@ -15,6 +15,8 @@ pub enum Visibility {
     Predicted,
     /// There is none.
     Gone,
+    /// There is to be none: it was let go on purpose.
+    Released,
 }
 
 impl From<TargetState> for Visibility {
@@ -72,6 +74,16 @@ impl Measurement {
         let Point { x, y } = self.centroid;
         let ego_velocity = Vector { x: turned.x - zoom * (x - 0.5), y: turned.y - zoom * (y - 0.5) };
         Some(Self { ego_velocity: Some(ego_velocity), ..*self })
+    }
+
+    /// Whether it reaches to a side of the picture, but for a pixel, that it moves out of.
+    pub fn leaves_view(&self) -> bool {
+        let Rect { x, y, width, height } = self.bounds;
+        let leaves = |from: f64, length: f64, speed: f64, pixels: u32| {
+            let pixel = 1.0 / f64::from(pixels.max(1));
+            length > 0.0 && (from < pixel && speed < 0.0 || from + length > 1.0 - pixel && speed > 0.0)
+        };
+        leaves(x, width, self.velocity.x, self.size.0) || leaves(y, height, self.velocity.y, self.size.1)
     }
 
     /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.

@@ -11,7 +11,7 @@ use std::time::Duration;
 use tokio::sync::Notify;
 
 use ptztrack_contract::lock::lock;
-use servo::{Measurement, Time};
+use servo::{Measurement, Time, Visibility};
 
 use super::Clock;
 use crate::LoopSettings;
@@ -83,15 +83,20 @@ impl Mailbox {
     }
 
     /// Leaves the newest picture of the target, in place of one not looked at yet.
-    pub fn see(&self, measurement: Measurement) {
+    pub fn see(&self, mut measurement: Measurement) {
         let mut mail = self.mail();
         // Read under the lock, so that no picture is left behind those that `rest` makes void.
         if self.paused.load(Ordering::Relaxed) {
             return;
         }
-        if mail.measurement.replace(measurement).is_some() {
+        if let Some(before) = mail.measurement {
             self.overtaken.fetch_add(1, Ordering::Relaxed);
+            // Nobody is there any more, and that was somebody's wish.
+            if (before.visibility, measurement.visibility) == (Visibility::Released, Visibility::Gone) {
+                measurement.visibility = Visibility::Released;
+            }
         }
+        mail.measurement = Some(measurement);
         drop(mail);
         self.arrived.notify_one();
     }
@@ -194,5 +199,26 @@ impl Mailbox {
 
     fn mail(&self) -> MutexGuard<'_, Mail> {
         lock(&self.mail)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn that_somebody_was_let_go_is_not_overtaken_by_pictures_of_nobody() {
+        let see = |visibilities: &[Visibility]| {
+            let mailbox = Mailbox::new(Clock::running());
+            for visibility in visibilities {
+                let at = Measurement::at(0.5, 0.5, mailbox.now());
+                mailbox.see(Measurement { visibility: *visibility, ..at });
+            }
+            mailbox.take().measurement.map(|measurement| measurement.visibility)
+        };
+        let (seen, gone, released) = (Visibility::Seen, Visibility::Gone, Visibility::Released);
+        assert_eq!(see(&[released, gone, gone]), Some(released));
+        assert_eq!(see(&[released, gone, seen]), Some(seen), "somebody else");
+        assert_eq!(see(&[seen, gone]), Some(gone));
     }
 }

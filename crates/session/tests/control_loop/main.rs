@@ -8,6 +8,7 @@ mod discovery;
 mod learning;
 mod motion;
 mod others;
+mod out_of_view;
 mod point_to_point;
 mod words;
 mod zoom;
