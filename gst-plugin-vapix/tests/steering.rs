@@ -6,7 +6,7 @@
 mod common;
 
 use std::sync::mpsc;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use common::{FRAME, Heard, PATIENCE, Rig, camera, moves, target};
 use gst::prelude::*;
@@ -157,41 +157,47 @@ fn pictures_without_target_meta_stop_the_camera() {
     });
 }
 
-/// Somebody who walks out of the picture, followed.
-fn with_somebody_leaving(camera: &VirtualCamera) -> (Rig, TargetMeta) {
-    let mut rig = Rig::ready(&camera.url()).with("search-time", 60_000_000_000u64).play();
+/// By itself the camera would go on for so long after somebody who walks out of the picture.
+const SEARCH_TIME: Duration = Duration::from_secs(10);
+
+/// Somebody who walks out of the picture is followed, and lost. How soon after that the camera is stopped, by pictures like this.
+fn stopped_after(search_time: Duration, then: impl FnOnce(&mut Rig, TargetMeta) -> TargetMeta) -> Duration {
+    let camera = camera(Auth::None);
+    let search_time = u64::try_from(search_time.as_nanos()).unwrap();
+    let mut rig = Rig::ready(&camera.url()).with("max-speed", 1.0).with("search-time", search_time).play();
     let leaving = TargetMeta {
         bounds: Rect { x: 0.8, y: 0.2, width: 0.2, height: 0.4 },
         velocity: Vector { x: 0.1, y: 0.0 },
         ..target(TargetState::Tracking, 0.9, 0.4)
     };
-    rig.push_until(&leaving, camera, |status| status.moving);
-    (rig, leaving)
+    rig.push_until(&leaving, &camera, |status| status.moving);
+    let lost = Instant::now();
+    rig.push(&TargetMeta { state: TargetState::Lost, ..leaving.clone() });
+    let meta = then(&mut rig, leaving);
+    rig.push_until(&meta, &camera, |status| !status.moving);
+    lost.elapsed()
+}
+
+#[test]
+fn the_camera_keeps_turning_after_whoever_leaves_the_picture() {
+    let nobody = |_: &mut Rig, _| TargetMeta::default();
+    let stopped_after = stopped_after(Duration::from_secs(2), nobody);
+    assert!(stopped_after >= Duration::from_millis(1500), "{stopped_after:?}");
 }
 
 #[test]
 fn whoever_is_let_go_as_they_leave_is_not_gone_after() {
-    let camera = camera(Auth::None);
-    let (mut rig, leaving) = with_somebody_leaving(&camera);
-    rig.push(&TargetMeta { state: TargetState::Searching, ..leaving });
-    rig.push_until(&TargetMeta::default(), &camera, |status| !status.moving);
-}
-
-#[test]
-fn whoever_leaves_is_not_gone_after_on_the_way_home() {
-    let camera = camera(Auth::None);
-    let (mut rig, leaving) = with_somebody_leaving(&camera);
-    rig.sink.set_property_from_str("steering", "home");
-    rig.push_until(&TargetMeta { state: TargetState::Lost, ..leaving }, &camera, |status| !status.moving);
+    let let_go = |_: &mut Rig, leaving| TargetMeta { state: TargetState::Searching, ..leaving };
+    assert!(stopped_after(SEARCH_TIME, let_go) < SEARCH_TIME / 2);
 }
 
 #[test]
 fn whoever_leaves_is_gone_after_only_as_long_as_that_is_wanted() {
-    let camera = camera(Auth::None);
-    let (mut rig, leaving) = with_somebody_leaving(&camera);
-    rig.push(&TargetMeta { state: TargetState::Lost, ..leaving });
-    rig.sink.set_property("search-time", 0u64);
-    rig.push_until(&TargetMeta::default(), &camera, |status| !status.moving);
+    let not_wanted = |rig: &mut Rig, _| {
+        rig.sink.set_property("search-time", 0u64);
+        TargetMeta::default()
+    };
+    assert!(stopped_after(SEARCH_TIME, not_wanted) < SEARCH_TIME / 2);
 }
 
 #[test]
@@ -305,7 +311,7 @@ fn at_its_limit_it_says_so_once_and_rests() {
 
 #[test]
 fn a_slow_camera_gets_the_newest_target_and_one_request_at_a_time() {
-    let settings = Settings { service_time: std::time::Duration::from_millis(250), ..Settings::default() };
+    let settings = Settings { service_time: Duration::from_millis(250), ..Settings::default() };
     let camera = VirtualCamera::start(settings).unwrap();
     let mut rig = Rig::playing(&camera.url());
     for frame in 0..60u32 {

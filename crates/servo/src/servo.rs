@@ -51,6 +51,8 @@ struct Target {
     considered: bool,
     /// Since when it is not known whether the camera is ours to follow it.
     undecided_since: Option<Time>,
+    /// It was going out of view when it was last seen.
+    leaves: bool,
     /// When the newest picture was taken after it went out of view; `None`: it did not.
     missed_at: Option<Time>,
 }
@@ -89,6 +91,9 @@ impl Servo {
     pub fn configure(&mut self, settings: ServoSettings) {
         if settings.prediction != self.estimator.prediction() {
             self.estimator = TargetEstimator::new(settings.prediction);
+            if self.is_out_of_view() {
+                self.lose();
+            }
         }
         let before = mem::replace(&mut self.settings, settings);
         let now = &self.settings;
@@ -123,8 +128,9 @@ impl Servo {
         let last_seen = match (measurement.visibility, &self.target) {
             (Visibility::Seen, _) => measurement.taken_at.min(now),
             (Visibility::Predicted, Some(target)) => target.last_seen,
-            (Visibility::Predicted, None) | (Visibility::Gone | Visibility::Released, _) => {
-                if self.goes_after(&measurement, actuator.mode, now) {
+            (Visibility::Predicted, None)
+            | (Visibility::Lost | Visibility::Gone | Visibility::Released, _) => {
+                if self.goes_after(&measurement, actuator, now) {
                     return None;
                 }
                 self.lose();
@@ -139,26 +145,41 @@ impl Servo {
             return None;
         }
         self.measure_height(&measurement, actuator.mode);
+        if self.is_out_of_view() {
+            // Back: it may go elsewhere by now.
+            self.estimator.clear();
+            self.controller.new_target();
+        }
         let view = self.view(&measurement);
         self.estimator.see(&measurement, &view, &self.camera.history, &self.delays());
         let oscillates = self.oscillates(&measurement, &view);
         let undecided_since = self.target.as_ref().and_then(|target| target.undecided_since);
-        let missed_at = None;
-        self.target = Some(Target { measurement, last_seen, considered: false, undecided_since, missed_at });
+        let leaves = match (measurement.visibility, &self.target) {
+            (Visibility::Seen, _) | (_, None) => measurement.leaves_view(),
+            (_, Some(target)) => target.leaves,
+        };
+        let (considered, missed_at) = (false, None);
+        self.target = Some(Target { measurement, last_seen, considered, undecided_since, leaves, missed_at });
         oscillates.then(|| self.controller.oscillation.gain_scale())
     }
 
-    /// Takes a picture without the target. Returns whether the camera turns on to where it must be by now, as it went out of view.
-    fn goes_after(&mut self, picture: &Measurement, mode: Mode, now: Time) -> bool {
-        let Some(target) = &mut self.target else { return false };
-        let was_lost = picture.visibility != Visibility::Released;
-        let left = was_lost && (target.missed_at.is_some() || target.measurement.leaves_view());
+    /// Takes a picture without the target. Returns whether the camera turns on to where it would be by now, as it went out of view.
+    fn goes_after(&mut self, picture: &Measurement, actuator: &ActuatorStatus, now: Time) -> bool {
+        let axes_known = !self.settings.learn_axes || self.axes.are_known();
         // A move to a position is over before anybody could tell where that is.
-        let goes_after = left && mode == Mode::Velocity && now < target.last_seen + self.settings.search_time;
-        if goes_after {
-            target.missed_at = Some(picture.taken_at.min(now));
+        let may_turn = actuator.access == Access::Ours && actuator.mode == Mode::Velocity && axes_known;
+        let Some(target) = &mut self.target else { return false };
+        let begins =
+            target.leaves && picture.visibility == Visibility::Lost && picture.id == target.measurement.id;
+        let goes_on = target.missed_at.is_some() && picture.visibility != Visibility::Released;
+        if !may_turn || !(begins || goes_on) || now >= target.last_seen + self.settings.search_time {
+            return false;
         }
-        goes_after
+        if target.missed_at.is_none() {
+            self.estimator.lose_sight();
+        }
+        (target.missed_at, target.considered) = (Some(picture.taken_at.min(now)), true);
+        true
     }
 
     /// Whether nobody can steer by this picture, as it stays the same though the camera was told to turn.
@@ -257,6 +278,9 @@ impl Servo {
     fn decide(&mut self, actuator: &ActuatorStatus, now: Time) -> Actuation {
         if actuator.access == Access::Others {
             // What moves it is theirs; what we last said must not outlive our hold on it.
+            if self.is_out_of_view() {
+                self.lose();
+            }
             return Actuation::Rest;
         }
         if !self.has_target(now) {
@@ -312,9 +336,9 @@ impl Servo {
         self.target.as_ref().is_some_and(|target| !target.considered)
     }
 
-    /// When the newest picture was taken that tells of the target, where there is one.
+    /// When the newest picture was taken that tells of the target, where there is one, or that it is out of view.
     pub fn newest_picture(&self) -> Option<Time> {
-        self.target.as_ref().map(|target| target.measurement.taken_at)
+        self.target.as_ref().map(|target| target.missed_at.unwrap_or(target.measurement.taken_at))
     }
 
     /// When the target will not have been seen for too long, where there is one.

@@ -12,7 +12,7 @@
 //! one request in flight and at most `max-rate` commands a second. All durations are nanoseconds. `sync` and `async` are
 //! off by default: a late target is worth nothing, and a pipeline must not wait for this sink to preroll.
 //!
-//! A target that goes out of the picture is gone after for `search-time`: the camera turns on to where it would be by now.
+//! After a target that goes out of the picture the camera keeps turning for `search-time`, to where it would be by now.
 //! Otherwise the camera is stopped when the target is lost or released, hidden or not seen for `stale-timeout`, on EOS, on a flush, when leaving
 //! PLAYING, when the element goes to READY or NULL, and when it is disposed of. A stop is repeated until the camera confirms
 //! it. EOS waits for that for up to 1 s, leaving PLAYING does not wait, and READY waits until 2.5 s after PLAYING was left: a

@@ -63,9 +63,6 @@ impl ZoomController {
     /// A target farther than this from the middle, in picture widths or heights, is not zoomed in on.
     const OFF_CENTRE: f64 = 0.25;
 
-    /// A box that comes this near to the picture's edge may be cut off by it.
-    const EDGE: f64 = 0.005;
-
     /// Nobody who walks away becomes shorter by so much, as a logarithm, from one picture to the next: what is seen is a part of
     /// them ...
     const PART: f64 = 0.3;
@@ -197,7 +194,7 @@ struct Size {
 
 fn outlook(measurement: &Measurement) -> Outlook {
     let Rect { x, y, width, height } = measurement.bounds;
-    let inside = ZoomController::EDGE..=1.0 - ZoomController::EDGE;
+    let inside = Measurement::EDGE..=1.0 - Measurement::EDGE;
     let whole = [x, y, x + width, y + height].iter().all(|edge| inside.contains(edge));
     let middle = measurement.bounds.centre();
     let off = (middle.x - 0.5).abs().max((middle.y - 0.5).abs());

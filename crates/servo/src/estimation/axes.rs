@@ -166,6 +166,11 @@ impl AxisEstimator {
         }
     }
 
+    /// Whether it is known how both turn the picture.
+    pub fn are_known(&self) -> bool {
+        self.exchange.is_known() && self.pan.is_known() && self.tilt.is_known()
+    }
+
     /// Whether a camera that rests may be told to turn faster yet.
     pub fn seeks_speed(&self) -> bool {
         let is_known = self.exchange.is_known() || self.pan.is_known() || self.tilt.is_known();

@@ -13,6 +13,8 @@ pub enum Visibility {
     Seen,
     /// It is hidden, and predicted.
     Predicted,
+    /// It was lost in this picture.
+    Lost,
     /// There is none.
     Gone,
     /// There is to be none: it was let go on purpose.
@@ -24,7 +26,8 @@ impl From<TargetState> for Visibility {
         match state {
             TargetState::Tracking => Self::Seen,
             TargetState::Occluded => Self::Predicted,
-            TargetState::Searching | TargetState::Lost => Self::Gone,
+            TargetState::Lost => Self::Lost,
+            TargetState::Searching => Self::Gone,
         }
     }
 }
@@ -58,6 +61,9 @@ pub struct Measurement {
 }
 
 impl Measurement {
+    /// A box that comes this near to the picture's edge may be cut off by it.
+    pub const EDGE: f64 = 0.005;
+
     /// What a background at rest seems to move in a second, in fields of view.
     pub const NOISE_FIELDS_S: f64 = 0.02;
 
@@ -76,14 +82,14 @@ impl Measurement {
         Some(Self { ego_velocity: Some(ego_velocity), ..*self })
     }
 
-    /// Whether it reaches to a side of the picture, but for a pixel, that it moves out of.
+    /// Whether it may be cut off by one side of the picture, which it moves out of.
     pub fn leaves_view(&self) -> bool {
         let Rect { x, y, width, height } = self.bounds;
-        let leaves = |from: f64, length: f64, speed: f64, pixels: u32| {
-            let pixel = 1.0 / f64::from(pixels.max(1));
-            length > 0.0 && (from < pixel && speed < 0.0 || from + length > 1.0 - pixel && speed > 0.0)
+        let leaves = |from: f64, length: f64, speed: f64| {
+            let (low, high) = (from < Self::EDGE, from + length > 1.0 - Self::EDGE);
+            length > 0.0 && (low && !high && speed < 0.0 || high && !low && speed > 0.0)
         };
-        leaves(x, width, self.velocity.x, self.size.0) || leaves(y, height, self.velocity.y, self.size.1)
+        leaves(x, width, self.velocity.x) || leaves(y, height, self.velocity.y)
     }
 
     /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.

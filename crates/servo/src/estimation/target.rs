@@ -59,6 +59,8 @@ pub struct TargetEstimator {
     first_seen: Option<(Time, PanTilt)>,
     /// Whether the last picture told how the background moved.
     background_seen: bool,
+    /// It went out of view: where it is by now is reckoned.
+    out_of_sight: bool,
 }
 
 impl TargetEstimator {
@@ -76,6 +78,7 @@ impl TargetEstimator {
             taken_at: Time::ZERO,
             first_seen: None,
             background_seen: false,
+            out_of_sight: false,
         }
     }
 
@@ -155,10 +158,17 @@ impl TargetEstimator {
         }
     }
 
+    /// It went out of view: it goes on as it did, but whether faster and faster nobody knows.
+    pub fn lose_sight(&mut self) {
+        self.target_rate.coast(self.taken_at, self.expected_rate(Duration::ZERO));
+        self.out_of_sight = true;
+    }
+
     /// Forgets the target.
     pub fn clear(&mut self) {
         self.target_rate.clear();
         self.first_seen = None;
+        self.out_of_sight = false;
     }
 
     /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
@@ -168,8 +178,9 @@ impl TargetEstimator {
         let shown = delays.sent_by(self.taken_at);
         let horizon = self.horizon(now, delays);
         let under_way = history.rotation(shown, now);
-        // The rate grows evenly: on the way it is what it is half way.
-        let walked = self.walked(self.target_rate(horizon / 2) * horizon.as_secs_f64());
+        // The rate grows evenly: on the way it is what it is half way. Reckoned for longer it is worth nothing.
+        let walks_for = horizon.min(Self::RECKONED);
+        let walked = self.walked(self.target_rate(walks_for / 2) * walks_for.as_secs_f64());
         self.round(under_way.pan) + walked - under_way
     }
 
@@ -186,7 +197,9 @@ impl TargetEstimator {
     /// By what the target's direction changes as it goes so far, on a great circle: where it passes below, at its rate
     /// it would go round the camera again and again.
     fn walked(&self, way_deg: PanTilt) -> PanTilt {
-        let across = (way_deg.pan * self.seen_of_pan()).to_radians();
+        // Whoever walks straight on never goes further round than this, however long.
+        const FARTHEST_DEG: f64 = 80.0;
+        let across = (way_deg.pan * self.seen_of_pan()).clamp(-FARTHEST_DEG, FARTHEST_DEG).to_radians();
         let elevation = (self.elevation_deg + way_deg.tilt).to_radians();
         let pan = across.sin().atan2(across.cos() * elevation.cos());
         let height = (across.cos() * elevation.sin()).asin();
@@ -196,7 +209,11 @@ impl TargetEstimator {
     /// Where the target is off the middle, and how it goes on.
     pub fn offset(&self, now: Time, history: &CommandHistory, delays: &Delays) -> Offset {
         let expected = self.error_at_effect(now, history, delays);
-        let target = self.target_rate(self.horizon(now, delays));
+        // As fast as it passed it goes on for a moment only: who walks straight on is seen to slow down.
+        let target = match self.out_of_sight {
+            true => PanTilt::default(),
+            false => self.target_rate(self.horizon(now, delays)),
+        };
         // Half round the camera, what goes up goes down in the picture.
         let target = PanTilt::new(target.pan, target.tilt * expected.pan.to_radians().cos());
         Offset {

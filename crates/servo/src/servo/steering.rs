@@ -43,7 +43,6 @@ impl Servo {
         let delays = self.delays();
         let wanted = self
             .zoom_goal()
-            .filter(|_| !self.is_out_of_view())
             .zip(self.zoom_lens())
             .and_then(|(goal, lens)| self.zoom.speed(&goal, &lens, measurement, &delays, now));
         wanted.or(self.zoom.is_moving(now).then_some(0.0))

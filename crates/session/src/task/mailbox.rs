@@ -91,9 +91,10 @@ impl Mailbox {
         }
         if let Some(before) = mail.measurement {
             self.overtaken.fetch_add(1, Ordering::Relaxed);
-            // Nobody is there any more, and that was somebody's wish.
-            if (before.visibility, measurement.visibility) == (Visibility::Released, Visibility::Gone) {
-                measurement.visibility = Visibility::Released;
+            // Nobody is there any more; how that came about is not overtaken.
+            let became = (before.visibility, measurement.visibility);
+            if let (Visibility::Lost | Visibility::Released, Visibility::Gone) = became {
+                (measurement.visibility, measurement.id) = (before.visibility, before.id);
             }
         }
         mail.measurement = Some(measurement);
@@ -207,7 +208,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn that_somebody_was_let_go_is_not_overtaken_by_pictures_of_nobody() {
+    fn how_somebody_was_lost_is_not_overtaken_by_pictures_of_nobody() {
         let see = |visibilities: &[Visibility]| {
             let mailbox = Mailbox::new(Clock::running());
             for visibility in visibilities {
@@ -216,9 +217,12 @@ mod tests {
             }
             mailbox.take().measurement.map(|measurement| measurement.visibility)
         };
-        let (seen, gone, released) = (Visibility::Seen, Visibility::Gone, Visibility::Released);
-        assert_eq!(see(&[released, gone, gone]), Some(released));
-        assert_eq!(see(&[released, gone, seen]), Some(seen), "somebody else");
+        let (seen, gone) = (Visibility::Seen, Visibility::Gone);
+        for how in [Visibility::Lost, Visibility::Released] {
+            assert_eq!(see(&[how, gone, gone]), Some(how));
+            assert_eq!(see(&[how, gone, seen]), Some(seen), "somebody else");
+        }
+        assert_eq!(see(&[Visibility::Lost, Visibility::Released]), Some(Visibility::Released));
         assert_eq!(see(&[seen, gone]), Some(gone));
     }
 }

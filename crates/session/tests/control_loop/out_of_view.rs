@@ -3,7 +3,7 @@
 //! A target that goes out of the picture.
 
 use super::*;
-use ptztrack_contract::{Rect, Vector};
+use ptztrack_contract::{Point, Rect, Vector};
 
 const PICTURE: Duration = Duration::from_millis(100);
 
@@ -27,6 +27,12 @@ fn with_somebody_leaving(settings: ServoSettings) -> Rig {
     rig
 }
 
+/// A picture in which they are not found any more.
+fn lose(rig: &mut Rig) {
+    rig.control
+        .measure(Measurement { visibility: Visibility::Lost, ..Measurement::at(0.0, 0.0, rig.now) }, rig.now);
+}
+
 /// Pictures without them: for how long the camera goes on to the right before it is stopped.
 fn goes_on_for(rig: &mut Rig, visibility: Visibility) -> Duration {
     let begin = rig.now;
@@ -46,9 +52,9 @@ fn goes_on_for(rig: &mut Rig, visibility: Visibility) -> Duration {
 #[test]
 fn the_camera_turns_on_after_whoever_goes_out_of_the_picture_but_not_for_ever() {
     let mut rig = with_somebody_leaving(ServoSettings::default());
-    let lasted = goes_on_for(&mut rig, Visibility::Gone);
+    let lasted = goes_on_for(&mut rig, Visibility::Lost);
     let search_time = ServoSettings::default().search_time;
-    assert!(lasted <= search_time && lasted + 2 * PICTURE >= search_time, "{lasted:?}");
+    assert!(lasted <= search_time && lasted >= ms(1500), "{lasted:?}");
     assert_eq!(goes_on_for_nobody(&mut rig), []);
 }
 
@@ -73,7 +79,59 @@ fn whoever_is_let_go_on_purpose_is_not_gone_after() {
 fn nobody_is_gone_after_where_that_is_not_wanted() {
     let mut rig =
         with_somebody_leaving(ServoSettings { search_time: Duration::ZERO, ..ServoSettings::default() });
+    assert_eq!(goes_on_for(&mut rig, Visibility::Lost), PICTURE);
+}
+
+/// As where the picture in which they were lost was dropped.
+#[test]
+fn nobody_is_gone_after_who_is_not_known_to_be_lost() {
+    let mut rig = with_somebody_leaving(ServoSettings::default());
     assert_eq!(goes_on_for(&mut rig, Visibility::Gone), PICTURE);
+}
+
+#[test]
+fn who_is_let_go_after_they_were_lost_is_gone_after_no_longer() {
+    let mut rig = with_somebody_leaving(ServoSettings::default());
+    lose(&mut rig);
+    assert_eq!(goes_on_for(&mut rig, Visibility::Released), PICTURE);
+}
+
+/// They are hidden where they are predicted to go out of view.
+#[test]
+fn who_was_hidden_before_they_would_have_left_is_not_gone_after() {
+    let mut rig = Rig::new(ServoSettings::default());
+    let inside = |now| Measurement {
+        centroid: Point { x: 0.8, y: 0.5 },
+        bounds: Rect { x: 0.74, y: 0.3, width: 0.12, height: 0.4 },
+        ..leaving(now)
+    };
+    rig.control.measure(inside(rig.now), rig.now);
+    rig.after(ms(20));
+    rig.control.measure(Measurement { visibility: Visibility::Predicted, ..leaving(rig.now) }, rig.now);
+    rig.after(ms(20));
+    assert_eq!(goes_on_for(&mut rig, Visibility::Lost), PICTURE);
+}
+
+/// It never goes further than whoever walks straight on could get.
+#[test]
+fn however_fast_they_went_the_camera_comes_to_rest_before_it_looks_back() {
+    let settings = ServoSettings { search_time: ms(10_000), ..ServoSettings::default() };
+    let mut rig = Rig::new(settings);
+    let begin = rig.now;
+    for _ in 0..5 {
+        let fast = Measurement { velocity: Vector { x: 1.5, y: 0.0 }, ..leaving(rig.now) };
+        rig.control.measure(fast, rig.now);
+        rig.after(ms(20));
+    }
+    for _ in 0..120 {
+        let picture = Measurement { visibility: Visibility::Lost, ..Measurement::at(0.0, 0.0, rig.now) };
+        rig.control.measure(picture, rig.now);
+        let sent = rig.after(PICTURE);
+        assert!(sent.iter().all(|command| pan_level(command) >= 0), "{sent:?}");
+    }
+    let turned = rig.control.servo().camera().history.rotation(begin, rig.now);
+    assert!((60.0..140.0).contains(&turned.pan), "{turned:?}");
+    assert!(rig.control.session().is_at_rest());
 }
 
 #[test]
@@ -82,14 +140,13 @@ fn who_is_lost_at_the_edge_but_goes_inwards_is_not_gone_after() {
     let inwards = Measurement { velocity: Vector { x: -0.3, y: 0.0 }, ..leaving(rig.now) };
     rig.control.measure(inwards, rig.now);
     rig.after(ms(1));
-    assert_eq!(goes_on_for(&mut rig, Visibility::Gone), PICTURE);
+    assert_eq!(goes_on_for(&mut rig, Visibility::Lost), PICTURE);
 }
 
 #[test]
 fn without_pictures_it_is_stopped_as_soon_as_ever() {
     let mut rig = with_somebody_leaving(ServoSettings::default());
-    rig.control
-        .measure(Measurement { visibility: Visibility::Gone, ..Measurement::at(0.0, 0.0, rig.now) }, rig.now);
+    lose(&mut rig);
     let begin = rig.now;
     while !rig.after(PICTURE).contains(&HALT) {
         assert!(rig.now - begin < ms(20_000), "it turns on and on");
@@ -101,10 +158,7 @@ fn without_pictures_it_is_stopped_as_soon_as_ever() {
 fn who_comes_back_into_view_is_followed() {
     let mut rig = with_somebody_leaving(ServoSettings::default());
     for _ in 0..10 {
-        rig.control.measure(
-            Measurement { visibility: Visibility::Gone, ..Measurement::at(0.0, 0.0, rig.now) },
-            rig.now,
-        );
+        lose(&mut rig);
         rig.after(PICTURE);
     }
     rig.see(0.1, 0.5);

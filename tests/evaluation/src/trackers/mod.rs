@@ -139,7 +139,7 @@ impl Tracker {
                 format!("fakesink name={SINK} sync=false async=false")
             }
             // The thesis knows its camera from the start.
-            TrackerName::Thesis => format!("{sink} prediction=average learn=false"),
+            TrackerName::Thesis => format!("{sink} prediction=average learn=false search-time=0"),
             _ => sink,
         }
     }

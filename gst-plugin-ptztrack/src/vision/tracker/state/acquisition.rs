@@ -38,7 +38,14 @@ impl Tracker {
         frame: Frame,
         tracked: &mut Tracked,
     ) -> Phase {
-        let (Phase::Tracking(target) | Phase::Occluded(target, _)) = phase else { return phase };
+        let target = match phase {
+            Phase::Tracking(target) | Phase::Occluded(target, _) => target,
+            Phase::Searching(lost) => {
+                // Nobody is to go after them any more.
+                tracked.id = lost.unwrap_or(0);
+                return Phase::Searching(None);
+            }
+        };
         if reason != ReleaseReason::Stationary {
             // It may move, and would be taken again at once.
             self.policy.release(target.id);

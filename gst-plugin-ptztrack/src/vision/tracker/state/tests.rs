@@ -652,6 +652,26 @@ fn looks_alone_keep_nobody_where_the_background_is_not_known() {
     assert!(lost.is_some_and(|pictures| pictures > 20), "{lost:?}");
 }
 
+/// Whoever goes after them is to hear of it.
+#[test]
+fn who_is_let_go_after_they_were_lost_is_told_of_once() {
+    let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
+    let mut tracker = Tracker::new(config());
+    let mut process = |detections: &[Detection], request: Option<TargetRequest>| {
+        if let Some(request) = request {
+            tracker.request(request);
+        }
+        let seen = Observation { luma: picture.luma(), scene: None };
+        let tracked = tracker.process(&seen, DT, detections).expect("track");
+        (tracked.state, tracked.id)
+    };
+    let (_, id) = process(&[detected(200.0, PERSON.0)], None);
+    assert!((0..200).any(|_| process(&[], None) == (TargetState::Lost, id)));
+    assert_eq!(process(&[], None), (TargetState::Searching, 0));
+    assert_eq!(process(&[], Some(TargetRequest::Release)), (TargetState::Searching, id));
+    assert_eq!(process(&[], Some(TargetRequest::Release)), (TargetState::Searching, 0));
+}
+
 /// People of those places before an even wall.
 fn before_a_wall(people: &[f32]) -> Picture {
     let mut picture = Scene::new(SIZE.0, SIZE.1).flat(240);
