@@ -165,13 +165,14 @@ impl Servo {
 
     /// Takes a picture without the target. Returns whether the camera turns on to where it would be by now, as it went out of view.
     fn goes_after(&mut self, picture: &Measurement, actuator: &ActuatorStatus, now: Time) -> bool {
-        let axes_known = !self.settings.learn_axes || self.axes.are_known();
+        // Nobody leaves by tilt alone, where that may be the wrong way round.
+        let knows_way = !self.settings.learn_axes || self.axes.is_pan_known();
         // A move to a position is over before anybody could tell where that is.
-        let may_turn = actuator.access == Access::Ours && actuator.mode == Mode::Velocity && axes_known;
+        let may_turn = actuator.access == Access::Ours && actuator.mode == Mode::Velocity && knows_way;
         let Some(target) = &mut self.target else { return false };
-        let begins =
-            target.leaves && picture.visibility == Visibility::Lost && picture.id == target.measurement.id;
-        let goes_on = target.missed_at.is_some() && picture.visibility != Visibility::Released;
+        let is_lost = picture.visibility == Visibility::Lost && picture.id == target.measurement.id;
+        let begins = target.leaves && is_lost;
+        let goes_on = target.missed_at.is_some() && (is_lost || picture.visibility == Visibility::Gone);
         if !may_turn || !(begins || goes_on) || now >= target.last_seen + self.settings.search_time {
             return false;
         }

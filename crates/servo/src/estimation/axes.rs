@@ -166,9 +166,9 @@ impl AxisEstimator {
         }
     }
 
-    /// Whether it is known how both turn the picture.
-    pub fn are_known(&self) -> bool {
-        self.exchange.is_known() && self.pan.is_known() && self.tilt.is_known()
+    /// Whether it is known how pan turns the picture.
+    pub fn is_pan_known(&self) -> bool {
+        self.exchange.is_known() && self.pan.is_known()
     }
 
     /// Whether a camera that rests may be told to turn faster yet.

@@ -46,7 +46,9 @@ impl RateAverage {
 
     /// Takes a rate at which it is only thought to go on, and whose changes so far are no sign of more.
     pub fn coast(&mut self, at: Time, rate: PanTilt) {
-        self.push(at, rate);
+        // Of whom it is not known when they were where, the rate is as it was before.
+        let newest = self.samples.back().map_or(at, |(newest, _)| *newest);
+        self.push(at.max(newest), rate);
         self.trends.clear();
     }
 

@@ -200,7 +200,10 @@ impl TargetEstimator {
         // Whoever walks straight on never goes further round than this, however long.
         const FARTHEST_DEG: f64 = 80.0;
         let across = (way_deg.pan * self.seen_of_pan()).clamp(-FARTHEST_DEG, FARTHEST_DEG).to_radians();
-        let elevation = (self.elevation_deg + way_deg.tilt).to_radians();
+        // Nor higher than this above the camera, or further beyond the point below it.
+        let (lowest, highest) =
+            ((-90.0 - FARTHEST_DEG).min(self.elevation_deg), FARTHEST_DEG.max(self.elevation_deg));
+        let elevation = (self.elevation_deg + way_deg.tilt).clamp(lowest, highest).to_radians();
         let pan = across.sin().atan2(across.cos() * elevation.cos());
         let height = (across.cos() * elevation.sin()).asin();
         PanTilt::new(pan.to_degrees(), height.to_degrees() - self.elevation_deg)

@@ -52,7 +52,8 @@ fn goes_on_for(rig: &mut Rig, visibility: Visibility) -> Duration {
 #[test]
 fn the_camera_turns_on_after_whoever_goes_out_of_the_picture_but_not_for_ever() {
     let mut rig = with_somebody_leaving(ServoSettings::default());
-    let lasted = goes_on_for(&mut rig, Visibility::Lost);
+    lose(&mut rig);
+    let lasted = goes_on_for(&mut rig, Visibility::Gone);
     let search_time = ServoSettings::default().search_time;
     assert!(lasted <= search_time && lasted >= ms(1500), "{lasted:?}");
     assert_eq!(goes_on_for_nobody(&mut rig), []);
@@ -112,15 +113,30 @@ fn who_was_hidden_before_they_would_have_left_is_not_gone_after() {
     assert_eq!(goes_on_for(&mut rig, Visibility::Lost), PICTURE);
 }
 
+/// Where the background was not seen in the last picture before they were lost.
+#[test]
+fn who_was_hidden_for_a_picture_as_they_left_is_gone_after_all_the_same() {
+    let mut rig = with_somebody_leaving(ServoSettings::default());
+    rig.control.measure(Measurement { visibility: Visibility::Predicted, ..leaving(rig.now) }, rig.now);
+    rig.after(ms(20));
+    lose(&mut rig);
+    assert!(goes_on_for(&mut rig, Visibility::Gone) >= ms::<Duration>(1500));
+}
+
 /// It never goes further than whoever walks straight on could get.
 #[test]
 fn however_fast_they_went_the_camera_comes_to_rest_before_it_looks_back() {
+    for velocity in [Vector { x: 1.5, y: 0.0 }, Vector { x: 1.5, y: -1.5 }] {
+        comes_to_rest_after(velocity);
+    }
+}
+
+fn comes_to_rest_after(velocity: Vector) {
     let settings = ServoSettings { search_time: ms(10_000), ..ServoSettings::default() };
     let mut rig = Rig::new(settings);
     let begin = rig.now;
     for _ in 0..5 {
-        let fast = Measurement { velocity: Vector { x: 1.5, y: 0.0 }, ..leaving(rig.now) };
-        rig.control.measure(fast, rig.now);
+        rig.control.measure(Measurement { velocity, ..leaving(rig.now) }, rig.now);
         rig.after(ms(20));
     }
     for _ in 0..120 {
@@ -130,7 +146,7 @@ fn however_fast_they_went_the_camera_comes_to_rest_before_it_looks_back() {
         assert!(sent.iter().all(|command| pan_level(command) >= 0), "{sent:?}");
     }
     let turned = rig.control.servo().camera().history.rotation(begin, rig.now);
-    assert!((60.0..140.0).contains(&turned.pan), "{turned:?}");
+    assert!((60.0..140.0).contains(&turned.pan) && turned.tilt < 100.0, "{turned:?}");
     assert!(rig.control.session().is_at_rest());
 }
 

@@ -42,7 +42,9 @@ impl Tracker {
             Phase::Tracking(target) | Phase::Occluded(target, _) => target,
             Phase::Searching(lost) => {
                 // Nobody is to go after them any more.
-                tracked.id = lost.unwrap_or(0);
+                if let Some(lost) = lost {
+                    (tracked.state, tracked.id) = (TargetState::Searching, lost);
+                }
                 return Phase::Searching(None);
             }
         };

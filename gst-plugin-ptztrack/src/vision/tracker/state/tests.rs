@@ -656,20 +656,26 @@ fn looks_alone_keep_nobody_where_the_background_is_not_known() {
 #[test]
 fn who_is_let_go_after_they_were_lost_is_told_of_once() {
     let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
-    let mut tracker = Tracker::new(config());
-    let mut process = |detections: &[Detection], request: Option<TargetRequest>| {
-        if let Some(request) = request {
-            tracker.request(request);
-        }
-        let seen = Observation { luma: picture.luma(), scene: None };
-        let tracked = tracker.process(&seen, DT, detections).expect("track");
-        (tracked.state, tracked.id)
+    // What is told of so many pictures after the one of somebody, who is let go in the last two.
+    let told = |pictures: usize| {
+        let mut tracker = Tracker::new(config());
+        let mut process = |detections: &[Detection], let_go: bool| {
+            if let_go {
+                tracker.request(TargetRequest::Release);
+            }
+            let seen = Observation { luma: picture.luma(), scene: None };
+            let tracked = tracker.process(&seen, DT, detections).expect("track");
+            (tracked.state, tracked.id)
+        };
+        let first = process(&[detected(200.0, PERSON.0)], false);
+        assert_eq!(first, (TargetState::Tracking, 1));
+        (0..pictures).map(|picture| process(&[], picture + 2 >= pictures)).collect::<Vec<_>>()
     };
-    let (_, id) = process(&[detected(200.0, PERSON.0)], None);
-    assert!((0..200).any(|_| process(&[], None) == (TargetState::Lost, id)));
-    assert_eq!(process(&[], None), (TargetState::Searching, 0));
-    assert_eq!(process(&[], Some(TargetRequest::Release)), (TargetState::Searching, id));
-    assert_eq!(process(&[], Some(TargetRequest::Release)), (TargetState::Searching, 0));
+    let lost = told(200).iter().position(|told| *told == (TargetState::Lost, 1)).unwrap();
+    let nobody = (TargetState::Searching, 0);
+    let let_go = (TargetState::Searching, 1);
+    assert_eq!(told(lost + 4)[lost..], [(TargetState::Lost, 1), nobody, let_go, nobody]);
+    assert_eq!(told(lost + 2)[lost..], [let_go, nobody], "in the very picture in which they are lost");
 }
 
 /// People of those places before an even wall.
