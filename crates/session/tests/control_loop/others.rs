@@ -218,9 +218,8 @@ fn a_queue_that_may_not_be_asked_any_more_does_not_keep_the_stop() {
     assert!(rig.control.session().is_at_rest());
 }
 
-/// A camera that turns on after its yes looks as one does that somebody else moves.
-#[test]
-fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera() {
+/// A camera whose yes to a stop is not to be trusted has said it.
+fn told_to_stop() -> Rig {
     let protocol = Protocol { confirms_stops: true, ..vapix::Client::PROTOCOL };
     let control = ControlLoop::new(ServoSettings::default(), &protocol);
     let mut rig = Rig { control, now: ms(1000), sent: Vec::new() };
@@ -230,6 +229,13 @@ fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera(
     rig.aside(ms(500), |_| None);
     rig.control.release();
     assert_eq!(rig.after(ms(10)), [HALT]);
+    rig
+}
+
+/// A camera that turns on after its yes looks as one does that somebody else moves.
+#[test]
+fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera() {
+    let mut rig = told_to_stop();
     let mut pan_deg = 0.0;
     for _ in 0..8 {
         pan_deg -= 5.0;
@@ -243,15 +249,7 @@ fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera(
 /// Nobody else stops it for us.
 #[test]
 fn a_stop_that_pictures_show_is_not_repeated_whoever_seems_to_move_the_camera() {
-    let protocol = Protocol { confirms_stops: true, ..vapix::Client::PROTOCOL };
-    let control = ControlLoop::new(ServoSettings::default(), &protocol);
-    let mut rig = Rig { control, now: ms(1000), sent: Vec::new() };
-    for _ in 0..10 {
-        rig.after(ms(5000));
-    }
-    rig.aside(ms(500), |_| None);
-    rig.control.release();
-    assert_eq!(rig.after(ms(10)), [HALT]);
+    let mut rig = told_to_stop();
     let mut pan_deg = 0.0;
     while !rig.control.session().is_taken_over(rig.now) {
         pan_deg -= 5.0;
