@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use super::{Mounting, ObservedRotation};
+use super::{Measurement, Mounting, ObservedRotation};
 use crate::Time;
 use crate::model::{CommandHistory, PanTilt};
 
@@ -98,9 +98,6 @@ impl AxisEstimator {
     /// ... and is told to be.
     const TOLD_ALONG: f64 = 4.0;
 
-    /// What a background at rest seems to turn by in a second, in fields of view.
-    const NOISE_FIELDS_S: f64 = 0.02;
-
     /// How the picture lies to the axes, of a camera that is mounted like this as far as was set.
     pub fn mounting(&self, set: Mounting) -> Mounting {
         Mounting {
@@ -124,7 +121,7 @@ impl AxisEstimator {
     ) -> Option<AxisFinding> {
         let since = turn.from - Self::LONGEST_DELAY;
         let told: Vec<PanTilt> = history.rates_between(since, turn.to).collect();
-        let noise = Self::NOISE_FIELDS_S * fov_deg;
+        let noise = Measurement::NOISE_FIELDS_S * fov_deg;
         self.heed_rest(turn, history, noise);
         let along = (along_one(told.iter().copied()), along_one([turn.rate]));
         match along {

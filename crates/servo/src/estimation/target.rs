@@ -59,8 +59,6 @@ pub struct TargetEstimator {
     first_seen: Option<(Time, PanTilt)>,
     /// Whether the last picture told how the background moved.
     background_seen: bool,
-    /// It went out of view: where it is by now is reckoned.
-    out_of_sight: bool,
 }
 
 impl TargetEstimator {
@@ -78,7 +76,6 @@ impl TargetEstimator {
             taken_at: Time::ZERO,
             first_seen: None,
             background_seen: false,
-            out_of_sight: false,
         }
     }
 
@@ -161,14 +158,12 @@ impl TargetEstimator {
     /// It went out of view: it goes on as it did, but whether faster and faster nobody knows.
     pub fn lose_sight(&mut self) {
         self.target_rate.coast(self.taken_at, self.expected_rate(Duration::ZERO));
-        self.out_of_sight = true;
     }
 
     /// Forgets the target.
     pub fn clear(&mut self) {
         self.target_rate.clear();
         self.first_seen = None;
-        self.out_of_sight = false;
     }
 
     /// The error left when a command sent `now` shows in the picture, if nothing new is commanded: the
@@ -212,11 +207,7 @@ impl TargetEstimator {
     /// Where the target is off the middle, and how it goes on.
     pub fn offset(&self, now: Time, history: &CommandHistory, delays: &Delays) -> Offset {
         let expected = self.error_at_effect(now, history, delays);
-        // As fast as it passed it goes on for a moment only: who walks straight on is seen to slow down.
-        let target = match self.out_of_sight {
-            true => PanTilt::default(),
-            false => self.target_rate(self.horizon(now, delays)),
-        };
+        let target = self.target_rate(self.horizon(now, delays));
         // Half round the camera, what goes up goes down in the picture.
         let target = PanTilt::new(target.pan, target.tilt * expected.pan.to_radians().cos());
         Offset {

@@ -28,7 +28,11 @@ impl Servo {
         let law = self.control_law(&self.view(measurement), actuator.interval, now);
         let delays = self.delays();
         let history = &self.camera.history;
-        let offset = self.estimator.offset(now, history, &delays);
+        let mut offset = self.estimator.offset(now, history, &delays);
+        if self.is_out_of_view() {
+            // As fast as it passed it goes on for a moment only: who walks straight on is seen to slow down.
+            offset.target = PanTilt::default();
+        }
         let wanted = self.controller.rate(&offset, history.rate_at(now), &law);
         let position = self.limits.position(history, delays.command, now);
         let wanted = if self.settings.learn_axes { self.axes.cautious(wanted, history, now) } else { wanted };
