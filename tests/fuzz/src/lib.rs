@@ -7,14 +7,16 @@
 mod camera;
 mod others;
 mod structure;
+mod video;
 
 pub use camera::*;
 pub use others::*;
+pub use video::*;
 
 /// A target: takes anything, says whether it was understood, and never panics.
 pub type Target = fn(&[u8]) -> bool;
 
-pub const TARGETS: [(&str, Target); 21] = [
+pub const TARGETS: [(&str, Target); 23] = [
     ("challenge", challenge),
     ("position", position),
     ("limits", limits),
@@ -27,6 +29,8 @@ pub const TARGETS: [(&str, Target); 21] = [
     ("onvif", onvif),
     ("location", location),
     ("rtsp", rtsp),
+    ("media", media),
+    ("multipart", multipart),
     ("picture", picture),
     ("configuration", configuration),
     ("page", page),

@@ -5,11 +5,13 @@
 //! goes by: by Digest, or over verified TLS, and nowhere but at its own address.
 //!
 //! ```text
-//! MJPEG:  camera ─ session::http::HttpClient ─ appsrc
-//! RTSP:   camera ─ relay ─ 127.0.0.1 ─ rtspsrc
+//! MJPEG:  camera ─ session::http::HttpClient ─ multipart ─ appsrc
+//! RTSP:   camera ─ relay, media ─ 127.0.0.1 ─ rtspsrc
 //! ```
 
 mod http;
+pub mod media;
+pub mod multipart;
 mod rtsp;
 pub mod rtsp_message;
 
@@ -28,6 +30,10 @@ use session::http::ClientSettings;
 pub const LONGEST_SILENCE: Duration = Duration::from_secs(1);
 /// For the first: to log in over a long way, and for the camera to start an encoder.
 const LONGEST_START: Duration = Duration::from_secs(4);
+
+/// Sources for which `rtspsrc` makes a buffer and a thread, for each stream of a camera. There may be more than one, as a camera that
+/// begins its stream anew may do so as another.
+const MOST_PER_STREAM: u32 = 4;
 
 /// Why there are no pictures.
 #[derive(Debug, Clone, thiserror::Error)]
@@ -105,10 +111,29 @@ impl Video {
                 let hand_over = move |source: &AppSrc, _| drop(hand_over.try_send(source.clone()));
                 source.set_callbacks(gst_app::AppSrcCallbacks::builder().need_data(hand_over).build());
             }
-            (Self::Rtsp(location), None) => source.set_property("location", location),
+            (Self::Rtsp(location), None) => {
+                source.set_property("location", location);
+                limit(source);
+            }
             _ => {}
         }
     }
+}
+
+/// Has an `rtspsrc` ask for nothing that would come past the connection to the camera, and serve few sources of it.
+fn limit(source: &gst::Element) {
+    use gst::prelude::*;
+    if glib::subclass::SignalId::lookup("new-manager", source.type_()).is_none() {
+        return;
+    }
+    source.set_property_from_str("protocols", "tcp");
+    source.connect("new-manager", false, |values| {
+        let manager = values.get(1)?.get::<gst::Element>().ok()?;
+        if manager.has_property_with_type("max-streams", glib::Type::U32) {
+            manager.set_property("max-streams", MOST_PER_STREAM);
+        }
+        None
+    });
 }
 
 type Report = SyncSender<Result<Video, Failure>>;
@@ -133,4 +158,23 @@ fn open<F: Future<Output = ()>>(
         .map_err(Failure::new)?;
     let no_answer = |_| Err(Failure::new(Error::Timeout(LONGEST_START)));
     opened.recv_timeout(finding + LONGEST_START + LONGEST_SILENCE).unwrap_or_else(no_answer)
+}
+
+#[cfg(test)]
+mod tests {
+    use gst::prelude::*;
+
+    use super::*;
+
+    #[test]
+    fn rtspsrc_asks_for_tcp_only_and_makes_few_streams() {
+        gst::init().unwrap();
+        let source = gst::ElementFactory::make("rtspsrc").build().unwrap();
+        Video::Rtsp("rtsp://127.0.0.1:1/".to_owned()).connect(&source);
+        let protocols = source.property_value("protocols").serialize().unwrap();
+        assert!(protocols.ends_with("TCP") && !protocols.contains('+'), "{protocols}");
+        let manager = gst::ElementFactory::make("rtpbin").build().unwrap();
+        source.emit_by_name::<()>("new-manager", &[&manager]);
+        assert_eq!(manager.property::<u32>("max-streams"), MOST_PER_STREAM);
+    }
 }

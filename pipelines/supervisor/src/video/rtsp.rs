@@ -21,6 +21,7 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 
+use super::media::Media;
 use super::rtsp_message::{Item, Message};
 use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
 
@@ -253,30 +254,52 @@ async fn ask(mut source: BufReader<ReadHalf<TcpStream>>, asking: &Mutex<Asking>)
 /// From the camera to `rtspsrc`.
 async fn answer(
     mut camera: BufReader<ReadHalf<Box<dyn Connection>>>,
-    source: &mut WriteHalf<TcpStream>,
+    source: &mut (impl AsyncWrite + Unpin),
     asking: &Mutex<Asking>,
 ) -> Result<(), Failure> {
+    let mut media = Media::default();
     while !camera.fill_buf().await.map_err(Failure::new)?.is_empty() {
         let Some(item) = Item::read(&mut camera).await.map_err(Failure::new)? else { break };
-        match &item {
+        match item {
+            Item::Packet(packet) => {
+                if let Some(passed) = media.pass(&packet)? {
+                    source.write_all(&passed).await.map_err(Failure::new)?;
+                }
+            }
             Item::Message(message) if message.status() == Some(401) => {
-                asking.lock().await.challenged(message).await?;
-                continue;
+                asking.lock().await.challenged(&message).await?;
             }
-            Item::Message(message) if message.status().is_some_and(|status| (300..400).contains(&status)) => {
-                let to = message.header("location").unwrap_or_default();
-                return Err(Error::Redirected(excerpt(to)).into());
+            Item::Message(message) => {
+                check(&message)?;
+                source.write_all(&message.to_bytes()).await.map_err(Failure::new)?;
             }
-            Item::Message(message) if streams(&message.body) > MOST_STREAMS => {
-                let said =
-                    format!("the camera offers {} streams, more than {MOST_STREAMS}", streams(&message.body));
-                return Err(Failure::new(said));
-            }
-            _ => {}
         }
-        source.write_all(&item.to_bytes()).await.map_err(Failure::new)?;
     }
     Ok(())
+}
+
+/// Refuses a message by which `rtspsrc` would go elsewhere, set up streams without end, or open a way of its own.
+fn check(message: &Message) -> Result<(), Failure> {
+    if message.status().is_some_and(|status| (300..400).contains(&status)) {
+        let to = message.header("location").unwrap_or_default();
+        return Err(Error::Redirected(excerpt(to)).into());
+    }
+    let offered = streams(&message.body);
+    if offered > MOST_STREAMS {
+        return Err(Failure::new(format!("the camera offers {offered} streams, more than {MOST_STREAMS}")));
+    }
+    if !message.headers_of("transport").all(is_by_tcp) {
+        return Err(Failure::new("the camera would send pictures by UDP, past this connection"));
+    }
+    Ok(())
+}
+
+/// Whether packets come in the connection itself (RFC 2326, section 12.39), by the letters that `rtspsrc` goes by: where it does not
+/// find `TCP` at its place, or finds `multicast` anywhere, it opens ports of UDP, whatever it has asked for.
+fn is_by_tcp(transport: &str) -> bool {
+    let transport = transport.to_ascii_lowercase();
+    let way = transport.split(';').next().unwrap_or_default();
+    way.split('/').nth(2) == Some("tcp") && !transport.contains("multicast")
 }
 
 /// How many streams a description offers (SDP, RFC 8866): as many as it has media.
@@ -330,6 +353,52 @@ mod tests {
     async fn who_does_not_read_keeps_nobody_waiting() {
         let (near, _far) = duplex(16);
         assert!(asking(near).write(&[0; 64]).await.is_err());
+    }
+
+    /// What is passed on of what a camera says, and how that ended.
+    async fn answered(said: &[u8]) -> (Vec<u8>, Result<(), Failure>) {
+        let (near, mut far) = duplex(64 * 1024);
+        far.write_all(said).await.unwrap();
+        drop(far);
+        let camera: Box<dyn Connection> = Box::new(near);
+        let asking = Mutex::new(asking(duplex(16).0));
+        let mut passed: Vec<u8> = Vec::new();
+        let result = answer(BufReader::new(split(camera).0), &mut passed, &asking).await;
+        (passed, result)
+    }
+
+    #[tokio::test]
+    async fn who_would_send_past_the_connection_is_given_up() {
+        let response =
+            |transport: &str| format!("RTSP/1.0 200 OK\r\nCSeq: 3\r\nTransport: {transport}\r\n\r\n");
+        for transport in ["RTP/AVP/TCP;unicast;interleaved=0-1", "rtp/avp/tcp;interleaved=2-3;ssrc=7"] {
+            let said = response(transport);
+            let (passed, result) = answered(said.as_bytes()).await;
+            assert!(result.is_ok() && passed == said.as_bytes(), "{transport}: {result:?}");
+        }
+        for transport in [
+            "RTP/AVP;unicast;client_port=5000-5001",
+            "RTP/AVP/UDP;unicast;client_port=5000-5001",
+            "RTP/AVP;multicast;destination=239.0.0.1;port=5000-5001",
+            "RTP/AVP/TCP;Multicast",
+            "RTP/AVP;unicast;source=TCP",
+            // To `rtspsrc` it is another word.
+            "RTP/AVP/TCP ;unicast;client_port=5000-5001",
+            "",
+        ] {
+            let (passed, result) = answered(response(transport).as_bytes()).await;
+            assert!(result.is_err() && passed.is_empty(), "{transport}: {result:?}");
+        }
+    }
+
+    /// `rtspsrc` would keep something of everybody who is named in a description.
+    #[tokio::test]
+    async fn of_packets_pictures_pass_and_descriptions_of_strangers_do_not() {
+        let picture = b"$\0\0\x0c\x80\x60\0\x01\0\0\0\0\0\0\0\x07";
+        let description = b"$\x01\0\x0c\x81\xca\0\x02\0\0\0\x09\x01\0\0\0";
+        let (passed, result) = answered(&[&picture[..], description, picture].concat()).await;
+        assert!(result.is_ok(), "{result:?}");
+        assert_eq!(passed, [*picture, *picture].concat());
     }
 
     #[test]
