@@ -4,12 +4,12 @@
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
 use std::fs;
-use std::io::{ErrorKind, Read, Write};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
 use std::net::{Shutdown, TcpListener, TcpStream};
 use std::path::Path;
 use std::process::Command;
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use chrono::DateTime;
 use end_to_end::{GstLaunch, PATIENCE, Program, Times, Viewer, certificate, scene, scratch};
@@ -20,6 +20,9 @@ use virtual_camera::VirtualCamera;
 
 /// Between two pictures of the camera.
 const INTERVAL: Duration = Duration::from_nanos(1_000_000_000 / 15);
+
+/// Who has set up no stream may stay for so long where there is room.
+const LONGEST_VISIT: Duration = Duration::from_secs(30);
 
 /// Ours has to send a stranger away before the server would do so by itself, after a minute.
 const LONGEST_TUNNEL: Duration = Duration::from_secs(50);
@@ -46,6 +49,30 @@ fn address(program: &mut Program) -> String {
 /// Host and port of such an address.
 fn server(url: &str) -> &str {
     url.trim_start_matches("rtsp://").trim_end_matches("/door")
+}
+
+/// The first line of the answer to such a request; empty where there is none.
+#[track_caller]
+fn answer(mut client: &TcpStream, request: &str) -> String {
+    client.set_read_timeout(Some(PATIENCE)).unwrap();
+    client.write_all(format!("{request} RTSP/1.0\r\nCSeq: 1\r\n\r\n").as_bytes()).unwrap();
+    let lines = BufReader::new(client).lines().map(Result::unwrap);
+    let head: Vec<String> = lines.take_while(|line| !line.is_empty()).collect();
+    head.into_iter().next().unwrap_or_default()
+}
+
+/// Somebody who asks for nothing in particular, and for nothing more. Answered, so that they have a place before anybody else comes.
+#[track_caller]
+fn stranger(url: &str) -> TcpStream {
+    let stranger = TcpStream::connect(server(url)).unwrap();
+    assert_eq!(answer(&stranger, "OPTIONS *"), "RTSP/1.0 200 OK");
+    stranger
+}
+
+/// That, and nothing else, is told to who was answered before.
+#[track_caller]
+fn is_sent_away(mut client: &TcpStream) -> bool {
+    client.read(&mut [0]).unwrap() == 0
 }
 
 /// Whether it can be read, and what was said.
@@ -257,23 +284,78 @@ fn who_believes_its_certificate_sees_and_nobody_else_does() {
     program.end("TERM");
 }
 
-/// Once they are gone there is room again.
+/// Neither who watches has to go nor who comes last. Once they are gone there is room again.
 #[test]
 fn those_who_are_too_many_are_sent_away_and_nobody_is_followed_the_worse_for_it() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
     let mut program = start("crowd", &camera, "codec = \"h264\"", "");
     let url = address(&mut program);
-    let mut crowd: Vec<TcpStream> = (0..200).map(|_| TcpStream::connect(server(&url)).unwrap()).collect();
-    // The last of them is told nothing but that.
-    let last = crowd.last_mut().unwrap();
-    last.set_read_timeout(Some(PATIENCE)).unwrap();
-    assert_eq!(last.read(&mut [0]).unwrap(), 0);
+    let viewer = Viewer::start(&url, |_| {});
+    viewer.document();
+    let crowd: Vec<TcpStream> = (0..200).map(|_| stranger(&url)).collect();
+    assert!(is_sent_away(&crowd[0]));
+    assert_eq!(answer(&crowd[199], "OPTIONS *"), "RTSP/1.0 200 OK");
+    let since = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap();
+    assert!(std::iter::repeat_with(|| viewer.document().0).any(|text| told(&text) > since));
     is_steered(&camera);
     drop(crowd);
     let begin = Instant::now();
     while !ffprobe(&url).0 {
         assert!(begin.elapsed() < PATIENCE, "there is no room any more");
     }
+    program.end("TERM");
+}
+
+/// They need not have gone by themselves.
+#[test]
+fn as_many_as_there_may_be_who_say_nothing_keep_nobody_out() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("silent", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let begin = Instant::now();
+    // One or two more than there may be.
+    let silent: Vec<TcpStream> = (0..130).map(|_| stranger(&url)).collect();
+    let viewer = TcpStream::connect(server(&url)).unwrap();
+    assert_eq!(answer(&viewer, &format!("DESCRIBE {url}")), "RTSP/1.0 200 OK");
+    assert!(is_sent_away(&silent[0]));
+    assert!(begin.elapsed() < LONGEST_VISIT / 2, "{:?}", begin.elapsed());
+    program.end("TERM");
+}
+
+/// The status of the answer to a request, which is read to its end.
+#[track_caller]
+fn status(server: &mut BufReader<TcpStream>, request: &str) -> u16 {
+    server.get_mut().write_all(format!("{request}\r\n\r\n").as_bytes()).unwrap();
+    let mut head = String::new();
+    while !head.ends_with("\r\n\r\n") {
+        assert_ne!(server.read_line(&mut head).unwrap(), 0, "{head}");
+    }
+    let length = head.lines().find_map(|line| line.strip_prefix("Content-Length: "));
+    let mut body = vec![0; length.map_or(0, |length| length.parse().unwrap())];
+    server.read_exact(&mut body).unwrap();
+    head.split(' ').nth(1).unwrap().parse().unwrap()
+}
+
+/// By UDP, anybody on the network could fill the memory with reports, and pictures would go in clear.
+#[test]
+fn pictures_go_by_the_connection_itself_and_no_other_way() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let mut program = start("udp", &camera, "codec = \"h264\"", "");
+    let url = address(&mut program);
+    let client = TcpStream::connect(server(&url)).unwrap();
+    client.set_read_timeout(Some(PATIENCE)).unwrap();
+    let mut client = BufReader::new(client);
+    let describe = format!("DESCRIBE {url} RTSP/1.0\r\nCSeq: 1\r\nAccept: application/sdp");
+    assert_eq!(status(&mut client, &describe), 200);
+    for (transport, answer) in [
+        ("RTP/AVP;unicast;client_port=5000-5001", 461),
+        ("RTP/AVP;multicast", 461),
+        ("RTP/AVP/TCP;unicast;interleaved=0-1", 200),
+    ] {
+        let setup = format!("SETUP {url}/stream=0 RTSP/1.0\r\nCSeq: 2\r\nTransport: {transport}");
+        assert_eq!(status(&mut client, &setup), answer, "{transport}");
+    }
+    drop(client);
     program.end("TERM");
 }
 

@@ -38,6 +38,8 @@ impl MediaFactory {
             .build();
         factory.add_role_from_structure(&access);
         factory.set_shared(true);
+        // By UDP, reports would be taken from anybody on the network, and pictures go in clear beside a connection by TLS.
+        factory.set_protocols(gst_rtsp::RTSPLowerTrans::TCP);
         factory.set_media_gtype(Media::static_type());
         // The packets' times are told by it.
         factory.set_clock(Some(&gst::SystemClock::obtain()));

@@ -28,6 +28,7 @@ use gst_rtsp_server::{
 use pipeline_supervisor::Backoff;
 use ptztrack_contract::lock::lock;
 use tokio::runtime::Handle;
+use visitor::Visitors;
 
 use crate::config::{CameraSettings, Codec, Restream};
 use crate::event::{Event, Level};
@@ -37,7 +38,7 @@ use crate::log::Log;
 /// The only role there is: whoever knows the password.
 const ROLE: &str = "viewer";
 
-/// As many as the page takes at once; the others are sent away.
+/// As many as the page takes at once. Beyond that, somebody without a stream is sent away.
 const MOST_CLIENTS: usize = 128;
 
 /// Nobody has to send more than a few words in the body of a request; it is read before anybody has logged in.
@@ -87,9 +88,9 @@ impl Restreaming {
         server.set_content_length_limit(LONGEST_BODY);
         let context = glib::MainContext::new();
         server.connect_client_connected({
-            let context = context.clone();
+            let (visitors, context) = (Visitors::default(), context.clone());
             // Called in the thread of that context.
-            move |server, client| visitor::receive(server, client, &context)
+            move |server, client| visitors.receive(server, client, &context)
         });
         let main_loop = glib::MainLoop::new(Some(&context), false);
         context.spawn(serve(server.clone(), context.clone(), settings.clone(), log));

@@ -1,15 +1,15 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! Clients that have set up no stream yet: what they send is read before anybody has logged in, so they may send and stay no longer
-//! than a log-in takes.
+//! than a log-in takes, and where there are too many, they make room.
 
 use std::os::fd::AsRawFd;
-use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, Weak};
 use std::time::{Duration, Instant};
 
 use glib::translate::from_glib_none;
 use gst_rtsp_server::{RTSPClient, RTSPServer, gio, prelude::*};
+use ptztrack_contract::lock::lock;
 
 use super::{LONGEST_BODY, MOST_CLIENTS};
 
@@ -25,21 +25,84 @@ const MOST_WAITING: i32 = 16 * 1024;
 /// Between two looks at what they have sent.
 const LOOK: Duration = Duration::from_millis(50);
 
-/// Whether a client has set up a stream.
-type Settled = Arc<AtomicBool>;
+/// What has become of a visit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Visit {
+    Open,
+    /// A stream was set up.
+    Settled,
+    /// Others need the place.
+    SentAway,
+}
 
-/// Takes on a client that has just connected, in the thread that carries out `context`.
-pub(super) fn receive(server: &RTSPServer, client: &RTSPClient, context: &glib::MainContext) {
-    let Some(socket) = socket_of(client) else { return };
-    // Where it is not taken, more is read.
-    let _ = socket.set_option(libc::SOL_SOCKET, libc::SO_RCVBUF, MOST_WAITING);
-    let settled = Settled::default();
-    client.connect_new_session({
-        let settled = settled.clone();
-        move |_, _| settled.store(true, Ordering::Relaxed)
-    });
-    let is_too_much = server.client_filter(None).len() > MOST_CLIENTS;
-    context.spawn_local(watch(socket, client.downgrade(), settled, is_too_much));
+/// A client that has connected.
+struct Visitor {
+    client: glib::WeakRef<RTSPClient>,
+    visit: Mutex<Visit>,
+}
+
+impl Visitor {
+    fn is(&self, visit: Visit) -> bool {
+        *lock(&self.visit) == visit
+    }
+
+    /// Ends its visit so, unless it has ended already: nobody is sent away from a stream.
+    fn end(&self, end: Visit) -> bool {
+        let mut visit = lock(&self.visit);
+        let is_open = *visit == Visit::Open;
+        if is_open {
+            *visit = end;
+        }
+        is_open
+    }
+
+    /// Has it make room, where it has a place and no stream, neither one of its own nor one of a session of before.
+    fn makes_room(&self) -> bool {
+        let client = self.client.upgrade();
+        client.is_some_and(|client| client.session_filter(None).is_empty()) && self.end(Visit::SentAway)
+    }
+}
+
+/// Those who are being watched, oldest first.
+#[derive(Default)]
+pub(super) struct Visitors(Mutex<Vec<Weak<Visitor>>>);
+
+impl Visitors {
+    /// Takes on a client that has just connected, in the thread that carries out `context`.
+    pub(super) fn receive(&self, server: &RTSPServer, client: &RTSPClient, context: &glib::MainContext) {
+        let Some(socket) = socket_of(client) else { return };
+        // Where it is not taken, more is read.
+        let _ = socket.set_option(libc::SOL_SOCKET, libc::SO_RCVBUF, MOST_WAITING);
+        let visitor = Arc::new(Visitor { client: client.downgrade(), visit: Mutex::new(Visit::Open) });
+        // Not as a session begins: it may be for a transport that is refused.
+        client.connect_setup_request({
+            let visitor = Arc::downgrade(&visitor);
+            move |_, _| {
+                if let Some(visitor) = visitor.upgrade() {
+                    visitor.end(Visit::Settled);
+                }
+            }
+        });
+        self.add(&visitor);
+        if server.client_filter(None).len() > MOST_CLIENTS {
+            self.make_room();
+        }
+        context.spawn_local(watch(socket, visitor));
+    }
+
+    /// Who is watched no more is forgotten.
+    fn add(&self, visitor: &Arc<Visitor>) {
+        let mut visitors = lock(&self.0);
+        visitors.retain(|visitor| visitor.strong_count() > 0);
+        visitors.push(Arc::downgrade(visitor));
+    }
+
+    /// Sends away who has been here for longest without a stream. The newcomer is the last of them: were it the first, those who only
+    /// connect would keep everybody out.
+    fn make_room(&self) {
+        let visitors: Vec<_> = lock(&self.0).iter().filter_map(Weak::upgrade).collect();
+        let _ = visitors.iter().any(|visitor| visitor.makes_room());
+    }
 }
 
 /// By which a client has connected.
@@ -63,22 +126,23 @@ fn answering(client: &RTSPClient) -> Option<gio::Socket> {
     }
 }
 
-/// Sends a client away at once, or where it stays for too long or sends too much without setting up a stream.
-async fn watch(socket: gio::Socket, client: glib::WeakRef<RTSPClient>, settled: Settled, is_too_much: bool) {
+/// Sends a client away that is to make room, or stays for too long or sends too much without setting up a stream.
+async fn watch(socket: gio::Socket, visitor: Arc<Visitor>) {
     let begin = Instant::now();
     let is_short = || received(&socket) <= MOST_BYTES;
-    while !is_too_much && begin.elapsed() < LONGEST_VISIT && is_short() {
+    while !visitor.is(Visit::SentAway) && begin.elapsed() < LONGEST_VISIT && is_short() {
         glib::timeout_future(LOOK).await;
         // A client may be there without its socket: in a tunnel it waits for another request by which it would be told more.
-        if settled.load(Ordering::Relaxed) || (socket.is_closed() && client.upgrade().is_none()) {
+        if visitor.is(Visit::Settled) || (socket.is_closed() && visitor.client.upgrade().is_none()) {
             return;
         }
     }
-    let client = client.upgrade();
-    // One that goes on with a session of before; or, where the client is gone and its socket is not, that of a tunnel through HTTP,
-    // which is another client's now.
-    let belongs = client.as_ref().is_none_or(|client| !client.session_filter(None).is_empty());
-    if !is_too_much && is_short() && belongs {
+    let client = visitor.client.upgrade();
+    // One that goes on with a session of before, unless its place is another's by now; or, where the client is gone and its socket is not,
+    // that of a tunnel through HTTP, which is another client's now.
+    let goes_on = |client: &RTSPClient| !client.session_filter(None).is_empty();
+    let belongs = client.as_ref().is_none_or(|client| !visitor.is(Visit::SentAway) && goes_on(client));
+    if is_short() && belongs {
         return;
     }
     // Without this, one of a tunnel waits for another request until the server itself ends it, after a minute. Asked for first: the
