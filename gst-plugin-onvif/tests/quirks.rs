@@ -84,7 +84,7 @@ fn each_quirk() {
         let stage = follows(quirk.switch(), camera(OnvifSettings::with(&[quirk]), 120.0), 0.25);
         let warnings: Vec<_> = stage.heard.into_iter().filter_map(Heard::into_warning).collect();
         let expected = match quirk {
-            Quirk::TimeoutRefused => &["refuses to be told how long a move may last"][..],
+            Quirk::TimeoutRefused => &["refuses moves with a time limit"][..],
             _ => &[],
         };
         let told = warnings.iter().zip(expected).all(|(warning, expected)| warning.contains(expected));
@@ -283,8 +283,7 @@ fn a_zoom_that_breaks_the_answer_is_stopped_and_left_alone() {
         let mut stage = zooming(camera(OnvifSettings::with(quirks), 120.0));
         walk_away(&mut stage);
         let zoom_step = stage.camera.status().zoom_step;
-        let told =
-            |heard: &Heard| matches!(heard, Heard::Warning(text) if text.contains("zoom is left alone"));
+        let told = |heard: &Heard| matches!(heard, Heard::Warning(text) if text.contains("it is not zoomed from now on"));
         assert_eq!(
             stage.heard.iter().filter(|heard| told(heard)).count(),
             1,

@@ -4,7 +4,7 @@ use std::mem;
 use std::time::Duration;
 
 use servo::{Motion, Position, Presets};
-use session::http::{Credentials, HttpClient, Identity, Repeat, unexpected};
+use session::http::{Credentials, HttpClient, Identity, Repeat, excerpt, unexpected};
 use session::{Command, Error, Protocol, Query, Request, Response, Stop};
 use tokio::time::timeout;
 
@@ -273,9 +273,7 @@ impl Client {
         match profiles.into_iter().find(is_wanted) {
             Some(profile) => Ok(profile),
             None if names.is_empty() => Err(Error::NoPtz),
-            None => {
-                Err(Error::Camera(format!("no profile `{wanted}` with PTZ; there are {}", names.join(", "))))
-            }
+            None => Err(no_such_profile(wanted, &names)),
         }
     }
 
@@ -463,7 +461,7 @@ impl Client {
             let _ = self.stop(&Command::Stop(Stop::AllAxes), abilities).await;
         }
         self.moves.leave_zoom();
-        self.warn("the camera breaks off where it is told to zoom: the zoom is left alone from here on");
+        self.warn("the camera breaks off its answer when told to zoom: it is not zoomed from now on");
     }
 
     async fn stop(&mut self, command: &Command, abilities: &Abilities) -> Result<(), Error> {
@@ -525,7 +523,7 @@ impl Client {
     }
 
     fn warn_of_no_timeout(&mut self) {
-        self.warn("the camera refuses to be told how long a move may last: if the network fails while it moves, it goes on turning. Use it with `dead-man`, over a network that does not fail");
+        self.warn("the camera refuses moves with a time limit: if the network fails during a move, it keeps turning. Leave `dead-man` on, and use a reliable network");
     }
 
     fn warn(&mut self, text: &str) {
@@ -541,6 +539,12 @@ fn worse(first: Error, second: Error) -> Error {
         Error::NotPermitted { .. } | Error::BadCredentials { .. } | Error::CredentialsMissing
     );
     if second.may_have_acted() || (is_refused && !first.may_have_acted()) { second } else { first }
+}
+
+/// The tokens are the camera's own words.
+fn no_such_profile(wanted: &str, tokens: &[String]) -> Error {
+    let tokens = excerpt(&tokens.join(", "));
+    Error::Camera(format!("no profile `{wanted}` with PTZ; set `profile` to one of {tokens}"))
 }
 
 /// Where a message goes.
@@ -566,5 +570,12 @@ mod tests {
         assert_eq!(worse(first(), Error::Camera("no such space".to_owned())), first());
         let late = || Error::Timeout(Duration::from_secs(1));
         assert_eq!(worse(late(), Error::CredentialsMissing), late(), "it may be turning");
+    }
+
+    #[test]
+    fn the_profiles_that_there_are_are_no_order_to_a_terminal() {
+        let tokens = ["a\u{1b}[2J".to_owned(), "b\r\nc".to_owned()];
+        let told = "no profile `x` with PTZ; set `profile` to one of a[2J, b c";
+        assert_eq!(no_such_profile("x", &tokens), Error::Camera(told.to_owned()));
     }
 }

@@ -30,4 +30,4 @@ pub use answers::{
 pub use client::Client;
 pub use soap::{Answer, Element, read_answer};
 pub use streams::{Encoding, StreamAddress, VideoStream, parse_stream_address, parse_streams};
-pub use ws_discovery::{Announcement, GROUP, parse_announcements, probe};
+pub use ws_discovery::{Announcement, GROUP, Probe, parse_announcements, probe};

@@ -69,7 +69,7 @@ async fn a_camera_that_refuses_a_timeout_is_moved_without_and_somebody_is_told_o
     let camera = camera(&[Quirk::TimeoutRefused]);
     let mut client = client(&camera, "pass");
     assert_eq!(client.exchange(&RIGHT).await, Ok(Response::Accepted));
-    assert!(client.take_warning().unwrap().contains("how long a move may last"));
+    assert!(client.take_warning().unwrap().contains("moves with a time limit"));
     assert_eq!(client.exchange(&RIGHT).await, Ok(Response::Accepted));
     assert_eq!(client.take_warning(), None);
 }

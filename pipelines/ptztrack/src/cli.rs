@@ -50,11 +50,11 @@ pub enum Task {
         #[arg(long, value_name = "SECONDS", default_value = "3", value_parser = seconds)]
         wait: Duration,
     },
-    /// Tell a ptztrack that runs that the middle of a camera's picture shows this place of another one's, for it to learn
+    /// Tell a running ptztrack that the middle of a camera's picture shows this place of another one's, for it to learn
     Point(Point),
     /// Follow with one camera, without a file
     Follow(Box<Follow>),
-    /// Read a file and name every mistake in it, with its line, and what this machine has not got for a camera
+    /// Read a file and name every mistake in it, with its line, and what this machine lacks for a camera
     Check {
         /// The file
         file: PathBuf,
@@ -88,7 +88,7 @@ pub struct Serving {
 pub struct Follow {
     /// The camera: a host name or an address, for example 192.168.0.90 or https://192.168.0.90
     address: String,
-    /// What it is spoken to by; else it is asked for VAPIX, then for ONVIF
+    /// Protocol; if not given, VAPIX is tried, then ONVIF
     #[arg(long, value_enum)]
     protocol: Option<Protocol>,
     /// Account with the right to control PTZ; its password is in the environment variable CAMERA_PASSWORD or in a file
@@ -97,7 +97,7 @@ pub struct Follow {
     /// File with the password
     #[arg(long, value_name = "FILE", requires = "user")]
     password_file: Option<PathBuf>,
-    /// How pictures come [default: by VAPIX mjpeg; by ONVIF as the stream is that suits best]
+    /// How pictures come [default: by VAPIX mjpeg; by ONVIF that of the best-suited stream]
     #[arg(long, value_enum)]
     codec: Option<Codec>,
     /// The camera's RTSP server, for example rtsp://192.168.0.90:554
@@ -106,7 +106,7 @@ pub struct Follow {
     /// Size of the picture, for example 640x480; by ONVIF the stream is taken that comes nearest
     #[arg(long, value_parser = |text: &str| crate::config::size(text).ok_or("width and height in pixels, as 640x480"))]
     size: Option<(u32, u32)>,
-    /// Pictures per second
+    /// Pictures per second; with ONVIF it is set on the camera's own pages
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=60))]
     rate: Option<u32>,
     /// Show the picture in a window
@@ -134,6 +134,9 @@ impl Follow {
             (None, None) => Codec::usual(protocol),
         };
         codec.check(protocol)?;
+        if protocol == Protocol::Onvif && self.rate.is_some() {
+            return Err("with ONVIF the rate is set on the camera's own pages: leave out --rate".to_owned());
+        }
         let stream = best.map_or_else(String::new, |best| format!(", its stream is {best}"));
         log.info("found", format!("{address} speaks {}{stream}", protocol.name()));
         let camera = CameraSettings {

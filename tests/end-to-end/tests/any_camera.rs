@@ -68,7 +68,9 @@ fn who_may_not_or_is_not_there_is_told_what_to_do() {
     let text = refused(&["follow", &address, "--user", "somebody"]);
     assert!(text.contains("refuses user `somebody`") && text.contains("is not locked"), "{text}");
     let text = refused(&["follow", &address, "--user", scene::USER, "--protocol", "vapix"]);
-    assert!(text.contains("no camera that can be followed with") && text.contains("by VAPIX: "), "{text}");
+    assert!(text.contains("is not a usable camera") && text.contains("by VAPIX: "), "{text}");
+    let text = refused(&["follow", &address, "--user", scene::USER, "--rate", "10"]);
+    assert!(text.contains("with ONVIF the rate is set on the camera's own pages"), "{text}");
     assert_eq!(camera.commands().len(), 0);
 }
 

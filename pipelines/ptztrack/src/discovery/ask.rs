@@ -63,7 +63,7 @@ pub async fn ask(
     }
     let reasons: Vec<_> =
         refusals.iter().map(|(protocol, err)| format!("  by {}: {err}", protocol.name())).collect();
-    Err(format!("{address} is no camera that can be followed with:\n{}", reasons.join("\n")))
+    Err(format!("{address} is not a usable camera:\n{}", reasons.join("\n")))
 }
 
 fn sentence(address: &str, err: &Error) -> String {
@@ -87,6 +87,11 @@ fn with_scheme(address: &str) -> String {
         _ if address.parse::<Ipv6Addr>().is_ok() => format!("http://[{address}]"),
         _ => format!("http://{address}"),
     }
+}
+
+/// Whether who is asked there may be asked by plain HTTP.
+fn is_plain(address: &str) -> bool {
+    address.get(..7).is_some_and(|scheme| scheme.eq_ignore_ascii_case("http://"))
 }
 
 fn settings(
@@ -145,8 +150,12 @@ async fn ask_onvif(
     client.streams().await
 }
 
-/// Where else its host says that it has ONVIF: many have it at another port.
+/// Where else its host says that it has ONVIF: many have it at another port. Nowhere, where that would be by plain HTTP in place of what
+/// was asked for.
 async fn told_by(address: &str) -> Vec<String> {
+    if !is_plain(address) {
+        return Vec::new();
+    }
     let rest = address.split_once("://").map_or(address, |(_, rest)| rest);
     let authority = rest.split('/').next().unwrap_or(rest);
     let host = match authority.rsplit_once(':') {
@@ -169,6 +178,8 @@ async fn told_by(address: &str) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
+    use std::io::ErrorKind;
+
     use super::*;
 
     #[test]
@@ -184,24 +195,43 @@ mod tests {
         }
     }
 
-    /// Whoever hears the question can answer it, too.
+    /// Whoever hears the question can answer it, too; and who does not can send what looks as if its own host had sent it.
     #[tokio::test]
     async fn where_else_it_is_is_told_by_its_own_host() {
-        let answer = |port: u16| {
+        let answer = |id: &str, port: u16| {
             format!(
-                "<e:Envelope xmlns:e='x' xmlns:d='y'><e:Body><d:ProbeMatches><d:ProbeMatch><d:XAddrs>\
-                 http://camera:{port}/onvif/device_service</d:XAddrs></d:ProbeMatch></d:ProbeMatches></e:Body></e:Envelope>"
+                "<e:Envelope xmlns:e='x' xmlns:d='y'><e:Header><e:RelatesTo>{id}</e:RelatesTo></e:Header><e:Body><d:ProbeMatches>\
+                 <d:ProbeMatch><d:XAddrs>http://camera:{port}/onvif/device_service</d:XAddrs></d:ProbeMatch></d:ProbeMatches>\
+                 </e:Body></e:Envelope>"
             )
         };
         let camera = UdpSocket::bind(("127.0.0.2", onvif::GROUP.port())).await.unwrap();
         let stranger = UdpSocket::bind("127.0.0.3:0").await.unwrap();
         tokio::spawn(async move {
             let mut question = [0; 4096];
-            while let Ok((_, asking)) = camera.recv_from(&mut question).await {
-                stranger.send_to(answer(8001).as_bytes(), asking).await.unwrap();
-                camera.send_to(answer(8002).as_bytes(), asking).await.unwrap();
+            while let Ok((length, asking)) = camera.recv_from(&mut question).await {
+                let question = String::from_utf8_lossy(&question[..length]);
+                let id = question.split("MessageID>").nth(1).and_then(|rest| rest.split('<').next()).unwrap();
+                stranger.send_to(answer(id, 8001).as_bytes(), asking).await.unwrap();
+                camera.send_to(answer(&onvif::probe().id, 8003).as_bytes(), asking).await.unwrap();
+                camera.send_to(answer(id, 8002).as_bytes(), asking).await.unwrap();
             }
         });
         assert_eq!(told_by("http://127.0.0.2").await, ["http://127.0.0.2:8002"]);
+    }
+
+    /// Who answers the question is logged in to by plain HTTP.
+    #[tokio::test]
+    async fn who_is_asked_by_https_is_asked_nowhere_else() {
+        let camera = std::net::UdpSocket::bind(("127.0.0.4", onvif::GROUP.port())).unwrap();
+        camera.set_nonblocking(true).unwrap();
+        let question = || camera.recv_from(&mut [0; 4096]).map_err(|err| err.kind());
+        // Nobody is at this port.
+        for address in ["https://127.0.0.4:1", "HTTPS://127.0.0.4:1"] {
+            assert!(ask(address, None, None).await.is_err());
+            assert_eq!(question(), Err(ErrorKind::WouldBlock), "{address}");
+        }
+        assert!(ask("http://127.0.0.4:1", None, None).await.is_err());
+        assert!(question().is_ok());
     }
 }

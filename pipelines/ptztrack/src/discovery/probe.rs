@@ -99,20 +99,21 @@ async fn ask_network(own: Ipv4Addr, wait: Duration) -> io::Result<Vec<Heard>> {
     listen(UdpSocket::from_std(socket.into())?, onvif::GROUP.into(), wait).await
 }
 
-/// Asks there, twice as a datagram may be lost, and hears who answers: so many at most.
+/// Asks there, twice as a datagram may be lost, and hears who answers that, and nobody else: so many at most.
 pub async fn listen(socket: UdpSocket, whom: SocketAddr, wait: Duration) -> io::Result<Vec<Heard>> {
     let question = onvif::probe();
     let end = Instant::now() + wait;
     let mut heard = Vec::new();
     let mut answer = vec![0; LONGEST];
     for until in [end - wait / 2, end] {
-        socket.send_to(question.as_bytes(), whom).await?;
+        socket.send_to(question.message.as_bytes(), whom).await?;
         while let Ok(received) = timeout_at(until, socket.recv_from(&mut answer)).await {
             // Refused by a host that has nobody there, for one.
             let Ok((length, sender)) = received else { break };
             let text = String::from_utf8_lossy(answer.get(..length).unwrap_or_default());
             let announcements = onvif::parse_announcements(&text);
-            let cameras = announcements.iter().filter_map(|camera| Heard::of(camera, sender.ip()));
+            let answers = announcements.iter().filter(|camera| camera.answers(&question.id));
+            let cameras = answers.filter_map(|camera| Heard::of(camera, sender.ip()));
             for camera in cameras {
                 if heard.len() < MOST && !heard.contains(&camera) {
                     heard.push(camera);
@@ -131,7 +132,7 @@ mod tests {
     fn a_camera_is_where_its_answer_comes_from() {
         let heard = |addresses: &[&str]| {
             let addresses = addresses.iter().map(|&address| address.to_owned()).collect();
-            let announcement = Announcement { addresses, name: "Door".to_owned() };
+            let announcement = Announcement { addresses, name: "Door".to_owned(), ..Announcement::default() };
             let heard = Heard::of(&announcement, IpAddr::from([10, 0, 0, 7]))?;
             Some((heard.address(), heard.location()))
         };
