@@ -13,6 +13,7 @@ mod allocation;
 mod analytics;
 pub mod bgavgdetect;
 mod duration;
+mod frame;
 pub mod lkfeaturetrack;
 use ptztrack_contract::lock;
 pub mod luma_source;

@@ -198,6 +198,24 @@ fn the_trail_ends_with_its_time_and_its_target() {
 }
 
 #[test]
+fn the_trail_ends_where_time_goes_backwards_or_is_not_known() {
+    init();
+    let info = info(VideoFormat::Rgb, 640, 480);
+    for pts in [Some(gst::ClockTime::ZERO), None] {
+        let mut harness = harness(&["trail"], &info);
+        harness.push_and_pull(with_target(&info, 1, 1, 0.2, 0.5)).unwrap();
+        let out = harness.push_and_pull(with_target(&info, 2, 1, 0.4, 0.5)).unwrap();
+        assert_ne!(bytes(&out), bytes(&grey(&info, 2)));
+        let mut buffer = grey(&info, 0);
+        buffer.make_mut().set_pts(pts);
+        // Nobody is there any more.
+        TargetMeta::default().attach(buffer.make_mut()).unwrap();
+        let out = harness.push_and_pull(buffer).unwrap();
+        assert_eq!(bytes(&out), bytes(&grey(&info, 0)), "{pts:?}");
+    }
+}
+
+#[test]
 fn a_flush_ends_the_trail() {
     init();
     let info = info(VideoFormat::Rgb, 640, 480);

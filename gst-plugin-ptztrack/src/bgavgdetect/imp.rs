@@ -96,12 +96,12 @@ pub struct BgAvgDetect {
         blurb = "Largest area of a region, as a fraction of the frame"
     )]
     #[property(
-        name = "zones", type = String, mutable_playing, blurb = "Where people are chosen (empty = everywhere), in the picture in which it is set: polygons separated by `;`, each of three or more points `x,y` (0 to 1) separated by spaces",
+        name = "zones", type = String, mutable_playing, blurb = "Where regions are reported (empty = everywhere), in the picture at the time of setting: polygons separated by `;`, each of three or more points `x,y` (0 to 1) separated by spaces",
         get = |imp: &Self| lock(&imp.settings).zones.text.to_string(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("zones", text, |settings| &mut settings.zones)
     )]
     #[property(
-        name = "exclude-zones", type = String, mutable_playing, blurb = "Where nobody is chosen: polygons as in zones",
+        name = "exclude-zones", type = String, mutable_playing, blurb = "Where no regions are reported: polygons as in zones",
         get = |imp: &Self| lock(&imp.settings).exclude_zones.text.to_string(),
         set = |imp: &Self, text: Option<String>| imp.set_zones("exclude-zones", text, |settings| &mut settings.exclude_zones)
     )]
@@ -119,7 +119,7 @@ pub struct BgAvgDetect {
         name = "settle-time", get, type = u64, member = settle_time_ns, mutable_playing,
         set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "settle-time", value) { lock(&imp.settings).settle_time_ns = value },
         default = Settings::default().settle_time_ns, maximum = 60_000_000_000,
-        blurb = "How long pictures may still show the camera moving after it stopped, in nanoseconds"
+        blurb = "With profile=thesis: how long pictures may still show the camera moving after it stopped, in nanoseconds"
     )]
     #[property(
         name = "max-gap", get, type = u64, member = max_gap_ns, mutable_playing,
@@ -444,7 +444,7 @@ impl BgAvgDetect {
             gst::element_imp_warning!(
                 self,
                 gst::StreamError::Failed,
-                ("A frame passes unseen: {error}. Further faults of this stream are not reported")
+                ("A frame was not analysed: {error}. Further faults of this stream are not reported")
             );
         }
     }

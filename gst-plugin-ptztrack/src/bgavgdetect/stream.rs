@@ -3,11 +3,12 @@
 use std::time::Duration;
 
 use gst_video::prelude::*;
-use gst_video::{VideoConverter, VideoFrameRef, VideoInfo};
+use gst_video::{VideoConverter, VideoInfo};
 use ptztrack_contract::{MotionChange, MotionMeta, Plane, Rect, Region, SceneMeta, View};
 
 use super::Output;
 use super::settings::Settings;
+use crate::frame;
 use crate::luma_source::{LumaSource, LumaSourceError};
 use crate::unseen::Unseen;
 use crate::vision::{
@@ -157,8 +158,7 @@ impl Stream {
         buffer: &gst::BufferRef,
         settings: &Settings,
     ) -> Result<Option<Vec<Region>>, StreamError> {
-        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
-            .map_err(|_| StreamError::Buffer)?;
+        let frame = frame::readable(buffer, &self.in_info).ok_or(StreamError::Buffer)?;
         let luma = self.source.luma(&frame)?;
         Ok(self.detector.process(&luma, &settings.detector())?)
     }
@@ -172,8 +172,7 @@ impl Stream {
         settings: &Settings,
         heard: &Heard,
     ) -> Result<(Option<MotionMeta>, SceneMeta), StreamError> {
-        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &self.in_info)
-            .map_err(|_| StreamError::Buffer)?;
+        let frame = frame::readable(buffer, &self.in_info).ok_or(StreamError::Buffer)?;
         let picture = self.source.picture(&frame)?;
         let from_pts = std::mem::replace(&mut self.scene_pts, buffer.pts());
         let config = settings.detector();
@@ -232,15 +231,13 @@ impl Stream {
         regions: &[Region],
         output: Output,
     ) -> Result<(), StreamError> {
-        let mut out = VideoFrameRef::from_buffer_ref_writable(outbuf, &self.out_info)
-            .map_err(|_| StreamError::Buffer)?;
+        let mut out = frame::writable(outbuf, &self.out_info).ok_or(StreamError::Buffer)?;
         let stride = out.plane_stride().first().copied().unwrap_or(0).unsigned_abs() as usize;
         if output != Output::Foreground {
             self.detector.draw_mask(out.plane_data_mut(0)?, stride, 1)?;
             return Ok(());
         }
-        let frame =
-            VideoFrameRef::from_buffer_ref_readable(inbuf, &self.in_info).map_err(|_| StreamError::Buffer)?;
+        let frame = frame::readable(inbuf, &self.in_info).ok_or(StreamError::Buffer)?;
         let converter = match self.converter.take() {
             Some(converter) => converter,
             None => VideoConverter::new(&self.in_info, &self.out_info, None)?,

@@ -8,8 +8,8 @@ use gst::subclass::prelude::*;
 use gst_base::prelude::*;
 use gst_base::subclass::BaseTransformMode;
 use gst_base::subclass::prelude::*;
+use gst_video::VideoInfo;
 use gst_video::subclass::prelude::*;
-use gst_video::{VideoFrameRef, VideoInfo};
 use ptztrack_contract::{
     CameraEvent, MOTION_ROI, RefusedValues, TargetChange, TargetState, Times, TrackMessage, TrackerEvent,
 };
@@ -20,6 +20,7 @@ use crate::allocation::refuse_crop;
 #[cfg(feature = "analytics")]
 use crate::analytics::Analytics;
 use crate::duration;
+use crate::frame;
 use crate::lock::lock;
 use crate::luma_source::{self, LumaSource};
 use crate::pad_templates;
@@ -216,7 +217,7 @@ pub struct LkFeatureTrack {
     )]
     #[property(
         name = "ignored-tracks", type = String, mutable_playing,
-        blurb = "Numbers of tracks that become the target only where they are selected, as 3,7",
+        blurb = "Numbers of tracks that become the target only when selected by hand, for example 3,7",
         get = |imp: &Self| operator::in_words(&lock(&imp.settings).ignored_tracks),
         set = |imp: &Self, numbers: Option<String>| imp.ignore(&numbers.unwrap_or_default())
     )]
@@ -234,13 +235,13 @@ pub struct LkFeatureTrack {
         name = "stationary-timeout", get, type = u64, member = stationary_timeout_ns, mutable_playing,
         set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "stationary-timeout", value) { lock(&imp.settings).stationary_timeout_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().stationary_timeout_ns,
-        blurb = "A target that stands still for longer is released and not taken again until it moves, in nanoseconds (0: never)"
+        blurb = "A target that stands still longer than this is released and not taken again until it moves, in nanoseconds (0: never)"
     )]
     #[property(
         name = "max-tracking-time", get, type = u64, member = max_tracking_time_ns, mutable_playing,
         set = |imp: &Self, value: u64| if duration::accepts(imp, &imp.refused, "max-tracking-time", value) { lock(&imp.settings).max_tracking_time_ns = value },
         maximum = 86_400_000_000_000, default = Settings::default().max_tracking_time_ns,
-        blurb = "A target that is tracked for longer is released and not taken again until it has moved and 3 s have passed, in nanoseconds (0: never)"
+        blurb = "A target tracked for longer than this is released and not taken again until it has moved and 3 s have passed, in nanoseconds (0: never)"
     )]
     settings: Mutex<Settings>,
     /// Taken out by the streaming thread while it computes.
@@ -305,6 +306,8 @@ impl BaseTransformImpl for LkFeatureTrack {
 
     fn start(&self) -> Result<(), gst::ErrorMessage> {
         self.refused.warn(&*self.obj());
+        // What was asked for while nothing was to be seen was meant for what was seen before.
+        *lock(&self.request) = None;
         Ok(())
     }
 
@@ -447,8 +450,8 @@ impl LkFeatureTrack {
             fault = Some(format!("the detector's meta cannot be read: {err}"));
             &[]
         });
-        let frame = VideoFrameRef::from_buffer_ref_readable(buffer, &stream.info)
-            .map_err(|err| format!("the frame cannot be mapped: {err}"))?;
+        let frame = frame::readable(buffer, &stream.info)
+            .ok_or("the buffer does not hold a frame of the negotiated caps")?;
         let picture =
             stream.source.picture(&frame).map_err(|err| format!("the frame has no readable luma: {err}"))?;
         let mut seen = Observation::from(picture.luma);

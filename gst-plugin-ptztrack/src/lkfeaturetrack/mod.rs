@@ -27,8 +27,8 @@
 //!
 //! ## States
 //! *Searching* → *tracking* → *occluded* (hidden: coasted for `coast-time` and looked for) → *tracking* again
-//! or *lost* for one frame → *searching*. Every change goes upstream as an event, so that the detector sleeps
-//! while the target is followed, and onto the bus as an element message named `ptztrack-target` (`change`:
+//! or *lost* for one frame → *searching*. Every change goes upstream as an event, so that the detector
+//! knows where the target is (with `profile=thesis` it sleeps meanwhile), and onto the bus as an element message named `ptztrack-target` (`change`:
 //! `acquired`, `occluded`, `reacquired`, `lost`, `released`, and every `message-interval` a `position`).
 //!
 //! A change of size, a seek (flush) or a gap of more than two seconds loses the target: another picture.
@@ -40,8 +40,9 @@
 //! others when they part. A right click releases the target. The key `n` selects the track of the next number, a digit the
 //! track of that number.
 //! Applications emit `select-target` (x and y in frame sizes, 0 to 1), `select-track` (a number), `next-target` and
-//! `release-target` instead. A number that nobody has is a warning, and the target stays. What was released is not chosen again for
-//! three seconds. The tracks in `ignored-tracks` are not chosen at all: they become the target where they are selected.
+//! `release-target` instead; what is asked for while the element is stopped is forgotten. A number that nobody has is a warning, and the
+//! target stays. What was released is not chosen again for three seconds. The tracks in `ignored-tracks` are not chosen at all: they become
+//! the target where they are selected.
 //!
 //! ## Giving up
 //! Both limits are off by default: whoever guards a door wants to see who waits there. A message `released` says

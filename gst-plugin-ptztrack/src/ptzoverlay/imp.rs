@@ -13,6 +13,7 @@ use ptztrack_contract::{
 use super::{caps, pixels};
 use crate::allocation::refuse_crop;
 use crate::duration;
+use crate::frame;
 use crate::lock::lock;
 use crate::pad_templates;
 use crate::vision::{self, ColourSpace, FrameSize, OverlayRectangle, Parts, Pen, Seen, Shape, Trail};
@@ -100,7 +101,7 @@ pub struct PtzOverlay {
     )]
     #[property(
         name = "boxes", get, set, type = bool, member = boxes, default = Settings::default().boxes, mutable_playing,
-        blurb = "Draw the boxes of what moves, where none of a track is drawn, and of the target"
+        blurb = "Draw boxes around the target, and around what moves where no box of a track is drawn"
     )]
     #[property(
         name = "tracks", get, set, type = bool, member = tracks, default = Settings::default().tracks, mutable_playing,
@@ -416,14 +417,14 @@ fn failed(err: opencv::Error) -> String {
 }
 
 /// Adds to the trail. A dropped frame (DISCONT) does not break it, only a new target or a jump back does:
-/// a leaky queue in front marks each drop as discontinuity.
+/// a leaky queue in front marks each drop as discontinuity. Where a frame has no time, nobody knows how old the trail is.
 fn remember(
     trail: &mut Trail,
     pts: Option<gst::ClockTime>,
     target: Option<&TargetMeta>,
     trail_duration_ns: u64,
 ) {
-    let Some(pts) = pts else { return };
+    let Some(pts) = pts else { return trail.clear() };
     if let Some(target) = target
         && matches!(target.state, TargetState::Tracking | TargetState::Occluded)
     {
@@ -470,12 +471,12 @@ fn attach(buffer: &mut gst::BufferRef, composition: &VideoOverlayComposition) ->
 
 type WritableFrame<'a> = gst_video::VideoFrameRef<&'a mut gst::BufferRef>;
 
-fn frame<'a>(
+fn mapped<'a>(
     buffer: &'a mut gst::BufferRef,
     info: &gst_video::VideoInfo,
 ) -> Result<WritableFrame<'a>, String> {
-    gst_video::VideoFrameRef::from_buffer_ref_writable(buffer, info)
-        .map_err(|_| format!("the frame is no {}x{} {:?}", info.width(), info.height(), info.format()))
+    frame::writable(buffer, info)
+        .ok_or_else(|| format!("the frame is no {}x{} {:?}", info.width(), info.height(), info.format()))
 }
 
 fn blend(
@@ -483,7 +484,7 @@ fn blend(
     info: &gst_video::VideoInfo,
     composition: &VideoOverlayComposition,
 ) -> Result<(), String> {
-    composition.blend(&mut frame(buffer, info)?).map_err(|err| err.to_string())
+    composition.blend(&mut mapped(buffer, info)?).map_err(|err| err.to_string())
 }
 
 fn draw(
@@ -493,7 +494,7 @@ fn draw(
     shapes: &[Shape],
     pen: &mut Pen,
 ) -> Result<(), String> {
-    let mut frame = frame(buffer, info)?;
+    let mut frame = mapped(buffer, info)?;
     pixels::with_surface(&mut frame, colours, |surface| pen.draw(shapes, frame_size(info), surface))
         .map_err(failed)
 }

@@ -28,10 +28,13 @@ impl Trail {
         self.points.push_back((seconds, point));
     }
 
-    /// Forgets what is older than `duration` seconds at `now`.
+    /// Forgets what is older than `duration` seconds at `now`, and what would be yet to come, as time went backwards.
     pub fn expire(&mut self, now: f64, duration: f64) {
         while self.points.front().is_some_and(|&(seconds, _)| now - seconds > duration) {
             self.points.pop_front();
+        }
+        while self.points.back().is_some_and(|&(seconds, _)| seconds > now) {
+            self.points.pop_back();
         }
     }
 
@@ -64,6 +67,16 @@ mod tests {
         trail.expire(4.5, 2.0);
         let xs: Vec<_> = trail.points().map(|point| point.x).collect();
         assert_eq!(xs, [0.3, 0.4]);
+    }
+
+    #[test]
+    fn forgets_what_is_yet_to_come() {
+        let mut trail = trail();
+        trail.expire(2.0, 10.0);
+        let xs: Vec<_> = trail.points().map(|point| point.x).collect();
+        assert_eq!(xs, [0.0, 0.1, 0.2]);
+        trail.expire(-1.0, 10.0);
+        assert_eq!(trail.points().len(), 0);
     }
 
     #[test]

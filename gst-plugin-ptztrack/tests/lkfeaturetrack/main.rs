@@ -178,6 +178,28 @@ fn an_application_selects_and_releases() {
     assert_eq!(bench.push(picture(Some((60, 80)), None), &[]).state, TargetState::Searching);
 }
 
+/// It may be about what was seen before a stop, minutes ago.
+#[test]
+fn what_is_asked_for_before_the_start_is_forgotten_and_before_the_first_picture_it_is_not() {
+    init();
+    for started in [false, true] {
+        let element = gst::ElementFactory::make("lkfeaturetrack").build().unwrap();
+        element.set_property_from_str("selection", "manual");
+        let select = || element.emit_by_name::<()>("select-target", &[&(76.0 / 320.0), &(116.0 / 240.0)]);
+        if !started {
+            select();
+        }
+        // Starts it.
+        let harness = Harness::with_element(&element, Some("sink"), Some("src"));
+        if started {
+            select();
+        }
+        let state = Bench::of(harness).push(picture(Some((60, 80)), None), &[]).state;
+        let expected = if started { TargetState::Tracking } else { TargetState::Searching };
+        assert_eq!(state, expected, "asked for after the start: {started}");
+    }
+}
+
 /// Two who stand there, and what the bus hears of them.
 const TWO: [Seen; 2] = [("motion", (60, 80, 32, 72)), ("motion", (200, 80, 32, 72))];
 

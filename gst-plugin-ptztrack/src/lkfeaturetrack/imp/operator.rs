@@ -95,7 +95,7 @@ impl LkFeatureTrack {
             gst::element_imp_warning!(
                 self,
                 gst::ResourceError::NotFound,
-                ("There is no track {id} to select; the target stays. There are {numbers:?}.")
+                ("There is no track {id} to select; the target stays. Select one of {numbers:?}.")
             );
         }
     }

@@ -28,6 +28,8 @@ mod region;
 mod size;
 mod track;
 
+use std::cmp::Reverse;
+
 use opencv::core::Rect2f;
 use ptztrack_contract::TrackChange;
 
@@ -50,6 +52,9 @@ use crate::vision::Observation;
 /// Smaller regions, in pixels of either side, have no features; larger shares of the frame are nobody.
 const MIN_SIDE: f32 = 6.0;
 const MAX_SHARE: f32 = 0.9;
+/// So many regions are looked at, first where somebody has been known for longest and then the largest, and so many tracks are kept on trial: the time
+/// that a picture takes is bounded, whatever a detector tells.
+const MOST: usize = 128;
 /// Part of the box that must be in the picture.
 const LEFT: f32 = 0.35;
 /// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second.
@@ -266,6 +271,19 @@ impl Tracks {
     fn look(&mut self, seen: &Observation, regions: impl Iterator<Item = Region>, frame: Frame) {
         self.regions.clear();
         self.regions.extend(regions.filter(|region| is_sound(region.bounds, frame)));
+        if self.regions.len() > MOST {
+            let Self { regions, tracks, .. } = self;
+            let known: Vec<_> = tracks.iter().filter(|track| track.is_confirmed()).collect();
+            let known_s = |region: &Region| {
+                let there = known.iter().filter(|track| (region.bounds & track.bounds()).area() > 0.0);
+                there.map(|track| track.journey.age_s).fold(0.0, f64::max)
+            };
+            // Both are no less than 0, so that their bits are in order.
+            regions.sort_by_cached_key(|region| {
+                Reverse((known_s(region).to_bits(), region.bounds.area().max(0.0).to_bits()))
+            });
+            regions.truncate(MOST);
+        }
         for region in &mut self.regions {
             region.looks = self.viewer.look(seen, region.bounds);
             region.restless = region.restless.max(self.places.at(region.bounds));
@@ -336,7 +354,10 @@ impl Tracks {
 
     /// What belongs to nobody is somebody new.
     fn begin(&mut self, frame: Frame) {
-        for (number, region) in self.regions.iter_mut().enumerate().filter(|(_, region)| !region.is_owned) {
+        let unconfirmed = self.tracks.iter().filter(|track| !track.is_confirmed()).count();
+        let room = MOST.saturating_sub(unconfirmed);
+        let new = self.regions.iter_mut().enumerate().filter(|(_, region)| !region.is_owned);
+        for (number, region) in new.take(room) {
             self.tracks.push(Track::new(number, region, frame));
             region.is_owned = true;
         }

@@ -51,6 +51,36 @@ fn a_walker_is_one_track_with_their_speed() {
     assert!((track.bounds().x - 214.0).abs() < 4.0, "{track:?}");
 }
 
+/// By a detector that tells everything again and again, each time elsewhere.
+#[test]
+fn there_are_no_more_regions_and_tracks_than_a_picture_has_time_for() {
+    let mut tracks = Tracks::default();
+    for picture in 0..10 {
+        let place = |n: i32| ((n * 7919 + picture * 104_729) % 590) as f32;
+        let regions: Vec<_> = (0..5000).map(|n| at(place(n), place(n / 3) * 0.6, 40.0, 90.0)).collect();
+        seen_in(&mut tracks, &regions, STILL, DT);
+        let on_trial = tracks.tracks.iter().filter(|track| !track.is_confirmed()).count();
+        assert!(tracks.regions.len() <= MOST && on_trial <= MOST && tracks.tracks.len() <= 10 * MOST);
+    }
+}
+
+#[test]
+fn somebody_small_is_not_lost_among_many_who_are_larger() {
+    let mut tracks = Tracks::default();
+    let small = at(600.0, 20.0, 10.0, 25.0);
+    for _ in 0..5 {
+        seen_in(&mut tracks, &[small], STILL, DT);
+    }
+    assert_eq!(numbers(&tracks), [1]);
+    let large = (0..200).map(|n| at((n % 20) as f32 * 20.0, (n / 20) as f32 * 30.0 + 60.0, 40.0, 90.0));
+    let regions: Vec<_> = large.chain([small]).collect();
+    for _ in 0..5 {
+        seen_in(&mut tracks, &regions, STILL, DT);
+        let track = tracks.get(1).expect("there");
+        assert!(track.region().is_some(), "{track:?}");
+    }
+}
+
 #[test]
 fn the_cameras_own_motion_is_no_motion_of_theirs() {
     let mut tracks = Tracks::default();
