@@ -155,7 +155,7 @@ impl Servo {
         let oscillates = self.oscillates(&measurement, &view);
         let undecided_since = self.target.as_ref().and_then(|target| target.undecided_since);
         let leaves = match (measurement.visibility, &self.target) {
-            (Visibility::Seen, _) | (_, None) => measurement.leaves_view(),
+            (Visibility::Seen, _) | (_, None) => self.leaves_view(&measurement),
             (_, Some(target)) => target.leaves,
         };
         let (considered, missed_at) = (false, None);
@@ -163,12 +163,17 @@ impl Servo {
         oscillates.then(|| self.controller.oscillation.gain_scale())
     }
 
+    /// Whether the target goes out of view on a side that the camera is known to turn to.
+    fn leaves_view(&self, measurement: &Measurement) -> bool {
+        let (sideways, up_or_down) = measurement.leaves_view();
+        let knows = |is_known: bool| !self.settings.learn_axes || is_known;
+        sideways && knows(self.axes.is_pan_known()) || up_or_down && knows(self.axes.are_known())
+    }
+
     /// Takes a picture without the target. Returns whether the camera turns on to where it would be by now, as it went out of view.
     fn goes_after(&mut self, picture: &Measurement, actuator: &ActuatorStatus, now: Time) -> bool {
-        // Nobody leaves by tilt alone, where that may be the wrong way round.
-        let knows_way = !self.settings.learn_axes || self.axes.is_pan_known();
         // A move to a position is over before anybody could tell where that is.
-        let may_turn = actuator.access == Access::Ours && actuator.mode == Mode::Velocity && knows_way;
+        let may_turn = actuator.access == Access::Ours && actuator.mode == Mode::Velocity;
         let Some(target) = &mut self.target else { return false };
         let is_lost = picture.visibility == Visibility::Lost && picture.id == target.measurement.id;
         let begins = target.leaves && is_lost;

@@ -168,6 +168,11 @@ impl AxisEstimator {
         self.exchange.is_known() && self.pan.is_known()
     }
 
+    /// Whether it is known of both which way they turn the picture.
+    pub fn are_known(&self) -> bool {
+        self.is_pan_known() && self.tilt.is_known()
+    }
+
     /// Whether a camera that rests may be told to turn faster yet.
     pub fn seeks_speed(&self) -> bool {
         let is_known = self.exchange.is_known() || self.pan.is_known() || self.tilt.is_known();

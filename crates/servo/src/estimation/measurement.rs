@@ -82,14 +82,14 @@ impl Measurement {
         Some(Self { ego_velocity: Some(ego_velocity), ..*self })
     }
 
-    /// Whether it may be cut off by one side of the picture, which it moves out of.
-    pub fn leaves_view(&self) -> bool {
+    /// Whether it may be cut off by one side of the picture, which it moves out of: sideways, and up or down.
+    pub fn leaves_view(&self) -> (bool, bool) {
         let Rect { x, y, width, height } = self.bounds;
         let leaves = |from: f64, length: f64, speed: f64| {
             let (low, high) = (from < Self::EDGE, from + length > 1.0 - Self::EDGE);
             length > 0.0 && (low && !high && speed < 0.0 || high && !low && speed > 0.0)
         };
-        leaves(x, width, self.velocity.x) || leaves(y, height, self.velocity.y)
+        (leaves(x, width, self.velocity.x), leaves(y, height, self.velocity.y))
     }
 
     /// A target of ordinary size that is seen there, and does not move: what tests and examples begin with.

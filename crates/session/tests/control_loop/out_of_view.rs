@@ -181,3 +181,40 @@ fn who_comes_back_into_view_is_followed() {
     let sent = rig.after(PICTURE);
     assert!(pan_level(sent.last().unwrap()) < 0, "{sent:?}");
 }
+
+/// Follows somebody who is to the right, while the background is seen to move as the camera pans; tilt is never told.
+fn with_pan_known() -> Rig {
+    let settings = ServoSettings { learn_axes: true, ..ServoSettings::default() };
+    let mut rig = Rig::new(settings);
+    for _ in 0..100 {
+        let fields_s = rig.control.status(rig.now).rate.pan / rig.control.estimates().fov_deg;
+        let ego_velocity = Some(Vector { x: -fields_s, y: 0.0 });
+        rig.control.measure(Measurement { ego_velocity, ..Measurement::at(0.8, 0.5, rig.now) }, rig.now);
+        rig.after(ms(50));
+    }
+    rig
+}
+
+/// For how long the camera goes on after somebody who goes there.
+fn goes_after(mut rig: Rig, leaving: impl Fn(Time) -> Measurement) -> Duration {
+    for _ in 0..5 {
+        rig.control.measure(leaving(rig.now), rig.now);
+        rig.after(ms(20));
+    }
+    assert!(!rig.control.session().is_at_rest());
+    goes_on_for(&mut rig, Visibility::Lost)
+}
+
+#[test]
+fn nobody_is_gone_after_by_an_axis_of_which_nobody_knows_which_way_it_turns() {
+    let below = |now| Measurement {
+        centroid: Point { x: 0.6, y: 0.9 },
+        bounds: Rect { x: 0.55, y: 0.7, width: 0.1, height: 0.3 },
+        velocity: Vector { x: 0.0, y: 0.3 },
+        ..leaving(now)
+    };
+    assert!(goes_after(with_pan_known(), leaving) >= ms::<Duration>(1000));
+    assert_eq!(goes_after(with_pan_known(), below), PICTURE);
+    let unknown = Rig::new(ServoSettings { learn_axes: true, ..ServoSettings::default() });
+    assert_eq!(goes_after(unknown, leaving), PICTURE);
+}
