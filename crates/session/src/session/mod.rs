@@ -268,7 +268,7 @@ impl Session {
     /// Whether a stop is ours to send: the camera may be moving at our word, and would hear it. Who has taken the camera has not
     /// ended what it still does for us; but for what it may yet do, from rest, his move is not to be stopped.
     pub fn is_ours_to_stop(&self, now: Time) -> bool {
-        let may_yet_move = self.in_doubt() && !self.is_taken_over(now);
+        let may_yet_move = (self.in_doubt() || self.awaits_mover()) && !self.is_taken_over(now);
         !self.halted() && (!self.is_at_rest() || may_yet_move)
     }
 

@@ -144,6 +144,9 @@ impl Session {
     /// What the camera does from here on is unknown.
     pub(super) fn unanswered(&mut self, command: &Command, now: Time) -> Fact {
         self.scheduler.failed(command, true, now);
+        if let Some(confirmation) = self.stop_confirmation.as_mut().filter(|_| !command.is_stop()) {
+            confirmation.moved();
+        }
         self.arbitration.excuse(now + Scheduler::DOUBT);
         Fact::Unanswered(command.actuation())
     }

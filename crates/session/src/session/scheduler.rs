@@ -166,7 +166,12 @@ impl Scheduler {
         self.stop_tried = false;
     }
 
-    /// The same, and not all that he said may have been acted on yet.
+    /// It was told to stop, as somebody whom it does not obey: he who says it next may have to wait before.
+    pub fn turns_on(&mut self) {
+        (self.may_move, self.stop_tried) = (true, true);
+    }
+
+    /// It moves at the word of somebody who is not there any more, and not all that he said may have been acted on yet.
     pub fn inherited(&mut self, stop: Stop, now: Time) {
         self.found_moving(stop);
         self.doubt_until = Some(now + Self::DOUBT);

@@ -10,7 +10,7 @@ use servo::Time;
 
 use super::connection::Connection;
 use super::control_queue::ControlQueue;
-use super::{Forbidden, Session};
+use super::{Forbidden, Session, StopConfirmation};
 
 /// As whom the camera is spoken to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -73,7 +73,7 @@ impl Session {
     /// Whoever moved the camera is its owner after all.
     pub fn mover_stays(&mut self) {
         if self.speaker == Speaker::Newcomer {
-            self.exchange();
+            self.give_way();
         }
         self.other = None;
         self.speaker = Speaker::Owner;
@@ -137,11 +137,19 @@ impl Session {
         Some(mover.heard_at())
     }
 
+    /// Whether he is to stop it yet.
+    pub fn awaits_mover(&self) -> bool {
+        self.last_word_at().is_some()
+    }
+
     /// Whether nothing is left to be told for the camera to rest for good.
     pub fn has_stopped(&self, now: Time) -> bool {
         let most = self.unseen_repeats();
         let is_open = self.stop_confirmation.as_ref().is_some_and(|stop| stop.is_open(most, now));
-        let waits = self.last_word_at().is_some_and(|at| at <= now + Forbidden::PAUSE);
+        let is_leaving = self.stop_confirmation.as_ref().is_some_and(StopConfirmation::is_leaving);
+        // Nobody is followed meanwhile; at the end nobody is anyway.
+        let patience = if is_leaving { Forbidden::RARELY } else { Forbidden::PAUSE };
+        let waits = self.last_word_at().is_some_and(|at| at <= now + patience);
         self.stays_at_rest() && !is_open && !waits
     }
 
@@ -159,11 +167,7 @@ impl Session {
         let is_heard =
             !other.connection.halted() && (self.connection.halted() || other.heard_at() <= heard_at);
         if is_heard {
-            if other.is_next {
-                // Even where it has said yes once more meanwhile: that is worth no more than the yes before.
-                self.scheduler.found_moving(self.stop());
-            }
-            self.exchange();
+            self.give_way();
             self.speaker = if self.speaker == Speaker::Mover { Speaker::Newcomer } else { Speaker::Mover };
         } else if self.connection.halted() && other.connection.halted() {
             self.decide_speaker();
@@ -171,7 +175,15 @@ impl Session {
         is_heard
     }
 
-    /// Has the other speak.
+    /// Has the other speak, who stops the camera where he was to be next.
+    fn give_way(&mut self) {
+        if self.other.as_ref().is_some_and(|other| other.is_next) {
+            // Even where it has said yes once more meanwhile: that is worth no more than the yes before.
+            self.scheduler.turns_on();
+        }
+        self.exchange();
+    }
+
     fn exchange(&mut self) {
         if let Some(other) = &mut self.other {
             mem::swap(&mut self.connection, &mut other.connection);
@@ -207,7 +219,6 @@ impl Session {
 mod tests {
     use super::*;
     use crate::fixtures::PROTOCOL;
-    use crate::session::StopConfirmation;
     use crate::session::scheduler::Scheduler;
     use crate::session::{CommandedMotion, Fact, Steering};
     use crate::{Command, Error, Next, Query, Request, Response, SessionSettings, Stop};
@@ -450,12 +461,17 @@ mod tests {
         assert!(session.stays_at_rest());
     }
 
-    /// The mover was refused, and may ask again only after twenty seconds.
-    fn with_refused_mover() -> Session {
+    fn seconds(seconds: u64) -> Time {
+        Time::from_millis(1000 * seconds)
+    }
+
+    /// The mover was refused once and so many times more: after the first of them he may ask again after ten seconds, after each one
+    /// more twice as late.
+    fn with_refused_mover(times: u32) -> Session {
         let mut session = untrusted(false);
         let forbidden = Error::NotPermitted { user: "root".to_owned() };
         assert_eq!(session.fails(&forbidden), Speaker::Newcomer);
-        for _ in 0..2 {
+        for _ in 0..times {
             session.other.as_mut().unwrap().connection.failed(&forbidden, true, Time::ZERO);
         }
         session
@@ -478,24 +494,52 @@ mod tests {
 
     #[test]
     fn whoever_moved_the_camera_has_the_last_word_however_long_he_is_to_wait() {
-        let second = |seconds: u64| Time::from_millis(1000 * seconds);
-        let mut session = with_refused_mover();
-        let said = session.obeyed_until(Time::ZERO, second(15));
+        let mut session = with_refused_mover(2);
+        let said = session.obeyed_until(Time::ZERO, seconds(15));
         assert!(
-            said.iter().all(|(speaker, at)| *speaker == Speaker::Newcomer && *at < second(10)),
+            said.iter().all(|(speaker, at)| *speaker == Speaker::Newcomer && *at < seconds(10)),
             "{said:?}"
         );
-        assert!(session.stays_at_rest() && !session.has_stopped(second(15)));
+        assert!(session.stays_at_rest() && !session.has_stopped(seconds(15)));
         // Another password is no reason to forget him.
-        session.owner_changed(second(15));
-        assert_eq!(session.obeyed_until(second(15), second(22)), [(Speaker::Mover, second(20))]);
-        session.obeyed_until(second(22), second(40));
+        session.owner_changed(seconds(15));
+        assert_eq!(session.obeyed_until(seconds(15), seconds(22)), [(Speaker::Mover, seconds(20))]);
+        session.obeyed_until(seconds(22), seconds(40));
         assert_eq!(session.speaker(), Speaker::Owner);
     }
 
     #[test]
+    fn at_the_end_he_is_not_forgotten_however_long_he_is_to_wait() {
+        let mut session = with_refused_mover(2);
+        session.leave(Time::ZERO);
+        session.obeyed_until(Time::ZERO, seconds(8));
+        assert!(session.stays_at_rest() && session.awaits_mover());
+        assert_eq!(session.obeyed_until(seconds(8), seconds(22)), [(Speaker::Mover, seconds(20))]);
+        assert!(!session.awaits_mover());
+    }
+
+    #[test]
+    fn nor_is_he_asked_sooner_where_nobody_else_may_ask() {
+        let mut session = with_refused_mover(2);
+        session.obeyed_until(Time::ZERO, seconds(15));
+        session.owner_changed(seconds(15));
+        session.hears(&ASK, Err(wrong()), seconds(15));
+        assert_eq!(session.speaker(), Speaker::Mover);
+        assert_eq!(session.obeyed_until(seconds(15), seconds(22)), [(Speaker::Mover, seconds(20))]);
+    }
+
+    #[test]
+    fn where_the_mover_is_the_owner_after_all_he_has_the_last_word_as_such() {
+        let mut session = with_refused_mover(1);
+        session.obeyed_until(Time::ZERO, seconds(8));
+        assert!(session.stays_at_rest() && session.awaits_mover());
+        session.mover_stays();
+        assert_eq!(session.obeyed_until(seconds(8), seconds(12)), [(Speaker::Owner, seconds(10))]);
+    }
+
+    #[test]
     fn nobody_waits_for_the_mover_where_the_camera_is_seen_to_rest() {
-        let mut session = with_refused_mover();
+        let mut session = with_refused_mover(1);
         told_in_vain(&mut session);
         let later = Time::from_millis(3000);
         assert_eq!(session.obeyed_at(later), [Speaker::Newcomer]);

@@ -69,6 +69,11 @@ impl StopConfirmation {
         self.leaving = true;
     }
 
+    /// Whether it is the end.
+    pub fn is_leaving(&self) -> bool {
+        self.leaving
+    }
+
     fn forget(&mut self) {
         *self = Self { leaving: self.leaving, ..Self::default() };
     }

@@ -60,10 +60,9 @@ impl<O: Fn(Event)> TaskState<O> {
 
     /// Whether the end has come: at rest for good, out of time, or with no right to speak.
     pub fn is_over(&self) -> bool {
-        self.deadline.is_some_and(|deadline| {
-            let done = self.control.session().stays_at_rest() && !self.control.session().is_queued();
-            done || self.control.session().halted() || deadline <= self.mailbox.now()
-        })
+        let session = self.control.session();
+        let done = session.stays_at_rest() && !session.awaits_mover() && !session.is_queued();
+        self.deadline.is_some_and(|deadline| done || session.halted() || deadline <= self.mailbox.now())
     }
 
     /// When the time for a confirmed stop is over, nobody waits for it any more; it is retried for a while.
@@ -197,9 +196,9 @@ impl<O: Fn(Event)> TaskState<O> {
         let now = self.mailbox.now();
         let status = self.control.status(now);
         let (estimates, stop) = (Some(self.control.estimates()), Some(self.control.stop()));
-        let (may_yet_move, halted) =
-            (!self.control.session().stays_at_rest(), self.control.session().halted());
-        let refusal = self.control.session().refusal(now);
+        let session = self.control.session();
+        let (may_yet_move, halted) = (!session.stays_at_rest() || session.awaits_mover(), session.halted());
+        let refusal = session.refusal(now);
         let coalesced = self.control.overtaken() + self.mailbox.overtaken();
         let mut statistics = lock(&self.statistics);
         (statistics.status, statistics.estimates, statistics.stop) = (status, estimates, stop);
@@ -267,6 +266,7 @@ mod tests {
     use crate::{Command, LoopSettings, Next, Protocol, Query, SessionSettings, Stop};
     use proptest::prelude::*;
     use servo::{Measurement, Motion, Position, ServoSettings, Visibility};
+    use std::cell::RefCell;
     use std::sync::mpsc::{Receiver, TryRecvError};
 
     const MOVE: Request = Request::Command(Command::Move {
@@ -296,10 +296,14 @@ mod tests {
 
     /// A task at one second of its time.
     fn state() -> (TaskState<impl Fn(Event)>, Told) {
+        state_of(&PROTOCOL)
+    }
+
+    fn state_of(protocol: &Protocol) -> (TaskState<impl Fn(Event) + use<>>, Told) {
         let (events, told) = std::sync::mpsc::channel();
         let mailbox = Arc::new(Mailbox::new(Clock::held()));
         mailbox.hold_at(ms(1000));
-        let control = ControlLoop::new(ServoSettings::default(), &PROTOCOL);
+        let control = ControlLoop::new(ServoSettings::default(), protocol);
         (TaskState::new(control, mailbox, Arc::default(), move |event| drop(events.send(event))), told)
     }
 
@@ -328,6 +332,7 @@ mod tests {
         /// Does the next of what is due now; returns what that was.
         fn exchange(&mut self, answer: impl Fn(&Command) -> Result<Response, Error>) -> Option<Request> {
             let now = self.mailbox.now();
+            self.control.session_mut().settle_speaker(now);
             let Next::Do(request) = self.control.next_request(now) else { return None };
             let answer = match &request {
                 Request::Command(command) => answer(command),
@@ -366,6 +371,36 @@ mod tests {
         assert_eq!(state.serve_at(ms(9000), |_| Ok(Response::Accepted)), [HALT]);
         assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
         assert!(!gave_up(&told));
+    }
+
+    /// He was refused twice, so that he may ask again after ten seconds; meanwhile somebody else is told yes, which has no effect.
+    #[test]
+    fn at_the_end_too_whoever_moved_the_camera_is_waited_for_to_stop_it() {
+        let (mut state, _told) =
+            state_of(&Protocol { confirms_stops: true, has_control_queue: false, ..PROTOCOL });
+        let yes = |_: &Command| Ok(Response::Accepted);
+        state.see(Visibility::Seen);
+        assert_eq!(state.serve_at(ms(1000), yes).len(), 1, "it turns");
+        state.control.session_mut().stand_in(ms(1000));
+        state.control.release();
+        let forbidden = || Error::NotPermitted { user: "root".to_owned() };
+        let answers = RefCell::new(vec![forbidden(), Error::Broken("reset".to_owned()), forbidden()]);
+        let refuse = |_: &Command| {
+            let mut answers = answers.borrow_mut();
+            if answers.is_empty() { Ok(Response::Accepted) } else { Err(answers.remove(0)) }
+        };
+        assert_eq!([1100, 1200, 1300, 1400].map(|at| state.serve_at(ms(at), refuse).len()), [1; 4]);
+        let rest = state.mailbox.finish(FINISH_BUDGET);
+        for at in [1500, 1600, 1800, 2000, 9000] {
+            state.serve_at(ms(at), yes);
+        }
+        assert_eq!(rest.try_recv(), Ok(()));
+        let session = state.control.session();
+        assert!(session.stays_at_rest() && session.is_ours_to_stop(ms(9000)));
+        assert!(!state.is_over() && lock(&state.statistics).may_yet_move);
+        assert_eq!(state.serve_at(ms(11_400), yes), [HALT]);
+        state.serve_at(ms(11_600), yes);
+        assert!(state.is_over() && !lock(&state.statistics).may_yet_move);
     }
 
     /// Else whoever comes next would find us still in its way.

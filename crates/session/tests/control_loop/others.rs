@@ -246,6 +246,22 @@ fn a_stop_that_no_picture_tells_of_is_repeated_whoever_seems_to_move_the_camera(
     assert_eq!(rig.sent, [HALT]);
 }
 
+/// What no picture told of the stop before says nothing of this one.
+#[test]
+fn a_stop_after_a_move_that_went_unanswered_is_repeated_like_any_other() {
+    let mut rig = told_to_stop();
+    assert_eq!(rig.after(ms(3100)), [HALT]);
+    rig.now += ms(200);
+    rig.see(0.9, 0.5);
+    rig.run(|_| Err(Error::Timeout(ms(1))));
+    assert!(!rig.control.session().is_at_rest());
+    rig.control.release();
+    rig.sent.clear();
+    let stops: Vec<_> = (0..40).flat_map(|_| rig.after(ms(200))).collect();
+    // For what it may yet act on, and as no picture tells of it.
+    assert_eq!(stops, [HALT; 3]);
+}
+
 /// Nobody else stops it for us.
 #[test]
 fn a_stop_that_pictures_show_is_not_repeated_whoever_seems_to_move_the_camera() {
