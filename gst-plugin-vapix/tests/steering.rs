@@ -8,7 +8,7 @@ mod common;
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 
-use common::{FRAME, Heard, PATIENCE, Rig, camera, moves, target};
+use common::{FRAME, Heard, PATIENCE, Rig, Stamps, camera, moves, target};
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, CameraChange, CameraEvent, Rect, TargetMeta, TargetState, Vector};
 use virtual_camera::{Auth, Settings, VirtualCamera};
@@ -102,6 +102,47 @@ fn a_target_in_the_middle_moves_nothing() {
     assert_eq!(moves(&camera), [] as [&str; 0]);
 }
 
+/// Pictures have timestamps, by which they are of now.
+fn by_the_clock(rig: &mut Rig) {
+    let clock = gst::SystemClock::obtain();
+    rig.sink.set_clock(Some(&clock)).unwrap();
+    rig.sink.set_base_time(clock.time());
+    rig.stamps = Some(Stamps::default());
+}
+
+/// One waits in the sink's preroll meanwhile, others in queues.
+#[test]
+fn a_picture_of_before_a_pause_moves_nothing_after_it() {
+    let camera = camera(Auth::None);
+    let mut rig = Rig::playing(&camera.url());
+    by_the_clock(&mut rig);
+    let middle = target(TargetState::Tracking, 0.5, 0.5);
+    rig.push_until(&middle, &camera, |status| status.requests >= 3);
+    let capture_time = rig.sink.current_running_time();
+    rig.sink.set_state(gst::State::Paused).unwrap();
+    rig.sink.set_state(gst::State::Playing).unwrap();
+    rig.push(&TargetMeta { capture_time, ..target(TargetState::Tracking, 0.9, 0.4) });
+    let requests = camera.status().requests;
+    rig.push_until(&middle, &camera, |status| status.requests > requests + 1);
+    drop(rig);
+    assert_eq!(moves(&camera), [] as [&str; 0]);
+}
+
+/// As by `intervideosrc` or `videorate`, where the tracker's pictures have stopped.
+#[test]
+fn a_picture_that_is_shown_again_does_not_keep_the_camera_turning() {
+    let camera = camera(Auth::None);
+    for flags in [gst::BufferFlags::GAP, gst::BufferFlags::empty()] {
+        let mut rig = far_from_its_limits(&camera);
+        by_the_clock(&mut rig);
+        let aside = target(TargetState::Tracking, 0.9, 0.4);
+        rig.push_until(&aside, &camera, |status| status.moving);
+        let capture_time = rig.sink.current_running_time();
+        rig.flags = flags;
+        rig.push_until(&TargetMeta { capture_time, ..aside }, &camera, |status| !status.moving);
+    }
+}
+
 /// Sets a camera going, ends it in some way, and expects rest.
 #[track_caller]
 fn comes_to_rest(end: impl FnOnce(&mut Rig)) {
@@ -189,6 +230,16 @@ fn the_camera_keeps_turning_after_whoever_leaves_the_picture() {
 fn whoever_is_let_go_as_they_leave_is_not_gone_after() {
     let let_go = |_: &mut Rig, leaving| TargetMeta { state: TargetState::Searching, ..leaving };
     assert!(stopped_after(SEARCH_TIME, let_go) < SEARCH_TIME / 2);
+}
+
+/// Where everybody may be in another place.
+#[test]
+fn whoever_leaves_is_not_gone_after_into_a_picture_of_another_size() {
+    let resized = |rig: &mut Rig, _| {
+        rig.harness().set_src_caps_str("video/x-raw,format=GRAY8,width=640,height=480,framerate=25/1");
+        TargetMeta::default()
+    };
+    assert!(stopped_after(SEARCH_TIME, resized) < SEARCH_TIME / 2);
 }
 
 #[test]

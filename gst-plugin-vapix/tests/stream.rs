@@ -11,14 +11,15 @@ use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, CameraEvent, TargetMeta, TargetState};
 use virtual_camera::{Auth, Fault};
 
-/// So many seconds of buffers without a target meta, by the stream's time; what is heard of that.
-fn without_target(seconds: u64, first_has_one: bool) -> Vec<Heard> {
+/// So many seconds of such buffers without a target meta, by the stream's time; what is heard of that.
+fn without_target(seconds: u64, first_has_one: bool, flags: gst::BufferFlags) -> Vec<Heard> {
     let camera = camera(Auth::None);
     let mut rig = Rig::ready(&camera.url()).with("lockstep", true).with("timeout", PATIENT_NS).play();
     for picture in 0..=25 * seconds {
         let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
         let content = buffer.get_mut().unwrap();
         content.set_pts(gst::ClockTime::from_mseconds(40 * picture));
+        content.set_flags(flags);
         if first_has_one && picture == 0 {
             target(TargetState::Searching, 0.5, 0.5).attach(content).unwrap();
         }
@@ -29,12 +30,17 @@ fn without_target(seconds: u64, first_has_one: bool) -> Vec<Heard> {
 
 #[test]
 fn a_stream_without_target_metas_is_warned_of_once() {
-    let warnings = without_target(5, false);
+    let whole = gst::BufferFlags::empty();
+    let warnings = without_target(5, false, whole);
     assert!(
         matches!(warnings.as_slice(), [Heard::Warning(text)] if text.contains("lkfeaturetrack")),
         "{warnings:?}"
     );
-    assert_eq!(without_target(5, true), []);
+    assert_eq!(without_target(5, true, whole), []);
+    // `lkfeaturetrack` is there, and lets these pass.
+    for flags in [gst::BufferFlags::CORRUPTED, gst::BufferFlags::GAP] {
+        assert_eq!(without_target(5, false, flags), []);
+    }
 }
 
 /// The target is in every picture, but those come later and later.

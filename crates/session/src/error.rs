@@ -56,7 +56,7 @@ pub enum Error {
         reason: &'static str,
     },
     /// The camera refuses, with this text.
-    #[error("the camera answered `Error: {0}`")]
+    #[error("the camera refuses: {0}")]
     Camera(String),
     /// The answer has another form than documented.
     #[error("the camera's answer was not understood: {0}")]
@@ -107,7 +107,7 @@ impl Error {
             }
             Self::Timeout(_) | Self::Broken(_) => "Check camera and network; retrying.",
             Self::CredentialsMissing => {
-                "Set `user` and `password`; a camera that never did without is sent nothing more until then."
+                "Set `user` and `password`; until then nothing more is sent, except to a camera that once worked without."
             }
             Self::BadCredentials { .. } => {
                 "Correct `user` or `password`; nothing more is sent until then, so as not to lock the account."

@@ -18,9 +18,17 @@ use crate::stream::Fault;
 pub trait Measuring: PtzSink {
     /// Leaves a measurement of the target that a buffer brings for the camera task.
     fn measure(&self, buffer: &gst::BufferRef) {
+        let flags = buffer.flags();
+        if flags.contains(gst::BufferFlags::GAP) {
+            // The picture before, shown again by an element that fills in where none comes.
+            return;
+        }
         self.miss_pictures();
         let target = TargetMeta::of(buffer);
-        self.miss_meta(target.is_some());
+        // The tracker lets corrupted ones pass.
+        if target.is_some() || !flags.contains(gst::BufferFlags::CORRUPTED) {
+            self.miss_meta(target.is_some());
+        }
         match target {
             Some(Ok(target)) => self.see(&target, buffer),
             Some(Err(err)) => self.warn(Fault::UnreadableMeta, || {
@@ -33,24 +41,32 @@ pub trait Measuring: PtzSink {
     }
 
     fn see(&self, target: &TargetMeta, buffer: &gst::BufferRef) {
-        let Some(picture) = lock(&self.core().stream).picture else { return };
+        let Some(picture) = lock(&self.core().stream).picture() else { return };
         if !picture.shows(target) || buffer.meta::<gst_video::VideoCropMeta>().is_some() {
             return self.warn(Fault::OtherPicture, || {
                 format!("the picture has been cropped, or its shape changed, since the target was found in it: the camera cannot be steered by it. Put `{}` in front of the element that does that, or have it done before the tracker", Self::PARTICULARS.name)
             });
         }
-        let age = self.age(target, buffer.pts());
+        let shown = self.running_time(buffer.pts());
+        let captured = target.capture_time.or(shown);
+        let age = self.age(captured, shown);
         let (stale_timeout, steering) = {
             let settings = lock(&self.core().settings);
             (settings.servo.stale_timeout, settings.steering)
         };
+        if self.is_from_before_pause(captured, stale_timeout) {
+            return;
+        }
         if age > stale_timeout {
             return self.warn(Fault::OldPictures, || {
                 format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
             });
         }
+        // Who is lost as the picture has become another one has not gone out of view.
+        let is_gone = matches!(target.state, TargetState::Lost | TargetState::Searching);
+        let is_cut_off = lock(&self.core().stream).is_other_picture() && is_gone;
         let visibility = match steering {
-            Steering::Follow if is_released(target) => Visibility::Released,
+            Steering::Follow if is_released(target) || is_cut_off => Visibility::Released,
             Steering::Follow => target.state.into(),
             // On the way there it does not matter who is there.
             Steering::Home | Steering::LookAt => Visibility::Released,
@@ -75,17 +91,24 @@ pub trait Measuring: PtzSink {
     }
 
     /// How long ago the picture was taken, as far as its timestamp tells.
-    fn age(&self, target: &TargetMeta, pts: Option<gst::ClockTime>) -> Duration {
+    fn age(&self, captured: Option<gst::ClockTime>, shown: Option<gst::ClockTime>) -> Duration {
         if lock(&self.core().stream).lockstep {
             return Duration::ZERO;
         }
-        let captured = target.capture_time.or_else(|| self.running_time(pts));
         let Some((now, captured)) = self.obj().current_running_time().zip(captured) else {
             return Duration::ZERO;
         };
-        let nanoseconds = |time: gst::ClockTime| i64::try_from(time.nseconds()).unwrap_or(i64::MAX);
         let arrived = self.time();
-        lock(&self.core().stream).age.of(nanoseconds(captured), nanoseconds(now), arrived)
+        let (captured, shown, now) = (nanoseconds(captured), shown.map(nanoseconds), nanoseconds(now));
+        lock(&self.core().stream).age.of(captured, shown, now, arrived)
+    }
+
+    /// Whether the picture was on its way when the pipeline was paused. For a while only, as a source may begin anew with its timestamps.
+    fn is_from_before_pause(&self, captured: Option<gst::ClockTime>, stale_timeout: Duration) -> bool {
+        let now = self.time();
+        captured.is_some_and(|time| {
+            lock(&self.core().stream).was_paused_after(nanoseconds(time), now, stale_timeout)
+        })
     }
 
     /// Tells where no picture came for so long that nobody was followed. That may have been all; but where a network fills a
@@ -103,7 +126,7 @@ pub trait Measuring: PtzSink {
             gst::element_imp_info!(
                 self,
                 gst::StreamError::Failed,
-                ("no picture came for {pause:.1?}, which is more than `stale-timeout` ({stale_timeout:?}): nobody was followed meanwhile. Where the network held the pictures back, those that come now may be as late, and nobody is followed well by them: lower the bit rate of the camera's stream, or whatever else fills the line")
+                ("no picture came for {pause:.1?}, which is more than `stale-timeout` ({stale_timeout:?}): nobody was followed meanwhile. If the network held them back, later ones may be just as late, and following suffers: lower the stream's bit rate, or reduce other traffic")
             );
         }
     }
@@ -127,6 +150,11 @@ pub trait Measuring: PtzSink {
 }
 
 impl<S: PtzSink> Measuring for S {}
+
+/// In a number that can be subtracted from.
+pub fn nanoseconds(time: gst::ClockTime) -> i64 {
+    i64::try_from(time.nseconds()).unwrap_or(i64::MAX)
+}
 
 /// Whether somebody was let go on purpose in this picture: who is lost is called so.
 fn is_released(target: &TargetMeta) -> bool {

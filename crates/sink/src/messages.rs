@@ -54,7 +54,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::NoZoom) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera does not zoom, by its own word or as its picture shows: `auto-zoom` has no effect")
+                ("the camera reports no zoom, or its picture does not change when it zooms: `auto-zoom` has no effect")
             ),
             Event::Loop(LoopEvent::ZoomLimitsUnkept) => gst::element_imp_warning!(
                 self,
@@ -69,7 +69,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Axes(AxisFinding::Inverted)) => gst::element_imp_info!(
                 self,
                 gst::ResourceError::Settings,
-                ("an axis of the camera turns the picture the other way than is set: it is steered accordingly from here on. `invert-pan` or `invert-tilt` would have it known from the start")
+                ("an axis of the camera turns the picture opposite to its setting: this is allowed for from now on. `invert-pan` or `invert-tilt` makes it right from the start")
             ),
             Event::Loop(LoopEvent::PictureFrozen) => gst::element_imp_warning!(
                 self,
@@ -84,7 +84,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Session(SessionEvent::StopInVain)) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Write,
-                ("the camera has accepted every stop, and the picture shows that it still turns: it is stopped again in other words. Check it, and stop it by hand if need be")
+                ("the camera accepts every stop, but the picture shows it still turning: another stop command is sent. Check it, and stop it by hand if need be")
             ),
             Event::Loop(LoopEvent::Oscillating(gain_scale)) => gst::element_imp_warning!(
                 self,
@@ -114,7 +114,7 @@ pub trait Telling: PtzSink {
             Event::Loop(LoopEvent::Session(SessionEvent::HomeRefused(err))) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::Settings,
-                ("the camera refuses to be sent to a position, for `home` or `look-at`: {err}; it stays where it is. Correct them, or do without"),
+                ("the camera refuses to move to a position (`home` or `look-at`): {err}; it stays where it is. Correct or unset them"),
                 details: gst::Structure::new_empty(MOVE_REFUSED)
             ),
             Event::Loop(LoopEvent::Session(SessionEvent::Mode(mode))) => gst::element_imp_info!(
@@ -135,7 +135,7 @@ pub trait Telling: PtzSink {
             Event::NoWatchdog(reason) => gst::element_imp_warning!(
                 self,
                 gst::ResourceError::NotFound,
-                ("no watchdog process: {reason}. A camera that moves when this process is killed or hangs would go on turning. Install `{}` in `libexec` beside the plugin, or name it by {}_WATCHDOG; `dead-man=false` does without", Self::PARTICULARS.watchdog, Self::PARTICULARS.environment)
+                ("no watchdog process: {reason}. A camera that moves when this process is killed or hangs would go on turning. Install `{}` in `libexec` beside the plugin, or name it by {}_WATCHDOG; `dead-man=false` turns this protection off", Self::PARTICULARS.watchdog, Self::PARTICULARS.environment)
             ),
             Event::Warning(text) => gst::element_imp_warning!(self, gst::ResourceError::Settings, ("{text}")),
             Event::Died(reason) => gst::element_imp_error!(

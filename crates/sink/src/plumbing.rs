@@ -17,7 +17,7 @@ use session::{Client, Status};
 
 use crate::Particulars;
 use crate::events::{PendingStatus, camera_event};
-use crate::measure::Measuring;
+use crate::measure::{Measuring, nanoseconds};
 use crate::messages::Telling;
 use crate::picture::Picture;
 use crate::properties::Property;
@@ -134,8 +134,13 @@ pub trait Plumbing: PtzSink {
             self.start_task()?;
         }
         if transition == gst::StateChange::PausedToPlaying {
-            lock(&self.core().stream).resume();
+            let now = self.time();
+            lock(&self.core().stream).resume(now);
             self.with_task(CameraTask::play);
+        }
+        if transition == gst::StateChange::PlayingToPaused {
+            let (running_time, now) = (self.obj().current_running_time().map(nanoseconds), self.time());
+            lock(&self.core().stream).suspend(running_time, now);
         }
         let result = self.parent_change_state(transition);
         match transition {
@@ -155,7 +160,7 @@ pub trait Plumbing: PtzSink {
     fn take_caps(&self, caps: &gst::Caps) -> Result<(), gst::LoggableError> {
         let picture = Picture::of(caps)
             .ok_or_else(|| gst::loggable_error!(Self::category(), "caps without a size: {caps}"))?;
-        lock(&self.core().stream).picture = Some(picture);
+        lock(&self.core().stream).shows(picture);
         // Of a field of view it can only be said now how high it is.
         lock(&self.core().pending_status).renew();
         Ok(())
@@ -171,6 +176,7 @@ pub trait Plumbing: PtzSink {
     fn heed(&self, event: gst::Event) -> bool {
         match event.type_() {
             gst::EventType::Eos => self.rest(),
+            gst::EventType::FlushStop => lock(&self.core().stream).seek(),
             gst::EventType::FlushStart => {
                 let handled = self.parent_event(event);
                 // After the parent, see above; and without a wait, as this is the seeking thread.
@@ -326,7 +332,7 @@ pub trait Plumbing: PtzSink {
             let Ok(_pushing) = self.core().pushing.try_lock() else { return };
             let now = self.time();
             let Some(status) = lock(&self.core().pending_status).take(now) else { continue };
-            let aspect = lock(&self.core().stream).picture.map(|picture| picture.aspect);
+            let aspect = lock(&self.core().stream).picture().map(|picture| picture.aspect);
             let mounting = lock(&self.core().settings).servo.mounting;
             let event = camera_event(&status, &mounting, aspect);
             // Nobody upstream needs to care.

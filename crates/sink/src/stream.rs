@@ -14,13 +14,17 @@ use crate::picture::Picture;
 #[derive(Debug, Default)]
 pub struct Stream {
     /// As the caps have it.
-    pub picture: Option<Picture>,
+    picture: Option<Picture>,
+    /// It is another one since somebody was looked for in it.
+    is_other: bool,
     /// Whether time is the stream's.
     pub lockstep: bool,
     /// How old pictures are.
     pub age: PictureAge,
     /// When the last picture came, unless the pipeline was paused since.
     last_came: Option<Time>,
+    /// When the pipeline was last paused, in nanoseconds of running time, and when it went on.
+    paused: Option<(i64, Time)>,
     meta_wait: MetaWait,
     warned: Vec<Fault>,
 }
@@ -51,6 +55,22 @@ enum MetaWait {
 }
 
 impl Stream {
+    /// From here on the picture is of this size and shape.
+    pub fn shows(&mut self, picture: Picture) {
+        let before = self.picture.replace(picture);
+        self.is_other |= before.is_some_and(|before| before != picture);
+    }
+
+    /// As the caps have it.
+    pub fn picture(&self) -> Option<Picture> {
+        self.picture
+    }
+
+    /// Whether the picture is another one than when this was last asked.
+    pub fn is_other_picture(&mut self) -> bool {
+        mem::take(&mut self.is_other)
+    }
+
     /// Nothing came yet.
     pub fn new(lockstep: bool) -> Self {
         Self { lockstep, ..Self::default() }
@@ -74,9 +94,25 @@ impl Stream {
         before.map(|before| now - before)
     }
 
-    /// The pipeline was paused: that nothing came meanwhile is as it should be.
-    pub fn resume(&mut self) {
+    /// The pipeline is paused at this running time, in nanoseconds, and this time.
+    pub fn suspend(&mut self, running_time: Option<i64>, now: Time) {
+        self.paused = running_time.map(|at| (at, now)).filter(|_| !self.lockstep);
+    }
+
+    /// The pipeline was paused, or was not running yet: that nothing came meanwhile is as it should be.
+    pub fn resume(&mut self, now: Time) {
         self.last_came = None;
+        self.paused = self.paused.map(|(at, _)| (at, now));
+    }
+
+    /// What comes from here on is of elsewhere in the stream.
+    pub fn seek(&mut self) {
+        self.paused = None;
+    }
+
+    /// Whether the pipeline was paused after this running time, in nanoseconds, and has gone on since for no longer than that.
+    pub fn was_paused_after(&self, running_time: i64, now: Time, within: Duration) -> bool {
+        self.paused.is_some_and(|(at, resumed)| running_time <= at && now <= resumed + within)
     }
 
     /// A buffer came, with a target meta or without. Returns whether none has had one for long.
@@ -104,6 +140,8 @@ pub struct PictureAge {
 #[derive(Debug)]
 struct Arrival {
     captured: i64,
+    /// Running time of its buffer, where it has one.
+    shown: Option<i64>,
     /// The one before it had the same timestamp.
     repeats: bool,
     /// By so much its timestamp was behind the clock.
@@ -116,18 +154,20 @@ impl PictureAge {
     /// shows for an hour.
     const DRIFT: f64 = 2e-4;
 
-    /// How old the picture is that was captured at one running time and arrives at another, both in nanoseconds, and at a
-    /// time of a clock that nobody sets.
-    pub fn of(&mut self, captured: i64, now: i64, arrived: Time) -> Duration {
+    /// How old the picture is that was captured at one running time, is to be shown at another, and arrives at a third, all in
+    /// nanoseconds, and at a time of a clock that nobody sets.
+    pub fn of(&mut self, captured: i64, shown: Option<i64>, now: i64, arrived: Time) -> Duration {
         let behind = now.saturating_sub(captured);
         self.least = match &self.last {
             Some(last) => {
                 let elapsed = (arrived - last.at).as_nanos() as i64;
+                // By an element that shows a picture again where none comes.
+                let is_shown_again = shown > last.shown;
                 // Nothing grows older by more than the time that has passed, and no picture is taken before the one before it,
                 // though it may come twice: the rest is a clock that was set.
                 let older = match captured.cmp(&last.captured) {
                     Ordering::Greater => elapsed,
-                    Ordering::Equal if !last.repeats => elapsed,
+                    Ordering::Equal if is_shown_again || !last.repeats => elapsed,
                     Ordering::Equal | Ordering::Less => 0,
                 };
                 let set = behind.saturating_sub(last.behind).saturating_sub(older).max(0);
@@ -138,7 +178,7 @@ impl PictureAge {
             None => behind,
         };
         let repeats = self.last.as_ref().is_some_and(|last| last.captured == captured);
-        self.last = Some(Arrival { captured, repeats, behind, at: arrived });
+        self.last = Some(Arrival { captured, shown, repeats, behind, at: arrived });
         Duration::from_nanos(u64::try_from(behind.saturating_sub(self.least)).unwrap_or(0))
     }
 }
@@ -152,7 +192,7 @@ mod tests {
     fn age(pictures: &mut PictureAge, [arrived, now, captured]: [i64; 3]) -> i64 {
         const MS: i64 = 1_000_000;
         let arrived = Time::from_millis(arrived as u64);
-        pictures.of(captured * MS, now * MS, arrived).as_millis() as i64
+        pictures.of(captured * MS, Some(captured * MS), now * MS, arrived).as_millis() as i64
     }
 
     #[test]
@@ -207,6 +247,34 @@ mod tests {
         }
     }
 
+    /// The buffer is another one, of a later time.
+    #[test]
+    fn a_picture_that_is_shown_again_and_again_grows_old() {
+        const MS: i64 = 1_000_000;
+        let mut pictures = PictureAge::default();
+        for at in (0..=2000).step_by(40) {
+            let captured = at.min(1000);
+            let late = pictures.of(captured * MS, Some(at * MS), at * MS, Time::from_millis(at as u64));
+            // A clock may be slow by a little.
+            assert!((late.as_millis() as i64 - (at - captured)).abs() <= 1, "{at}: {late:?}");
+        }
+    }
+
+    #[test]
+    fn a_picture_of_before_a_pause_is_known_for_a_while() {
+        let ms = Time::from_millis;
+        let within = Duration::from_secs(1);
+        let mut stream = Stream::default();
+        assert!(!stream.was_paused_after(0, ms(0), within), "it was never paused");
+        stream.suspend(Some(5000), ms(5));
+        stream.resume(ms(60_000));
+        let known = [(5000, 60_500), (5001, 60_500), (5000, 61_001)];
+        assert_eq!(
+            known.map(|(taken, now)| stream.was_paused_after(taken, ms(now), within)),
+            [true, false, false]
+        );
+    }
+
     #[test]
     fn a_slow_clock_makes_no_picture_old() {
         let mut pictures = PictureAge::default();
@@ -225,7 +293,7 @@ mod tests {
             [40, 80, 2080].map(|at| stream.pause(ms(at))),
             [None, Some(40), Some(2000)].map(|pause: Option<u64>| pause.map(Duration::from_millis))
         );
-        stream.resume();
+        stream.resume(ms(8900));
         assert_eq!(stream.pause(ms(9000)), None);
         let mut stream = Stream::new(true);
         assert_eq!([40, 2080].map(|at| stream.pause(ms(at))), [None; 2]);
@@ -246,7 +314,7 @@ mod tests {
         fn any_timestamps_give_an_age(pictures in prop::collection::vec(any::<(i64, i64, u32)>(), 1..20)) {
             let mut age = PictureAge::default();
             for (captured, now, arrived) in pictures {
-                age.of(captured, now, Time::from_millis(arrived.into()));
+                age.of(captured, Some(captured), now, Time::from_millis(arrived.into()));
             }
         }
     }

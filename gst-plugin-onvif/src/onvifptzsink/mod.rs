@@ -68,7 +68,7 @@ pub enum Authentication {
     Auto,
     /// In clear too.
     #[enum_value(
-        name = "Basic without that too: anybody on the network path can then read the password",
+        name = "As auto, but Basic whenever the camera asks for it: anybody on the network path can then read the password",
         nick = "basic"
     )]
     Basic,
@@ -115,7 +115,7 @@ pub enum SpeedCurve {
     Linear,
     /// By the cube.
     #[default]
-    #[enum_value(name = "By the cube of the step: velocities are in proportion", nick = "cubic")]
+    #[enum_value(name = "By the cube of the step: in proportion to the ONVIF velocity", nick = "cubic")]
     Cubic,
 }
 

@@ -137,7 +137,7 @@ pub enum Authentication {
     Auto,
     /// In clear too.
     #[enum_value(
-        name = "Basic without that too: anybody on the network path can then read the password",
+        name = "As auto, but Basic whenever the camera asks for it: anybody on the network path can then read the password",
         nick = "basic"
     )]
     Basic,

@@ -61,6 +61,8 @@ pub struct Rig {
     pub bus: gst::Bus,
     /// Where pictures have timestamps.
     pub stamps: Option<Stamps>,
+    /// Of buffers.
+    pub flags: gst::BufferFlags,
     harness: Option<gst_check::Harness>,
 }
 
@@ -77,7 +79,7 @@ impl Rig {
             .unwrap();
         let bus = gst::Bus::new();
         sink.set_bus(Some(&bus));
-        Self { sink, bus, stamps: None, harness: None }
+        Self { sink, bus, stamps: None, flags: gst::BufferFlags::empty(), harness: None }
     }
 
     /// The same, playing.
@@ -113,6 +115,7 @@ impl Rig {
         let mut buffer = gst::Buffer::with_size(320 * 240).unwrap();
         let content = buffer.get_mut().unwrap();
         content.set_pts(self.stamps.as_ref().map(Stamps::next));
+        content.set_flags(self.flags);
         meta.attach(content).unwrap();
         assert_eq!(self.harness().push(buffer), Ok(gst::FlowSuccess::Ok));
     }

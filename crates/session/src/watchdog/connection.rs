@@ -187,7 +187,7 @@ fn reap(child: &mut Child) -> Option<ExitStatus> {
 /// A watchdog ends a connection over which something comes that it does not know.
 fn not_understood() -> io::Error {
     io::Error::other(
-        "it does not answer, as one of another version does; start it anew (ptztrack-watchdog.service)",
+        "it does not answer; it may be of another version: restart it (ptztrack-watchdog.service)",
     )
 }
 
@@ -254,7 +254,7 @@ mod tests {
         BufReader::new(old).read_until(b'\n', &mut Vec::new()).unwrap();
         let said = end("it", &connection);
         std::fs::remove_file(socket).unwrap();
-        assert!(said.contains("another version") && said.contains("start it anew"), "{said}");
+        assert!(said.contains("another version") && said.contains("restart it"), "{said}");
     }
 
     /// Were it told once it runs, it would know nothing where the application dies in the meantime.
