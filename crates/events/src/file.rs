@@ -69,14 +69,14 @@ pub enum Error {
     },
     /// Somebody reads what was deleted, for as long as that lasts.
     #[error(
-        "{file}: what was deleted is still in the file beside it, as somebody reads that; delete it again"
+        "{file}: the deleted event is still in the log beside it, as another program is reading it; repeat the deletion"
     )]
     Read {
         /// The file.
         file: String,
     },
     /// It was written by another version.
-    #[error("{file} is of another version of ptztrack: it is moved aside when that version keeps events")]
+    #[error("{file} is of another version of ptztrack: this version moves it aside once it writes events")]
     OtherVersion {
         /// The file.
         file: String,

@@ -39,7 +39,7 @@ pub struct AskEvents {
 
 #[derive(Debug, Subcommand)]
 enum Change {
-    /// Delete all that is known of who was followed then: times, way and picture; a recording stays as it is
+    /// Delete all that is kept of one event: times, way and picture; a recording stays as it is
     Delete {
         /// Its number
         id: i64,
@@ -54,7 +54,7 @@ struct Place {
     /// The folder that events are kept in [default: STATE_DIRECTORY, else ~/.local/state/ptztrack]
     #[arg(long, value_name = "FOLDER")]
     folder: Option<PathBuf>,
-    /// The file of cameras, which may name another
+    /// The file of cameras, which may name another folder
     #[arg(long, value_name = "FILE", conflicts_with = "folder")]
     config: Option<PathBuf>,
 }
@@ -85,7 +85,7 @@ impl AskEvents {
             aside.iter().for_each(|aside| eprintln!("{}", store::moved(aside)));
             return match store.delete(id).map_err(said)? {
                 true => Ok(format!("Event {id} is deleted.\n")),
-                false => Err(format!("There is no event {id}.")),
+                false => Err(format!("There is no event {id}; nothing of it is left in the file.")),
             };
         }
         let (folder, zones) = self.place.read()?;

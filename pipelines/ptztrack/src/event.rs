@@ -70,10 +70,13 @@ impl fmt::Display for Event {
             Level::Warning => "warning: ",
             Level::Error => "error: ",
         };
-        // One line, and nothing that a terminal would obey, whatever the elements and cameras have to say.
-        let detail = self.detail.replace(char::is_control, " ");
-        write!(f, "{} {camera}: {level}{detail}", self.time)
+        write!(f, "{} {camera}: {level}{}", self.time, on_one_line(&self.detail))
     }
+}
+
+/// One line, and nothing that a terminal would obey, whatever the elements and cameras have to say.
+pub fn on_one_line(text: &str) -> String {
+    text.replace(char::is_control, " ")
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ fn run(options: Options) -> Result<(), Failure> {
         Task::Check { file } => {
             let config = Config::load(&file)?;
             config.check_machine()?;
-            println!("{} is right; cameras: {}", file.display(), config.cameras.len());
+            println!("{} is valid; cameras: {}", file.display(), config.cameras.len());
             Ok(())
         }
         Task::Events(ask) => {

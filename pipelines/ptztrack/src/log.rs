@@ -7,7 +7,7 @@ use events::Sighting;
 use ptztrack_contract::lock::lock;
 use tokio::sync::broadcast;
 
-use crate::event::{Event, Level};
+use crate::event::{Event, Level, on_one_line};
 use crate::waiting::{self, MOST_BYTES, Sightings, Waiting};
 
 /// How a line looks.
@@ -85,8 +85,8 @@ impl Log {
         let put = lock(&self.sightings).as_ref().map(|waiting| waiting.put(sighting));
         if put == Some(Err(1)) {
             let detail = format!(
-                "those who were followed wait for the disk, {} MiB of them, which is all there is room for: whoever is followed from \
-                 now on is lost until they are kept",
+                "{} MiB of events wait for the disk, and there is no room for more: new ones are lost until it writes again. Check the \
+                 disk",
                 MOST_BYTES >> 20
             );
             self.tell(&Event::new(Level::Warning, None, "events-lost", detail));
@@ -114,6 +114,7 @@ impl Log {
 
     /// Shows these lines below the log, instead of those before.
     pub fn show_status(&self, lines: Vec<String>) {
+        let lines: Vec<String> = lines.into_iter().map(|line| on_one_line(&line)).collect();
         let mut status = lock(&self.status);
         let text = format!("{}{}", above(&status), below(&lines));
         *status = lines;
@@ -133,4 +134,16 @@ fn below(status: &[String]) -> String {
 /// Nobody can be told that standard error cannot be written.
 fn write(text: &str) {
     let _ = stderr().lock().write_all(text.as_bytes());
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_status_is_one_line_and_no_order_to_a_terminal() {
+        let log = Log::default();
+        log.show_status(vec!["door: a\r\nb\u{1b}[2Jc".to_owned()]);
+        assert_eq!(*lock(&log.status), ["door: a  b [2Jc"]);
+    }
 }

@@ -69,7 +69,7 @@ impl Point {
                 Err("the page wants a password: give --user and --password-file".to_owned())
             }
             StatusCode::NOT_FOUND => {
-                Err(format!("there is no camera `{}`, or none `{}`", self.camera, self.from))
+                Err(format!("there is no camera `{}` or no camera `{}`", self.camera, self.from))
             }
             other => Err(format!("the page answers: {other}")),
         }

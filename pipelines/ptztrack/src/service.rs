@@ -212,7 +212,7 @@ fn read_again(
             if needs_restart {
                 log.error(
                     "restart-needed",
-                    "what changed in [http], [mqtt], [events], [zone] and [restream] counts from the next start on",
+                    "changes in [http], [mqtt], [events], [zone] and [restream] need a restart to take effect",
                 );
             }
             for (table, reason) in lost {

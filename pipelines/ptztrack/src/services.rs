@@ -141,7 +141,11 @@ async fn serve(http: Http, fleet: Arc<Fleet>, events: Events, log: Arc<Log>) {
         tokio::time::sleep(LISTEN_AGAIN).await;
     };
     if let Ok(address) = listener.local_addr() {
-        let what = if http.credentials.is_ok() { "page, /metrics and" } else { "as long as it waits, only" };
+        let what = if http.credentials.is_ok() {
+            "page, /metrics and"
+        } else {
+            "until its password can be read, only"
+        };
         log.info("listening", format!("{what} /healthz at http://{address}/"));
     }
     http::serve(listener, &http, fleet, events, log).await;

@@ -89,14 +89,14 @@ impl Keeper {
         let _ = self.ended.recv_timeout(LONGEST_END);
         let lost = self.count.waiting() + self.count.take_lost();
         if lost > 0 {
-            let detail = format!("{lost} who were followed are lost: the disk did not take them in time");
+            let detail = format!("{lost} events are lost: the disk did not take them in time");
             self.log.tell(&Event::new(Level::Warning, None, "events-lost", detail));
         }
     }
 }
 
 fn not_kept(reason: &str) -> String {
-    format!("who is followed is not kept: {reason}")
+    format!("events are not kept: {reason}")
 }
 
 struct Keeping {
@@ -136,8 +136,7 @@ impl Keeping {
             let broken = self.open.take().filter(|_| err.is_corrupt());
             let is_mended = broken.is_some_and(|store| self.put_aside(store));
             if !is_mended && !std::mem::replace(&mut self.in_trouble, true) {
-                let detail =
-                    format!("{}; the cameras follow, and it is tried again", not_kept(&err.to_string()));
+                let detail = format!("{}; the cameras keep following; retrying", not_kept(&err.to_string()));
                 self.log.tell(&Event::new(Level::Warning, None, "events-not-kept", detail));
             }
             thread::sleep(pauses.after(Duration::ZERO));
@@ -145,7 +144,7 @@ impl Keeping {
         let lost = self.count.take_lost();
         if std::mem::take(&mut self.in_trouble) || lost > 0 {
             let lost = if lost > 0 { format!("; {lost} are lost") } else { String::new() };
-            self.log.info("events-kept", format!("who is followed is kept again{lost}"));
+            self.log.info("events-kept", format!("events are kept again{lost}"));
         }
     }
 

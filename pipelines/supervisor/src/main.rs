@@ -21,7 +21,7 @@ fn main() -> ExitCode {
     match run() {
         Ok(()) => ExitCode::SUCCESS,
         Err(err) => {
-            eprintln!("{err}\nNot started anew: that would end in the same way.");
+            eprintln!("{err}\nNot restarted: it would fail in the same way.");
             ExitCode::FAILURE
         }
     }

@@ -17,8 +17,8 @@ use virtual_camera::Fault;
 
 const HEADER: &str = "# How soon video and control are back
 
-Video and PTZ come from one camera and are lost together. Measured by `cargo run --example coming_back`; the worst of
-three runs, from the moment when the camera can be reached again until a picture arrives, and until the camera accepts the first
+Video and PTZ come from one camera and are lost together. Measured by `cargo run --example coming_back`, after
+`cargo build --workspace --lib --bins --examples`; the worst of three runs, from the moment when the camera can be reached again until a picture arrives, and until the camera accepts the first
 command. If the camera went on turning meanwhile, the target has to be found again after that.
 
 | What follows | What is lost | Video is back after | Control is back after |

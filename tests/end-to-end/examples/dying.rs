@@ -23,8 +23,8 @@ use virtual_camera::{Fault, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
 
-What happens to a camera whose application dies while the camera turns. Measured by `cargo run --example dying`, over
-HTTP with the default properties; the worst of three runs, from the death (where the camera cannot be reached or refuses to stop: from the
+What happens to a camera whose application dies while the camera turns. Measured by `cargo run --example dying`, after
+`cargo build --workspace --lib --bins`, over HTTP with the default properties; the worst of three runs, from the death (where the camera cannot be reached or refuses to stop: from the
 end of that) until the camera is at rest. In the last column the watchdog could not be started.
 
 | Way to die | What stops the camera | It rests after | Without `vapix-watchdog` |

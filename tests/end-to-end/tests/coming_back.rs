@@ -69,7 +69,7 @@ fn a_wrong_password_is_not_tried_for_ever() {
     let mut command = script("headless.sh");
     command.env("CAMERA", camera.url()).env("CAMERA_USER", scene::USER).env("CAMERA_PASSWORD", "falsch");
     let (status, output) = GstLaunch::spawn(command).finish();
-    assert!(!status.success() && output.contains("Not started anew"), "{output}");
+    assert!(!status.success() && output.contains("Not restarted"), "{output}");
 }
 
 /// Each part of a recording stays.

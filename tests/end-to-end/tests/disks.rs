@@ -109,16 +109,16 @@ fn a_full_disk_of_events_is_said_once_and_they_are_kept_when_there_is_room() {
     let other = disk.folder().join("other");
     let _ = fs::write(&other, vec![0; (MEBIBYTES as usize) << 20]);
     let (camera, mut program) = with_events_on(&disk, "events-full");
-    program.launch.wait_for_line("warning: who is followed is not kept: ");
+    program.launch.wait_for_line("warning: events are not kept: ");
     is_steered(&camera);
     assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
     is_steered(&camera);
     fs::remove_file(other).unwrap();
     // What was missing may have been a file or a first event.
-    program.launch.wait_for_line("who is followed is kept again");
+    program.launch.wait_for_line("events are kept again");
     let said = program.end("TERM");
     assert!(said.contains(": event 1: target "), "{said}");
-    assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+    assert_eq!(said.matches("are not kept").count(), 1, "{said}");
     scene::assert_left_at_rest(&camera);
 }
 

@@ -95,16 +95,16 @@ fn a_folder_that_cannot_be_written_is_said_once_and_nobody_is_followed_the_worse
     fs::write(&there, "").unwrap();
     let mut program =
         Program::start("events-unwritable", file(&camera, &format!("[events]\nfolder = {there:?}\n")), &[]);
-    program.launch.wait_for_line("warning: who is followed is not kept: ");
+    program.launch.wait_for_line("warning: events are not kept: ");
     scene::wait_until_following(&camera);
     is_steered(&camera);
     assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
     fs::remove_file(&there).unwrap();
-    program.launch.wait_for_line("who is followed is kept again");
+    program.launch.wait_for_line("events are kept again");
     program.launch.wait_for_line(": event 1: target 1 was followed");
     let said = program.end("TERM");
     fs::remove_dir_all(&there).unwrap();
-    assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+    assert_eq!(said.matches("are not kept").count(), 1, "{said}");
 }
 
 /// As by somebody who copies it, or cleans it up.
@@ -117,16 +117,16 @@ fn a_store_that_another_writer_has_locked_is_said_once_and_written_once_it_is_fr
     writer.execute_batch("BEGIN IMMEDIATE").unwrap();
     let mut program =
         Program::start("events-locked", file(&camera, &format!("[events]\nfolder = {there:?}\n")), &[]);
-    let line = program.launch.wait_for_line("warning: who is followed is not kept: ");
+    let line = program.launch.wait_for_line("warning: events are not kept: ");
     assert!(line.contains("database is locked"), "{line}");
     scene::wait_until_following(&camera);
     is_steered(&camera);
     assert_eq!(program.ask("POST", "/cameras/door/release").0, 204);
     writer.execute_batch("COMMIT").unwrap();
-    program.launch.wait_for_line("who is followed is kept again");
+    program.launch.wait_for_line("events are kept again");
     program.launch.wait_for_line(": event 1: target 1 was followed");
     let said = program.end("TERM");
-    assert_eq!(said.matches("is not kept").count(), 1, "{said}");
+    assert_eq!(said.matches("are not kept").count(), 1, "{said}");
     assert!(Reader::open(&there).unwrap().sighting(1).unwrap().is_some());
     fs::remove_dir_all(&there).unwrap();
 }

@@ -101,7 +101,7 @@ fn a_camera_that_takes_no_moves_to_a_position_is_called_no_more() {
     let file = |folder: &Path| yard_calls_door(&yard, &door, folder);
     let environment = [("STATE_DIRECTORY", state.as_path())];
     let mut program = Program::start_in("hand-over-refused", file, &[], &environment);
-    program.launch.wait_for_line("door: warning: refuses to turn where another camera sees somebody");
+    program.launch.wait_for_line("door: warning: refuses to turn to where another camera sees somebody");
     program.wait_for("/cameras", |cameras| !cameras.contains("turns to whom another one sees"));
     assert_eq!(door.status().pan_deg, -20.0);
     program.end("TERM");
@@ -152,13 +152,13 @@ fn what_a_camera_looks_at_can_be_said_by_hand() {
         (output.status.code(), String::from_utf8_lossy(&[output.stdout, output.stderr].concat()).into_owned())
     };
     let (status, said) = point("door", "yard", "0.4,0.7");
-    assert!(status == Some(0) && said == "sees 0.40,0.70 of yard at 0.50,0.50, as somebody says\n", "{said}");
-    program.launch.wait_for_line("door: sees 0.40,0.70 of yard at 0.50,0.50, as somebody says");
+    assert!(status == Some(0) && said == "sees 0.40,0.70 of yard at 0.50,0.50, as told by hand\n", "{said}");
+    program.launch.wait_for_line("door: sees 0.40,0.70 of yard at 0.50,0.50, as told by hand");
     let (status, said) = point("yard", "door", "0.4,0.7");
     assert!(status == Some(1) && said.contains("door does not call it: [handover.door] says"), "{said}");
     program.launch.wait_for_line("yard: warning: door does not call it");
     let (status, said) = point("door", "gate", "0.4,0.7");
-    assert!(status == Some(1) && said.contains("there is no camera `door`, or none `gate`"), "{said}");
+    assert!(status == Some(1) && said.contains("there is no camera `door` or no camera `gate`"), "{said}");
     assert_eq!(point("door", "yard", "4,7").0, Some(2));
     program.end("TERM");
     let (status, said) = point("door", "yard", "0.4,0.7");
@@ -195,9 +195,9 @@ fn a_place_is_clicked_in_both_pictures() {
     browser.save_picture("ptztrack-page-pair.png");
     click(&mut browser, "door", 0.75, 0.5);
     browser.wait_for(
-        "/^door sees 0.2\\d,0.7\\d of yard at 0.7\\d,0.\\d+, as somebody says/.test(pairing.innerText)",
+        "/^door sees 0.2\\d,0.7\\d of yard at 0.7\\d,0.\\d+, as told by hand/.test(pairing.innerText)",
     );
-    program.launch.wait_for_line("as somebody says");
+    program.launch.wait_for_line("as told by hand");
     program.end("TERM");
 }
 

@@ -197,7 +197,7 @@ fn whoever_was_recorded_is_played_and_kept_as_a_clip() {
         assert!(clip[0] == kind && clip[1].as_u64().unwrap() > 10_000, "{clip}");
         // Where the recording is gone, that is said.
         fs::remove_dir_all(program.folder().join("recordings")).unwrap();
-        assert_eq!(program.ask("GET", "/events/1/clip"), (404, "The recording is no more.\n".to_owned()));
+        assert_eq!(program.ask("GET", "/events/1/clip"), (404, "The recording is gone.\n".to_owned()));
         program.end("TERM");
         scene::assert_left_at_rest(&camera);
     }

@@ -81,8 +81,8 @@ impl Dispatcher {
     fn leave_alone(&mut self, to: &str) {
         if self.refused.insert(to.to_owned(), Instant::now() + REFUSED).is_none() {
             let detail = format!(
-                "refuses to turn where another camera sees somebody: without moves to a position (ONVIF's AbsoluteMove, VAPIX' \
-                 pan= and tilt=) it cannot be called. It follows whom it sees itself, and is called again after {} s",
+                "refuses to turn to where another camera sees somebody: without moves to a position (ONVIF's AbsoluteMove, VAPIX' \
+                 pan= and tilt=) it cannot be called. It keeps following on its own, and is called again after {} s",
                 REFUSED.as_secs()
             );
             self.tell(to, Level::Warning, "not-called", detail);

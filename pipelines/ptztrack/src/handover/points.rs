@@ -43,12 +43,12 @@ impl Dispatcher {
         let both = format!("{:.2},{:.2} of {from} at {:.2},{:.2}", there.x, there.y, here.x, here.y);
         match place.zip(direction) {
             None => {
-                Err(format!("cannot be told that it sees {both}: it turns, or does not say where it looks"))
+                Err(format!("cannot take {both}: one of the cameras turns or does not report where it looks"))
             }
             Some((place, direction)) if self.link(from, to).point(place, direction) => {
-                Ok(format!("sees {both}, as somebody says"))
+                Ok(format!("sees {both}, as told by hand"))
             }
-            Some(_) => Err(format!("does not see {both}, by all that is known")),
+            Some(_) => Err(format!("cannot see {both}, by what was learned")),
         }
     }
 }

@@ -195,9 +195,9 @@ async fn recorded(asked: Asked, Path(id): Path<i64>, purpose: Purpose) -> Respon
     };
     let clip = match recording::cut(pieces, purpose).await {
         Ok(clip) => clip,
-        Err(NoClip::Gone) => return (StatusCode::NOT_FOUND, "The recording is no more.\n").into_response(),
+        Err(NoClip::Gone) => return (StatusCode::NOT_FOUND, "The recording is gone.\n").into_response(),
         Err(NoClip::Busy) => {
-            return (StatusCode::SERVICE_UNAVAILABLE, "Others are taken from the recordings: try again.\n")
+            return (StatusCode::SERVICE_UNAVAILABLE, "Too many clips are being made: try again.\n")
                 .into_response();
         }
     };

@@ -325,7 +325,7 @@ async fn order(
                 return (StatusCode::BAD_REQUEST, "x, y and zoom are from -1 to 1\n").into_response();
             }
             _ if !known.abilities().turn => {
-                return (StatusCode::CONFLICT, "it does not say where it looks\n").into_response();
+                return (StatusCode::CONFLICT, "the camera does not report where it looks\n").into_response();
             }
             [right, up, zoom] if !known.turn(Turn { right, up, zoom }) => return handed_over(),
             _ => {}

@@ -80,7 +80,7 @@ impl Hearing {
                 Ok(rumqttc::Event::Incoming(Incoming::SubAck(answer))) => {
                     let is_refused = answer.return_codes.contains(&SubscribeReasonCode::Failure);
                     if is_refused && !std::mem::replace(&mut refused, true) {
-                        self.not_exchanged("it lets this client hear none");
+                        self.not_exchanged("it refuses the subscription");
                     }
                 }
                 Ok(rumqttc::Event::Incoming(Incoming::Publish(publish))) => {
@@ -105,7 +105,7 @@ impl Hearing {
     fn not_exchanged(&self, reason: &str) {
         let topic = self.topics.tracks("+");
         let detail = format!(
-            "the MQTT broker passes no {topic} on: {reason}. Nobody is handed over to or from cameras of other processes; \
+            "the MQTT broker does not relay {topic}: {reason}. Nobody is handed over to or from cameras of other processes; \
              allow this user to connect twice, and to read and write there"
         );
         self.log.error("tracks-not-exchanged", detail);

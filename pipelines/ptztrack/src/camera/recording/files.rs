@@ -19,7 +19,7 @@ const FREE_SHARE: u64 = 20;
 
 /// Of the disk, no file is begun or written where less than this share is free: others delete theirs before it comes to that.
 const LEAST_SHARE: u64 = 2 * FREE_SHARE;
-const SHORT: &str = "less than a fortieth of the disk is free";
+const SHORT: &str = "less than a fortieth of the disk is free: make room";
 
 /// A file has at most one part in so many of the disk, as large as the room that is never written to: only where another begins is
 /// anything deleted for `keep-bytes`, and the newest is never deleted to make room.

@@ -143,8 +143,7 @@ impl Recorder {
                 return;
             }
             if !std::mem::replace(&mut *lock(&self.trouble), true) {
-                let detail =
-                    format!("nothing is recorded: {failure}; the camera is followed, and it is tried again");
+                let detail = format!("nothing is recorded: {failure}; the camera keeps following; retrying");
                 self.tell(Level::Warning, "recording-failed", &detail);
             }
             thread::sleep(pause);
