@@ -81,7 +81,7 @@ pub fn read_for_visitors(table: &mut Table) -> Result<Option<Credentials>, Strin
 /// The password of a table, from where the file says it is.
 fn password(table: &mut Table) -> Option<Result<Secret, String>> {
     if let Some(value) = table.value("password") {
-        let text = "a password does not belong into this file: `password-file`, `password-environment` or \
+        let text = "a password does not belong in this file: `password-file`, `password-environment` or \
             `password-credential` say where it is";
         table.source.wrong(value.span(), text);
     }

@@ -57,7 +57,7 @@ fn a_password_does_not_belong_into_the_file() {
     let wrong =
         parse("[camera.a]\naddress = \"http://a\"\nuser = \"u\"\npassword = \"secret\"\n").unwrap_err();
     assert!(
-        wrong.contains("line 4: a password does not belong into this file") && !wrong.contains("secret"),
+        wrong.contains("line 4: a password does not belong in this file") && !wrong.contains("secret"),
         "{wrong}"
     );
 }
