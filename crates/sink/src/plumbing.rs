@@ -139,8 +139,8 @@ pub trait Plumbing: PtzSink {
             self.with_task(CameraTask::play);
         }
         if transition == gst::StateChange::PlayingToPaused {
-            let (running_time, now) = (self.obj().current_running_time().map(nanoseconds), self.time());
-            lock(&self.core().stream).suspend(running_time, now);
+            let running_time = self.obj().current_running_time().map(nanoseconds);
+            lock(&self.core().stream).suspend(running_time);
         }
         let result = self.parent_change_state(transition);
         match transition {

@@ -23,8 +23,10 @@ pub struct Stream {
     pub age: PictureAge,
     /// When the last picture came, unless the pipeline was paused since.
     last_came: Option<Time>,
-    /// When the pipeline was last paused, in nanoseconds of running time, and when it went on.
-    paused: Option<(i64, Time)>,
+    /// Running time at which the pipeline was last paused, in nanoseconds.
+    paused_at: Option<i64>,
+    /// When it last went on.
+    resumed: Time,
     meta_wait: MetaWait,
     warned: Vec<Fault>,
 }
@@ -55,6 +57,11 @@ enum MetaWait {
 }
 
 impl Stream {
+    /// Nothing came yet.
+    pub fn new(lockstep: bool) -> Self {
+        Self { lockstep, ..Self::default() }
+    }
+
     /// From here on the picture is of this size and shape.
     pub fn shows(&mut self, picture: Picture) {
         let before = self.picture.replace(picture);
@@ -69,11 +76,6 @@ impl Stream {
     /// Whether the picture is another one than when this was last asked.
     pub fn is_other_picture(&mut self) -> bool {
         mem::take(&mut self.is_other)
-    }
-
-    /// Nothing came yet.
-    pub fn new(lockstep: bool) -> Self {
-        Self { lockstep, ..Self::default() }
     }
 
     /// Buffers without a target meta for so long have no tracker upstream: those put one on each, target or not.
@@ -94,25 +96,24 @@ impl Stream {
         before.map(|before| now - before)
     }
 
-    /// The pipeline is paused at this running time, in nanoseconds, and this time.
-    pub fn suspend(&mut self, running_time: Option<i64>, now: Time) {
-        self.paused = running_time.map(|at| (at, now)).filter(|_| !self.lockstep);
+    /// The pipeline is paused at this running time, in nanoseconds.
+    pub fn suspend(&mut self, running_time: Option<i64>) {
+        self.paused_at = running_time.filter(|_| !self.lockstep);
     }
 
     /// The pipeline was paused, or was not running yet: that nothing came meanwhile is as it should be.
     pub fn resume(&mut self, now: Time) {
-        self.last_came = None;
-        self.paused = self.paused.map(|(at, _)| (at, now));
+        (self.last_came, self.resumed) = (None, now);
     }
 
     /// What comes from here on is of elsewhere in the stream.
     pub fn seek(&mut self) {
-        self.paused = None;
+        self.paused_at = None;
     }
 
     /// Whether the pipeline was paused after this running time, in nanoseconds, and has gone on since for no longer than that.
     pub fn was_paused_after(&self, running_time: i64, now: Time, within: Duration) -> bool {
-        self.paused.is_some_and(|(at, resumed)| running_time <= at && now <= resumed + within)
+        self.paused_at.is_some_and(|at| running_time <= at) && now <= self.resumed + within
     }
 
     /// A buffer came, with a target meta or without. Returns whether none has had one for long.
@@ -266,13 +267,15 @@ mod tests {
         let within = Duration::from_secs(1);
         let mut stream = Stream::default();
         assert!(!stream.was_paused_after(0, ms(0), within), "it was never paused");
-        stream.suspend(Some(5000), ms(5));
+        stream.suspend(Some(5000));
         stream.resume(ms(60_000));
         let known = [(5000, 60_500), (5001, 60_500), (5000, 61_001)];
         assert_eq!(
             known.map(|(taken, now)| stream.was_paused_after(taken, ms(now), within)),
             [true, false, false]
         );
+        stream.seek();
+        assert!(!stream.was_paused_after(5000, ms(60_500), within), "its timestamps are others'");
     }
 
     #[test]
