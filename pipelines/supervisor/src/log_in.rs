@@ -226,4 +226,30 @@ mod tests {
             assert!(graph.contains("source") && !graph.contains("xyzzy"), "{graph}");
         }
     }
+
+    /// Of a pipeline that does not take it for pictures in parts.
+    #[test]
+    fn a_stream_of_another_kind_passes_as_it_is() {
+        gst::init().unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = listener.local_addr().unwrap();
+        std::thread::spawn(move || {
+            for mut client in listener.incoming().map_while(Result::ok) {
+                if client.read(&mut [0; 4096]).is_ok_and(|read| read > 0) {
+                    let head = b"HTTP/1.1 200 OK\r\nContent-Type: video/x-flv\r\nContent-Length: 5\r\n\r\n";
+                    let _ = client.write_all(&[&head[..], b"FLV--"].concat());
+                }
+            }
+        });
+        let text = format!(
+            "souphttpsrc name=source user-id=operator location=http://{address}/video ! appsink name=out sync=false"
+        );
+        let pipeline = gst::parse::launch(&text).unwrap().downcast::<gst::Pipeline>().unwrap();
+        LogIn::new("plugh").apply(&pipeline).unwrap();
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let out = pipeline.by_name("out").unwrap().downcast::<gst_app::AppSink>().unwrap();
+        let sample = out.try_pull_sample(gst::ClockTime::from_seconds(60)).unwrap();
+        assert_eq!(sample.buffer().unwrap().map_readable().unwrap().as_slice(), b"FLV--");
+        pipeline.set_state(gst::State::Null).unwrap();
+    }
 }

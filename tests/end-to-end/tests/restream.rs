@@ -51,14 +51,21 @@ fn server(url: &str) -> &str {
     url.trim_start_matches("rtsp://").trim_end_matches("/door")
 }
 
-/// The first line of the answer to such a request; empty where there is none.
+/// The first line of the answer to such a request with more in its head, which is read to its end; empty where there is none.
 #[track_caller]
-fn answer(mut client: &TcpStream, request: &str) -> String {
+fn answer_to(mut client: &TcpStream, request: &str, more: &str) -> String {
     client.set_read_timeout(Some(PATIENCE)).unwrap();
-    client.write_all(format!("{request} RTSP/1.0\r\nCSeq: 1\r\n\r\n").as_bytes()).unwrap();
-    let lines = BufReader::new(client).lines().map(Result::unwrap);
-    let head: Vec<String> = lines.take_while(|line| !line.is_empty()).collect();
-    head.into_iter().next().unwrap_or_default()
+    client.write_all(format!("{request} RTSP/1.0\r\nCSeq: 1\r\n{more}\r\n").as_bytes()).unwrap();
+    let (mut server, mut head) = (BufReader::new(client), String::new());
+    while !head.ends_with("\r\n\r\n") && server.read_line(&mut head).unwrap() > 0 {}
+    let length = head.lines().find_map(|line| line.strip_prefix("Content-Length: "));
+    let mut body = vec![0; length.map_or(0, |length| length.parse().unwrap())];
+    server.read_exact(&mut body).unwrap();
+    head.lines().next().unwrap_or_default().to_owned()
+}
+
+fn answer(client: &TcpStream, request: &str) -> String {
+    answer_to(client, request, "")
 }
 
 /// Somebody who asks for nothing in particular, and for nothing more. Answered, so that they have a place before anybody else comes.
@@ -322,20 +329,6 @@ fn as_many_as_there_may_be_who_say_nothing_keep_nobody_out() {
     program.end("TERM");
 }
 
-/// The status of the answer to a request, which is read to its end.
-#[track_caller]
-fn status(server: &mut BufReader<TcpStream>, request: &str) -> u16 {
-    server.get_mut().write_all(format!("{request}\r\n\r\n").as_bytes()).unwrap();
-    let mut head = String::new();
-    while !head.ends_with("\r\n\r\n") {
-        assert_ne!(server.read_line(&mut head).unwrap(), 0, "{head}");
-    }
-    let length = head.lines().find_map(|line| line.strip_prefix("Content-Length: "));
-    let mut body = vec![0; length.map_or(0, |length| length.parse().unwrap())];
-    server.read_exact(&mut body).unwrap();
-    head.split(' ').nth(1).unwrap().parse().unwrap()
-}
-
 /// By UDP, anybody on the network could fill the memory with reports, and pictures would go in clear.
 #[test]
 fn pictures_go_by_the_connection_itself_and_no_other_way() {
@@ -343,17 +336,18 @@ fn pictures_go_by_the_connection_itself_and_no_other_way() {
     let mut program = start("udp", &camera, "codec = \"h264\"", "");
     let url = address(&mut program);
     let client = TcpStream::connect(server(&url)).unwrap();
-    client.set_read_timeout(Some(PATIENCE)).unwrap();
-    let mut client = BufReader::new(client);
-    let describe = format!("DESCRIBE {url} RTSP/1.0\r\nCSeq: 1\r\nAccept: application/sdp");
-    assert_eq!(status(&mut client, &describe), 200);
-    for (transport, answer) in [
-        ("RTP/AVP;unicast;client_port=5000-5001", 461),
-        ("RTP/AVP;multicast", 461),
-        ("RTP/AVP/TCP;unicast;interleaved=0-1", 200),
+    assert_eq!(
+        answer_to(&client, &format!("DESCRIBE {url}"), "Accept: application/sdp\r\n"),
+        "RTSP/1.0 200 OK"
+    );
+    for (transport, status) in [
+        ("RTP/AVP;unicast;client_port=5000-5001", "461"),
+        ("RTP/AVP;multicast", "461"),
+        ("RTP/AVP/TCP;unicast;interleaved=0-1", "200"),
     ] {
-        let setup = format!("SETUP {url}/stream=0 RTSP/1.0\r\nCSeq: 2\r\nTransport: {transport}");
-        assert_eq!(status(&mut client, &setup), answer, "{transport}");
+        let setup = format!("SETUP {url}/stream=0");
+        let answer = answer_to(&client, &setup, &format!("Transport: {transport}\r\n"));
+        assert_eq!(answer.split(' ').nth(1), Some(status), "{transport}");
     }
     drop(client);
     program.end("TERM");
