@@ -9,6 +9,7 @@
 //! RTSP:   camera ─ relay, media ─ 127.0.0.1 ─ rtspsrc
 //! ```
 
+mod address;
 mod http;
 pub mod media;
 pub mod multipart;
@@ -21,8 +22,8 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::Duration;
 
+pub use address::rtsp_host;
 use gst_app::AppSrc;
-pub use rtsp::host as rtsp_host;
 use session::Error;
 use session::http::ClientSettings;
 

@@ -21,13 +21,10 @@ use tokio::task::{AbortHandle, JoinSet};
 use tokio::time::timeout;
 use tokio_rustls::TlsConnector;
 
+use super::address::rtsp_host;
 use super::media::Media;
 use super::rtsp_message::{Item, Message};
 use super::{Ended, Failure, LONGEST_SILENCE, LONGEST_START, Video};
-
-/// RFC 7826, section 4.2; IANA.
-const PORT: u16 = 554;
-const TLS_PORT: u16 = 322;
 
 /// Challenges to one request that are answered, where each says that the one before is stale.
 const MOST_CHALLENGES: usize = 5;
@@ -88,22 +85,6 @@ pub async fn carry(
     }
 }
 
-/// Host and port of an address of RTSP, and whether it is by TLS.
-pub fn host(address: &str) -> Option<(String, u16, bool)> {
-    let (rest, tls) = match address.strip_prefix("rtsp://") {
-        Some(rest) => (rest, false),
-        None => (address.strip_prefix("rtsps://")?, true),
-    };
-    let rest = rest.trim_end_matches('/');
-    let wrong = |c: char| c.is_whitespace() || matches!(c, '/' | '@' | '?' | '#');
-    let colon = rest.rfind(':').filter(|colon| rest.rfind(']').is_none_or(|end| end < *colon));
-    let (host, port) = match colon {
-        Some(colon) => (rest.get(..colon)?, rest.get(colon + 1..)?.parse().ok()?),
-        None => (rest, if tls { TLS_PORT } else { PORT }),
-    };
-    (!host.is_empty() && !rest.contains(wrong)).then(|| (host.to_owned(), port, tls))
-}
-
 /// 128 random bits: others on this machine must not find the camera behind the open door.
 fn word() -> io::Result<String> {
     let mut bytes = [0; 16];
@@ -113,8 +94,8 @@ fn word() -> io::Result<String> {
 
 /// A connection to the camera, and whether the camera is known to be at the other end.
 async fn connect(settings: &ClientSettings, camera: &str) -> Result<(Box<dyn Connection>, bool), Failure> {
-    let (host, port, over_tls) =
-        host(camera).ok_or_else(|| Failure::new(format!("{} names no host", without_user_info(camera))))?;
+    let (host, port, over_tls) = rtsp_host(camera)
+        .ok_or_else(|| Failure::new(format!("{} names no host", without_user_info(camera))))?;
     let bare = host.trim_matches(['[', ']']);
     let said = |err: io::Error| Failure::new(format!("{host}, port {port}: {err}"));
     let late = |_| said(io::ErrorKind::TimedOut.into());
