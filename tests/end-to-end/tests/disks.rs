@@ -153,6 +153,11 @@ fn the_oldest_recordings_make_room_for_the_newest() {
     assert!(names().iter().any(|name| name == old[1]), "{:?}", names());
     let said = recorded.end();
     assert!(!said.contains("nothing is recorded"), "{said}");
+    assert_eq!(
+        said.matches("door: warning: the oldest recordings are deleted before their time").count(),
+        1,
+        "{said}"
+    );
 }
 
 /// It takes a little now and then, and keeps whoever writes on it waiting in between.

@@ -113,15 +113,15 @@ struct Cutter {
 }
 
 impl Cutter {
-    /// `None` where there is no more, or nobody takes it.
+    /// As much as there is of it: a file may be deleted, or never ended as it was written while the power failed. `None` where nobody
+    /// takes any more.
     fn read(&mut self, piece: &Piece) -> Option<()> {
-        let reader = Reader::open(piece)?;
+        let Some(reader) = Reader::open(piece) else { return Some(()) };
         while let Some(sample) = reader.packets.try_pull_sample(LONGEST_WAIT) {
-            let packet = sample.buffer_owned()?;
-            let in_file = sample.segment()?.downcast_ref::<gst::ClockTime>()?.to_stream_time(packet.pts())?;
+            let Some((packet, in_file, caps)) = packet(&sample) else { return Some(()) };
             let [in_file, at, from] =
                 [in_file, piece.at, piece.from].map(|time| time.nseconds().cast_signed());
-            self.take(packet, in_file + at - from, sample.caps()?)?;
+            self.take(packet, in_file + at - from, caps)?;
         }
         Some(())
     }
@@ -147,6 +147,13 @@ impl Cutter {
         self.writer = Some(Writer::begin(form, caps, self.sender.clone())?);
         self.tell.take()?.send(form).ok()
     }
+}
+
+/// What is encoded, when in its file, and what it is.
+fn packet(sample: &gst::Sample) -> Option<(gst::Buffer, gst::ClockTime, &gst::CapsRef)> {
+    let packet = sample.buffer_owned()?;
+    let in_file = sample.segment()?.downcast_ref::<gst::ClockTime>()?.to_stream_time(packet.pts())?;
+    Some((packet, in_file, sample.caps()?))
 }
 
 /// Reads what is encoded in a file.
@@ -334,6 +341,22 @@ mod tests {
         let (_, parts) = all(vec![piece(&files[1], 1000, 9000, 0)], Purpose::Keep).unwrap();
         let times = times("open", &parts);
         assert!((28..=31).contains(&times.len()), "{times:?}");
+        std::fs::remove_dir_all(files[0].parent().unwrap()).unwrap();
+    }
+
+    /// As where the disk was full, or the power failed.
+    #[test]
+    fn what_is_left_is_cut_where_its_first_file_is_gone_or_has_no_end() {
+        let files = record("left", "x264enc tune=zerolatency key-int-max=15 ! h264parse");
+        let pieces = || vec![piece(&files[0], 3000, 3000, 0), piece(&files[1], 0, 2000, 1000)];
+        let cut = || times("left", &all(pieces(), Purpose::Play).unwrap().1);
+        assert!((44..=46).contains(&cut().len()));
+        let bytes = std::fs::read(&files[0]).unwrap();
+        std::fs::write(&files[0], &bytes[..bytes.len() / 4]).unwrap();
+        assert!((29..=31).contains(&cut().len()), "it ends before the clip begins");
+        std::fs::remove_file(&files[0]).unwrap();
+        let left = cut();
+        assert!((29..=31).contains(&left.len()) && left[0] == 0, "{left:?}");
         std::fs::remove_dir_all(files[0].parent().unwrap()).unwrap();
     }
 

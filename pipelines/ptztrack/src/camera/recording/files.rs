@@ -20,6 +20,8 @@ const FREE_SHARE: u64 = 20;
 /// Of the disk, no file is begun or written where less than this share is free: others delete theirs before it comes to that.
 const LEAST_SHARE: u64 = 2 * FREE_SHARE;
 const SHORT: &str = "less than a fortieth of the disk is free: make room";
+pub const EARLY: &str = "the oldest recordings are deleted before their time, as less than a twentieth of the disk is free: make room, \
+                         or set a lower `keep` or `keep-bytes`";
 
 /// A file has at most one part in so many of the disk, as large as the room that is never written to: only where another begins is
 /// anything deleted for `keep-bytes`, and the newest is never deleted to make room.
@@ -54,6 +56,11 @@ impl Segments {
         segments.push_back(Segment { at_ms, file, writer });
         let surplus = segments.len().saturating_sub(Self::MOST);
         segments.drain(..surplus);
+    }
+
+    /// When the file began that is the newest.
+    fn newest_ms(&self) -> Option<i64> {
+        lock(&self.0).back().map(|segment| segment.at_ms)
     }
 
     /// Where a time is.
@@ -115,33 +122,59 @@ fn name_of(file: &Path) -> Option<(&str, i64)> {
 /// it recorded just before.
 const TIME: usize = 18;
 
-fn now_ms() -> i64 {
+pub fn now_ms() -> i64 {
     let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
     i64::try_from(now.as_millis()).unwrap_or(i64::MAX)
 }
 
+/// When the first picture of a file was taken, in milliseconds since 1970, where that is known.
+pub trait Taken: Fn(&gst::BufferRef) -> Option<i64> + Send + Sync + 'static {}
+impl<F: Fn(&gst::BufferRef) -> Option<i64> + Send + Sync + 'static> Taken for F {}
+
 /// Names the files by the time at which they begin, bounds them, and deletes old ones whenever another begins.
-pub fn configure(pipeline: &gst::Pipeline, recording: &Recording, camera: &str, segments: &Arc<Segments>) {
+pub fn configure(
+    pipeline: &gst::Pipeline,
+    recording: &Recording,
+    camera: &str,
+    segments: &Arc<Segments>,
+    taken: impl Taken,
+) {
     let Some(sink) = pipeline.by_name("recording") else { return };
     sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
     // Where the folder cannot be made, there is no disk to be asked about; the element says so.
     let _ = fs::create_dir_all(&recording.folder);
-    if let Some(bytes) = largest_file(recording, disk_bytes(&recording.folder)) {
+    if let Some(bytes) = largest_file(recording, Disk::of(&recording.folder).map(|disk| disk.bytes)) {
         sink.set_property("max-size-bytes", bytes);
     }
     let (recording, camera, segments) = (recording.clone(), camera.to_owned(), segments.clone());
     // Goes with the sink.
     let writer = Arc::new(());
-    sink.connect("format-location", false, move |_| {
+    sink.connect("format-location-full", false, move |values| {
         // Where a folder cannot be written, the element says so.
         let _ = fs::create_dir_all(&recording.folder);
         delete_old(&recording, &camera);
-        let time = glib::DateTime::now_utc().and_then(|now| now.format("%Y%m%dT%H%M%S%f"));
-        let time = time.map(|time| time.chars().take(TIME).collect::<String>()).unwrap_or_default();
-        let file = recording.folder.join(format!("{camera}-{time}.mkv"));
-        segments.begin(now_ms(), file.clone(), &writer);
+        let first = values.get(2).and_then(|value| value.get::<gst::Sample>().ok());
+        let taken_ms = first.and_then(|first| taken(first.buffer()?));
+        let at_ms = begin_ms(taken_ms, segments.newest_ms(), now_ms());
+        let file = recording.folder.join(format!("{camera}-{}.mkv", name_at(at_ms)));
+        segments.begin(at_ms, file.clone(), &writer);
         Some(file.to_value())
     });
+}
+
+/// When a file begins: with its first picture. `splitmuxsink` opens it only where it has all pictures up to the next that needs no other,
+/// and of a camera that sends one a minute that is a minute later. Not before the file before it, as it would be written over.
+fn begin_ms(taken_ms: Option<i64>, newest_ms: Option<i64>, now_ms: i64) -> i64 {
+    // Where the clock was set back, the newest is yet to come.
+    let earliest = newest_ms.map_or(i64::MIN, |newest| newest.saturating_add(1)).min(now_ms);
+    taken_ms.unwrap_or(now_ms).clamp(earliest, now_ms)
+}
+
+/// A time as it is in names.
+fn name_at(at_ms: i64) -> String {
+    let seconds = glib::DateTime::from_unix_utc(at_ms.div_euclid(1000));
+    let seconds = seconds.and_then(|time| time.format("%Y%m%dT%H%M%S"));
+    seconds.map(|seconds| format!("{seconds}{:03}", at_ms.rem_euclid(1000))).unwrap_or_default()
 }
 
 /// The bytes after which the next file begins, on a disk of so many. It may still be larger by pictures that need the one before.
@@ -152,38 +185,52 @@ fn largest_file(recording: &Recording, disk: Option<u64>) -> Option<u64> {
     of_kept.into_iter().chain(of_disk).min().map(|bytes| bytes.max(1))
 }
 
-/// How large the disk is. Nothing where nobody can tell: not every network's disk does.
-fn disk_bytes(folder: &Path) -> Option<u64> {
-    let disk = rustix::fs::statvfs(folder).ok()?;
-    Some(disk.f_blocks.saturating_mul(disk.f_frsize)).filter(|bytes| *bytes > 0)
+/// A disk as whoever records may fill it, in bytes: what is kept for root, or is beyond a quota, is no part of it. `df` reckons its
+/// percentage in the same way.
+#[derive(Debug, Clone, Copy)]
+struct Disk {
+    bytes: u64,
+    free: u64,
 }
 
-/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest and what is being
-/// written.
-///
-/// # Errors
-/// It has so little still that nothing is to be written.
-pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Result<(), &'static str> {
-    let mut files = files(&recording.folder, camera);
-    sort_newest_first(&mut files, now_ms());
-    let oldest_first = files.into_iter().skip(1).rev().map(|file| file.path);
-    delete_while(|| has_less(&recording.folder, FREE_SHARE), oldest_first, segments);
-    if has_less(&recording.folder, LEAST_SHARE) { Err(SHORT) } else { Ok(()) }
-}
+impl Disk {
+    /// Nothing where nobody can tell: not every network's disk does.
+    fn of(folder: &Path) -> Option<Self> {
+        let disk = rustix::fs::statvfs(folder).ok()?;
+        let used = disk.f_blocks.saturating_sub(disk.f_bfree);
+        let [bytes, free] = [used.saturating_add(disk.f_bavail), disk.f_bavail]
+            .map(|blocks| blocks.saturating_mul(disk.f_frsize));
+        (bytes > 0).then_some(Self { bytes, free })
+    }
 
-fn delete_while(is_short: impl Fn() -> bool, files: impl Iterator<Item = PathBuf>, segments: &Segments) {
-    for file in files.filter(|file| !segments.is_written(file)) {
-        if !is_short() {
-            return;
-        }
-        // One that cannot be deleted keeps none of the others.
-        let _ = fs::remove_file(file);
+    /// Whether less than one part of so many is free.
+    fn has_less(self, share: u64) -> bool {
+        self.free < self.bytes / share
     }
 }
 
-/// Whether less than one part of so many is free.
-fn has_less(folder: &Path, share: u64) -> bool {
-    rustix::fs::statvfs(folder).is_ok_and(|disk| disk.f_bavail < disk.f_blocks / share)
+/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest and what is being
+/// written. Returns how many it were.
+///
+/// # Errors
+/// It has so little still that nothing is to be written.
+pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Result<usize, &'static str> {
+    let has_less = |share| Disk::of(&recording.folder).is_some_and(|disk| disk.has_less(share));
+    let mut files = files(&recording.folder, camera);
+    sort_newest_first(&mut files, now_ms());
+    let oldest_first = files.into_iter().skip(1).rev().map(|file| file.path);
+    let deleted = delete_while(|| has_less(FREE_SHARE), oldest_first, segments);
+    if has_less(LEAST_SHARE) { Err(SHORT) } else { Ok(deleted) }
+}
+
+/// Returns how many were deleted; one that cannot be keeps none of the others.
+fn delete_while(
+    is_short: impl Fn() -> bool,
+    files: impl Iterator<Item = PathBuf>,
+    segments: &Segments,
+) -> usize {
+    let files = files.filter(|file| !segments.is_written(file));
+    files.take_while(|_| is_short()).filter(|file| fs::remove_file(file).is_ok()).count()
 }
 
 /// Whether something was written not long ago.
@@ -320,7 +367,7 @@ mod tests {
         segments.begin(0, old.clone(), &writer);
         segments.begin(1, written.clone(), &writer);
         let there = || files().map(|file| file.exists()).collect::<Vec<_>>();
-        delete_while(|| oldest.exists(), files(), &segments);
+        assert_eq!(delete_while(|| oldest.exists(), files(), &segments), 1);
         assert_eq!(there(), [false, true, true]);
         delete_while(|| true, files(), &segments);
         assert_eq!(there(), [false, false, true], "what is written stays");
@@ -354,8 +401,59 @@ mod tests {
         assert_eq!(largest(Some(2000), None), Some(500));
         assert_eq!(largest(None, None), None);
         assert_eq!(largest(Some(3), Some(40_000)), Some(1), "0 would be without a bound");
-        assert!(disk_bytes(&std::env::temp_dir()).unwrap() > 0);
-        assert_eq!(disk_bytes(Path::new("/not/there")), None);
+    }
+
+    #[test]
+    fn a_disk_is_what_may_be_filled_of_it() {
+        let disk = Disk::of(&std::env::temp_dir()).unwrap();
+        assert!(0 < disk.free && disk.free <= disk.bytes, "{disk:?}");
+        assert!(Disk::of(Path::new("/not/there")).is_none());
+        let short = |free| Disk { bytes: 40_000, free }.has_less(LEAST_SHARE);
+        assert_eq!([short(999), short(1000)], [true, false]);
+    }
+
+    #[test]
+    fn a_file_begins_with_its_first_picture_and_after_the_one_before() {
+        assert_eq!(begin_ms(Some(1000), None, 61_000), 1000);
+        assert_eq!(begin_ms(None, Some(500), 61_000), 61_000);
+        assert_eq!(begin_ms(Some(1000), Some(2000), 61_000), 2001);
+        assert_eq!(begin_ms(Some(62_000), Some(2000), 61_000), 61_000, "never later than it is opened");
+        assert_eq!(begin_ms(Some(1000), Some(90_000), 61_000), 61_000, "the clock was set back");
+        assert_eq!(name_at(1_767_225_600_250), "20260101T000000250");
+    }
+
+    /// A second's pictures that are opened a second later.
+    #[test]
+    fn files_are_named_by_when_their_first_picture_was_taken() {
+        gst::init().unwrap();
+        let folder = std::env::temp_dir().join(format!("ptztrack-named-{}", std::process::id()));
+        let recording = Recording {
+            folder: folder.clone(),
+            segment: Duration::from_secs(2),
+            ..recording(Some(3600), None)
+        };
+        let text = "videotestsrc num-buffers=60 ! video/x-raw,width=64,height=48,framerate=10/1 \
+                    ! x264enc tune=zerolatency key-int-max=10 ! h264parse ! splitmuxsink name=recording muxer-factory=matroskamux";
+        let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
+        const BEGIN_MS: i64 = 1_767_225_600_000;
+        let first = Mutex::new(None);
+        let taken = move |picture: &gst::BufferRef| {
+            let pts = i64::try_from(picture.pts()?.mseconds()).ok()?;
+            // Encoders count from a time of their own.
+            Some(BEGIN_MS + pts - *lock(&first).get_or_insert(pts))
+        };
+        configure(&pipeline, &recording, "door", &Arc::default(), taken);
+        pipeline.set_state(gst::State::Playing).unwrap();
+        let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+        let end =
+            pipeline.bus().unwrap().timed_pop_filtered(gst::ClockTime::from_seconds(60), &kinds).unwrap();
+        pipeline.set_state(gst::State::Null).unwrap();
+        let mut began: Vec<_> =
+            files(&folder, "door").into_iter().map(|file| file.began_ms - BEGIN_MS).collect();
+        began.sort_unstable();
+        fs::remove_dir_all(&folder).unwrap();
+        assert_eq!(end.type_(), gst::MessageType::Eos);
+        assert_eq!(began, [0, 2000, 4000]);
     }
 
     /// Noise, as it is large; all of it within a segment.
@@ -367,7 +465,7 @@ mod tests {
         let text = "videotestsrc num-buffers=50 pattern=snow ! video/x-raw,width=320,height=240 ! jpegenc \
                     ! splitmuxsink name=recording muxer-factory=matroskamux";
         let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
-        configure(&pipeline, &recording, "door", &Arc::default());
+        configure(&pipeline, &recording, "door", &Arc::default(), |_: &gst::BufferRef| None);
         pipeline.set_state(gst::State::Playing).unwrap();
         let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
         let end =

@@ -13,7 +13,7 @@ mod files;
 pub use clip::{Clip, Form, NoClip, Purpose, cut};
 pub use files::{Segments, pieces};
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::thread;
@@ -60,6 +60,8 @@ pub struct Recorder {
     /// Held by everybody who still writes.
     _writing: Sender<()>,
     trouble: Arc<Mutex<bool>>,
+    /// Whether it was said that files are deleted to make room.
+    told_early: Arc<AtomicBool>,
     segments: Arc<Segments>,
 }
 
@@ -76,6 +78,8 @@ struct FeedState {
     source: Option<gst_app::AppSrc>,
     /// It begins with a picture that needs no other.
     begun: bool,
+    /// The time of the newest picture in its stream, and when it came, in milliseconds since 1970.
+    newest: Option<(gst::ClockTime, i64)>,
     ended: bool,
 }
 
@@ -93,6 +97,7 @@ impl Recorder {
                 log,
                 _writing: writing,
                 trouble: Arc::default(),
+                told_early: Arc::default(),
                 segments: Arc::default(),
             },
             Recordings(written),
@@ -127,7 +132,7 @@ impl Recorder {
     }
 
     /// In its own thread: writes, and begins anew where that fails.
-    fn run(&self, feed: &Feed) {
+    fn run(&self, feed: &Arc<Feed>) {
         let mut pause = SHORTEST_PAUSE;
         loop {
             let begin = Instant::now();
@@ -152,12 +157,14 @@ impl Recorder {
     }
 
     /// Until the end of the stream.
-    fn write(&self, feed: &Feed) -> Result<(), String> {
-        files::make_room(&self.settings, &self.camera, &self.segments)?;
+    fn write(&self, feed: &Arc<Feed>) -> Result<(), String> {
+        self.make_room()?;
         let said = |err: glib::Error| err.message().to_owned();
         let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
-        files::configure(&pipeline, &self.settings, &self.camera, &self.segments);
+        let copied = feed.clone();
+        let taken = move |picture: &gst::BufferRef| copied.taken_ms(picture.pts()?);
+        files::configure(&pipeline, &self.settings, &self.camera, &self.segments, taken);
         let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
         let bus = pipeline.bus().ok_or("a pipeline without a bus")?;
         // Where it fails, a message has the reason.
@@ -168,7 +175,7 @@ impl Recorder {
             let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
             match bus.timed_pop_filtered(wait, &kinds) {
                 None => {
-                    if let Err(short) = files::make_room(&self.settings, &self.camera, &self.segments) {
+                    if let Err(short) = self.make_room() {
                         break Err(short.to_owned());
                     }
                     if files::newest_grew(&self.settings, &self.camera, LOOK * 2)
@@ -185,6 +192,15 @@ impl Recorder {
         };
         let _ = pipeline.set_state(gst::State::Null);
         result
+    }
+
+    /// Says once where files go before their time.
+    fn make_room(&self) -> Result<(), &'static str> {
+        let deleted = files::make_room(&self.settings, &self.camera, &self.segments)?;
+        if deleted > 0 && !self.told_early.swap(true, Ordering::Relaxed) {
+            self.tell(Level::Warning, "recording-deleted-early", files::EARLY);
+        }
+        Ok(())
     }
 
     fn tell(&self, level: Level, event: &str, detail: &str) {
@@ -222,9 +238,18 @@ impl Feed {
             sample.buffer().is_none_or(|buffer| buffer.flags().contains(gst::BufferFlags::DELTA_UNIT));
         if state.begun || !delta {
             state.begun = true;
+            let pts = sample.buffer().and_then(gst::BufferRef::pts);
+            state.newest = pts.map(|pts| (pts, files::now_ms())).or(state.newest);
             // Where it is over, its own thread says so.
             let _ = source.push_sample(sample);
         }
+    }
+
+    /// When the picture came that has this time in the stream, in milliseconds since 1970.
+    fn taken_ms(&self, pts: gst::ClockTime) -> Option<i64> {
+        let (newest, came_ms) = lock(&self.0).newest?;
+        let before_ms = newest.saturating_sub(pts).mseconds();
+        Some(came_ms.saturating_sub(i64::try_from(before_ms).ok()?))
     }
 
     fn start(&self, source: gst_app::AppSrc) {
@@ -233,7 +258,7 @@ impl Feed {
         if state.ended {
             let _ = source.end_of_stream();
         }
-        (state.source, state.begun) = (Some(source), false);
+        (state.source, state.begun, state.newest) = (Some(source), false, None);
     }
 
     fn stop(&self) {
@@ -389,6 +414,24 @@ mod tests {
         assert!(said.as_ref().is_some_and(|said| said.contains("needs no other")), "{said:?}");
         let one = bounds::BUFFER + SMALL;
         assert_eq!(written, LONGEST_GROUP / one * one);
+    }
+
+    #[test]
+    fn it_is_known_when_a_picture_of_before_came() {
+        gst::init().unwrap();
+        let pipeline = gst::parse::launch(&description(Codec::Mjpeg)).unwrap();
+        let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
+        let feed = Feed::default();
+        feed.start(source.downcast::<gst_app::AppSrc>().unwrap());
+        let second = gst::ClockTime::from_seconds;
+        assert_eq!(feed.taken_ms(second(1)), None);
+        let mut newest = gst::Buffer::from_slice(vec![0; SMALL]);
+        newest.get_mut().unwrap().set_pts(second(61));
+        let before = files::now_ms();
+        feed.copy(&gst::Sample::builder().buffer(&newest).build());
+        let came = before..=files::now_ms();
+        assert!(came.contains(&(feed.taken_ms(second(1)).unwrap() + 60_000)));
+        assert!(came.contains(&feed.taken_ms(second(90)).unwrap()), "none is from later");
     }
 
     #[test]
