@@ -116,6 +116,9 @@ impl Cutter {
     /// As much as there is of it: a file may be deleted, or never ended as it was written while the power failed. `None` where nobody
     /// takes any more.
     fn read(&mut self, piece: &Piece) -> Option<()> {
+        if self.sender.is_closed() {
+            return None;
+        }
         let Some(reader) = Reader::open(piece) else { return Some(()) };
         while let Some(sample) = reader.packets.try_pull_sample(LONGEST_WAIT) {
             let Some((packet, in_file, caps)) = packet(&sample) else { return Some(()) };
@@ -138,7 +141,8 @@ impl Cutter {
         if self.writer.is_none() {
             self.begin(caps)?;
         }
-        let writer = self.writer.as_mut()?;
+        // A file has pictures of one kind: where the camera changed them, the clip ends.
+        let writer = self.writer.as_mut().filter(|writer| writer.takes(caps))?;
         self.lead.drain(..).try_for_each(|(packet, at)| writer.write(packet, at))
     }
 
@@ -186,6 +190,7 @@ struct Writer {
     _pipeline: Stopping,
     /// Waits where nobody takes what comes of it.
     pad: gst::Pad,
+    caps: gst::Caps,
     /// Says that all was taken, or that nobody takes it.
     ended: mpsc::Receiver<()>,
     /// When the first picture was taken, in nanoseconds, and the last one's time in the clip.
@@ -224,7 +229,24 @@ impl Writer {
             gst::event::Segment::new(&segment),
         ];
         begins.into_iter().all(|event| pad.push_event(event)).then_some(())?;
-        Some(Self { _pipeline: pipeline, pad, ended, began: None, last: gst::ClockTime::ZERO })
+        Some(Self {
+            _pipeline: pipeline,
+            pad,
+            caps: caps.to_owned(),
+            ended,
+            began: None,
+            last: gst::ClockTime::ZERO,
+        })
+    }
+
+    /// Whether pictures of these caps can go on from those before: their sizes and the codec's settings are told once.
+    fn takes(&self, caps: &gst::CapsRef) -> bool {
+        let of = |caps: &gst::CapsRef| {
+            let structure = caps.structure(0)?;
+            let value = |field| structure.value(field).ok().and_then(|value| value.serialize().ok());
+            Some((structure.name().to_string(), ["width", "height", "codec_data"].map(value)))
+        };
+        caps == self.caps.as_ref() || of(caps) == of(&self.caps)
     }
 
     /// One that was taken then; a clip begins with its first, and never goes back.
@@ -358,6 +380,20 @@ mod tests {
         let left = cut();
         assert!((29..=31).contains(&left.len()) && left[0] == 0, "{left:?}");
         std::fs::remove_dir_all(files[0].parent().unwrap()).unwrap();
+    }
+
+    #[test]
+    fn a_clip_ends_where_the_pictures_become_others() {
+        const ENCODER: &str = "x264enc tune=zerolatency key-int-max=15 ! h264parse";
+        let files = record("before", ENCODER);
+        let smaller = record("after", &format!("videoscale ! video/x-raw,width=32,height=24 ! {ENCODER}"));
+        let pieces = |next: &PathBuf| vec![piece(&files[0], 3000, 3000, 0), piece(next, 0, 2000, 1000)];
+        let cut = |next| times("others", &all(pieces(next), Purpose::Play).unwrap().1).len();
+        assert!((14..=16).contains(&cut(&smaller[1])));
+        assert!((44..=46).contains(&cut(&files[1])));
+        for files in [files, smaller] {
+            std::fs::remove_dir_all(files[0].parent().unwrap()).unwrap();
+        }
     }
 
     #[test]

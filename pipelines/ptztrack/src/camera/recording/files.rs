@@ -2,16 +2,15 @@
 
 //! What is recorded, and how long it is kept.
 
-use std::collections::VecDeque;
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, Weak};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 use events::Pointer;
 use gst::prelude::*;
-use ptztrack_contract::lock::lock;
 
+use super::segments::Segments;
 use crate::config::Recording;
 
 /// This share of a disk is left to others: one in so many.
@@ -19,7 +18,7 @@ const FREE_SHARE: u64 = 20;
 
 /// Of the disk, no file is begun or written where less than this share is free: others delete theirs before it comes to that.
 const LEAST_SHARE: u64 = 2 * FREE_SHARE;
-const SHORT: &str = "less than a fortieth of the disk is free: make room";
+pub const SHORT: &str = "less than a fortieth of the disk is free: make room";
 pub const EARLY: &str = "the oldest recordings are deleted before their time, as less than a twentieth of the disk is free: make room, \
                          or set a lower `keep` or `keep-bytes`";
 
@@ -29,52 +28,6 @@ const LARGEST_SHARE: u64 = LEAST_SHARE;
 
 /// A file has at most one part in so many of `keep-bytes`.
 const KEPT_FILES: u64 = 4;
-
-/// The files of a recording that began last, and when, in milliseconds since 1970. They are not looked for: the disk may hang.
-#[derive(Debug, Default)]
-pub struct Segments(Mutex<VecDeque<Segment>>);
-
-#[derive(Debug)]
-struct Segment {
-    at_ms: i64,
-    file: PathBuf,
-    /// Whoever writes it, while they do.
-    writer: Weak<()>,
-}
-
-impl Segments {
-    /// More are not remembered.
-    const MOST: usize = 64;
-
-    /// Whoever writes this one writes none of those before any more.
-    fn begin(&self, at_ms: i64, file: PathBuf, writer: &Arc<()>) {
-        let writer = Arc::downgrade(writer);
-        let mut segments = lock(&self.0);
-        for before in segments.iter_mut().filter(|segment| segment.writer.ptr_eq(&writer)) {
-            before.writer = Weak::new();
-        }
-        segments.push_back(Segment { at_ms, file, writer });
-        let surplus = segments.len().saturating_sub(Self::MOST);
-        segments.drain(..surplus);
-    }
-
-    /// When the file began that is the newest.
-    fn newest_ms(&self) -> Option<i64> {
-        lock(&self.0).back().map(|segment| segment.at_ms)
-    }
-
-    /// Where a time is.
-    pub fn at(&self, at_ms: i64) -> Option<Pointer> {
-        let segments = lock(&self.0);
-        let segment = segments.iter().rfind(|segment| segment.at_ms <= at_ms)?;
-        Some(Pointer { file: segment.file.clone(), offset_ms: at_ms - segment.at_ms })
-    }
-
-    /// Whether somebody still writes a file; its name need not be the newest, where the clock was set back.
-    fn is_written(&self, file: &Path) -> bool {
-        lock(&self.0).iter().any(|segment| segment.file == file && segment.writer.strong_count() > 0)
-    }
-}
 
 /// A part of a file of a recording.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -86,25 +39,36 @@ pub struct Piece {
     pub at: gst::ClockTime,
 }
 
-/// From there on for so long, in all files that the recording went on in.
+/// From there on for so long, in all files that the recording went on in. The file that is named may be the one before: of whoever came
+/// and went while the next one was not opened yet.
 pub fn pieces(from: &Pointer, lasts_ms: i64) -> Vec<Piece> {
-    let piece = |file: PathBuf, from_ms: i64, at_ms: i64| {
+    let mut files = later(&from.file);
+    files.insert(0, (0, from.file.clone()));
+    let (begin_ms, end_ms) = (from.offset_ms, from.offset_ms.saturating_add(lasts_ms));
+    let ends = files.iter().skip(1).map(|(at_ms, _)| *at_ms).chain([i64::MAX]);
+    let seen = files.iter().zip(ends).filter(|((at_ms, _), ends_ms)| *at_ms < end_ms && *ends_ms > begin_ms);
+    let piece = |((at_ms, file), _): (&(i64, PathBuf), _)| {
         let time = |ms: i64| gst::ClockTime::from_mseconds(ms.max(0).unsigned_abs());
-        Piece { file, from: time(from_ms), lasts: time(lasts_ms - at_ms), at: time(at_ms) }
+        let first_ms = begin_ms.max(*at_ms);
+        let [from, lasts, at] = [first_ms - at_ms, end_ms - first_ms, first_ms - begin_ms].map(time);
+        Piece { file: file.clone(), from, lasts, at }
     };
-    let mut pieces = vec![piece(from.file.clone(), from.offset_ms, 0)];
-    let Some((camera, began_ms)) = name_of(&from.file) else { return pieces };
-    let later = fs::read_dir(from.file.parent().unwrap_or(Path::new("."))).into_iter().flatten().flatten();
-    let mut later: Vec<(i64, PathBuf)> = later
+    seen.map(piece).collect()
+}
+
+/// The files that this recording went on in, and how much later each began, in milliseconds; the earliest first.
+fn later(file: &Path) -> Vec<(i64, PathBuf)> {
+    let Some((camera, began_ms)) = name_of(file) else { return Vec::new() };
+    let entries = fs::read_dir(file.parent().unwrap_or(Path::new("."))).into_iter().flatten().flatten();
+    let mut later: Vec<_> = entries
         .filter_map(|entry| {
-            let file = entry.path();
-            let at_ms = name_of(&file).filter(|(of, _)| *of == camera)?.1 - began_ms - from.offset_ms;
-            (file > from.file && at_ms < lasts_ms).then_some((at_ms, file))
+            let other = entry.path();
+            let at_ms = name_of(&other).filter(|(of, _)| *of == camera)?.1 - began_ms;
+            (other.as_path() > file).then_some((at_ms, other))
         })
         .collect();
     later.sort();
-    pieces.extend(later.into_iter().map(|(at_ms, file)| piece(file, 0, at_ms)));
-    pieces
+    later
 }
 
 /// Whose recording a file is of, and when it began, in milliseconds since 1970. Nothing but names as [`configure`] gives them: a clip
@@ -127,17 +91,14 @@ pub fn now_ms() -> i64 {
     i64::try_from(now.as_millis()).unwrap_or(i64::MAX)
 }
 
-/// When the first picture of a file was taken, in milliseconds since 1970, where that is known.
-pub trait Taken: Fn(&gst::BufferRef) -> Option<i64> + Send + Sync + 'static {}
-impl<F: Fn(&gst::BufferRef) -> Option<i64> + Send + Sync + 'static> Taken for F {}
-
-/// Names the files by the time at which they begin, bounds them, and deletes old ones whenever another begins.
+/// Names the files by the time at which they begin, bounds them, and deletes old ones whenever another begins. When the picture of a
+/// time in the stream came is in milliseconds since 1970.
 pub fn configure(
     pipeline: &gst::Pipeline,
     recording: &Recording,
     camera: &str,
     segments: &Arc<Segments>,
-    taken: impl Taken,
+    came_ms: impl Fn(gst::ClockTime) -> Option<i64> + Send + Sync + 'static,
 ) {
     let Some(sink) = pipeline.by_name("recording") else { return };
     sink.set_property("max-size-time", u64::try_from(recording.segment.as_nanos()).unwrap_or(u64::MAX));
@@ -154,20 +115,11 @@ pub fn configure(
         let _ = fs::create_dir_all(&recording.folder);
         delete_old(&recording, &camera);
         let first = values.get(2).and_then(|value| value.get::<gst::Sample>().ok());
-        let taken_ms = first.and_then(|first| taken(first.buffer()?));
-        let at_ms = begin_ms(taken_ms, segments.newest_ms(), now_ms());
-        let file = recording.folder.join(format!("{camera}-{}.mkv", name_at(at_ms)));
-        segments.begin(at_ms, file.clone(), &writer);
+        let came_ms = first.and_then(|first| came_ms(first.buffer()?.pts()?));
+        let named = |at_ms| recording.folder.join(format!("{camera}-{}.mkv", name_at(at_ms)));
+        let file = segments.begin(came_ms, now_ms(), named, &writer);
         Some(file.to_value())
     });
-}
-
-/// When a file begins: with its first picture. `splitmuxsink` opens it only where it has all pictures up to the next that needs no other,
-/// and of a camera that sends one a minute that is a minute later. Not before the file before it, as it would be written over.
-fn begin_ms(taken_ms: Option<i64>, newest_ms: Option<i64>, now_ms: i64) -> i64 {
-    // Where the clock was set back, the newest is yet to come.
-    let earliest = newest_ms.map_or(i64::MIN, |newest| newest.saturating_add(1)).min(now_ms);
-    taken_ms.unwrap_or(now_ms).clamp(earliest, now_ms)
 }
 
 /// A time as it is in names.
@@ -203,34 +155,45 @@ impl Disk {
         (bytes > 0).then_some(Self { bytes, free })
     }
 
-    /// Whether less than one part of so many is free.
-    fn has_less(self, share: u64) -> bool {
-        self.free < self.bytes / share
+    /// So many bytes are missing where one part of so many is to be free.
+    fn lacks(self, share: u64) -> u64 {
+        (self.bytes / share).saturating_sub(self.free)
     }
 }
 
-/// Deletes the oldest files of this camera for as long as the disk has less left than is to be, but for the newest and what is being
-/// written. Returns how many it were.
-///
-/// # Errors
-/// It has so little still that nothing is to be written.
-pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Result<usize, &'static str> {
-    let has_less = |share| Disk::of(&recording.folder).is_some_and(|disk| disk.has_less(share));
-    let mut files = files(&recording.folder, camera);
-    sort_newest_first(&mut files, now_ms());
-    let oldest_first = files.into_iter().skip(1).rev().map(|file| file.path);
-    let deleted = delete_while(|| has_less(FREE_SHARE), oldest_first, segments);
-    if has_less(LEAST_SHARE) { Err(SHORT) } else { Ok(deleted) }
+/// What room there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Room {
+    /// So many files were deleted for it.
+    pub deleted: usize,
+    /// There is so little still that nothing is to be written.
+    pub is_short: bool,
 }
 
-/// Returns how many were deleted; one that cannot be keeps none of the others.
-fn delete_while(
-    is_short: impl Fn() -> bool,
-    files: impl Iterator<Item = PathBuf>,
-    segments: &Segments,
-) -> usize {
-    let files = files.filter(|file| !segments.is_written(file));
-    files.take_while(|_| is_short()).filter(|file| fs::remove_file(file).is_ok()).count()
+/// Deletes the oldest files of this camera where the disk has less left than is to be, but for the newest and what is being written.
+pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Room {
+    let lacks = |share| Disk::of(&recording.folder).map_or(0, |disk| disk.lacks(share));
+    let mut files = files(&recording.folder, camera);
+    sort_newest_first(&mut files, now_ms());
+    let oldest_first = files.into_iter().skip(1).rev().filter(|file| !segments.is_written(&file.path));
+    let deleted = delete(lacks(FREE_SHARE), oldest_first);
+    Room { deleted, is_short: lacks(LEAST_SHARE) > 0 }
+}
+
+/// Deletes files until so many bytes are free, as soon as the disk has freed them: it does so later, where a file is still read, and some
+/// file systems always. Returns how many it were; one that cannot be deleted keeps none of the others.
+fn delete(mut bytes: u64, files: impl Iterator<Item = Kept>) -> usize {
+    let mut deleted = 0;
+    for file in files {
+        if bytes == 0 {
+            break;
+        }
+        if fs::remove_file(&file.path).is_ok() {
+            bytes = bytes.saturating_sub(file.bytes);
+            deleted += 1;
+        }
+    }
+    deleted
 }
 
 /// Whether something was written not long ago.
@@ -304,6 +267,10 @@ fn too_much(mut files: Vec<Kept>, recording: &Recording, now_ms: i64) -> Vec<Pat
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Mutex;
+
+    use ptztrack_contract::lock::lock;
+
     use super::*;
 
     fn kept(path: &str, bytes: u64) -> Kept {
@@ -357,24 +324,17 @@ mod tests {
     }
 
     #[test]
-    fn as_much_is_deleted_as_is_needed_but_never_what_is_written() {
+    fn as_much_is_deleted_as_is_needed() {
         let folder = std::env::temp_dir().join(format!("ptztrack-short-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        let [oldest, old, written] = ["a", "b", "c"].map(|name| folder.join(name));
-        let files = || [&oldest, &old, &written].map(PathBuf::clone).into_iter();
-        files().for_each(|file| fs::write(file, "x").unwrap());
-        let (segments, writer) = (Segments::default(), Arc::new(()));
-        segments.begin(0, old.clone(), &writer);
-        segments.begin(1, written.clone(), &writer);
-        let there = || files().map(|file| file.exists()).collect::<Vec<_>>();
-        assert_eq!(delete_while(|| oldest.exists(), files(), &segments), 1);
-        assert_eq!(there(), [false, true, true]);
-        delete_while(|| true, files(), &segments);
-        assert_eq!(there(), [false, false, true], "what is written stays");
-        // As when it is begun anew.
-        drop(writer);
-        delete_while(|| written.exists(), files(), &segments);
-        assert_eq!(there(), [false, false, false]);
+        let paths = ["a", "b", "c"].map(|name| folder.join(name));
+        paths.iter().for_each(|path| fs::write(path, "x").unwrap());
+        let files = || paths.iter().map(|path| kept(path.to_str().unwrap(), 40));
+        let there = || paths.iter().map(|path| path.exists()).collect::<Vec<_>>();
+        assert_eq!((delete(0, files()), there()), (0, vec![true, true, true]));
+        assert_eq!((delete(40, files()), there()), (1, vec![false, true, true]));
+        // One that is gone already frees nothing.
+        assert_eq!((delete(41, files()), there()), (2, vec![false, false, false]));
         fs::remove_dir_all(&folder).unwrap();
     }
 
@@ -408,18 +368,8 @@ mod tests {
         let disk = Disk::of(&std::env::temp_dir()).unwrap();
         assert!(0 < disk.free && disk.free <= disk.bytes, "{disk:?}");
         assert!(Disk::of(Path::new("/not/there")).is_none());
-        let short = |free| Disk { bytes: 40_000, free }.has_less(LEAST_SHARE);
-        assert_eq!([short(999), short(1000)], [true, false]);
-    }
-
-    #[test]
-    fn a_file_begins_with_its_first_picture_and_after_the_one_before() {
-        assert_eq!(begin_ms(Some(1000), None, 61_000), 1000);
-        assert_eq!(begin_ms(None, Some(500), 61_000), 61_000);
-        assert_eq!(begin_ms(Some(1000), Some(2000), 61_000), 2001);
-        assert_eq!(begin_ms(Some(62_000), Some(2000), 61_000), 61_000, "never later than it is opened");
-        assert_eq!(begin_ms(Some(1000), Some(90_000), 61_000), 61_000, "the clock was set back");
-        assert_eq!(name_at(1_767_225_600_250), "20260101T000000250");
+        let lacks = |free| Disk { bytes: 40_000, free }.lacks(LEAST_SHARE);
+        assert_eq!([lacks(900), lacks(1000), lacks(2000)], [100, 0, 0]);
     }
 
     /// A second's pictures that are opened a second later.
@@ -437,12 +387,12 @@ mod tests {
         let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
         const BEGIN_MS: i64 = 1_767_225_600_000;
         let first = Mutex::new(None);
-        let taken = move |picture: &gst::BufferRef| {
-            let pts = i64::try_from(picture.pts()?.mseconds()).ok()?;
+        let came_ms = move |pts: gst::ClockTime| {
+            let pts = i64::try_from(pts.mseconds()).ok()?;
             // Encoders count from a time of their own.
             Some(BEGIN_MS + pts - *lock(&first).get_or_insert(pts))
         };
-        configure(&pipeline, &recording, "door", &Arc::default(), taken);
+        configure(&pipeline, &recording, "door", &Arc::default(), came_ms);
         pipeline.set_state(gst::State::Playing).unwrap();
         let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
         let end =
@@ -465,7 +415,7 @@ mod tests {
         let text = "videotestsrc num-buffers=50 pattern=snow ! video/x-raw,width=320,height=240 ! jpegenc \
                     ! splitmuxsink name=recording muxer-factory=matroskamux";
         let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
-        configure(&pipeline, &recording, "door", &Arc::default(), |_: &gst::BufferRef| None);
+        configure(&pipeline, &recording, "door", &Arc::default(), |_| None);
         pipeline.set_state(gst::State::Playing).unwrap();
         let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
         let end =
@@ -511,25 +461,11 @@ mod tests {
             let parts = pieces.into_iter().map(|p| (p.file, time(p.from), time(p.lasts), time(p.at)));
             parts.collect::<Vec<_>>()
         };
-        let found = [of(1000, 5000), of(590_250, 30_000)];
+        let found = [of(1000, 5000), of(590_250, 30_000), of(610_250, 5000)];
         fs::remove_dir_all(&folder).unwrap();
         assert_eq!(found[0], [(first.clone(), 1000, 5000, 0)]);
-        assert_eq!(found[1], [(first.clone(), 590_250, 30_000, 0), (second, 0, 20_000, 10_000)]);
-    }
-
-    #[test]
-    fn a_time_is_in_the_file_that_began_last() {
-        let segments = Segments::default();
-        assert_eq!(segments.at(5000), None);
-        let writer = Arc::new(());
-        for (at_ms, file) in [(1000, "a.mkv"), (3000, "b.mkv")] {
-            segments.begin(at_ms, file.into(), &writer);
-        }
-        let in_file = |file: &str, offset_ms| Some(Pointer { file: file.into(), offset_ms });
-        assert_eq!(segments.at(999), None);
-        assert_eq!(segments.at(2999), in_file("a.mkv", 1999));
-        assert_eq!(segments.at(3000), in_file("b.mkv", 0));
-        (4..100).for_each(|second| segments.begin(1000 * second, "c.mkv".into(), &writer));
-        assert_eq!((segments.at(3500), segments.at(99_500)), (None, in_file("c.mkv", 500)));
+        assert_eq!(found[1], [(first.clone(), 590_250, 30_000, 0), (second.clone(), 0, 20_000, 10_000)]);
+        // Which was opened after they had gone.
+        assert_eq!(found[2], [(second, 10_000, 5000, 0)]);
     }
 }

@@ -9,9 +9,13 @@
 
 mod clip;
 mod files;
+mod segments;
 
 pub use clip::{Clip, Form, NoClip, Purpose, cut};
-pub use files::{Segments, pieces};
+pub use files::pieces;
+pub use segments::Segments;
+
+use segments::Arrivals;
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
@@ -78,8 +82,6 @@ struct FeedState {
     source: Option<gst_app::AppSrc>,
     /// It begins with a picture that needs no other.
     begun: bool,
-    /// The time of the newest picture in its stream, and when it came, in milliseconds since 1970.
-    newest: Option<(gst::ClockTime, i64)>,
     ended: bool,
 }
 
@@ -132,7 +134,7 @@ impl Recorder {
     }
 
     /// In its own thread: writes, and begins anew where that fails.
-    fn run(&self, feed: &Arc<Feed>) {
+    fn run(&self, feed: &Feed) {
         let mut pause = SHORTEST_PAUSE;
         loop {
             let begin = Instant::now();
@@ -157,19 +159,21 @@ impl Recorder {
     }
 
     /// Until the end of the stream.
-    fn write(&self, feed: &Arc<Feed>) -> Result<(), String> {
+    fn write(&self, feed: &Feed) -> Result<(), String> {
         self.make_room()?;
         let said = |err: glib::Error| err.message().to_owned();
         let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
-        let copied = feed.clone();
-        let taken = move |picture: &gst::BufferRef| copied.taken_ms(picture.pts()?);
-        files::configure(&pipeline, &self.settings, &self.camera, &self.segments, taken);
+        let arrivals = Arc::new(Arrivals::default());
+        let came = arrivals.clone();
+        files::configure(&pipeline, &self.settings, &self.camera, &self.segments, move |pts| {
+            came.came_ms(pts)
+        });
         let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
         let bus = pipeline.bus().ok_or("a pipeline without a bus")?;
         // Where it fails, a message has the reason.
         let _ = pipeline.set_state(gst::State::Playing);
-        feed.start(source.ok_or("no source")?);
+        feed.start(source.ok_or("no source")?, arrivals);
         let result = loop {
             let wait = gst::ClockTime::from_nseconds(u64::try_from(LOOK.as_nanos()).unwrap_or(u64::MAX));
             let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
@@ -196,11 +200,11 @@ impl Recorder {
 
     /// Says once where files go before their time.
     fn make_room(&self) -> Result<(), &'static str> {
-        let deleted = files::make_room(&self.settings, &self.camera, &self.segments)?;
-        if deleted > 0 && !self.told_early.swap(true, Ordering::Relaxed) {
+        let room = files::make_room(&self.settings, &self.camera, &self.segments);
+        if room.deleted > 0 && !self.told_early.swap(true, Ordering::Relaxed) {
             self.tell(Level::Warning, "recording-deleted-early", files::EARLY);
         }
-        Ok(())
+        if room.is_short { Err(files::SHORT) } else { Ok(()) }
     }
 
     fn tell(&self, level: Level, event: &str, detail: &str) {
@@ -238,27 +242,18 @@ impl Feed {
             sample.buffer().is_none_or(|buffer| buffer.flags().contains(gst::BufferFlags::DELTA_UNIT));
         if state.begun || !delta {
             state.begun = true;
-            let pts = sample.buffer().and_then(gst::BufferRef::pts);
-            state.newest = pts.map(|pts| (pts, files::now_ms())).or(state.newest);
             // Where it is over, its own thread says so.
             let _ = source.push_sample(sample);
         }
     }
 
-    /// When the picture came that has this time in the stream, in milliseconds since 1970.
-    fn taken_ms(&self, pts: gst::ClockTime) -> Option<i64> {
-        let (newest, came_ms) = lock(&self.0).newest?;
-        let before_ms = newest.saturating_sub(pts).mseconds();
-        Some(came_ms.saturating_sub(i64::try_from(before_ms).ok()?))
-    }
-
-    fn start(&self, source: gst_app::AppSrc) {
-        bound_groups(&source);
+    fn start(&self, source: gst_app::AppSrc, arrivals: Arc<Arrivals>) {
+        watch_groups(&source, arrivals);
         let mut state = lock(&self.0);
         if state.ended {
             let _ = source.end_of_stream();
         }
-        (state.source, state.begun, state.newest) = (Some(source), false, None);
+        (state.source, state.begun) = (Some(source), false);
     }
 
     fn stop(&self) {
@@ -278,9 +273,9 @@ impl Feed {
     }
 }
 
-/// Ends the recording with an error where pictures go on and on that need the one before: `splitmuxsink` keeps them all until one
+/// Notes when pictures come that need no other. Ends the recording with an error where pictures go on and on that need the one before: `splitmuxsink` keeps them all until one
 /// comes that needs no other. Which ones do is known behind the parser only: not every depayloader says so, as that of MPEG-4.
-fn bound_groups(source: &gst_app::AppSrc) {
+fn watch_groups(source: &gst_app::AppSrc, arrivals: Arc<Arrivals>) {
     let Some(pad) = parsed(source) else { return };
     let kept = AtomicUsize::new(0);
     pad.add_probe(gst::PadProbeType::BUFFER, move |pad, info| {
@@ -289,6 +284,9 @@ fn bound_groups(source: &gst_app::AppSrc) {
             return gst::PadProbeReturn::Handled;
         };
         let delta = buffer.flags().contains(gst::BufferFlags::DELTA_UNIT);
+        if let Some(pts) = buffer.pts().filter(|_| !delta) {
+            arrivals.note(pts, files::now_ms());
+        }
         let now = cost(buffer).saturating_add(if delta { before } else { 0 });
         kept.store(now, Ordering::Relaxed);
         if now <= LONGEST_GROUP {
@@ -327,7 +325,7 @@ mod tests {
         let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
         let source = source.downcast::<gst_app::AppSrc>().unwrap();
         let feed = Feed::default();
-        feed.start(source.clone());
+        feed.start(source.clone(), Arc::default());
         let picture = picture(size, false);
         for _ in 0..number {
             feed.copy(&picture);
@@ -375,7 +373,7 @@ mod tests {
         });
         let source = pipeline.by_name("feed").unwrap().downcast::<gst_app::AppSrc>().unwrap();
         let feed = Feed::default();
-        feed.start(source);
+        feed.start(source, Arc::default());
         pipeline.set_state(gst::State::Playing).unwrap();
         pictures.for_each(|picture| feed.copy(picture));
         feed.end();
@@ -416,22 +414,64 @@ mod tests {
         assert_eq!(written, LONGEST_GROUP / one * one);
     }
 
+    /// Whatever a parser does to their times.
     #[test]
-    fn it_is_known_when_a_picture_of_before_came() {
+    fn of_every_codec_it_is_known_when_the_first_picture_of_a_file_came() {
         gst::init().unwrap();
-        let pipeline = gst::parse::launch(&description(Codec::Mjpeg)).unwrap();
-        let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
-        let feed = Feed::default();
-        feed.start(source.downcast::<gst_app::AppSrc>().unwrap());
-        let second = gst::ClockTime::from_seconds;
-        assert_eq!(feed.taken_ms(second(1)), None);
-        let mut newest = gst::Buffer::from_slice(vec![0; SMALL]);
-        newest.get_mut().unwrap().set_pts(second(61));
-        let before = files::now_ms();
-        feed.copy(&gst::Sample::builder().buffer(&newest).build());
-        let came = before..=files::now_ms();
-        assert!(came.contains(&(feed.taken_ms(second(1)).unwrap() + 60_000)));
-        assert!(came.contains(&feed.taken_ms(second(90)).unwrap()), "none is from later");
+        let encoders = [
+            (Codec::Mjpeg, "jpegenc"),
+            (Codec::Mpeg4, "avenc_mpeg4 gop-size=10 ! rtpmp4vpay config-interval=1 ! rtpmp4vdepay"),
+            (Codec::H264, "x264enc tune=zerolatency key-int-max=10"),
+            (
+                Codec::H265,
+                "x265enc tune=zerolatency key-int-max=10 option-string=pools=1:frame-threads=1:log-level=error",
+            ),
+        ];
+        for (codec, encoder) in encoders {
+            let text = format!(
+                "videotestsrc num-buffers=40 ! video/x-raw,format=I420,width=320,height=240,framerate=10/1 ! {encoder} ! appsink name=tap sync=false"
+            );
+            let camera = gst::parse::launch(&text).unwrap().downcast::<gst::Pipeline>().unwrap();
+            let tap = camera.by_name("tap").unwrap().downcast::<gst_app::AppSink>().unwrap();
+            let pipeline =
+                gst::parse::launch(&description(codec)).unwrap().downcast::<gst::Pipeline>().unwrap();
+            let recording = pipeline.by_name("recording").unwrap();
+            let folder = std::env::temp_dir().join(format!("ptztrack-came-{}", std::process::id()));
+            std::fs::create_dir_all(&folder).unwrap();
+            recording.set_property("max-size-time", 1_000_000_000_u64);
+            let (arrivals, opened) = (Arc::new(Arrivals::default()), Arc::new(Mutex::new(Vec::new())));
+            recording.connect("format-location-full", false, {
+                let (arrivals, opened, folder) = (arrivals.clone(), opened.clone(), folder.clone());
+                move |values| {
+                    let first = values[2].get::<gst::Sample>().unwrap();
+                    let came = first.buffer().and_then(|first| arrivals.came_ms(first.pts()?));
+                    lock(&opened).push(came.is_some());
+                    Some(folder.join(format!("{}.mkv", lock(&opened).len())).to_value())
+                }
+            });
+            let feed = Feed::default();
+            feed.start(pipeline.by_name("feed").unwrap().downcast().unwrap(), arrivals);
+            pipeline.set_state(gst::State::Playing).unwrap();
+            camera.set_state(gst::State::Playing).unwrap();
+            // Without a network MPEG-4 has no times.
+            for number in 0.. {
+                let Ok(sample) = tap.pull_sample() else { break };
+                let mut picture = sample.buffer_owned().unwrap();
+                picture.make_mut().set_pts(gst::ClockTime::from_mseconds(100 * number));
+                feed.copy(
+                    &gst::Sample::builder().buffer(&picture).caps(&sample.caps_owned().unwrap()).build(),
+                );
+            }
+            feed.end();
+            let kinds = [gst::MessageType::Eos, gst::MessageType::Error];
+            let bus = pipeline.bus().unwrap();
+            let end = bus.timed_pop_filtered(gst::ClockTime::from_seconds(60), &kinds).unwrap();
+            camera.set_state(gst::State::Null).unwrap();
+            pipeline.set_state(gst::State::Null).unwrap();
+            std::fs::remove_dir_all(folder).unwrap();
+            assert_eq!(end.type_(), gst::MessageType::Eos, "{codec:?}: {end:?}");
+            assert_eq!(*lock(&opened), [true; 4], "{codec:?}");
+        }
     }
 
     #[test]
