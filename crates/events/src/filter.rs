@@ -35,7 +35,8 @@ impl Area {
     fn has(&self, pan_deg: f64, tilt_deg: f64) -> bool {
         let (left, right) = self.pan_deg;
         let after_left = (pan_deg - left).rem_euclid(360.0);
-        after_left <= (right - left).rem_euclid(360.0)
+        let is_all_around = right - left >= 360.0;
+        (is_all_around || after_left <= (right - left).rem_euclid(360.0))
             && (self.tilt_deg.0..=self.tilt_deg.1).contains(&tilt_deg)
     }
 }
@@ -50,5 +51,7 @@ mod tests {
         assert!(area(-10.0, 10.0).has(0.0, -5.0) && !area(-10.0, 10.0).has(20.0, -5.0));
         assert!(area(170.0, -170.0).has(-179.0, -5.0) && !area(170.0, -170.0).has(0.0, -5.0));
         assert!(!area(-10.0, 10.0).has(0.0, 5.0));
+        assert!(area(-180.0, 180.0).has(0.0, -5.0) && area(0.0, 360.0).has(-90.0, -5.0));
+        assert!(area(10.0, 10.0).has(10.0, -5.0) && !area(10.0, 10.0).has(11.0, -5.0));
     }
 }

@@ -247,6 +247,24 @@ mod tests {
         fleet.of("door").unwrap().control()
     }
 
+    /// They are tried again where a camera that is starting refuses everybody.
+    #[test]
+    fn user_and_password_that_were_right_are_so_when_something_else_of_the_camera_changes() {
+        gst::init().unwrap();
+        let fleet = Fleet::new(Arc::new(Log::unwritten()));
+        let changed = |change: fn(&mut CameraSettings)| {
+            fleet.apply(door("http://127.0.0.1:1"));
+            fleet.of("door").unwrap().worked.store(true, Ordering::Relaxed);
+            let mut cameras = door("http://127.0.0.1:1");
+            change(&mut cameras[0]);
+            fleet.apply(cameras);
+            fleet.of("door").unwrap().worked.load(Ordering::Relaxed)
+        };
+        assert!(changed(|camera| camera.rate = Some(5)));
+        assert!(!changed(|camera| camera.address = "http://127.0.0.1:2".to_owned()));
+        fleet.end();
+    }
+
     #[test]
     fn a_camera_that_is_handed_over_in_the_last_second_is_so_after_a_restart_whatever_is_kept_later() {
         gst::init().unwrap();

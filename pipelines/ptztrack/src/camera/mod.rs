@@ -129,6 +129,16 @@ impl Camera {
     ) -> Self {
         let known = Arc::new(Known::new(&settings.name));
         known.take_control(control);
+        let is_same = |before: &CameraSettings| {
+            (&before.address, &before.credentials) == (&settings.address, &settings.credentials)
+        };
+        // User and password that were right are tried again, where the camera refuses them for a while.
+        if predecessor
+            .as_ref()
+            .is_some_and(|before| is_same(&before.settings) && before.known.worked.load(Ordering::Relaxed))
+        {
+            known.worked.store(true, Ordering::Relaxed);
+        }
         let predecessor = Arc::new(Mutex::new(predecessor.and_then(Self::into_thread)));
         Self { settings, known, runner, log, thread: None, predecessor }
     }

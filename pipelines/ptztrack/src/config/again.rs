@@ -43,7 +43,9 @@ impl<T: Clone + PartialEq> Service for Result<Option<T>, String> {
 impl Again {
     /// Of what was read, where the program runs by `current`: what cameras there are and whom they call; a service that could not
     /// be started yet; of all else nothing.
-    pub fn of(read: Config, current: &Config) -> Self {
+    pub fn of(mut read: Config, current: &Config) -> Self {
+        // Who is kept is a matter of [events].
+        read.cameras.iter_mut().for_each(|camera| camera.kept = current.store.what);
         let mut this = Self {
             config: Config { cameras: read.cameras, hand_over: read.hand_over, ..current.clone() },
             needs_restart: (&read.store, &read.zones) != (&current.store, &current.zones),

@@ -47,7 +47,7 @@ pub struct CameraSettings {
     /// In a window, too.
     pub show: bool,
     pub isolation: Isolation,
-    /// People are handed over from it or to it.
+    /// It has a process of its own, which is to tell whom it sees: people are handed over from it or to it.
     pub hands_over: bool,
     /// What is kept of those who were followed.
     pub kept: Option<Kept>,
@@ -155,8 +155,13 @@ impl CameraSettings {
         }
         let address: Option<String> = table.need("address");
         let protocol = table.get("protocol").unwrap_or_default();
-        let camera = address
-            .and_then(|address| Self::at(&name, protocol, &address).inspect_err(|err| table.wrong(err)).ok());
+        let camera = address.and_then(|address| {
+            let wrong = |reason| match table.value("address") {
+                Some(value) => table.source.wrong(value.span(), reason),
+                None => table.wrong(reason),
+            };
+            Self::at(&name, protocol, &address).map_err(wrong).ok()
+        });
         // The rest is read all the same, so that every mistake is found at once.
         let mut camera = camera.unwrap_or_else(|| Self::without_address(&name));
         camera.kind = table.get("kind").unwrap_or_default();
@@ -187,12 +192,18 @@ impl CameraSettings {
         camera.recording = table.table("recording").and_then(Recording::read);
         camera.properties = zones(&mut table);
         camera.properties.extend(security(&mut table, protocol.sink()));
-        for element in ELEMENTS {
-            camera
-                .properties
-                .extend(table.table(element).iter().flat_map(|table| properties::read(element, table)));
-        }
         camera.pipeline = pipeline(&mut table);
+        for element in ELEMENTS {
+            let Some(table) = table.table(element) else { continue };
+            if camera.pipeline.is_none() && element != protocol.sink() && Protocol::SINKS.contains(&element) {
+                table.wrong(format!(
+                    "[camera.{name}.{element}] has no effect: the camera speaks {}, so write {}",
+                    protocol.name(),
+                    protocol.sink()
+                ));
+            }
+            camera.properties.extend(properties::read(element, &table));
+        }
         if let Some(source) = camera.credentials.as_ref().and_then(|_| camera.source_that_gives_password()) {
             table.wrong(format!(
                 "`{source}` sends the password in clear to whoever answers in the camera's place: let `source` be an \

@@ -168,7 +168,9 @@ impl Config {
         let mut cameras: Vec<_> = cameras.into_iter().filter_map(read).collect();
         let hand_over = HandOver::read_all(&mut root, &cameras);
         for camera in &mut cameras {
-            camera.hands_over = hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
+            // In this process it is seen who is where, and the camera need not begin anew where this changes.
+            camera.hands_over = camera.isolation == Isolation::Process
+                && hand_over.iter().any(|hand_over| hand_over.concerns(&camera.name));
         }
         let zones = Zone::read_all(&mut root, &cameras);
         root.no_more();

@@ -2,6 +2,8 @@
 
 //! Properties of elements, by their names.
 
+use std::time::Duration;
+
 use gst::prelude::*;
 use serde::{Deserialize, Serialize};
 use toml::de::DeValue;
@@ -41,7 +43,24 @@ pub fn read(factory: &str, table: &Table) -> Vec<Property> {
             Err(reason) => table.source.wrong(value.span(), reason),
         }
     }
+    if let Some(reason) = crossed(&element) {
+        table.wrong(reason);
+    }
     found
+}
+
+/// Whether the lower end of a range is beyond its upper one: an element looks at them where it starts.
+fn crossed(element: &gst::Element) -> Option<String> {
+    let number = |name: &str| {
+        element.find_property(name).filter(|spec| spec.value_type() == glib::Type::F64)?;
+        Some(element.property::<f64>(name))
+    };
+    element.list_properties().iter().find_map(|spec| {
+        let range = spec.name().strip_suffix("-min")?;
+        let (min, max) = (number(spec.name())?, number(&format!("{range}-max"))?);
+        (min > max)
+            .then(|| format!("`{range}-min` is {min} and `{range}-max` {max}: the first is the lower one"))
+    })
 }
 
 /// One property from text, as `zones` of a camera.
@@ -103,7 +122,7 @@ fn accepted(element: &gst::Element, spec: &glib::ParamSpec, text: &str) -> Resul
     let wrong = || format!("`{name}` must be {}", allowed(spec));
     let value = glib::Value::deserialize_with_pspec(text, spec).map_err(|_| wrong())?;
     if !within(spec, &value) {
-        return Err(wrong());
+        return Err(longest(spec).unwrap_or_else(wrong));
     }
     element.set_property_from_value(name, &value);
     let readable = spec.flags().contains(glib::ParamFlags::READABLE);
@@ -111,7 +130,8 @@ fn accepted(element: &gst::Element, spec: &glib::ParamSpec, text: &str) -> Resul
     // An element that has wishes beyond a range says them in its description, and keeps what it had.
     let as_text = |value: &glib::Value| value.serialize().ok();
     if readable && !taken() && as_text(&element.property_value(name)) != as_text(&value) {
-        return Err(format!("`{name}` cannot be {text}: {}", spec.blurb().unwrap_or_default()));
+        let unit = if is_duration(spec) { " nanoseconds (write \"3s\" for seconds)" } else { "" };
+        return Err(format!("`{name}` cannot be {text}{unit}: {}", spec.blurb().unwrap_or_default()));
     }
     Ok(())
 }
@@ -149,6 +169,12 @@ fn allowed(spec: &glib::ParamSpec) -> String {
     } else {
         format!("text in quotes: {}", spec.blurb().unwrap_or_default())
     }
+}
+
+/// What a duration is at most, in words.
+fn longest(spec: &glib::ParamSpec) -> Option<String> {
+    let most = Duration::from_nanos(spec.downcast_ref::<glib::ParamSpecUInt64>()?.maximum());
+    Some(format!("`{}` must be {}, at most {most:?}", spec.name(), units::DURATION))
 }
 
 /// Durations are 64 bits of nanoseconds in every element of ours.

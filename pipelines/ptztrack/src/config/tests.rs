@@ -350,14 +350,20 @@ fn a_share_hands_over_to_others_where_one_of_two_cameras_is_not_in_it() {
 #[test]
 fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
     let cameras = "[camera.yard]\naddress = \"http://a\"\nkind = \"fixed\"\n[camera.door]\naddress = \"http://b\"\n[camera.hall]\naddress = \"http://c\"\n";
-    let config = parse(&format!("{cameras}[handover.yard]\ncalls = [\"door\"]\nprecedence = 3\n")).unwrap();
+    let text = "[handover.yard]\ncalls = [\"door\"]\nprecedence = 3\n";
+    let config = parse(&format!("{cameras}{text}")).unwrap();
     let [wish] = config.hand_over.as_slice() else { panic!("{config:?}") };
     assert_eq!(
         (wish.from.as_str(), wish.calls.as_slice(), wish.precedence),
         ("yard", &["door".to_owned()][..], 3)
     );
-    let hands_over: Vec<_> = config.cameras.iter().map(|camera| (&*camera.name, camera.hands_over)).collect();
-    assert_eq!(hands_over, [("door", true), ("hall", false), ("yard", true)]);
+    let in_processes = cameras.replace("address", "isolation = \"process\"\naddress");
+    let telling = |cameras: &str| {
+        let config = parse(&format!("{cameras}{text}")).unwrap();
+        config.cameras.into_iter().filter(|camera| camera.hands_over).map(|c| c.name).collect::<Vec<_>>()
+    };
+    assert_eq!(telling(&in_processes), ["door", "yard"]);
+    assert!(telling(cameras).is_empty(), "they begin anew for nothing");
     for (table, reason) in [
         ("[handover.gate]\ncalls = [\"door\"]", "line 8: handover: there is no camera `gate`"),
         ("[handover.yard]\ncalls = [\"gate\"]", "line 8: handover: there is no camera `gate`"),
@@ -385,4 +391,55 @@ fn cameras_that_hand_over_are_cameras_and_those_that_are_called_turn() {
         let wrong = parse(&format!("{cameras}{table}\n")).unwrap_err();
         assert!(wrong.starts_with(reason), "{wrong}");
     }
+}
+
+#[test]
+fn who_is_kept_changes_at_a_restart_and_touches_no_camera() {
+    let cameras = "[camera.a]\naddress = \"http://a\"\n";
+    let current = parse(cameras).unwrap();
+    let read = parse(&format!("{cameras}[events]\npixelate-faces = true\n")).unwrap();
+    let again = Again::of(read, &current);
+    assert!(again.needs_restart);
+    assert_eq!(again.config.cameras, current.cameras);
+}
+
+#[test]
+fn a_table_that_would_have_no_effect_is_a_mistake() {
+    let camera = |more: &str| parse(&format!("[camera.a]\naddress = \"http://a\"\n{more}"));
+    let other = "protocol = \"onvif\"\n[camera.a.vapixptzsink]\ntilt-max = 5\n";
+    let wrong = camera(other).unwrap_err();
+    assert_eq!(
+        wrong,
+        "line 4: [camera.a.vapixptzsink] has no effect: the camera speaks ONVIF, so write onvifptzsink"
+    );
+    camera(&other.replace("vapix", "onvif")).unwrap();
+    // In a pipeline of one's own there may be anything.
+    camera(&format!("pipeline = \"fakesrc name=source ! fakesink\"\n{other}")).unwrap();
+}
+
+#[test]
+fn a_range_goes_from_the_lower_end_to_the_upper() {
+    let sink =
+        |text: &str| parse(&format!("[camera.a]\naddress = \"http://a\"\n[camera.a.vapixptzsink]\n{text}"));
+    let wrong = sink("pan-min = 10\npan-max = -10\n").unwrap_err();
+    assert!(wrong.contains("`pan-min` is 10 and `pan-max` -10"), "{wrong}");
+    sink("pan-min = -10\npan-max = 10\n").unwrap();
+}
+
+#[test]
+fn a_duration_that_cannot_be_is_answered_with_its_unit_and_its_end() {
+    let set = |element: &str, text: &str| {
+        let text = format!("[camera.a]\naddress = \"http://a\"\n[camera.a.{element}]\n{text}\n");
+        parse(&text).unwrap_err()
+    };
+    let wrong = set("vapixptzsink", "search-time = 3");
+    assert!(wrong.contains("`search-time` cannot be 3 nanoseconds (write \"3s\" for seconds)"), "{wrong}");
+    let wrong = set("lkfeaturetrack", "stationary-timeout = \"999d\"");
+    assert!(wrong.contains("\"7d\", at most 86400s"), "{wrong}");
+}
+
+#[test]
+fn a_wrong_address_is_told_in_its_own_line() {
+    let wrong = parse("[camera.a]\ncodec = \"mjpeg\"\naddress = \"192.168.0.90\"\n").unwrap_err();
+    assert!(wrong.starts_with("line 3: `192.168.0.90` is not an address"), "{wrong}");
 }

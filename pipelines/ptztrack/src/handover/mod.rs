@@ -215,13 +215,14 @@ impl Dispatcher {
             |name: &str| wishes.iter().any(|wish| wish.concerns(name) && !wish.cameras().all(is_ours));
         let told = ours.iter().filter(|view| concerns_others(&view.known.name));
         told.for_each(|view| self.tell_others(view));
-        let others = others.into_iter().filter(|view| concerned(&view.known.name));
+        // A broker sends us what we tell others, too.
+        let is_theirs = |view: &View| concerned(&view.known.name) && !is_ours(&view.known.name);
+        let others: Vec<_> = others.into_iter().filter(is_theirs).collect();
         let mut views = BTreeMap::new();
-        for mut view in others.chain(ours) {
+        for mut view in others.into_iter().chain(ours) {
             let name = view.known.name.clone();
             view.widest_fov_deg = self.widest(&view);
             self.notice_pipeline(&view);
-            // One that is here is what it is, whatever others say.
             views.insert(name, view);
         }
         views
@@ -330,5 +331,32 @@ impl Dispatcher {
 
     fn tell(&self, camera: &str, level: Level, event: &str, detail: String) {
         self.log.tell(&Event::new(level, Some(camera), event, detail));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stage::wish;
+    use super::*;
+
+    /// A broker echoes: what is told of `yard` comes back, with numbers of pipelines that only others can tell apart.
+    #[test]
+    fn what_we_say_ourselves_is_not_what_others_say() {
+        let log = Arc::new(Log::unwritten());
+        let (exchange, mut saying) = Exchange::new();
+        let fleet = Arc::new(Fleet::at_rest("yard"));
+        let mut dispatcher = Dispatcher::new(fleet.clone(), Some(exchange.clone()), log);
+        let wishes = [wish(&["door"])];
+        dispatcher.change(&wishes, &fleet.known());
+        dispatcher.tick(&wishes);
+        let pipelines = dispatcher.pipelines.clone();
+        assert!(pipelines.contains_key("yard"));
+        dispatcher.refused.insert("yard".to_owned(), Instant::now());
+        let (camera, said) = saying.try_recv().unwrap();
+        exchange.hear(&camera, said.as_bytes()).unwrap();
+        assert_eq!(exchange.views(Instant::now()).len(), 1);
+        dispatcher.tick(&wishes);
+        assert_eq!(dispatcher.pipelines, pipelines);
+        assert!(dispatcher.refused.contains_key("yard"), "what was known of its tracks is gone");
     }
 }

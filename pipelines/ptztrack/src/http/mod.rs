@@ -8,7 +8,7 @@ mod metrics;
 
 use std::convert::Infallible;
 use std::future::poll_fn;
-use std::net::IpAddr;
+use std::net::{IpAddr, SocketAddr};
 use std::pin::pin;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -104,8 +104,10 @@ pub async fn serve(listener: TcpListener, http: &Http, fleet: Arc<Fleet>, events
         }
         // It is never closed.
         let Ok(place) = places.clone().acquire_owned().await else { return };
-        let local = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), |address| address.ip());
-        let visit = Visit { local, peer: peer.ip(), welcome: Arc::default() };
+        // By `[::]` whoever comes by IPv4 has an address of IPv6 as well.
+        let address = |address: SocketAddr| address.ip().to_canonical();
+        let local = stream.local_addr().map_or(IpAddr::from([0, 0, 0, 0]), address);
+        let visit = Visit { local, peer: address(peer), welcome: Arc::default() };
         // Who takes nothing of what was sent is gone; where that cannot be asked for, the system has its own limit.
         let _ = SockRef::from(&stream).set_tcp_user_timeout(Some(LONGEST_STALL));
         let connection = answer(stream, router.clone(), visit.clone());
