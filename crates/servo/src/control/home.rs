@@ -109,7 +109,13 @@ impl HomeReturn {
         self.at_start = false;
     }
 
-    /// It has taken the command to go home, or will not.
+    /// It has taken the command to go home. Where it was to go there no longer by then, it is on no way of ours.
+    pub fn taken(&mut self) {
+        self.strayed();
+        self.settled = self.absence.is_some();
+    }
+
+    /// It will not go there.
     pub fn settled(&mut self) {
         self.strayed();
         self.settled = true;

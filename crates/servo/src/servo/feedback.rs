@@ -34,7 +34,7 @@ impl Servo {
         }
         match actuation {
             Actuation::Move(motion) if self.leads_home(motion) => {
-                self.home.settled();
+                self.home.taken();
                 self.zoom.leave();
             }
             _ if !actuation.is_rest() => self.home.strayed(),
@@ -44,10 +44,12 @@ impl Servo {
 
     /// It may have acted on this, or may yet.
     pub fn unanswered(&mut self, actuation: &Actuation, now: Time) {
-        if let Actuation::Move(Motion::Velocity { zoom: Some(zoom), .. }) = actuation
-            && *zoom != 0.0
-        {
-            self.zoom.commanded(now, *zoom);
+        let Actuation::Move(Motion::Velocity { zoom, .. }) = actuation else { return };
+        // A move home that was under way may be over by it.
+        self.moves.rest(now);
+        self.home.strayed();
+        if let Some(zoom) = zoom.filter(|zoom| *zoom != 0.0) {
+            self.zoom.commanded(now, zoom);
         }
     }
 

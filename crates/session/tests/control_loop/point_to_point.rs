@@ -89,6 +89,50 @@ fn a_zoom_is_ended_before_the_camera_goes_home() {
     );
 }
 
+/// Where nobody is, to be at home.
+fn homeward() -> Rig {
+    let there = Position { pan_deg: Some(90.0), tilt_deg: Some(0.0), zoom: None };
+    Rig::new(ServoSettings {
+        home: Some(Home::Position(there)),
+        home_timeout: Duration::ZERO,
+        ..ServoSettings::default()
+    })
+}
+
+fn nobody(rig: &Rig) -> Measurement {
+    Measurement { visibility: Visibility::Gone, ..Measurement::at(0.5, 0.5, rig.now) }
+}
+
+#[test]
+fn a_move_that_went_unanswered_on_the_way_home_is_stopped() {
+    let mut rig = homeward();
+    rig.control.measure(nobody(&rig), rig.now);
+    assert!(matches!(rig.after(ms(0))[..], [Command::Move { motion: Motion::Absolute { .. }, .. }]));
+    rig.now += ms(200);
+    rig.see(0.9, 0.5);
+    rig.run(|_| Err(Error::Timeout(ms(1500))));
+    let sent = mem::take(&mut rig.sent);
+    assert!(matches!(sent[..], [Command::Move { motion: Motion::Velocity { .. }, .. }, ..]), "{sent:?}");
+    // Nobody, before a stop could be sent.
+    rig.control.lose_target();
+    let sent: Vec<_> = (0..20).flat_map(|_| rig.after(ms(100))).collect();
+    assert!(sent.first().is_some_and(Command::is_stop), "{sent:?}");
+}
+
+#[test]
+fn a_move_home_that_is_accepted_once_it_is_not_wanted_any_more_is_stopped() {
+    let mut rig = homeward();
+    rig.control.measure(nobody(&rig), rig.now);
+    let Next::Do(request) = rig.control.next_request(rig.now) else { panic!("it does not go home") };
+    rig.control.sending(&request, rig.now);
+    // As where the pipeline is paused.
+    rig.control.release();
+    rig.now += ms(100);
+    rig.control.on_response(&request, Ok(Response::Accepted), rig.now, rig.now);
+    let sent: Vec<_> = (0..5).flat_map(|_| rig.after(ms(100))).collect();
+    assert!(matches!(sent[..], [Command::Stop(_)]), "{sent:?}");
+}
+
 /// The camera counts in its own picture, which is the one that arrives: an axis that is inverted within it inverts that too.
 #[test]
 fn whichever_axis_is_inverted_the_camera_centres_the_place_that_is_seen() {
