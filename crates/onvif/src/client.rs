@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use std::mem;
 use std::time::Duration;
 
 use servo::{Motion, Position, Presets};
@@ -116,10 +115,16 @@ impl session::Client for Client {
     }
 
     async fn exchange(&mut self, request: &Request) -> Result<Response, Error> {
+        if self.inherits && matches!(request, Request::Query(_)) {
+            // What it can do is not inherited but for commands, which are not to wait for it.
+            self.abilities = None;
+            self.inherits = false;
+        }
         let answer = self.answer(request).await;
-        if mem::take(&mut self.inherits) && answer.is_err() {
+        if self.inherits && answer.is_err() {
             // It may be otherwise than it was then.
             (self.clock, self.services, self.profile, self.abilities) = (None, None, None, None);
+            self.inherits = false;
         }
         answer
     }
@@ -394,6 +399,10 @@ impl Client {
                 self.call(Path::Ptz, &message).await.map(drop)
             }
             Motion::Preset { number } => {
+                if self.presets.is_empty() {
+                    // Their numbers were told to somebody else, whose place this is.
+                    self.presets().await?;
+                }
                 let index = usize::try_from(number).unwrap_or(usize::MAX).wrapping_sub(1);
                 let Some(token) = self.presets.get(index) else {
                     return Err(Error::Camera(format!("there is no preset {number}")));
@@ -436,9 +445,10 @@ impl Client {
         };
         let message = messages::continuous_move(self.profile(), velocity, Some(after));
         let moved = self.call(Path::Ptz, &message).await;
-        let refusal = match moved {
-            Err(refusal @ Error::Camera(_)) => refusal,
-            Err(broken @ Error::Broken(_)) if self.moves.breaks_at_timeout() => broken,
+        let (refusal, is_for_good) = match moved {
+            // One that is busy may take the next.
+            Err(refusal @ Error::Camera(_)) => (refusal, self.moves.refuses_timeout()),
+            Err(broken @ Error::Broken(_)) if self.moves.refuses_timeout() => (broken, true),
             other => {
                 self.moves.took_timeout(other.is_ok());
                 return other.map(drop);
@@ -447,6 +457,9 @@ impl Client {
         let message = messages::continuous_move(self.profile(), velocity, None);
         // Where it refuses even so, it was not for the timeout.
         self.call(Path::Ptz, &message).await.map_err(|err| worse(refusal, err))?;
+        if !is_for_good {
+            return Ok(());
+        }
         if let Some(abilities) = &mut self.abilities {
             abilities.timeout = MoveTimeout::Never;
         }
@@ -498,7 +511,8 @@ impl Client {
 
     /// Where the camera looks. Some take half a minute to say so: they are asked only whether they are there.
     async fn position(&mut self, abilities: &Abilities) -> Result<Position, Error> {
-        if self.late_statuses < LATE_STATUSES {
+        let is_asked = self.late_statuses < LATE_STATUSES;
+        if is_asked {
             let message = messages::get_status(self.profile());
             match timeout(STATUS_TIMEOUT, self.call(Path::Ptz, &message)).await {
                 Ok(Ok(body)) => {
@@ -508,10 +522,12 @@ impl Client {
                         .ok_or_else(|| Error::Camera("the camera does not tell its position".to_owned()));
                 }
                 Ok(Err(err)) => return Err(err),
-                Err(_) => self.late_statuses += 1,
+                Err(_) => {}
             }
         }
         self.clock = Some(self.ask_clock().await?);
+        // It is there, and late with this alone.
+        self.late_statuses += u32::from(is_asked);
         Err(Error::Camera("the camera takes too long to tell its position".to_owned()))
     }
 

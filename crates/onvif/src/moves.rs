@@ -22,7 +22,7 @@ pub struct Moves {
     broken_zooms: u32,
     /// The zoom is left alone.
     leaves_zoom: bool,
-    /// Moves with a timeout, in a row, at which the camera closed the connection.
+    /// Moves with a timeout, in a row, that the camera refused, or at which it closed the connection.
     broken_timeouts: u32,
 }
 
@@ -42,7 +42,7 @@ impl Moves {
     /// After so many moves with zoom whose answers were none, the zoom is left alone (onvifsim: TL-IPC652P-A4).
     const BROKEN_ZOOMS: u32 = 2;
 
-    /// After so many moves with a timeout at which the camera closed the connection, one without is tried.
+    /// After so many moves with a timeout that the camera refused, or at which it closed the connection, it takes none.
     const BROKEN_TIMEOUTS: u32 = 2;
 
     /// How to stop the camera this time: a stop after a stop is told in the other words.
@@ -72,8 +72,8 @@ impl Moves {
         self.stopped = false;
     }
 
-    /// The camera closed the connection at a move with a timeout; returns whether it may be for that.
-    pub fn breaks_at_timeout(&mut self) -> bool {
+    /// The camera refused a move with a timeout, or closed the connection at it; returns whether that is likely to be for the timeout.
+    pub fn refuses_timeout(&mut self) -> bool {
         self.broken_timeouts += 1;
         self.broken_timeouts > Self::BROKEN_TIMEOUTS
     }

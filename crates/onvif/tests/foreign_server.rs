@@ -3,7 +3,8 @@
 //! Our client before a server that others wrote, with WSDL and log-in of its own: the crate `onvif-server`.
 #![allow(missing_docs, clippy::unwrap_used, clippy::expect_used)]
 
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::future::pending;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -23,6 +24,9 @@ use session::{Client as _, Command, Error, Query, Request, Response, Stop};
 const PATIENCE: Duration = Duration::from_secs(60);
 
 const LONGEST_MESSAGE: usize = 64 * 1024;
+
+/// Whoever would be answered so is not answered.
+const SILENCE: StatusCode = StatusCode::REQUEST_TIMEOUT;
 
 /// What a camera was told.
 #[derive(Clone, Default)]
@@ -105,6 +109,7 @@ async fn served_with(
             let (head, body) = request.into_parts();
             let body = to_bytes(body, LONGEST_MESSAGE).await.unwrap();
             match instead(&String::from_utf8_lossy(&body)) {
+                Some(answer) if answer.status() == SILENCE => pending().await,
                 Some(answer) => answer,
                 None => next.run(HttpRequest::from_parts(head, body.into())).await,
             }
@@ -115,12 +120,16 @@ async fn served_with(
 }
 
 fn client(address: &str, password: &str) -> Client {
+    client_within(address, password, PATIENCE)
+}
+
+fn client_within(address: &str, password: &str, timeout: Duration) -> Client {
     Client::new(ClientSettings {
         location: Location::parse(address).unwrap().0,
         channel: String::new(),
         credentials: Some(Credentials { user: "admin".to_owned(), password: Secret::new(password) }),
         authentication: Authentication::Auto,
-        timeout: PATIENCE,
+        timeout,
         trust: Trust::System,
     })
     .unwrap()
@@ -236,5 +245,30 @@ async fn what_becomes_of_a_move_without_a_timeout_is_told_where_one_with_it_was_
         if !may_have_acted {
             assert_eq!(failed, Error::Camera("no such timeout".to_owned()));
         }
+    }
+}
+
+/// Who does not answer at all is asked for its position when it is back; who is late with that alone is not asked any more.
+#[tokio::test]
+async fn only_a_camera_that_is_there_is_late_with_its_position() {
+    for (silent, asked_again) in [("Envelope", true), ("GetStatus", false)] {
+        let (is_silent, asked) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicUsize::new(0)));
+        let (silence, asking) = (is_silent.clone(), asked.clone());
+        let instead = move |message: &str| {
+            asking.fetch_add(usize::from(message.contains("GetStatus")), Ordering::Relaxed);
+            (silence.load(Ordering::Relaxed) && message.contains(silent)).then(|| SILENCE.into_response())
+        };
+        let address = served_with(Camera::default(), instead).await;
+        let mut client = client_within(&address, "secret", Duration::from_millis(1200));
+        let position = Request::Query(Query::Position);
+        let _ = client.exchange(&position).await;
+        is_silent.store(true, Ordering::Relaxed);
+        for _ in 0..2 {
+            client.exchange(&position).await.unwrap_err();
+        }
+        is_silent.store(false, Ordering::Relaxed);
+        let before = asked.load(Ordering::Relaxed);
+        let _ = client.exchange(&position).await;
+        assert_eq!(asked.load(Ordering::Relaxed) > before, asked_again, "{silent}");
     }
 }
