@@ -33,8 +33,9 @@ impl Target {
 #[derive(Debug)]
 pub struct Collector {
     camera: String,
-    /// When it began; from then on another clock counts, which never jumps.
     run_ms: i64,
+    /// When it began, by the clock as it was when somebody was first seen; from then on another one counts, which never jumps.
+    began_ms: i64,
     now: Option<Followed>,
 }
 
@@ -59,15 +60,19 @@ pub struct Ended {
 impl Collector {
     /// For a tracker that was started at this time, in milliseconds since 1970.
     pub fn new(camera: &str, run_ms: i64) -> Self {
-        Self { camera: camera.to_owned(), run_ms, now: None }
+        Self { camera: camera.to_owned(), run_ms, began_ms: run_ms, now: None }
     }
 
-    /// Who is followed so long after the start; what is over by that is returned.
-    pub fn see(&mut self, elapsed: Duration, target: Option<&Target>) -> Option<Ended> {
-        let at_ms = self.run_ms + milliseconds(elapsed);
+    /// Who is followed so long after the start, and at this time, in milliseconds since 1970; what is over by that is returned.
+    pub fn see(&mut self, elapsed: Duration, now_ms: i64, target: Option<&Target>) -> Option<Ended> {
         let track = target.map(|target| target.track);
         let ended = if self.now.as_ref().map(|now| now.sighting.track) == track { None } else { self.end() };
         if let Some(target) = target {
+            if self.now.is_none() {
+                // A clock may have been set since the tracker was started.
+                self.began_ms = now_ms - milliseconds(elapsed);
+            }
+            let at_ms = self.began_ms + milliseconds(elapsed);
             let begin = || Followed::new(&self.camera, self.run_ms, target.track, at_ms);
             self.now.get_or_insert_with(begin).see(at_ms, target);
         }
@@ -139,16 +144,30 @@ mod tests {
     #[test]
     fn each_track_that_was_followed_is_one_sighting() {
         let mut collector = Collector::new("door", 1_000_000);
-        assert!(collector.see(at(0), None).is_none());
-        assert!(collector.see(at(100), Some(&FIRST)).is_none());
-        assert!(collector.see(at(900), Some(&FIRST)).is_none());
-        let first = collector.see(at(1000), Some(&SECOND)).unwrap().sighting;
+        assert!(collector.see(at(0), 1_000_000, None).is_none());
+        assert!(collector.see(at(100), 1_000_100, Some(&FIRST)).is_none());
+        assert!(collector.see(at(900), 1_000_900, Some(&FIRST)).is_none());
+        let first = collector.see(at(1000), 1_001_000, Some(&SECOND)).unwrap().sighting;
         assert_eq!((first.track, first.from_ms, first.to_ms), (1, 1_000_100, 1_000_900));
-        let second = collector.see(at(1100), None).unwrap().sighting;
+        let second = collector.see(at(1100), 1_001_100, None).unwrap().sighting;
         assert_eq!((second.track, second.from_ms, second.to_ms), (2, 1_001_000, 1_001_000));
         assert!(collector.end().is_none());
-        collector.see(at(2000), Some(&FIRST));
+        collector.see(at(2000), 1_002_000, Some(&FIRST));
         assert_eq!(collector.end().unwrap().sighting.camera, "door");
+    }
+
+    /// As where a board without a battery hears what time it is.
+    #[test]
+    fn a_clock_that_is_set_counts_from_the_next_sighting_on() {
+        let mut collector = Collector::new("door", 1_000_000);
+        collector.see(at(0), 1_000_000, Some(&FIRST));
+        let first =
+            collector.see(at(1000), 90_000_000, Some(&FIRST)).or_else(|| collector.end()).unwrap().sighting;
+        assert_eq!((first.from_ms, first.to_ms), (1_000_000, 1_001_000));
+        collector.see(at(2000), 90_001_000, Some(&SECOND));
+        collector.see(at(3000), 90_002_000, Some(&SECOND));
+        let second = collector.end().unwrap().sighting;
+        assert_eq!((second.run_ms, second.from_ms, second.to_ms), (1_000_000, 90_001_000, 90_002_000));
     }
 
     #[test]
@@ -160,7 +179,7 @@ mod tests {
         assert!(quality(0.5, 0.1, 0.0) > quality(0.5, 0.1, -1.0) && quality(0.5, 0.1, -1.0) > 0.0);
         let mut collector = Collector::new("door", 0);
         collector.offer(&FIRST, 0.9, || crop(9));
-        collector.see(at(0), Some(&FIRST));
+        collector.see(at(0), 0, Some(&FIRST));
         for (sharpness, width) in [(0.1, 1), (0.3, 3), (0.2, 2)] {
             collector.offer(&FIRST, sharpness, || crop(width));
         }
@@ -172,7 +191,7 @@ mod tests {
     fn a_path_has_a_step_a_second_and_does_not_grow_for_ever() {
         let path = |seconds: u64| {
             let mut collector = Collector::new("door", 0);
-            (0..seconds * 4).for_each(|n| drop(collector.see(at(n * 250), Some(&FIRST))));
+            (0..seconds * 4).for_each(|n| drop(collector.see(at(n * 250), 0, Some(&FIRST))));
             collector.end().unwrap().sighting.path
         };
         assert_eq!(path(10).len(), 10);

@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::ops::Range;
+
 use image::RgbImage;
 use image::codecs::jpeg::JpegEncoder;
 
@@ -32,7 +34,7 @@ impl Crop {
         // Of the clothes, whatever is shown of the head.
         let looks = self.looks();
         if pixelate {
-            self.pixelate_head();
+            self.pixelate_faces();
         }
         let picture = RgbImage::from_raw(self.width, self.height, self.rgb)?;
         let mut jpeg = Vec::new();
@@ -51,21 +53,32 @@ impl Crop {
         Looks::of((0..height).flat_map(row))
     }
 
-    /// The head, and as much above it, as a box may begin too low.
-    fn pixelate_head(&mut self) {
+    /// All but the person below the head: others may stand beside them, and a box may begin too low.
+    fn pixelate_faces(&mut self) {
         let [x, y, width, height] = self.person;
-        let head = height / HEAD;
-        let top = y.saturating_sub(head);
-        let cell = (width.max(head) / CELLS).max(1);
-        for row in (top..y + head).step_by(cell as usize) {
-            for column in (x..x + width).step_by(cell as usize) {
-                self.flatten(column..(column + cell).min(x + width), row..(row + cell).min(y + head));
+        let (shoulders, right, feet) = (y + height / HEAD, x + width, y + height);
+        let (all, body) = (0..self.width, shoulders..feet);
+        self.pixelate(all.clone(), 0..shoulders);
+        self.pixelate(0..x, body.clone());
+        self.pixelate(right..self.width, body);
+        self.pixelate(all, feet..self.height);
+    }
+
+    fn pixelate(&mut self, columns: Range<u32>, rows: Range<u32>) {
+        let [_, _, width, height] = self.person;
+        let cell = (width.max(height / HEAD) / CELLS).max(1);
+        for row in rows.clone().step_by(cell as usize) {
+            for column in columns.clone().step_by(cell as usize) {
+                self.flatten(
+                    column..column.saturating_add(cell).min(columns.end),
+                    row..row.saturating_add(cell).min(rows.end),
+                );
             }
         }
     }
 
     /// Gives all pixels of a cell their mean.
-    fn flatten(&mut self, columns: std::ops::Range<u32>, rows: std::ops::Range<u32>) {
+    fn flatten(&mut self, columns: Range<u32>, rows: Range<u32>) {
         let places: Vec<(u32, u32)> =
             rows.flat_map(|row| columns.clone().map(move |column| (column, row))).collect();
         let pixels: Vec<[u8; 3]> =
@@ -113,15 +126,21 @@ mod tests {
     }
 
     #[test]
-    fn a_pixelated_head_shows_no_stripes_and_the_rest_does() {
+    fn nobodys_face_is_known_but_clothes_are() {
         let mut crop = striped();
-        crop.pixelate_head();
-        let grey = |row: u32| (10..30).map(|column| crop.pixel(column, row).unwrap()[0]).collect::<Vec<_>>();
-        for row in [10, 20, 29] {
-            assert!(grey(row).iter().all(|shade| (102..=153).contains(shade)), "{row}: {:?}", grey(row));
+        crop.pixelate_faces();
+        let grey = |columns: Range<u32>, row: u32| {
+            columns.map(|column| crop.pixel(column, row).unwrap()[0]).collect::<Vec<_>>()
+        };
+        // The head, what is above and below it, and who stands on either side.
+        let faces = [0, 10, 29, 60, 79].map(|row| grey(0..40, row));
+        let beside = [grey(0..10, 30), grey(30..40, 59)];
+        for shades in faces.iter().chain(&beside) {
+            assert!(shades.iter().all(|shade| (85..=170).contains(shade)), "{shades:?}");
         }
-        for row in [9, 30] {
-            assert!(grey(row).contains(&0) && grey(row).contains(&255), "{row}");
+        for row in [30, 59] {
+            let clothes = grey(10..30, row);
+            assert!(clothes.iter().all(|shade| [0, 255].contains(shade)), "{row}: {clothes:?}");
         }
     }
 
@@ -138,7 +157,7 @@ mod tests {
     fn what_is_not_there_is_left_out() {
         let mut crop = Crop { person: [30, 0, 40, 200], ..striped() };
         crop.rgb.truncate(1000);
-        crop.pixelate_head();
+        crop.pixelate_faces();
         assert!(crop.clone().into_picture(1.0, false).is_none());
     }
 

@@ -3,14 +3,14 @@
 //! Who is followed, with the best picture: a branch of the camera's pipeline, which gets what is left for it.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant, SystemTime};
+use std::time::{Duration, Instant};
 
 use events::{Collector, Crop, Ended, Sighting, Target, sharpness};
 use gst_video::prelude::*;
 use ptztrack_contract::{BufferMeta, Rect, TargetMeta, TargetState};
 
 use super::known::Known;
-use super::recording::Segments;
+use super::recording::{Segments, now_ms};
 use super::sight::Person;
 use crate::config::{CameraSettings, Kept};
 use crate::log::Log;
@@ -55,9 +55,7 @@ struct Witness {
 
 impl Witness {
     fn new(known: Arc<Known>, kept: Kept, segments: Option<Arc<Segments>>, log: Arc<Log>) -> Self {
-        let now = SystemTime::now().duration_since(SystemTime::UNIX_EPOCH).unwrap_or_default();
-        let run_ms = i64::try_from(now.as_millis()).unwrap_or(i64::MAX);
-        let collector = Collector::new(&known.name, run_ms);
+        let collector = Collector::new(&known.name, now_ms());
         Self { kept, log, segments, began: Instant::now(), collector, known, looked: None }
     }
 
@@ -65,7 +63,7 @@ impl Witness {
         let Some(meta) = sample.buffer().and_then(TargetMeta::of).and_then(Result::ok) else { return };
         let followed = matches!(meta.state, TargetState::Tracking | TargetState::Occluded);
         let target = followed.then(|| self.target(&meta));
-        let ended = self.collector.see(self.began.elapsed(), target.as_ref());
+        let ended = self.collector.see(self.began.elapsed(), now_ms(), target.as_ref());
         ended.into_iter().for_each(|ended| self.keep(ended));
         if let Some(target) = target.filter(|_| meta.state == TargetState::Tracking && self.is_to_look()) {
             self.look(sample, &target, meta.bounds);

@@ -12,7 +12,7 @@ mod files;
 mod segments;
 
 pub use clip::{Clip, Form, NoClip, Purpose, cut};
-pub use files::pieces;
+pub use files::{now_ms, pieces};
 pub use segments::Segments;
 
 use segments::Arrivals;
@@ -285,7 +285,7 @@ fn watch_groups(source: &gst_app::AppSrc, arrivals: Arc<Arrivals>) {
         };
         let delta = buffer.flags().contains(gst::BufferFlags::DELTA_UNIT);
         if let Some(pts) = buffer.pts().filter(|_| !delta) {
-            arrivals.note(pts, files::now_ms());
+            arrivals.note(pts, now_ms());
         }
         let now = cost(buffer).saturating_add(if delta { before } else { 0 });
         kept.store(now, Ordering::Relaxed);
