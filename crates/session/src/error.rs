@@ -48,7 +48,7 @@ pub enum Error {
     #[error("the camera asks for Basic authentication, which shows the password to whoever listens")]
     BasicRefused,
     /// An HTTP status that is neither success nor a challenge.
-    #[error("the camera answered HTTP {status} {reason}")]
+    #[error("the camera answered HTTP {status}{space}{reason}", space = if reason.is_empty() { "" } else { " " })]
     Status {
         /// The status code.
         status: u16,

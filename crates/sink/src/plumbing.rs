@@ -237,7 +237,10 @@ pub trait Plumbing: PtzSink {
             gst::element_imp_error!(
                 self,
                 gst::ResourceError::NotFound,
-                ("no camera: set `location`, for example location={}", Self::PARTICULARS.example)
+                (
+                    "no camera: `location` is not set, or is no address. Set it, for example location={}",
+                    Self::PARTICULARS.example
+                )
             );
             return Err(gst::StateChangeError);
         };

@@ -2,7 +2,7 @@
 
 //! `ptztrack events`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
 use events::{Filter, Reader};
@@ -81,7 +81,9 @@ impl AskEvents {
     pub fn answer(self) -> Result<String, String> {
         let said = |err: events::Error| format!("{err}; --folder says where events are");
         if let Some(Change::Delete { id, place }) = self.change {
-            let (mut store, aside) = events::Store::open(&place.read()?.0).map_err(said)?;
+            let folder = place.read()?.0;
+            check(&folder)?;
+            let (mut store, aside) = events::Store::open(&folder).map_err(said)?;
             aside.iter().for_each(|aside| eprintln!("{}", store::moved(aside)));
             return match store.delete(id).map_err(said)? {
                 true => Ok(format!("Event {id} is deleted.\n")),
@@ -89,6 +91,7 @@ impl AskEvents {
             };
         }
         let (folder, zones) = self.place.read()?;
+        check(&folder)?;
         let filter =
             Filter { since_ms: self.since, until_ms: self.until, camera: self.camera, ..Filter::default() };
         let filter = Zone::narrow(&zones, self.zone.as_deref(), filter)
@@ -103,6 +106,18 @@ impl AskEvents {
             return Ok(entries.iter().map(|entry| format!("{}\n", report::object(entry))).collect());
         }
         Ok(report::table(&entries))
+    }
+}
+
+/// Whether there is anything to be asked.
+fn check(folder: &Path) -> Result<(), String> {
+    match folder.join(events::FILE).try_exists() {
+        Ok(false) => Err(format!(
+            "no events are kept in {} yet; --folder or --config says where else they are",
+            folder.display()
+        )),
+        // Why it cannot be read is said by who reads it.
+        _ => Ok(()),
     }
 }
 

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand};
 use onvif::VideoStream;
+use pipeline_supervisor::video::rtsp_host;
 
 use crate::ask_events::AskEvents;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol, Secret, Watchdogs};
@@ -122,6 +123,7 @@ impl Follow {
     /// # Errors
     /// What is wrong with it.
     pub async fn camera(&self, log: &Log) -> Result<CameraSettings, String> {
+        self.check()?;
         let credentials =
             self.user.as_ref().map(|user| self.password().map(|password| (user, password))).transpose()?;
         let credentials = credentials.map(|(user, password)| Credentials { user: user.clone(), password });
@@ -149,6 +151,22 @@ impl Follow {
             ..CameraSettings::at("camera", protocol, &address)?
         };
         camera.lacks().map_or(Ok(camera), Err)
+    }
+
+    /// What can be wrong before anybody is asked.
+    fn check(&self) -> Result<(), String> {
+        if self.rtsp.as_deref().is_some_and(|rtsp| rtsp_host(rtsp).is_none()) {
+            return Err("--rtsp needs an address such as rtsp://192.168.0.90:554".to_owned());
+        }
+        // Some sinks for windows crash without one.
+        if self.show && ["DISPLAY", "WAYLAND_DISPLAY"].iter().all(|name| std::env::var_os(name).is_none()) {
+            return Err(
+                "--show needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set: leave it out, or look at the page by \
+                 --http 127.0.0.1:9100"
+                    .to_owned(),
+            );
+        }
+        Ok(())
     }
 
     fn password(&self) -> Result<Secret, String> {

@@ -266,8 +266,9 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
         state.given_up = true;
         state.trouble = Some(reason.clone());
         drop(state);
-        let what_now = "not tried again until the configuration is read again (SIGHUP); a `password-credential` that has changed is \
-            read at a restart";
+        let reason = reason.trim_end_matches('.');
+        let what_now = "not tried again until the configuration is read again (SIGHUP); a password from `password-credential` or \
+            `password-environment` that has changed is read at a restart";
         tell(Level::Error, "given-up", format!("given up: {reason}; {what_now}"));
     } else {
         drop(state);

@@ -6,7 +6,9 @@ use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr};
 use std::time::Duration;
 
 use onvif::VideoStream;
-use session::http::{Authentication, ClientSettings, Credentials, Location, Secret, Trust};
+use session::http::{
+    Authentication, ClientSettings, Credentials, Location, Secret, Trust, without_user_info,
+};
 use session::{Client, Error, Query, Request};
 use tokio::net::{UdpSocket, lookup_host};
 
@@ -61,9 +63,15 @@ pub async fn ask(
             }
         }
     }
-    let reasons: Vec<_> =
-        refusals.iter().map(|(protocol, err)| format!("  by {}: {err}", protocol.name())).collect();
-    Err(format!("{address} is not a usable camera:\n{}", reasons.join("\n")))
+    Err(format!("{} is not a usable camera:{}", without_user_info(&address), told(&refusals)))
+}
+
+/// Why, by each protocol; once where it is the same.
+fn told(refusals: &[(Protocol, Error)]) -> String {
+    match refusals {
+        [(_, first), (_, second)] if first.to_string() == second.to_string() => format!(" {first}"),
+        _ => refusals.iter().map(|(protocol, err)| format!("\n  by {}: {err}", protocol.name())).collect(),
+    }
 }
 
 fn sentence(address: &str, err: &Error) -> String {
@@ -76,7 +84,7 @@ fn sentence(address: &str, err: &Error) -> String {
         }
         _ => err.advice(),
     };
-    format!("{address}: {err}. {advice}")
+    format!("{}: {err}. {advice}", without_user_info(address))
 }
 
 /// Host names and bare addresses are asked by HTTP.
@@ -151,17 +159,14 @@ async fn ask_onvif(
 }
 
 /// Where else its host says that it has ONVIF: many have it at another port. Nowhere, where that would be by plain HTTP in place of what
-/// was asked for.
+/// was asked for, or where a port was said: another camera may be at another.
 async fn told_by(address: &str) -> Vec<String> {
-    if !is_plain(address) {
+    let rest = address.split_once("://").map_or(address, |(_, rest)| rest);
+    let host = rest.split('/').next().unwrap_or(rest);
+    let says_port = host.rsplit_once(':').is_some_and(|(_, port)| !port.contains(']'));
+    if !is_plain(address) || says_port {
         return Vec::new();
     }
-    let rest = address.split_once("://").map_or(address, |(_, rest)| rest);
-    let authority = rest.split('/').next().unwrap_or(rest);
-    let host = match authority.rsplit_once(':') {
-        Some((host, port)) if !port.contains(']') => host,
-        _ => authority,
-    };
     let found = lookup_host(format!("{host}:{}", onvif::GROUP.port())).await;
     let Some(whom) = found.ok().and_then(|mut found| found.find(SocketAddr::is_ipv4)) else {
         return Vec::new();
@@ -181,6 +186,16 @@ mod tests {
     use std::io::ErrorKind;
 
     use super::*;
+
+    #[test]
+    fn what_is_the_same_by_both_protocols_is_told_once() {
+        let [no_ptz, silent] = [Error::NoPtz, Error::Timeout(PATIENCE)];
+        let vapix = (Protocol::Vapix, silent.clone());
+        assert_eq!(told(&[vapix.clone(), (Protocol::Onvif, silent.clone())]), format!(" {silent}"));
+        assert_eq!(told(std::slice::from_ref(&vapix)), format!("\n  by VAPIX: {silent}"));
+        let both = told(&[vapix, (Protocol::Onvif, no_ptz.clone())]);
+        assert_eq!(both, format!("\n  by VAPIX: {silent}\n  by ONVIF: {no_ptz}"));
+    }
 
     #[test]
     fn a_host_is_enough() {
@@ -231,7 +246,10 @@ mod tests {
             assert!(ask(address, None, None).await.is_err());
             assert_eq!(question(), Err(ErrorKind::WouldBlock), "{address}");
         }
+        // Nor at the usual one, nor is another one wanted where one is said.
         assert!(ask("http://127.0.0.4:1", None, None).await.is_err());
+        assert_eq!(question(), Err(ErrorKind::WouldBlock));
+        assert!(ask("http://127.0.0.4", None, None).await.is_err());
         assert!(question().is_ok());
     }
 }
