@@ -9,7 +9,7 @@ use ptztrack_contract::{
 };
 
 use crate::region_of_interest::remove_regions_of_interest;
-use crate::vision::{Detection, Tracked};
+use crate::vision::{Detection, Released, Tracked};
 
 /// What a detector saw in one frame; kept as memory for the next.
 #[derive(Default)]
@@ -105,9 +105,9 @@ pub(super) fn attach(
 
 /// The message that says so.
 pub(super) fn message(tracked: &Tracked, change: TargetChange, times: Times) -> TargetMessage {
-    TargetMessage {
+    let message = TargetMessage {
         change,
-        reason: tracked.released.filter(|_| change == TargetChange::Released),
+        reason: None,
         times,
         state: tracked.state,
         id: tracked.id,
@@ -115,5 +115,14 @@ pub(super) fn message(tracked: &Tracked, change: TargetChange, times: Times) -> 
         centroid: tracked.centroid,
         velocity: tracked.velocity,
         confidence: tracked.confidence,
+    };
+    match tracked.released {
+        Some(Released { reason, id, bounds, centroid, velocity, confidence })
+            if change == TargetChange::Released =>
+        {
+            let (reason, state) = (Some(reason), TargetState::Searching);
+            TargetMessage { reason, state, id, bounds, centroid, velocity, confidence, ..message }
+        }
+        _ => message,
     }
 }

@@ -86,7 +86,9 @@ pub use presence::Presence;
 pub use scene::{FrameSize, Parts, Seen, Spot, scene};
 pub use scene_model::{SceneModel, SceneView};
 pub use surface::{ColourSpace, Component, Surface};
-pub use tracker::{Choice, Config, Detection, Profile, TargetRequest, TimeLimits, Tracked, Tracker};
+pub use tracker::{
+    Choice, Config, Detection, Profile, Released, TargetRequest, TimeLimits, Tracked, Tracker,
+};
 pub use trail::Trail;
 pub use travelling::{TravellingBackground, Way};
 pub use zones::{ZoneError, Zones, zone_mask};

@@ -13,8 +13,8 @@ use gst_check::Harness;
 use gst_video::{NavigationEvent, VideoRegionOfInterestMeta};
 use gstptztrack::luma_source::FORMATS;
 use ptztrack_contract::{
-    BufferMeta, CameraEvent, MotionMeta, Rect, Region, TARGET_ROI, TargetChange, TargetMeta, TargetState,
-    TrackChange, TrackMessage, TracksMeta,
+    BufferMeta, CameraEvent, MotionMeta, Rect, Region, ReleaseReason, TARGET_ROI, TargetChange,
+    TargetMessage, TargetMeta, TargetState, TrackChange, TrackMessage, TracksMeta,
 };
 
 #[test]
@@ -241,6 +241,30 @@ fn everybody_is_told_of_and_whoever_is_asked_for_is_followed() {
     assert_eq!(see(&mut bench), (1, 2), "there is nobody of that number");
     let warnings = std::iter::from_fn(|| bench.bus.pop_filtered(&[gst::MessageType::Warning])).count();
     assert_eq!(warnings, 1);
+}
+
+#[test]
+fn who_is_released_for_another_is_told_of_as_themselves() {
+    let mut bench = Bench::new(|element| element.set_property_from_str("selection", "manual"));
+    let see = |bench: &mut Bench| drop(bench.push_through(street(0, [(60, 80), (200, 80)]), &TWO));
+    (0..4).for_each(|_| see(&mut bench));
+    for number in [1_u64, 2] {
+        bench.harness.element().unwrap().emit_by_name::<()>("select-track", &[&number]);
+        see(&mut bench);
+    }
+    let messages = bench.bus.iter();
+    let read = messages.filter_map(|message| TargetMessage::from_structure(message.structure()?).ok());
+    let told: Vec<_> =
+        read.map(|said| (said.change, said.id, said.state, said.reason, said.bounds.x < 0.5)).collect();
+    let (tracking, searching) = (TargetState::Tracking, TargetState::Searching);
+    assert_eq!(
+        told,
+        [
+            (TargetChange::Acquired, 1, tracking, None, true),
+            (TargetChange::Released, 1, searching, Some(ReleaseReason::Request), true),
+            (TargetChange::Acquired, 2, tracking, None, false),
+        ]
+    );
 }
 
 /// Two people who go apart: what is told of the target.

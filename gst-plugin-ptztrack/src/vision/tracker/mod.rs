@@ -44,5 +44,5 @@ pub use config::{Config, TargetRequest};
 pub use dwell_time::TimeLimits;
 pub use policy::Choice;
 pub use profile::Profile;
-pub use report::{Detection, Tracked};
+pub use report::{Detection, Released, Tracked};
 pub use state::Tracker;

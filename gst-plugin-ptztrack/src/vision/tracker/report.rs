@@ -33,8 +33,8 @@ pub struct Tracked {
     pub state: TargetState,
     /// What happened in this frame, in order.
     pub changes: Vec<TargetChange>,
-    /// Why the target was released, where it was.
-    pub released: Option<ReleaseReason>,
+    /// Who was released, where somebody was: another may be the target in the same picture.
+    pub released: Option<Released>,
     /// Number of the target, from 1; 0 where there is none.
     pub id: u64,
     /// Box of the target; predicted while it is hidden.
@@ -61,6 +61,23 @@ pub struct Tracked {
     pub track_changes: Vec<(TrackChange, u64, Option<u64>)>,
 }
 
+/// A target that was let go, as it was last seen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Released {
+    /// Why.
+    pub reason: ReleaseReason,
+    /// Its number.
+    pub id: u64,
+    /// Its box.
+    pub bounds: Rect,
+    /// Its centre of mass.
+    pub centroid: Point,
+    /// In the picture, the camera's own motion included.
+    pub velocity: Vector,
+    /// 0 to 1.
+    pub confidence: f64,
+}
+
 impl Tracked {
     /// Tells of a target of that number; who came and went stays.
     pub(super) fn tell_of(&mut self, state: TargetState, id: u64, target: &dyn Follow, frame: Frame) {
@@ -72,12 +89,19 @@ impl Tracked {
         self.features.extend(kept.chain(rejected));
         let estimate = target.estimate();
         let ego = estimate.ego_velocity;
-        (self.state, self.id, self.released) = (state, id, None);
+        (self.state, self.id) = (state, id);
         self.bounds = frame.rect(estimate.bounds);
         self.centroid = frame.point(estimate.centroid);
         self.velocity = frame.vector(estimate.own_velocity + ego.unwrap_or_default());
         self.ego_velocity = ego.map(|ego| frame.vector(ego));
         self.confidence = f64::from(estimate.confidence);
+    }
+
+    /// Whom it tells of is let go.
+    pub(super) fn release(&mut self, reason: ReleaseReason) {
+        let Self { id, bounds, centroid, velocity, confidence, .. } = *self;
+        self.released = Some(Released { reason, id, bounds, centroid, velocity, confidence });
+        self.changes.push(TargetChange::Released);
     }
 
     /// Tells how the background moves, `dt_s` after the last picture: without a target in the middle of the picture.

@@ -54,8 +54,7 @@ impl Tracker {
         }
         tracked.tell_of(TargetState::Searching, target.id, &*target.follow, frame);
         tracked.features.clear();
-        tracked.released = Some(reason);
-        tracked.changes.push(TargetChange::Released);
+        tracked.release(reason);
         Phase::Searching(None)
     }
 

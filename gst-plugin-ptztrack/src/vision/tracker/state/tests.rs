@@ -396,7 +396,9 @@ fn whoever_walks_while_hidden_does_not_stand() {
     let there = stand(3.0, 130.0);
     assert_at(&there[17], 130.0, 100.0);
     assert!(
-        there.iter().any(|tracked| tracked.released == Some(ReleaseReason::Stationary)),
+        there.iter().any(|tracked| tracked
+            .released
+            .is_some_and(|released| released.reason == ReleaseReason::Stationary)),
         "they stand now"
     );
 }
