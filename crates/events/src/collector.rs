@@ -9,6 +9,9 @@ use crate::{Crop, Sighting, Step};
 /// Between two steps of a path, at first.
 const STEP: Duration = Duration::from_secs(1);
 
+/// A clock that is kept right by the network is never so far off.
+const JUMP_MS: u64 = 60_000;
+
 /// Whom a camera follows, in one picture.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
@@ -69,14 +72,22 @@ impl Collector {
         let ended = if self.now.as_ref().map(|now| now.sighting.track) == track { None } else { self.end() };
         if let Some(target) = target {
             if self.now.is_none() {
-                // A clock may have been set since the tracker was started.
-                self.began_ms = now_ms - milliseconds(elapsed);
+                self.begin(now_ms - milliseconds(elapsed));
             }
             let at_ms = self.began_ms + milliseconds(elapsed);
             let begin = || Followed::new(&self.camera, self.run_ms, target.track, at_ms);
             self.now.get_or_insert_with(begin).see(at_ms, target);
         }
         ended
+    }
+
+    /// The tracker was started then, by the clock as it is now: it may have been set meanwhile. Then nothing of before is of the same
+    /// sighting, which would last as long as the clock was off.
+    fn begin(&mut self, began_ms: i64) {
+        if began_ms.abs_diff(self.began_ms) > JUMP_MS {
+            self.run_ms = began_ms;
+        }
+        self.began_ms = began_ms;
     }
 
     /// Takes a picture of them that is this sharp, where it is better than those before.
@@ -167,7 +178,10 @@ mod tests {
         collector.see(at(2000), 90_001_000, Some(&SECOND));
         collector.see(at(3000), 90_002_000, Some(&SECOND));
         let second = collector.end().unwrap().sighting;
-        assert_eq!((second.run_ms, second.from_ms, second.to_ms), (1_000_000, 90_001_000, 90_002_000));
+        assert_eq!((second.run_ms, second.from_ms, second.to_ms), (89_999_000, 90_001_000, 90_002_000));
+        collector.see(at(4000), 90_003_010, Some(&FIRST));
+        let third = collector.end().unwrap().sighting;
+        assert_eq!((third.run_ms, third.from_ms), (89_999_000, 90_003_010), "of the same run");
     }
 
     #[test]

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use std::mem;
 use std::time::Duration;
 
 use servo::{Motion, Position, Presets};
@@ -49,6 +50,8 @@ pub struct Client {
     warning: Option<String>,
     /// What is known of it somebody else found out, and nothing was said by it yet.
     inherits: bool,
+    /// Of what it can do no more is known than commands need that are not to wait: it is asked before the first question.
+    lacks_abilities: bool,
 }
 
 /// What became of our user and password.
@@ -92,6 +95,7 @@ impl session::Client for Client {
             late_statuses: 0,
             warning: None,
             inherits: false,
+            lacks_abilities: false,
             identity,
         };
         // Of a camera that nothing is known of it is asked.
@@ -115,16 +119,10 @@ impl session::Client for Client {
     }
 
     async fn exchange(&mut self, request: &Request) -> Result<Response, Error> {
-        if self.inherits && matches!(request, Request::Query(_)) {
-            // What it can do is not inherited but for commands, which are not to wait for it.
-            self.abilities = None;
-            self.inherits = false;
-        }
         let answer = self.answer(request).await;
-        if self.inherits && answer.is_err() {
+        if mem::take(&mut self.inherits) && answer.is_err() {
             // It may be otherwise than it was then.
             (self.clock, self.services, self.profile, self.abilities) = (None, None, None, None);
-            self.inherits = false;
         }
         answer
     }
@@ -136,7 +134,10 @@ impl session::Client for Client {
 
 impl Client {
     async fn answer(&mut self, request: &Request) -> Result<Response, Error> {
-        let abilities = self.connected().await?;
+        let mut abilities = self.connected().await?;
+        if self.lacks_abilities && matches!(request, Request::Query(_)) {
+            abilities = self.ask_abilities().await?;
+        }
         match request {
             Request::Command(command) => {
                 self.send(command, &abilities).await?;
@@ -178,7 +179,7 @@ impl Client {
         (self.services, self.profile, self.moves) = (Some(services), Some(profile), moves);
         self.abilities = Some(Abilities::with_timeout(timeout));
         self.clock = Some(CameraClock::ahead_by(clock_ahead_s));
-        self.inherits = true;
+        (self.inherits, self.lacks_abilities) = (true, true);
     }
 
     /// Whether the camera turns, by its own word.
@@ -256,6 +257,11 @@ impl Client {
         if let Some(abilities) = &self.abilities {
             return Ok(abilities.clone());
         }
+        self.ask_abilities().await
+    }
+
+    /// What it can do. What was known before stays until it has answered.
+    async fn ask_abilities(&mut self) -> Result<Abilities, Error> {
         let configuration = self.profile.as_ref().map_or("", |profile| &profile.configuration).to_owned();
         let options = messages::get_configuration_options(&configuration);
         let abilities = match self.call(Path::Ptz, &options).await {
@@ -267,6 +273,7 @@ impl Client {
         if abilities.timeout == MoveTimeout::Never {
             self.warn_of_no_timeout();
         }
+        self.lacks_abilities = false;
         Ok(self.abilities.insert(abilities).clone())
     }
 
@@ -445,10 +452,9 @@ impl Client {
         };
         let message = messages::continuous_move(self.profile(), velocity, Some(after));
         let moved = self.call(Path::Ptz, &message).await;
-        let (refusal, is_for_good) = match moved {
-            // One that is busy may take the next.
-            Err(refusal @ Error::Camera(_)) => (refusal, self.moves.refuses_timeout()),
-            Err(broken @ Error::Broken(_)) if self.moves.refuses_timeout() => (broken, true),
+        let (refusal, breaks) = match moved {
+            Err(refusal @ Error::Camera(_)) => (refusal, false),
+            Err(broken @ Error::Broken(_)) if self.moves.breaks_at_timeout() => (broken, true),
             other => {
                 self.moves.took_timeout(other.is_ok());
                 return other.map(drop);
@@ -457,7 +463,8 @@ impl Client {
         let message = messages::continuous_move(self.profile(), velocity, None);
         // Where it refuses even so, it was not for the timeout.
         self.call(Path::Ptz, &message).await.map_err(|err| worse(refusal, err))?;
-        if !is_for_good {
+        // One that was busy may take the next.
+        if !breaks && !self.moves.refuses_timeout() {
             return Ok(());
         }
         if let Some(abilities) = &mut self.abilities {

@@ -22,8 +22,11 @@ pub struct Moves {
     broken_zooms: u32,
     /// The zoom is left alone.
     leaves_zoom: bool,
-    /// Moves with a timeout, in a row, that the camera refused, or at which it closed the connection.
+    /// Moves with a timeout, in a row, at which the camera closed the connection.
     broken_timeouts: u32,
+    /// Those that it refused, and took without one.
+    #[serde(default)]
+    refused_timeouts: u32,
 }
 
 impl Default for Moves {
@@ -34,6 +37,7 @@ impl Default for Moves {
             broken_zooms: 0,
             leaves_zoom: false,
             broken_timeouts: 0,
+            refused_timeouts: 0,
         }
     }
 }
@@ -42,7 +46,7 @@ impl Moves {
     /// After so many moves with zoom whose answers were none, the zoom is left alone (onvifsim: TL-IPC652P-A4).
     const BROKEN_ZOOMS: u32 = 2;
 
-    /// After so many moves with a timeout that the camera refused, or at which it closed the connection, it takes none.
+    /// After so many moves with a timeout at which the camera closed the connection, or that it refused, it is moved without one.
     const BROKEN_TIMEOUTS: u32 = 2;
 
     /// How to stop the camera this time: a stop after a stop is told in the other words.
@@ -72,16 +76,22 @@ impl Moves {
         self.stopped = false;
     }
 
-    /// The camera refused a move with a timeout, or closed the connection at it; returns whether that is likely to be for the timeout.
-    pub fn refuses_timeout(&mut self) -> bool {
+    /// The camera closed the connection at a move with a timeout; returns whether it may be for that.
+    pub fn breaks_at_timeout(&mut self) -> bool {
         self.broken_timeouts += 1;
         self.broken_timeouts > Self::BROKEN_TIMEOUTS
+    }
+
+    /// The camera refused a move with a timeout and took it without; returns whether it is for that, and not for being busy.
+    pub fn refuses_timeout(&mut self) -> bool {
+        self.refused_timeouts += 1;
+        self.refused_timeouts > Self::BROKEN_TIMEOUTS
     }
 
     /// What became of a move with a timeout otherwise.
     pub fn took_timeout(&mut self, taken: bool) {
         if taken {
-            self.broken_timeouts = 0;
+            (self.broken_timeouts, self.refused_timeouts) = (0, 0);
         }
     }
 

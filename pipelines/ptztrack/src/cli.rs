@@ -13,6 +13,7 @@ use pipeline_supervisor::video::rtsp_host;
 use crate::ask_events::AskEvents;
 use crate::config::{CameraSettings, Codec, Credentials, Protocol, Secret, Watchdogs};
 use crate::discovery::{Found, ask};
+use crate::event::{Event, Level};
 use crate::log::{Format, Log};
 use crate::point::Point;
 use crate::shard::Shard;
@@ -123,7 +124,7 @@ impl Follow {
     /// # Errors
     /// What is wrong with it.
     pub async fn camera(&self, log: &Log) -> Result<CameraSettings, String> {
-        self.check()?;
+        self.check(log)?;
         let credentials =
             self.user.as_ref().map(|user| self.password().map(|password| (user, password))).transpose()?;
         let credentials = credentials.map(|(user, password)| Credentials { user: user.clone(), password });
@@ -154,17 +155,15 @@ impl Follow {
     }
 
     /// What can be wrong before anybody is asked.
-    fn check(&self) -> Result<(), String> {
+    fn check(&self, log: &Log) -> Result<(), String> {
         if self.rtsp.as_deref().is_some_and(|rtsp| rtsp_host(rtsp).is_none()) {
             return Err("--rtsp needs an address such as rtsp://192.168.0.90:554".to_owned());
         }
-        // Some sinks for windows crash without one.
+        // Some sinks for windows crash without one, and a few need none.
         if self.show && ["DISPLAY", "WAYLAND_DISPLAY"].iter().all(|name| std::env::var_os(name).is_none()) {
-            return Err(
-                "--show needs a display, and neither DISPLAY nor WAYLAND_DISPLAY is set: leave it out, or look at the page by \
-                 --http 127.0.0.1:9100"
-                    .to_owned(),
-            );
+            let detail = "neither DISPLAY nor WAYLAND_DISPLAY is set: if this ends here, leave out --show, or look at the page by \
+                          --http 127.0.0.1:9100";
+            log.tell(&Event::new(Level::Warning, None, "no-display", detail));
         }
         Ok(())
     }

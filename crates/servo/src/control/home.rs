@@ -109,6 +109,12 @@ impl HomeReturn {
         self.at_start = false;
     }
 
+    /// It may do something else at our word; where it started is still to be told.
+    pub fn doubted(&mut self) {
+        self.settled = false;
+        self.at_start = false;
+    }
+
     /// It has taken the command to go home. Where it was to go there no longer by then, it is on no way of ours.
     pub fn taken(&mut self) {
         self.strayed();

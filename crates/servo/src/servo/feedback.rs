@@ -47,7 +47,7 @@ impl Servo {
         let Actuation::Move(Motion::Velocity { zoom, .. }) = actuation else { return };
         // A move home that was under way may be over by it.
         self.moves.rest(now);
-        self.home.strayed();
+        self.home.doubted();
         if let Some(zoom) = zoom.filter(|zoom| *zoom != 0.0) {
             self.zoom.commanded(now, zoom);
         }

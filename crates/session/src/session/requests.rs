@@ -62,10 +62,6 @@ impl Session {
             // What became of the last move nobody knows, and the next one may be as late: over a network that holds them
             // back for seconds no target is followed by moves.
             Actuation::Move(_) if self.scheduler.is_unsure() => (stop, stop_due()),
-            // It goes on by the last move, and the next one has to wait for long, as it was refused.
-            Actuation::Move(_) if !self.is_at_rest() && retry_at > now + Connection::LONGEST_PAUSE => {
-                (stop, stop_due())
-            }
             Actuation::Move(motion) => {
                 let command = Command::of(motion, self.description.wants_free_moves());
                 let not_before = retry_at.max(self.modes.not_before(&command));

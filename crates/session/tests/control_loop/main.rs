@@ -442,26 +442,6 @@ fn a_move_that_the_user_may_not_make_is_tried_rarely() {
 }
 
 #[test]
-fn a_camera_that_refuses_the_next_moves_for_long_is_stopped_meanwhile() {
-    let mut rig = Rig::new(ServoSettings::default());
-    rig.see(0.9, 0.5);
-    assert!(matches!(rig.after(ms(0))[..], [Command::Move { .. }]));
-    let mut sent = Vec::new();
-    for _ in 0..5 {
-        rig.now += ms(100);
-        // Further away from one picture to the next.
-        rig.see(0.9 + f64::from(sent.len() as u32) / 100.0, 0.5);
-        rig.run(|command| match command.is_stop() {
-            true => Ok(Response::Accepted),
-            false => Err(Error::NotPermitted { user: "root".to_owned() }),
-        });
-        sent.append(&mut rig.sent);
-    }
-    let stops = sent.iter().position(Command::is_stop);
-    assert!(stops == Some(2) && sent.len() <= 5, "at the second refusal: {sent:?}");
-}
-
-#[test]
 fn absolute_mode_steps_from_rest_to_rest() {
     let mut rig = Rig::new(ServoSettings { mode: Mode::Absolute, ..ServoSettings::default() });
     rig.see(1.0, 0.5);

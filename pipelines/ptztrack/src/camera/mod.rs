@@ -130,7 +130,8 @@ impl Camera {
         let known = Arc::new(Known::new(&settings.name));
         known.take_control(control);
         let is_same = |before: &CameraSettings| {
-            (&before.address, &before.credentials) == (&settings.address, &settings.credentials)
+            let of = |of: &CameraSettings| (of.protocol, of.address.clone(), of.rtsp.clone());
+            of(before) == of(&settings) && before.credentials == settings.credentials
         };
         // User and password that were right are tried again, where the camera refuses them for a while.
         if predecessor
