@@ -30,6 +30,15 @@ if [ -z "${CAMERA:-}" ]; then
     exit 2
 fi
 
+# Anything else is no address, and no new start would make it one.
+case ${CAMERA,,} in
+http://?* | https://?*) ;;
+*)
+    echo "CAMERA needs http:// or https:// before the host, as http://192.168.0.90." >&2
+    exit 2
+    ;;
+esac
+
 CAMERA=${CAMERA%/}
 host=${CAMERA#*://}
 host=${host%%/*}

@@ -11,7 +11,9 @@ pub mod reach;
 mod supervisor;
 pub mod video;
 
+use std::cell::RefCell;
 use std::error::Error;
+use std::rc::Rc;
 
 pub use backoff::Backoff;
 pub use log_in::LogIn;
@@ -22,10 +24,10 @@ const ENDS: [i32; 3] = [1, 2, 15];
 
 /// Runs what `build` makes, again and again, until the process is told to end; `on_message` hears every message. To be
 /// called in the main thread: it runs the default main context. Nothing is started while nobody accepts the connection of a
-/// `souphttpsrc`, or `build` ends with a [`video::Failure`] that may pass; standard error says why.
+/// `souphttpsrc`, or `build` ends with a [`video::Failure`] that may pass; an error of no element says why.
 ///
 /// # Errors
-/// Those of [`Supervisor::run`].
+/// Those of [`Supervisor::run`], and an address of a `souphttpsrc` that is none.
 pub fn run(
     mut build: impl FnMut() -> Result<gst::Pipeline, Box<dyn Error>>,
     on_message: impl FnMut(&gst::Message) + 'static,
@@ -38,20 +40,22 @@ pub fn run(
             glib::ControlFlow::Continue
         })
     });
+    let on_message = Rc::new(RefCell::new(on_message));
+    let hears = on_message.clone();
     let reached = || {
-        let pipeline = match build().map_err(|err| err.downcast::<video::Failure>()) {
-            Ok(pipeline) => pipeline,
+        let built = build().and_then(|pipeline| reach::check_sources(&pipeline).map(|()| pipeline));
+        match built.map_err(|err| err.downcast::<video::Failure>()) {
+            Ok(pipeline) => Ok(Some(pipeline)),
             Err(Ok(failure)) if !failure.refused => {
-                eprintln!("{failure}");
-                return Ok(None);
+                let said = gst::message::Error::new(gst::ResourceError::OpenRead, &failure.reason);
+                on_message.borrow_mut()(&said);
+                Ok(None)
             }
-            Err(Ok(refused)) => return Err(refused.into()),
-            Err(Err(err)) => return Err(err),
-        };
-        let reached = reach::check_sources(&pipeline).inspect_err(|reason| eprintln!("{reason}"));
-        Ok(reached.is_ok().then_some(pipeline))
+            Err(Ok(refused)) => Err(refused.into()),
+            Err(Err(err)) => Err(err),
+        }
     };
-    let result = supervisor.run(reached, on_message);
+    let result = supervisor.run(reached, move |message| hears.borrow_mut()(message));
     signals.into_iter().for_each(glib::SourceId::remove);
     result
 }

@@ -13,7 +13,8 @@ use session::http::{
 };
 use url::Url;
 
-use crate::video::{Ended, LONGEST_SILENCE, Video};
+use crate::reach::ADVICE;
+use crate::video::{Ended, Failure, LONGEST_SILENCE, Video};
 
 /// Logs in for one pipeline after the other.
 #[derive(Debug)]
@@ -54,6 +55,11 @@ impl LogIn {
         Ok(())
     }
 
+    /// What ended the pictures of the pipeline that runs, where that is known better than an element can say.
+    pub fn ended(&self) -> Option<Failure> {
+        self.ended.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
     fn open(
         &self,
         source: &gst::Element,
@@ -83,7 +89,9 @@ impl LogIn {
         source.set_property("user-id", None::<&str>);
         if by_rtsp {
             let found = move || async move { Ok((origin, target)) };
-            Video::rtsp(&source.name(), settings, found, Duration::ZERO, self.ended.clone())?.connect(source);
+            Video::rtsp(&source.name(), settings, found, Duration::ZERO, self.ended.clone())
+                .map_err(|failure| Failure { reason: format!("{failure}. {ADVICE}"), ..failure })?
+                .connect(source);
         } else {
             let video = Video::http(&source.name(), settings, target)?;
             video.connect(&in_place_of(source)?);
@@ -140,7 +148,6 @@ mod tests {
     use std::net::TcpListener;
 
     use super::*;
-    use crate::video::Failure;
 
     /// A user and a password in an address reach no message: whoever reads the journal would know them.
     #[test]

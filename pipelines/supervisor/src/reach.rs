@@ -5,6 +5,7 @@
 //! A connection that `souphttpsrc` gives up before it is accepted costs a file descriptor for good: libsoup keeps what runs
 //! it. A camera that hangs, or is behind a cable that was pulled, would cost one with every other try.
 
+use std::error::Error;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::Duration;
 
@@ -12,19 +13,25 @@ use gst::prelude::*;
 use session::http::without_user_info;
 use url::Url;
 
+use crate::video::Failure;
+
 /// As long as a pipeline's own source waits.
 const PATIENCE: Duration = Duration::from_secs(1);
 /// Of RTSP, where an address has none (RFC 7826, section 4.2).
 const RTSP_PORT: u16 = 554;
+/// What a person can do about nothing coming from an address.
+pub const ADVICE: &str = "Check the address, the cable and the camera";
 
 /// Connects to the host of an address, and leaves it at that.
 ///
 /// # Errors
-/// Why nobody accepts a connection there.
-pub fn check(address: &str) -> Result<(), String> {
-    let (host, port) =
-        endpoint(address).ok_or_else(|| format!("{} names no host", without_user_info(address)))?;
-    let said = |err: std::io::Error| format!("{host}, port {port}: {err}");
+/// [`Failure`] where nobody accepts a connection there, and another where nobody ever will, as it is no address.
+pub fn check(address: &str) -> Result<(), Box<dyn Error>> {
+    let (host, port) = endpoint(address).ok_or_else(|| {
+        let shown = without_user_info(address);
+        format!("`{shown}` names no host: an address begins with http:// or https://")
+    })?;
+    let said = |err: std::io::Error| Failure::new(format!("{host}, port {port}: {err}. {ADVICE}"));
     let addresses = (host.as_str(), port).to_socket_addrs().map_err(said)?;
     let mut last = std::io::Error::other("the name has no address");
     for address in addresses {
@@ -33,14 +40,14 @@ pub fn check(address: &str) -> Result<(), String> {
             Err(err) => last = err,
         }
     }
-    Err(said(last))
+    Err(said(last).into())
 }
 
 /// Connects to whom `souphttpsrc` asks for an address: a proxy, where there is one.
 ///
 /// # Errors
 /// Those of [`check`].
-pub fn check_http(address: &str, proxy: Option<String>) -> Result<(), String> {
+pub fn check_http(address: &str, proxy: Option<String>) -> Result<(), Box<dyn Error>> {
     match proxy.filter(|proxy| !proxy.is_empty()) {
         Some(proxy) if proxy.contains("://") => check(&proxy),
         // It is often given without.
@@ -53,7 +60,7 @@ pub fn check_http(address: &str, proxy: Option<String>) -> Result<(), String> {
 ///
 /// # Errors
 /// Those of [`check`].
-pub fn check_sources(pipeline: &gst::Pipeline) -> Result<(), String> {
+pub fn check_sources(pipeline: &gst::Pipeline) -> Result<(), Box<dyn Error>> {
     for element in pipeline.iterate_recurse().into_iter().flatten() {
         if element.factory().is_some_and(|factory| factory.name() == "souphttpsrc")
             && let Some(address) = element.property::<Option<String>>("location")
@@ -100,11 +107,20 @@ mod tests {
             check_http(camera, Some(proxy)).unwrap();
         }
         drop(proxy);
-        assert!(
-            check_http(camera, Some(address.clone())).unwrap_err().contains(&address.replace(':', ", port "))
-        );
+        let said = |proxy| check_http(camera, proxy).unwrap_err().to_string();
+        assert!(said(Some(address.clone())).contains(&address.replace(':', ", port ")));
         for none in [None, Some(String::new())] {
-            assert!(check_http(camera, none).unwrap_err().starts_with("127.0.0.1, port 1: "));
+            assert!(said(none).starts_with("127.0.0.1, port 1: "));
+        }
+    }
+
+    /// Nobody who is not there may come to be there, at what is no address.
+    #[test]
+    fn what_is_no_address_is_no_failure_that_may_pass() {
+        let passes = |address| check(address).unwrap_err().is::<Failure>();
+        assert!(passes("http://127.0.0.1:1"));
+        for address in ["127.0.0.1:1", "localhost:1", "http://"] {
+            assert!(!passes(address), "{address}");
         }
     }
 }

@@ -3,9 +3,10 @@
 //! Video and PTZ are lost together, and both come back when the camera does.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::collections::HashSet;
 use std::time::{Duration, Instant};
 
-use end_to_end::following::{Following, MJPEG, RTSP, Video, python, rust, script};
+use end_to_end::following::{Following, MJPEG, Network, RTSP, Video, python, rust, script};
 use end_to_end::{GstLaunch, PATIENCE, Way, scene, scratch};
 use virtual_camera::VirtualCamera;
 
@@ -66,10 +67,51 @@ fn embedded_in_rust() {
 #[test]
 fn a_wrong_password_is_not_tried_for_ever() {
     let camera = VirtualCamera::start(scene::walking_person()).unwrap();
-    let mut command = script("headless.sh");
-    command.env("CAMERA", camera.url()).env("CAMERA_USER", scene::USER).env("CAMERA_PASSWORD", "falsch");
-    let (status, output) = GstLaunch::spawn(command).finish();
-    assert!(!status.success() && output.contains("Not restarted"), "{output}");
+    for file in ["headless.sh", "h264-rtsp.sh"] {
+        let mut command = script(file);
+        command.env("CAMERA", camera.url()).env("RTSP", camera.rtsp_url());
+        command.env("CAMERA_USER", scene::USER).env("CAMERA_PASSWORD", "falsch");
+        let (status, output) = GstLaunch::spawn(command).finish();
+        assert!(!status.success() && output.contains("Not restarted"), "{output}");
+        assert_eq!(output.matches("refuses user").count(), 1, "{output}");
+        assert!(!output.contains("tried again"), "{output}");
+    }
+}
+
+/// Each reason once, however often it is tried again, and that the picture is there.
+#[test]
+fn an_outage_is_told_once_and_so_is_its_end() {
+    for (file, video) in [("headless.sh", MJPEG), ("h264-rtsp.sh", RTSP)] {
+        let mut following = Following::start(|_| script(file));
+        following.starts_anew(video, |following| {
+            following.network.set(Way::Refused);
+            following.is_lost();
+            following.network.set(Way::Open);
+        });
+        following.launch.wait_for_line("the picture is there");
+        following.launch.signal("TERM");
+        let (status, output) = following.launch.finish();
+        assert!(status.success() && output.matches("the picture is there").count() == 1, "{output}");
+        let told: Vec<_> =
+            output.lines().filter(|line| line.contains("tried again until it is back")).collect();
+        let different: HashSet<_> = told.iter().collect();
+        assert!(!told.is_empty() && told.len() == different.len(), "{output}");
+    }
+}
+
+#[test]
+fn a_wrong_address_of_the_stream_is_told_once_and_by_its_name() {
+    let camera = VirtualCamera::start(scene::walking_person()).unwrap();
+    let network = Network::before(&camera);
+    let mut command = script("onvif-rtsp.sh");
+    network.surround(&mut command);
+    let stream = format!("rtsp://{}/none", network.rtsp.address());
+    let launch = GstLaunch::spawn(command.env("STREAM", &stream));
+    (0..4).for_each(|before| network.rtsp.wait_for_video_request(before));
+    launch.signal("TERM");
+    let (_, output) = launch.finish();
+    let told: Vec<_> = output.lines().filter(|line| line.contains("tried again until it is back")).collect();
+    assert!(told.len() == 1 && told[0].contains(&format!("{stream}: Not found")), "{output}");
 }
 
 /// Each part of a recording stays.

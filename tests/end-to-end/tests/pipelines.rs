@@ -134,6 +134,17 @@ fn without_a_camera_each_says_how_it_is_used() {
     }
 }
 
+/// It would never be reached.
+#[test]
+fn an_address_without_a_scheme_ends_each_at_once() {
+    for file in scripts() {
+        let output = Command::new(&file).env("CAMERA", "127.0.0.1:1").output().unwrap();
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(2), "{file:?}: {said}");
+        assert!(said.starts_with("CAMERA needs http:// or https://"), "{file:?}: {said}");
+    }
+}
+
 #[test]
 fn no_file_is_left_out_here() {
     let this = include_str!("pipelines.rs");
