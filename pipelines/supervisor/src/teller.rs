@@ -115,8 +115,7 @@ impl<O: Write, E: Write> Teller<O, E> {
                 self.picture_comes();
             }
             gst::MessageView::Element(element) => {
-                let structure = element.structure().filter(|structure| !is_told_by_warning(structure));
-                if let Some(structure) = structure {
+                if let Some(structure) = element.structure() {
                     self.tell(structure.to_string());
                 }
             }
@@ -241,12 +240,6 @@ fn post_picture(pad: &gst::Pad, pipeline: &glib::WeakRef<gst::Pipeline>) -> gst:
     gst::PadProbeReturn::Remove
 }
 
-/// A sink that loses its camera, or is refused, says so for programs, and with what to do in a warning.
-fn is_told_by_warning(structure: &gst::StructureRef) -> bool {
-    let change = structure.get::<&str>("change").unwrap_or_default();
-    structure.has_name("ptztrack-camera") && matches!(change, "disconnected" | "refused")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -355,13 +348,17 @@ mod tests {
         assert_eq!(told(&mut teller.out).len(), 1);
         for _ in 0..3 {
             begin(&mut teller);
-            ["disconnected", "refused", "connected"].iter().for_each(|change| teller.hear(&camera(change)));
+            ["disconnected", "connected"].iter().for_each(|change| teller.hear(&camera(change)));
         }
         assert!(teller.out.is_empty());
         teller.hear(&picture());
         teller.hear(&camera("moving"));
         let told = told(&mut teller.out);
-        assert!(told.len() == 2 && told[0].contains("connected") && told[1].contains("moving"), "{told:?}");
+        let expected = ["disconnected", "connected", "moving"];
+        assert!(
+            told.len() == 3 && told.iter().zip(expected).all(|(line, word)| line.contains(word)),
+            "{told:?}"
+        );
     }
 
     #[test]
