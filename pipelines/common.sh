@@ -48,6 +48,15 @@ case $host in
 esac
 RTSP=${RTSP:-rtsp://$host:554}
 RTSP=${RTSP%/}
+for address in "$RTSP" "${STREAM:-rtsp://}"; do
+    case ${address,,} in
+    rtsp://* | rtsps://*) ;;
+    *)
+        echo "$address is no address of RTSP: it begins with rtsp:// or rtsps://." >&2
+        exit 2
+        ;;
+    esac
+done
 if [ -z "${VIDEO_SINK:-}" ]; then
     if [ -n "${DISPLAY:-}${WAYLAND_DISPLAY:-}" ]; then VIDEO_SINK=autovideosink; else VIDEO_SINK=fakesink; fi
 fi

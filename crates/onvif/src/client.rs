@@ -265,9 +265,15 @@ impl Client {
         let configuration = self.profile.as_ref().map_or("", |profile| &profile.configuration).to_owned();
         let options = messages::get_configuration_options(&configuration);
         let abilities = match self.call(Path::Ptz, &options).await {
-            Ok(body) => parse_abilities(&body),
-            // It may be moved all the same.
-            Err(err) if err.is_answer() || matches!(err, Error::Broken(_)) => Abilities::default(),
+            Ok(body) => {
+                // By its own word.
+                self.inherits = false;
+                parse_abilities(&body)
+            }
+            // It may be moved all the same, by what is known.
+            Err(err) if err.is_answer() || matches!(err, Error::Broken(_)) => {
+                self.abilities.clone().unwrap_or_default()
+            }
             Err(err) => return Err(err),
         };
         if abilities.timeout == MoveTimeout::Never {

@@ -18,14 +18,18 @@ use std::error::Error;
 use std::io::{stderr, stdout};
 use std::process::ExitCode;
 use std::rc::Rc;
+use std::time::Duration;
 
 use gst::prelude::*;
 use pipeline_supervisor::LogIn;
 use teller::{Teller, run_suffix};
 
+/// A fault that comes and goes is told no more often.
+const QUIET: Duration = Duration::from_secs(5);
+
 fn main() -> ExitCode {
     let log_in = Rc::new(LogIn::new(std::env::var("CAMERA_PASSWORD").unwrap_or_default()));
-    let teller = Rc::new(RefCell::new(Teller::new(log_in.clone(), stdout(), stderr())));
+    let teller = Rc::new(RefCell::new(Teller::new(log_in.clone(), stdout(), stderr(), QUIET)));
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let hears = teller.clone();
     let next = || {

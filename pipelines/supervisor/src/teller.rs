@@ -3,10 +3,12 @@
 //! Tells a user what elements have to say: a fault once when it begins, and when it is over.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::error::Error;
 use std::io::Write;
 use std::iter::successors;
 use std::rc::Rc;
+use std::time::{Duration, Instant};
 
 use gst::prelude::*;
 use pipeline_supervisor::LogIn;
@@ -37,13 +39,25 @@ pub struct Teller<O, E> {
     gone: bool,
     /// What it said since then that is no fault: most pipelines without a picture say the same.
     held: Vec<String>,
-    /// Faults that were told since the last picture, and by which pipeline first: two elements of one may say the same.
-    said: HashMap<String, u32>,
+    /// Warnings of this pipeline that one before it gave as well: an element that goes on with a picture does not repeat them.
+    repeated: Vec<String>,
+    said: HashMap<String, Said>,
+    /// A fault that comes and goes is told no more often.
+    quiet: Duration,
+}
+
+/// A fault that was told.
+struct Said {
+    /// By this pipeline first: two elements of one may say the same.
+    run: u32,
+    at: Instant,
+    /// There was a picture since.
+    over: bool,
 }
 
 impl<O: Write, E: Write> Teller<O, E> {
-    /// With nothing heard yet; `log_in` knows some faults better than elements do.
-    pub fn new(log_in: Rc<LogIn>, out: O, err: E) -> Self {
+    /// With nothing heard yet; `log_in` knows some faults better than elements do, and one that comes and goes is told once in `quiet`.
+    pub fn new(log_in: Rc<LogIn>, out: O, err: E, quiet: Duration) -> Self {
         Self {
             log_in,
             out,
@@ -55,7 +69,9 @@ impl<O: Write, E: Write> Teller<O, E> {
             picture: false,
             gone: false,
             held: Vec::new(),
+            repeated: Vec::new(),
             said: HashMap::new(),
+            quiet,
         }
     }
 
@@ -68,6 +84,7 @@ impl<O: Write, E: Write> Teller<O, E> {
         self.run += 1;
         self.picture = false;
         self.held.clear();
+        self.repeated.clear();
         self.run
     }
 
@@ -79,7 +96,8 @@ impl<O: Write, E: Write> Teller<O, E> {
             let pipeline = pipeline.downgrade();
             for pad in sink.sink_pads() {
                 let pipeline = pipeline.clone();
-                pad.add_probe(gst::PadProbeType::BUFFER, move |pad, _| post_picture(pad, &pipeline));
+                let data = gst::PadProbeType::BUFFER | gst::PadProbeType::BUFFER_LIST;
+                pad.add_probe(data, move |pad, _| post_picture(pad, &pipeline));
             }
         }
     }
@@ -106,8 +124,11 @@ impl<O: Write, E: Write> Teller<O, E> {
             gst::MessageView::Warning(warning) => {
                 let warning = warning.error();
                 // While there are pictures, elements tell each fault once by themselves.
+                let line = format!("WARNING: {}: {warning}", from());
                 if self.picture || self.is_new(warning.message()) {
-                    let _ = writeln!(self.err, "WARNING: {}: {warning}", from());
+                    let _ = writeln!(self.err, "{line}");
+                } else {
+                    keep(&mut self.repeated, line);
                 }
             }
             gst::MessageView::Info(info) => self.tell(format!("INFO: {}: {}", from(), info.error())),
@@ -131,50 +152,63 @@ impl<O: Write, E: Write> Teller<O, E> {
             _ if refused => self.refusal = Some(reason),
             ended => {
                 let reason = ended.map_or(reason, |ended| self.at_cameras(&ended.reason));
-                self.tell_fault(&reason, "; it is tried again until it is back");
-                self.gone = true;
+                self.gone |= self.tell_fault(&reason, "; it is tried again until it is back");
             }
         }
     }
 
     fn tell(&mut self, line: String) {
         if self.gone {
-            if self.held.len() >= MOST_SAID {
-                self.held.remove(0);
-            }
-            self.held.push(line);
+            keep(&mut self.held, line);
         } else {
             let _ = writeln!(self.out, "{line}");
         }
     }
 
-    fn tell_fault(&mut self, fault: &str, what_now: &str) {
-        if self.is_new(fault) {
+    /// Returns whether it was told now.
+    fn tell_fault(&mut self, fault: &str, what_now: &str) -> bool {
+        let is_new = self.is_new(fault);
+        if is_new {
             // An element's own sentence ends here.
             let fault = fault.trim_end_matches('.').trim_end_matches("; retrying");
             let _ = writeln!(self.err, "ERROR: {fault}{what_now}");
         }
+        is_new
     }
 
     fn picture_comes(&mut self) {
         self.picture = true;
-        self.said.clear();
+        self.said.values_mut().for_each(|said| said.over = true);
         if std::mem::take(&mut self.gone) {
             let _ = writeln!(self.err, "INFO: the picture is there");
             for line in std::mem::take(&mut self.held) {
                 self.tell(line);
             }
         }
+        for line in std::mem::take(&mut self.repeated) {
+            let _ = writeln!(self.err, "{line}");
+        }
     }
 
-    /// Whether no pipeline before this one has said that since the last picture.
+    /// Whether no pipeline before this one has said that since the last picture, nor lately.
     fn is_new(&mut self, text: &str) -> bool {
         if self.said.len() >= MOST_SAID {
             self.said.clear();
         }
         // Each writes to a file of its own.
         let text = text.replace(&run_suffix(self.run), "");
-        *self.said.entry(text).or_insert(self.run) == self.run
+        let now = Said { run: self.run, at: Instant::now(), over: false };
+        match self.said.entry(text) {
+            Entry::Occupied(mut said) if said.get().over && said.get().at.elapsed() >= self.quiet => {
+                said.insert(now);
+                true
+            }
+            Entry::Occupied(said) => said.get().run == self.run && !said.get().over,
+            Entry::Vacant(place) => {
+                place.insert(now);
+                true
+            }
+        }
     }
 
     /// What is wrong, where, and what to do.
@@ -226,10 +260,21 @@ fn silence(element: &gst::Object) -> Option<i32> {
     (factory.name() == "watchdog").then(|| element.property("timeout"))
 }
 
-/// Has the pipeline say that a picture has come; packets, as a `watchdog` in a branch of its own has them, are none yet.
+/// Keeps the last of them.
+fn keep(lines: &mut Vec<String>, line: String) {
+    if lines.len() >= MOST_SAID {
+        lines.remove(0);
+    }
+    lines.push(line);
+}
+
+/// Has the pipeline say that a picture has come; packets that go nowhere, as in the branch of a `watchdog`, are none yet.
 fn post_picture(pad: &gst::Pad, pipeline: &glib::WeakRef<gst::Pipeline>) -> gst::PadProbeReturn {
-    let caps = pad.current_caps();
-    if caps.is_some_and(|caps| caps.structure(0).is_some_and(|caps| caps.has_name("application/x-rtp"))) {
+    let is_rtp = pad
+        .current_caps()
+        .is_some_and(|caps| caps.structure(0).is_some_and(|caps| caps.has_name("application/x-rtp")));
+    let factory = pad.parent_element().and_then(|sink| sink.factory());
+    if is_rtp && factory.is_some_and(|factory| factory.name() == "fakesink") {
         return gst::PadProbeReturn::Ok;
     }
     if let Some(pipeline) = pipeline.upgrade() {
@@ -248,7 +293,7 @@ mod tests {
 
     fn teller() -> Teller<Vec<u8>, Vec<u8>> {
         gst::init().unwrap();
-        Teller::new(Rc::new(LogIn::new("plugh")), Vec::new(), Vec::new())
+        Teller::new(Rc::new(LogIn::new("plugh")), Vec::new(), Vec::new(), Duration::ZERO)
     }
 
     /// Another begins, with a source and a sink.
@@ -316,6 +361,26 @@ mod tests {
         assert_eq!(outage(&mut teller), expected, "the pipeline with a picture ended by itself");
     }
 
+    /// As where a disk is full: each pipeline has a picture, and fails.
+    #[test]
+    fn a_fault_that_comes_and_goes_is_told_once_in_a_while() {
+        let mut teller = Teller { quiet: Duration::from_secs(3600), ..teller() };
+        assert_eq!(outage(&mut teller).last().unwrap(), "INFO: the picture is there");
+        for _ in 0..10 {
+            let sink = element(&begin(&mut teller), "filesink");
+            teller.hear(&error(&sink, gst::ResourceError::NoSpaceLeft, "no space left"));
+            teller.hear(&picture());
+        }
+        let lines = told(&mut teller.err);
+        let count = |text: &str| lines.iter().filter(|line| line.contains(text)).count();
+        assert_eq!((count("no space left"), count("the picture is there")), (1, 1), "{lines:?}");
+        // Where it stays, it is told as soon as it may be.
+        teller.quiet = Duration::ZERO;
+        let sink = element(&begin(&mut teller), "filesink");
+        teller.hear(&error(&sink, gst::ResourceError::NoSpaceLeft, "no space left"));
+        assert_eq!(told(&mut teller.err).len(), 1);
+    }
+
     #[test]
     fn each_warning_of_a_pipeline_is_told_and_those_of_the_next_only_where_they_are_others() {
         let mut teller = teller();
@@ -330,6 +395,8 @@ mod tests {
             [2, 0, 2, 0]
         );
         teller.hear(&picture());
+        // They will not be said again by those who go on.
+        assert_eq!(told(&mut teller.err).iter().filter(|line| line.ends_with("refused")).count(), 2);
         let pipeline = begin(&mut teller);
         teller.hear(&picture());
         told(&mut teller.err);
@@ -427,6 +494,8 @@ mod tests {
         gst::init().unwrap();
         assert!(has_picture("fakesrc num-buffers=1 ! fakesink"));
         assert!(!has_picture("fakesrc num-buffers=1 ! application/x-rtp ! fakesink"));
+        // Whoever passes packets on has no other.
+        assert!(has_picture("fakesrc num-buffers=1 ! application/x-rtp ! filesink location=/dev/null"));
         assert!(!has_picture("fakesrc num-buffers=0 ! fakesink"));
     }
 }
