@@ -15,8 +15,6 @@ pub use clip::{Clip, Form, NoClip, Purpose, cut};
 pub use files::{now_ms, pieces};
 pub use segments::Segments;
 
-use segments::Arrivals;
-
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
@@ -26,6 +24,7 @@ use std::time::{Duration, Instant};
 use gst::prelude::*;
 use ptztrack_contract::lock::lock;
 
+use self::segments::Arrivals;
 use super::bounds::{self, cost};
 use crate::config::{Codec, Recording};
 use crate::event::{Event, Level};
@@ -273,8 +272,9 @@ impl Feed {
     }
 }
 
-/// Notes when pictures come that need no other. Ends the recording with an error where pictures go on and on that need the one before: `splitmuxsink` keeps them all until one
-/// comes that needs no other. Which ones do is known behind the parser only: not every depayloader says so, as that of MPEG-4.
+/// Notes when pictures come that need no other. Ends the recording with an error where pictures go on and on that need the one before:
+/// `splitmuxsink` keeps them all until one comes that needs no other. Which ones do is known behind the parser only: not every
+/// depayloader says so, as that of MPEG-4.
 fn watch_groups(source: &gst_app::AppSrc, arrivals: Arc<Arrivals>) {
     let Some(pad) = parsed(source) else { return };
     let kept = AtomicUsize::new(0);
