@@ -13,7 +13,7 @@ use tokio::signal::unix::{Signal, SignalKind, signal};
 use tokio::task::JoinHandle;
 use tokio::time::{Interval, interval};
 
-use crate::config::{Again, Config, NotLoaded, Watchdogs};
+use crate::config::{Again, CameraSettings, Config, NotLoaded, Watchdogs};
 use crate::event::{Event, Level};
 use crate::fleet::Fleet;
 use crate::handover::{Exchange, HandingOver};
@@ -205,7 +205,8 @@ fn read_again(
 ) -> Option<Config> {
     // Its reason to fail would be that no plugin can be read, and the cameras say what they lack.
     let _ = gst::Registry::update();
-    match origin.read().map(|config| Again::of(config, current)) {
+    let counts = |read| if only_changes { waited_for(read, current) } else { read };
+    match origin.read().map(|config| Again::of(counts(config), current)) {
         Ok(again) if only_changes && again.config == *current => None,
         Ok(Again { config, needs_restart, lost }) => {
             log.info("read-again", "the configuration was read again");
@@ -233,6 +234,25 @@ fn read_again(
     }
 }
 
+/// Of what was read, cameras and services that waited for it: whoever saved something else has yet to ask for it.
+fn waited_for(read: Config, current: &Config) -> Config {
+    let now = |camera: &CameraSettings| {
+        let has_waited = camera.no_password.is_some();
+        let found = read.cameras.iter().find(|read| has_waited && read.name == camera.name);
+        found.unwrap_or(camera).clone()
+    };
+    let cameras = current.cameras.iter().map(now).collect();
+    let waiting = current.waiting();
+    let waits = |table| waiting.iter().any(|(waiting, _)| *waiting == table);
+    Config {
+        cameras,
+        http: if waits("http") { read.http } else { current.http.clone() },
+        mqtt: if waits("mqtt") { read.mqtt } else { current.mqtt.clone() },
+        restream: if waits("restream") { read.restream } else { current.restream.clone() },
+        ..current.clone()
+    }
+}
+
 async fn end(terminate: &mut Signal, interrupt: &mut Signal) {
     tokio::select! {
         _ = terminate.recv() => {}
@@ -255,4 +275,35 @@ async fn tick(interval: &mut Option<Interval>) {
 /// Without systemd there is nobody to tell.
 fn notify(state: &[NotifyState]) {
     let _ = sd_notify::notify(state);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file with these addresses of two cameras, the second of which waits for its password, as the broker does.
+    fn config(first: &str, second: &str, password: &str) -> Config {
+        let text = format!(
+            "[mqtt]\nhost = \"{first}\"\nuser = \"u\"\npassword-file = \"{password}\"\n\
+             [camera.a]\naddress = \"http://{first}\"\n\
+             [camera.b]\naddress = \"http://{second}\"\nuser = \"u\"\npassword-file = \"{password}\"\n"
+        );
+        Config::parse(&text).unwrap()
+    }
+
+    #[test]
+    fn what_did_not_wait_changes_only_where_it_is_asked_for() {
+        gst::init().unwrap();
+        let current = config("a", "b", "/nowhere/password");
+        assert_eq!(current.waiting().len(), 1);
+        // The password is there, and meanwhile somebody edits the rest.
+        let password = std::env::temp_dir().join(format!("ptztrack-waited-{}", std::process::id()));
+        std::fs::write(&password, "xyzzy").unwrap();
+        let read = config("c", "d", password.to_str().unwrap());
+        std::fs::remove_file(password).unwrap();
+        let counts = waited_for(read.clone(), &current);
+        assert_eq!(counts.cameras, [current.cameras[0].clone(), read.cameras[1].clone()]);
+        assert_eq!(counts.mqtt, read.mqtt);
+        assert_eq!(waited_for(current.clone(), &read).cameras, read.cameras, "nobody waits");
+    }
 }
