@@ -185,6 +185,8 @@ async fn told_by(address: &str) -> Vec<String> {
 mod tests {
     use std::io::ErrorKind;
 
+    use socket2::{Domain, Socket, Type};
+
     use super::*;
 
     #[test]
@@ -210,6 +212,15 @@ mod tests {
         }
     }
 
+    /// Where a host of this machine is asked; a virtual camera beside it listens at all addresses.
+    fn asked_at(host: [u8; 4]) -> std::net::UdpSocket {
+        let socket = Socket::new(Domain::IPV4, Type::DGRAM, None).unwrap();
+        socket.set_reuse_address(true).unwrap();
+        socket.set_nonblocking(true).unwrap();
+        socket.bind(&SocketAddr::from((host, onvif::GROUP.port())).into()).unwrap();
+        socket.into()
+    }
+
     /// Whoever hears the question can answer it, too; and who does not can send what looks as if its own host had sent it.
     #[tokio::test]
     async fn where_else_it_is_is_told_by_its_own_host() {
@@ -220,7 +231,7 @@ mod tests {
                  </e:Body></e:Envelope>"
             )
         };
-        let camera = UdpSocket::bind(("127.0.0.2", onvif::GROUP.port())).await.unwrap();
+        let camera = UdpSocket::from_std(asked_at([127, 0, 0, 2])).unwrap();
         let stranger = UdpSocket::bind("127.0.0.3:0").await.unwrap();
         tokio::spawn(async move {
             let mut question = [0; 4096];
@@ -238,8 +249,7 @@ mod tests {
     /// Who answers the question is logged in to by plain HTTP.
     #[tokio::test]
     async fn who_is_asked_by_https_is_asked_nowhere_else() {
-        let camera = std::net::UdpSocket::bind(("127.0.0.4", onvif::GROUP.port())).unwrap();
-        camera.set_nonblocking(true).unwrap();
+        let camera = asked_at([127, 0, 0, 4]);
         let question = || camera.recv_from(&mut [0; 4096]).map_err(|err| err.kind());
         // Nobody is at this port.
         for address in ["https://127.0.0.4:1", "HTTPS://127.0.0.4:1"] {
