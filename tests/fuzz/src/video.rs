@@ -33,9 +33,10 @@ fn is_packet(bytes: &[u8]) -> bool {
 /// Pictures are the same once they were passed on, and in whatever pieces they came.
 pub fn multipart(bytes: &[u8]) -> bool {
     let whole = pictures(bytes, bytes.len());
-    for size in [1, 2, 3, 7, bytes.len() / 2] {
-        assert_eq!(pictures(bytes, size), whole, "in pieces of {size}");
-    }
+    // One of them for each input: there are millions, and a byte at a time takes longest.
+    let sizes = [1, 2, 3, 7, bytes.len() / 2];
+    let size = sizes[bytes.len() % sizes.len()];
+    assert_eq!(pictures(bytes, size), whole, "in pieces of {size}");
     let Some(passed) = whole else { return false };
     assert_eq!(pictures(&passed, passed.len()).as_ref(), Some(&passed));
     !passed.is_empty()
