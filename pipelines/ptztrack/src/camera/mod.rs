@@ -129,17 +129,14 @@ impl Camera {
     ) -> Self {
         let known = Arc::new(Known::new(&settings.name));
         known.take_control(control);
-        let is_same = |before: &CameraSettings| {
-            let of = |of: &CameraSettings| (of.protocol, of.address.clone(), of.rtsp.clone());
-            of(before) == of(&settings) && before.credentials == settings.credentials
-        };
         // User and password that were right are tried again, where the camera refuses them for a while.
-        if predecessor
-            .as_ref()
-            .is_some_and(|before| is_same(&before.settings) && before.known.worked.load(Ordering::Relaxed))
-        {
-            known.worked.store(true, Ordering::Relaxed);
-        }
+        let worked = predecessor.as_ref().is_some_and(|before| {
+            let (was, is) = (&before.settings, &settings);
+            (was.protocol, &was.address, &was.rtsp, &was.credentials)
+                == (is.protocol, &is.address, &is.rtsp, &is.credentials)
+                && before.known.worked.load(Ordering::Relaxed)
+        });
+        known.worked.store(worked, Ordering::Relaxed);
         let predecessor = Arc::new(Mutex::new(predecessor.and_then(Self::into_thread)));
         Self { settings, known, runner, log, thread: None, predecessor }
     }

@@ -175,16 +175,15 @@ pub fn make_room(recording: &Recording, camera: &str, segments: &Segments) -> Ro
     let lacks = |share| Disk::of(&recording.folder).map_or(0, |disk| disk.lacks(share));
     let mut files = files(&recording.folder, camera);
     sort_newest_first(&mut files, now_ms());
-    let oldest_first = files.into_iter().skip(1).rev().filter(|file| !segments.is_written(&file.path));
-    let deleted = delete(lacks(FREE_SHARE), oldest_first);
+    let deleted = delete(lacks(FREE_SHARE), files.into_iter().skip(1).rev(), segments);
     Room { deleted, is_short: lacks(LEAST_SHARE) > 0 }
 }
 
-/// Deletes files until so many bytes are free, as soon as the disk has freed them: it does so later, where a file is still read, and some
-/// file systems always. Returns how many it were; one that cannot be deleted keeps none of the others.
-fn delete(mut bytes: u64, files: impl Iterator<Item = Kept>) -> usize {
+/// Deletes files that nobody writes until so many bytes are free, as soon as the disk has freed them: it does so later, where a file is
+/// still read, and some file systems always. Returns how many it were; one that cannot be deleted keeps none of the others.
+fn delete(mut bytes: u64, files: impl Iterator<Item = Kept>, segments: &Segments) -> usize {
     let mut deleted = 0;
-    for file in files {
+    for file in files.filter(|file| !segments.is_written(&file.path)) {
         if bytes == 0 {
             break;
         }
@@ -324,17 +323,24 @@ mod tests {
     }
 
     #[test]
-    fn as_much_is_deleted_as_is_needed() {
+    fn as_much_is_deleted_as_is_needed_but_never_what_is_written() {
         let folder = std::env::temp_dir().join(format!("ptztrack-short-{}", std::process::id()));
         fs::create_dir_all(&folder).unwrap();
-        let paths = ["a", "b", "c"].map(|name| folder.join(name));
+        let paths = ["a", "b", "c", "d"].map(|name| folder.join(name));
         paths.iter().for_each(|path| fs::write(path, "x").unwrap());
         let files = || paths.iter().map(|path| kept(path.to_str().unwrap(), 40));
         let there = || paths.iter().map(|path| path.exists()).collect::<Vec<_>>();
-        assert_eq!((delete(0, files()), there()), (0, vec![true, true, true]));
-        assert_eq!((delete(40, files()), there()), (1, vec![false, true, true]));
+        let (segments, writer) = (Segments::default(), Arc::new(()));
+        segments.begin(None, 0, |_| paths[2].clone(), &writer);
+        segments.begin(None, 1, |_| paths[3].clone(), &writer);
+        assert_eq!((delete(0, files(), &segments), there()), (0, vec![true, true, true, true]));
+        assert_eq!((delete(40, files(), &segments), there()), (1, vec![false, true, true, true]));
         // One that is gone already frees nothing.
-        assert_eq!((delete(41, files()), there()), (2, vec![false, false, false]));
+        assert_eq!((delete(41, files(), &segments), there()), (2, vec![false, false, false, true]));
+        assert_eq!((delete(u64::MAX, files(), &segments), there()[3]), (0, true), "what is written stays");
+        // As when it is begun anew.
+        drop(writer);
+        assert_eq!((delete(1, files(), &segments), there()[3]), (1, false));
         fs::remove_dir_all(&folder).unwrap();
     }
 
