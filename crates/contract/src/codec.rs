@@ -89,6 +89,11 @@ impl<'a> Reader<'a> {
         self.tuple(field, values)
     }
 
+    /// The same, `None` where the field is absent.
+    pub fn numbers_optional<const N: usize>(&self, field: &str) -> Result<Option<[f64; N]>, ContractError> {
+        if self.0.has_field(field) { self.numbers(field).map(Some) } else { Ok(None) }
+    }
+
     /// A flat list of finite numbers, `N` to an item.
     pub fn tuples<const N: usize>(&self, field: &str) -> Result<Vec<[f64; N]>, ContractError> {
         let mut tuples = Vec::with_capacity(self.list(field)?.len() / N);

@@ -27,10 +27,16 @@ impl CameraMotion {
 
     fn from_structure(structure: &gst::StructureRef) -> Result<Self, ContractError> {
         let reader = Reader::new(structure, Self::NAME)?;
-        let [a, b, c, d, e, f, g, h, i] = reader.numbers("homography")?;
-        let homography = Homography([[a, b, c], [d, e, f], [g, h, i]]);
-        Ok(Self { homography, covariance: reader.numbers("covariance")?, inliers: reader.get("inliers")? })
+        Ok(Self {
+            homography: homography(reader.numbers("homography")?),
+            covariance: reader.numbers("covariance")?,
+            inliers: reader.get("inliers")?,
+        })
     }
+}
+
+fn homography([a, b, c, d, e, f, g, h, i]: [f64; 9]) -> Homography {
+    Homography([[a, b, c], [d, e, f], [g, h, i]])
 }
 
 /// One plane of a reduced picture, a byte a pixel, rows packed. Copies share the pixels.
@@ -75,6 +81,9 @@ pub struct SceneMeta {
     pub from_pts: Option<gst::ClockTime>,
     /// How the camera moved since; `None` where that is not known (first picture, cut, nothing to hold on to).
     pub camera_motion: Option<CameraMotion>,
+    /// How it is taken to have moved since where that was not seen for a moment: as it did before. The motion of the next picture starts
+    /// from there. From a place in the earlier picture to its place in this one, both normalised.
+    pub coasted_motion: Option<Homography>,
     /// The picture's luma.
     pub luma: Plane,
     /// The picture's chroma, U and V (B−Y and R−Y, 128 for grey); `None` where it has no colour.
@@ -105,6 +114,9 @@ impl BufferMeta for SceneMeta {
         if let Some(motion) = self.camera_motion {
             structure.set("camera-motion", motion.to_structure());
         }
+        if let Some(motion) = self.coasted_motion {
+            structure.set("coasted-motion", codec::flat(motion.0));
+        }
         structure.set("luma", self.luma.to_structure());
         if let Some([u, v]) = &self.chroma {
             structure.set("u", u.to_structure());
@@ -122,6 +134,7 @@ impl BufferMeta for SceneMeta {
                 .get_optional("camera-motion")?
                 .map(CameraMotion::from_structure)
                 .transpose()?,
+            coasted_motion: reader.numbers_optional("coasted-motion")?.map(homography),
             luma: Self::plane(&reader, "luma")?,
             chroma: Self::plane_optional(&reader, "u")?
                 .zip(Self::plane_optional(&reader, "v")?)

@@ -189,6 +189,7 @@ fn scene() -> SceneMeta {
     SceneMeta {
         from_pts: Some(gst::ClockTime::from_mseconds(40)),
         camera_motion: Some(CameraMotion { homography, covariance: [0.1, 0.2, 0.3], inliers: 17 }),
+        coasted_motion: None,
         luma: plane(4, 3, 1),
         chroma: Some([plane(4, 3, 2), plane(4, 3, 3)]),
         foreground: plane(4, 3, 4),
@@ -200,7 +201,12 @@ fn scene() -> SceneMeta {
 fn scenes_travel_and_their_pixels_are_shared() {
     gst::init().unwrap();
     let unknown = SceneMeta { from_pts: None, camera_motion: None, chroma: None, ..scene() };
-    for meta in [scene(), unknown] {
+    let coasted = SceneMeta {
+        camera_motion: None,
+        coasted_motion: Some(Homography([[1.0, 0.0, 0.1], [0.0, 1.0, -0.2], [0.0, 0.0, 1.0]])),
+        ..scene()
+    };
+    for meta in [scene(), unknown, coasted] {
         let mut buffer = gst::Buffer::new();
         meta.attach(buffer.get_mut().unwrap()).unwrap();
         let read = SceneMeta::of(&buffer.copy()).unwrap().unwrap();

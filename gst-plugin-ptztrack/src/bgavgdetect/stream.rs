@@ -183,12 +183,14 @@ impl Stream {
             .update(&picture, config.analysis_width, elapsed, expected)
             .map_err(StreamError::Scene)?;
         self.zones.set(&config.zones, &config.exclude_zones);
-        self.zones.carry(seen.camera_motion.as_ref(), elapsed, heard.view);
+        let motion = seen.camera_motion.map(|motion| motion.homography);
+        self.zones.carry(motion, seen.coasted_motion, elapsed, heard.view);
         let size = (frame.width() as usize, frame.height() as usize);
         let motion = self.detector.process_likelihood(&seen, size, &config, &self.zones)?;
         let scene = SceneMeta {
             from_pts,
             camera_motion: seen.camera_motion,
+            coasted_motion: seen.coasted_motion,
             luma: plane(seen.luma),
             chroma: seen.chroma.map(|chroma| chroma.map(plane)),
             foreground: plane(seen.foreground),

@@ -61,9 +61,10 @@ impl SceneSource {
             && meta.from_pts != *last_pts
         {
             meta.camera_motion = between(&last.luma, &meta.luma, expected)?;
+            meta.coasted_motion = None;
         }
         if before.is_none() {
-            meta.camera_motion = None;
+            (meta.camera_motion, meta.coasted_motion) = (None, None);
         }
         let (meta, _) = self.last.insert((meta, pts));
         Ok(view(meta))
@@ -83,6 +84,7 @@ fn luma(plane: &Plane) -> Luma<'_> {
 fn view(meta: &SceneMeta) -> SceneView<'_> {
     SceneView {
         camera_motion: meta.camera_motion,
+        coasted_motion: meta.coasted_motion,
         luma: luma(&meta.luma),
         chroma: meta.chroma.as_ref().map(|[u, v]| [luma(u), luma(v)]),
         foreground: luma(&meta.foreground),

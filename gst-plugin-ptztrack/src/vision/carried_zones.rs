@@ -4,7 +4,7 @@
 
 use std::time::Duration;
 
-use ptztrack_contract::{CameraMotion, Homography, Point, View};
+use ptztrack_contract::{Homography, Point, View};
 
 use super::camera_motion::displacement;
 use super::zones::Zones;
@@ -40,9 +40,16 @@ impl CarriedZones {
         }
     }
 
-    /// Takes the next picture, to which the camera moved by `motion` within `elapsed`, and the servo's last word.
-    pub fn carry(&mut self, motion: Option<&CameraMotion>, elapsed: Duration, view: Option<View>) {
-        let step = motion.map_or(Homography::IDENTITY, |motion| motion.homography);
+    /// Takes the next picture, to which the camera moved by `motion` within `elapsed`, or, where that was not seen, is taken to have moved
+    /// by `coasted`; and the servo's last word.
+    pub fn carry(
+        &mut self,
+        motion: Option<Homography>,
+        coasted: Option<Homography>,
+        elapsed: Duration,
+        view: Option<View>,
+    ) {
+        let step = motion.or(coasted).unwrap_or(Homography::IDENTITY);
         self.since = self.since.then(&step);
         let rests = motion.is_some() && displacement(&step, MIDDLE) < RESTS;
         self.rest = if rests { self.rest.saturating_add(elapsed) } else { Duration::ZERO };
@@ -96,8 +103,8 @@ mod tests {
         camera.view()
     }
 
-    fn motion(x: f64) -> CameraMotion {
-        CameraMotion { homography: Homography::translation(x, 0.0), ..CameraMotion::default() }
+    fn motion(x: f64) -> Option<Homography> {
+        Some(Homography::translation(x, 0.0))
     }
 
     fn zones(zones: &str, exclude_zones: &str) -> CarriedZones {
@@ -114,7 +121,7 @@ mod tests {
     fn a_camera_that_never_turns_has_them_where_they_were_set() {
         let mut carried = zones(RIGHT_HALF, "0.8,0 1,0 1,1 0.8,1");
         for _ in 0..100 {
-            carried.carry(Some(&motion(0.0)), STEP, None);
+            carried.carry(motion(0.0), None, STEP, None);
         }
         assert_eq!([0.3, 0.6, 0.9].map(|x| carried.allow(at(x))), [false, true, false]);
     }
@@ -122,7 +129,7 @@ mod tests {
     #[test]
     fn without_zones_everything_is_allowed_everywhere() {
         let mut carried = zones("", "");
-        carried.carry(Some(&motion(-0.7)), STEP, view(0.0, 0.0));
+        carried.carry(motion(-0.7), None, STEP, view(0.0, 0.0));
         assert!(carried.allow(at(0.1)) && carried.allow(at(0.9)));
     }
 
@@ -130,7 +137,18 @@ mod tests {
     fn they_go_with_the_background() {
         let mut carried = zones(RIGHT_HALF, "");
         for _ in 0..10 {
-            carried.carry(Some(&motion(-0.03)), STEP, None);
+            carried.carry(motion(-0.03), None, STEP, None);
+        }
+        assert_eq!([0.1, 0.3, 0.9].map(|x| carried.allow(at(x))), [false, true, false]);
+    }
+
+    #[test]
+    fn they_go_on_with_a_background_that_is_not_seen_for_a_moment() {
+        let mut carried = zones(RIGHT_HALF, "");
+        for picture in 0..10 {
+            let (seen, coasted) =
+                if picture % 2 == 0 { (motion(-0.03), None) } else { (None, motion(-0.03)) };
+            carried.carry(seen, coasted, STEP, None);
         }
         assert_eq!([0.1, 0.3, 0.9].map(|x| carried.allow(at(x))), [false, true, false]);
     }
@@ -140,12 +158,12 @@ mod tests {
         let mut carried = zones("", RIGHT_HALF);
         let rest = |carried: &mut CarriedZones, pan| {
             for _ in 0..7 {
-                carried.carry(Some(&motion(0.0)), STEP, view(pan, 0.0));
+                carried.carry(motion(0.0), None, STEP, view(pan, 0.0));
             }
         };
         rest(&mut carried, 0.0);
         assert_eq!([0.4, 0.6].map(|x| carried.allow(at(x))), [true, false]);
-        carried.carry(None, STEP, None);
+        carried.carry(None, None, STEP, None);
         rest(&mut carried, 15.0);
         // 15 of 60 degrees to the right, the middle of then is at tan(-15)/tan(30).
         assert_eq!([0.25, 0.29].map(|x| carried.allow(at(x))), [true, false]);
@@ -158,7 +176,7 @@ mod tests {
     #[test]
     fn others_begin_where_the_camera_looks() {
         let mut carried = zones(RIGHT_HALF, "");
-        carried.carry(Some(&motion(-0.5)), STEP, None);
+        carried.carry(motion(-0.5), None, STEP, None);
         assert!(carried.allow(at(0.1)));
         let right: Zones = RIGHT_HALF.parse().unwrap();
         carried.set(&right, &Zones::default());

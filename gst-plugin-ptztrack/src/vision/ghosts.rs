@@ -164,6 +164,7 @@ mod tests {
     fn scene<'a>(picture: &'a Canvas, background: &'a Canvas) -> SceneView<'a> {
         SceneView {
             camera_motion: None,
+            coasted_motion: None,
             luma: picture.luma(),
             chroma: None,
             foreground: Luma::packed(&[255; SIZE.0 * SIZE.1], SIZE.0),

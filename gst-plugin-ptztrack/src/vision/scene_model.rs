@@ -16,6 +16,8 @@ use super::travelling::{TravellingBackground, Way};
 pub struct SceneView<'a> {
     /// How the camera moved since the picture before; `None` where that is not known.
     pub camera_motion: Option<CameraMotion>,
+    /// How it is taken to have moved since, where that was not seen for a moment; the motion of the next picture starts from there.
+    pub coasted_motion: Option<Homography>,
     /// The picture's luma.
     pub luma: Luma<'a>,
     /// Its U and V, where it has colour.
@@ -106,6 +108,7 @@ impl SceneModel {
         let luma = self.picture.luma();
         SceneView {
             camera_motion: self.camera_motion,
+            coasted_motion: self.motion.coasted(),
             luma,
             chroma: self.picture.chroma(),
             foreground: self.background.foreground().unwrap_or(luma),

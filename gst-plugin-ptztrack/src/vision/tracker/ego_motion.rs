@@ -15,9 +15,16 @@ pub(super) struct EgoMotion(Homography);
 impl EgoMotion {
     /// What was seen of it; `None` where it is not known.
     pub fn of(seen: &Observation) -> Option<Self> {
-        let motion = seen.scene?.camera_motion?;
-        let size = (seen.luma.width() as f64, seen.luma.height() as f64);
-        Some(Self(motion.homography.scaled(size.0, size.1)))
+        Some(Self::in_pixels(seen.scene?.camera_motion?.homography, seen))
+    }
+
+    /// What was seen of it, or else what it is taken to have been; `None` where neither is known.
+    pub fn seen_or_coasted(seen: &Observation) -> Option<Self> {
+        Self::of(seen).or_else(|| Some(Self::in_pixels(seen.scene?.coasted_motion?, seen)))
+    }
+
+    fn in_pixels(motion: Homography, seen: &Observation) -> Self {
+        Self(motion.scaled(seen.luma.width() as f64, seen.luma.height() as f64))
     }
 
     /// The picture moves as a whole.

@@ -195,9 +195,9 @@ impl Tracker {
         tracked.track_changes.extend(self.tracks.events().iter().copied());
     }
 
-    /// How the background moved, by what is seen of it or by what is known of the camera.
+    /// How the background moved, by what is seen of it, by how it moved before, or by what is known of the camera.
     fn ego_motion(&self, seen: &Observation) -> Option<EgoMotion> {
-        EgoMotion::of(seen).or(self.camera_rests.then(EgoMotion::default))
+        EgoMotion::seen_or_coasted(seen).or(self.camera_rests.then(EgoMotion::default))
     }
 
     /// Keeps account of everybody, whether a target is followed or not.

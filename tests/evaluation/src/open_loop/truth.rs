@@ -129,6 +129,7 @@ impl Truth {
         let Some(mut scene) = SceneMeta::of(buffer).and_then(Result::ok) else { return Ok(()) };
         if stages.contains(&Stage::Motion) {
             scene.camera_motion = self.motion.map(|motion| self.camera_motion(motion));
+            scene.coasted_motion = None;
         }
         if stages.contains(&Stage::Regions) {
             scene.foreground = self.foreground(&scene.foreground);
@@ -232,6 +233,7 @@ mod tests {
         let scene = SceneMeta {
             from_pts: None,
             camera_motion: None,
+            coasted_motion: None,
             luma: plane(90),
             chroma: None,
             foreground: plane(7),

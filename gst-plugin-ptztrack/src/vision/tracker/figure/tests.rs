@@ -30,6 +30,7 @@ impl Scene {
         let luma = plane(&self.luma);
         let scene = SceneView {
             camera_motion: None,
+            coasted_motion: None,
             luma,
             chroma: None,
             foreground: plane(&self.foreground),

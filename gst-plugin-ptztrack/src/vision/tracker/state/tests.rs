@@ -654,6 +654,24 @@ fn looks_alone_keep_nobody_where_the_background_is_not_known() {
     assert!(lost.is_some_and(|pictures| pictures > 20), "{lost:?}");
 }
 
+/// Where the camera turns, and a plain wall or blur fills the picture for a moment.
+#[test]
+fn tracks_go_on_with_a_background_whose_motion_is_not_seen() {
+    let at = |n: usize| 300.0 - 9.0 * n as f32;
+    let mut chain = following(Profile::Robust, &street((0.0, 0.0), &[(at(0), 100.0, 7)]), at(0), 100.0);
+    for n in 1..10 {
+        let picture = street((at(n) - at(0), 0.0), &[(at(n), 100.0, 7)]);
+        chain.process(&picture, DT, &[detected(at(n), PERSON.0)]);
+    }
+    let plain = Scene::new(SIZE.0, SIZE.1).flat(120);
+    for n in 10..12 {
+        let tracked = step(&mut chain, &plain);
+        assert_eq!(tracked.ego_velocity, None, "nobody saw it");
+        let off = (tracked.bounds.x * SIZE.0 as f64) as f32 - at(n);
+        assert!(off.abs() < 5.0, "picture {n}: {off} pixels off");
+    }
+}
+
 /// Whoever goes after them is to hear of it.
 #[test]
 fn who_is_let_go_after_they_were_lost_is_told_of_once() {

@@ -55,13 +55,15 @@ impl Robust {
         tracks: &mut Tracks,
         id: u64,
     ) -> opencv::Result<()> {
-        let ego = EgoMotion::of(seen).unwrap_or_default();
+        let ego = EgoMotion::seen_or_coasted(seen).unwrap_or_default();
         let expected = self.estimate.own_velocity * dt_s;
         let bounds = self.estimate.bounds;
         let map = self.appearance.map();
         let motion = self.flow.follow(&seen.luma, bounds, (ego, expected), map, dt_s)?;
-        // What the points of a target do that is not seen is what hides it does, or the wall.
-        let Some(motion) = motion.filter(|_| self.unseen_s == 0.0) else { return Ok(()) };
+        // What the points of a target do that is not seen is what hides it does, or the wall; and what they do against a background that
+        // is but taken to have moved may be its own.
+        let has_coasted = seen.scene.is_some_and(|scene| scene.coasted_motion.is_some());
+        let Some(motion) = motion.filter(|_| self.unseen_s == 0.0 && !has_coasted) else { return Ok(()) };
         if let Some(track) = tracks.get_mut(id) {
             let deviation = motion.deviation / (motion.trust * motion.trust).max(0.01);
             track.measure_velocity(motion.own / dt_s, deviation / dt_s);
