@@ -21,8 +21,7 @@
 //!
 //! ## Regions
 //! The closing is upright, as people are: it joins head and legs and not neighbours. A region is reported in the
-//! `confirm-frames`th picture in a row that shows it, with a number, its velocity and how far it has travelled against
-//! the background; `selection` says which.
+//! `confirm-frames`th picture in a row that shows it; `selection` says which.
 //!
 //! Regions whose middle lies outside `zones` or in `exclude-zones` are not reported, and nobody is chosen there; whoever is
 //! followed may go there. Both are polygons separated by `;`, each of three or more points `x,y` separated by spaces, with

@@ -486,6 +486,13 @@ impl LkFeatureTrack {
             gst::info!(CAT, imp = self, "target {} {change:?}", tracked.id);
             self.post(tracked, *change, times);
         }
+        if let Some(id) = tracked.without_corners {
+            gst::element_imp_warning!(
+                self,
+                gst::StreamError::Failed,
+                ("Track {id} cannot be followed, as nothing in it stands out; the target stays. Select somebody with more contrast.")
+            );
+        }
         let has_target = has_target(tracked.state);
         let interval = gst::ClockTime::from_nseconds(settings.message_interval_ns);
         stream.since_message = stream.since_message.saturating_add(step);

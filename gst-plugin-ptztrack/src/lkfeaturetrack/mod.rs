@@ -41,7 +41,8 @@
 //! track of that number.
 //! Applications emit `select-target` (x and y in frame sizes, 0 to 1), `select-track` (a number), `next-target` and
 //! `release-target` instead; what is asked for while the element is stopped is forgotten. A number that nobody has is a warning, and the
-//! target stays. What was released is not chosen again for three seconds. The tracks in `ignored-tracks` are not chosen at all: they become
+//! target stays; so is a place where nothing stands out. What was released, with `selection=group` all of them, is not chosen again for
+//! three seconds. The tracks in `ignored-tracks` are not chosen at all: they become
 //! the target where they are selected.
 //!
 //! ## Giving up

@@ -36,16 +36,21 @@ impl Group {
         self.bounds = None;
     }
 
-    /// Whoever is `ready` to be followed joins, and is in it until there is nobody any more of that number or `is_parked` says that
-    /// they stand. The target, where there is one, is in it at any rate.
+    /// The numbers of all who are in it.
+    pub fn members(&self) -> impl Iterator<Item = u64> + '_ {
+        self.members.iter().copied()
+    }
+
+    /// Whoever is `ready` to be followed joins, and is in it until there is nobody any more of that number or they are to be
+    /// `left_alone`. The target, where there is one, is in it at any rate.
     pub fn gather<'a>(
         &mut self,
         tracks: &Tracks,
         ready: impl Iterator<Item = &'a Track>,
         target: Option<u64>,
-        is_parked: impl Fn(&Track) -> bool,
+        left_alone: impl Fn(&Track) -> bool,
     ) {
-        self.members.retain(|id| tracks.get(*id).is_some_and(|track| !is_parked(track)));
+        self.members.retain(|id| tracks.get(*id).is_some_and(|track| !left_alone(track)));
         for id in ready.map(|track| track.id).chain(target) {
             if !self.members.contains(&id) {
                 self.members.push(id);

@@ -47,7 +47,8 @@ pub enum Choice {
 pub(super) struct Policy {
     /// Who stood, and where, in the newest picture: the place goes with the background.
     parked: Vec<(u64, Rect2f)>,
-    released: Option<(u64, f64)>,
+    /// Who was let go on purpose, and for how many seconds more they are left alone.
+    released: Vec<(u64, f64)>,
     /// Who is chosen by nobody but an operator.
     ignored: Arc<[u64]>,
 }
@@ -78,7 +79,8 @@ impl Policy {
 
     /// That track was let go on purpose: it is not chosen again for a while.
     pub fn release(&mut self, id: u64) {
-        self.released = Some((id, RELEASE_HOLD_S));
+        self.released.retain(|(released, _)| *released != id);
+        self.released.push((id, RELEASE_HOLD_S));
     }
 
     /// So much time passes, in which the background moves as `ego`. Where nobody knows how it moves, nobody knows any more where
@@ -89,7 +91,10 @@ impl Policy {
             *place = ego.apply_to(*place);
             tracks.get(*id).is_none_or(|track| stands_at(*place, track.seen_bounds()))
         });
-        self.released = self.released.filter(|(_, left)| *left > dt_s).map(|(id, left)| (id, left - dt_s));
+        self.released.retain_mut(|(_, left_s)| {
+            *left_s -= dt_s;
+            *left_s > 0.0
+        });
     }
 
     /// The tracks that may be followed now: seen, and going somewhere where they `must_travel`.
@@ -106,48 +111,49 @@ impl Policy {
                 && region
                     .is_some_and(|region| !region.outside && (!must_travel || region.restless <= RESTLESS))
                 && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
-                && self.released.is_none_or(|(released, _)| released != track.id)
-                && !self.ignored.contains(&track.id)
-                && !self.is_parked(track)
+                && !self.leaves_alone(track)
                 && (!must_travel || track.travels())
         })
     }
 
+    /// Whether a track is followed only where an operator asks for it, as it is to be ignored, was let go, or stands.
+    pub fn leaves_alone(&self, track: &Track) -> bool {
+        self.released.iter().any(|(released, _)| *released == track.id)
+            || self.ignored.contains(&track.id)
+            || self.is_parked(track)
+    }
+
     /// Whether a track is where somebody stood that was let go, and may be a part of them: who has come from elsewhere is not.
-    pub fn is_parked(&self, track: &Track) -> bool {
+    fn is_parked(&self, track: &Track) -> bool {
         self.parked.iter().any(|(id, place)| {
             let has_come = *id != track.id && track.has_gone_as_far_as(ARM * place.height);
             !has_come && stands_at(*place, track.seen_bounds())
         })
     }
 
-    /// The track to follow now, one that is seen, and going somewhere where it `must_travel`: the one of the number `before` all
-    /// others.
-    pub fn choose<'a>(
+    /// The tracks that may be followed now, going somewhere where they `must_travel`, in the order in which they are tried: the one of the
+    /// number `before` all others, then as is chosen.
+    pub fn choices<'a>(
         &'a self,
         tracks: &'a Tracks,
         choice: Choice,
         before: Option<u64>,
         must_travel: bool,
         frame: Frame,
-    ) -> Option<&'a Track> {
-        let ready = || self.ready(tracks, must_travel, frame);
-        let by = |value: fn(&Track, Frame) -> f64| {
-            let best = move |track: &&Track| value(track, frame);
-            ready().max_by(|a, b| best(a).total_cmp(&best(b)))
+    ) -> Vec<&'a Track> {
+        let value = |track: &Track| match choice {
+            Choice::Largest | Choice::Group => f64::from(track.seen_bounds().area()),
+            Choice::First => -(track.id as f64),
+            Choice::NearestCentre => -f64::from(length(centre(track.seen_bounds()) - centre(frame.bounds()))),
+            Choice::Manual => f64::NEG_INFINITY,
         };
-        if choice == Choice::Manual {
-            return None;
-        }
-        let known = ready().find(|track| Some(track.id) == before);
-        known.or_else(|| match choice {
-            Choice::Largest | Choice::Group => by(|track, _| f64::from(track.seen_bounds().area())),
-            Choice::First => by(|track, _| -(track.id as f64)),
-            Choice::NearestCentre => {
-                by(|track, frame| -f64::from(length(centre(track.seen_bounds()) - centre(frame.bounds()))))
-            }
-            Choice::Manual => None,
-        })
+        let is_known = |track: &Track| Some(track.id) == before;
+        let ready = self.ready(tracks, must_travel, frame);
+        let mut ready: Vec<_> = ready.filter(|_| choice != Choice::Manual).collect();
+        ready.sort_by(|one, other| {
+            is_known(other).cmp(&is_known(one)).then_with(|| value(other).total_cmp(&value(one)))
+        });
+        ready
     }
 }
 

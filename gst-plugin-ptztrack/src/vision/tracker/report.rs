@@ -35,6 +35,8 @@ pub struct Tracked {
     pub changes: Vec<TargetChange>,
     /// Who was released, where somebody was: another may be the target in the same picture.
     pub released: Option<Released>,
+    /// Number of whom an operator asked for and who cannot be followed, as no corner is seen of them.
+    pub without_corners: Option<u64>,
     /// Number of the target, from 1; 0 where there is none.
     pub id: u64,
     /// Box of the target; predicted while it is hidden.
@@ -147,6 +149,7 @@ impl Default for Tracked {
             state: TargetState::Searching,
             changes: Vec::new(),
             released: None,
+            without_corners: None,
             id: 0,
             bounds: Rect::default(),
             is_group: false,

@@ -189,9 +189,13 @@ impl Tracker {
         Tracked { features, tracks, ..Tracked::default() }
     }
 
+    /// Who is seen, or was a moment ago; and the target.
+    fn told_of(&self, target: u64) -> impl Iterator<Item = &Track> {
+        self.tracks.iter().filter(move |track| track.journey.unseen_s <= TOLD_S || track.id == target)
+    }
+
     fn tell_of_everybody(&self, target: u64, frame: Frame, tracked: &mut Tracked) {
-        let told = self.tracks.iter().filter(|track| track.journey.unseen_s <= TOLD_S || track.id == target);
-        tracked.tracks.extend(told.map(|track| reported(track, target, frame)));
+        tracked.tracks.extend(self.told_of(target).map(|track| reported(track, target, frame)));
         tracked.track_changes.extend(self.tracks.events().iter().copied());
     }
 
@@ -296,7 +300,7 @@ impl Tracker {
             return self.group.disband();
         }
         let ready = self.policy.ready(&self.tracks, must_travel, frame);
-        self.group.gather(&self.tracks, ready, target, |track| self.policy.is_parked(track));
+        self.group.gather(&self.tracks, ready, target, |track| self.policy.leaves_alone(track));
         let group = self.group.follow(&self.tracks, self.ego_motion(seen), dt_s as f32);
         if let (Some(group), Some(_)) = (group, target) {
             tracked.become_group(&group, frame);
@@ -311,8 +315,8 @@ impl Tracker {
         let track = self.tracks.get(target.id);
         let seen = track.filter(|track| track.journey.unseen_s <= MISSED_S);
         if target.dwell.is_on_trial() && seen.is_none_or(Track::goes_nowhere) {
-            let chosen = self.policy.choose(&self.tracks, choice, None, must_travel, frame);
-            return chosen.is_some_and(|track| track.id != target.id);
+            let choices = self.policy.choices(&self.tracks, choice, None, must_travel, frame);
+            return choices.first().is_some_and(|track| track.id != target.id);
         }
         let farthest = track.map_or(0.0, |track| track.journey.farthest);
         let height = target.follow.estimate().bounds.height;

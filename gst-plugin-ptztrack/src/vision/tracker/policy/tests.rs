@@ -25,7 +25,7 @@ impl Chain {
     }
 
     fn choose(&self, choice: Choice, must_travel: bool) -> Option<&Track> {
-        self.policy.choose(&self.tracks, choice, None, must_travel, FRAME)
+        self.policy.choices(&self.tracks, choice, None, must_travel, FRAME).first().copied()
     }
 
     fn chosen(&self) -> Option<Rect2f> {
@@ -52,7 +52,7 @@ fn choices() {
     assert_eq!(x(Choice::NearestCentre), Some(300.0));
     assert_eq!(x(Choice::Manual), None);
     let known = chain.choose(Choice::First, false).map(|track| track.id);
-    let again = chain.policy.choose(&chain.tracks, Choice::Largest, known, false, FRAME);
+    let again = chain.policy.choices(&chain.tracks, Choice::Largest, known, false, FRAME).first().copied();
     assert_eq!(again.map(|track| track.seen_bounds().x), Some(300.0), "who was lost goes before all others");
 }
 

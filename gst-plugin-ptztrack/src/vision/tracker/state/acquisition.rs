@@ -25,9 +25,12 @@ impl Tracker {
             return Ok(self.let_go(phase, ReleaseReason::Request, frame, tracked));
         }
         let Some(id) = self.requested(request, &phase, seen, frame) else { return Ok(phase) };
-        let free = self.let_go(phase, ReleaseReason::Request, frame, tracked);
-        let target = self.acquire(seen, id)?;
-        Ok(target.map_or(free, |target| self.begin(target, frame, tracked)))
+        let Some(target) = self.acquire(seen, id)? else {
+            tracked.without_corners = Some(id);
+            return Ok(phase);
+        };
+        self.let_go(phase, ReleaseReason::Request, frame, tracked);
+        Ok(self.begin(target, frame, tracked))
     }
 
     /// Lets the target go, where there is one.
@@ -50,7 +53,8 @@ impl Tracker {
         };
         if reason != ReleaseReason::Stationary {
             // It may move, and would be taken again at once.
-            self.policy.release(target.id);
+            self.group.members().chain([target.id]).for_each(|id| self.policy.release(id));
+            self.group.disband();
         }
         tracked.tell_of(TargetState::Searching, target.id, &*target.follow, frame);
         tracked.features.clear();
@@ -67,13 +71,16 @@ impl Tracker {
         tracked: &mut Tracked,
     ) -> opencv::Result<Phase> {
         let Config { choice, must_travel, .. } = self.config;
-        let chosen = self.policy.choose(&self.tracks, choice, lost, must_travel, frame);
-        let Some(id) = chosen.map(|track| track.id) else { return Ok(Phase::Searching(lost)) };
-        let Some(mut target) = self.acquire(seen, id)? else { return Ok(Phase::Searching(lost)) };
-        if must_travel {
-            target.dwell = DwellTime::on_trial();
+        let choices = self.policy.choices(&self.tracks, choice, lost, must_travel, frame);
+        let ids: Vec<u64> = choices.iter().map(|track| track.id).collect();
+        for id in ids {
+            let Some(mut target) = self.acquire(seen, id)? else { continue };
+            if must_travel {
+                target.dwell = DwellTime::on_trial();
+            }
+            return Ok(self.begin(target, frame, tracked));
         }
-        Ok(self.begin(target, frame, tracked))
+        Ok(Phase::Searching(lost))
     }
 
     /// Takes up the track of that number; `None` where it cannot be followed.

@@ -20,11 +20,14 @@ impl Tracker {
         seen: &Observation,
         frame: Frame,
     ) -> Option<u64> {
-        let numbers = || self.tracks.iter().map(|track| track.id);
         let now = phase.target().unwrap_or(0);
+        let numbers = || self.told_of(now).map(|track| track.id);
         match request {
             TargetRequest::Release => None,
-            TargetRequest::SelectTrack(id) => numbers().find(|other| *other == id && id != now),
+            TargetRequest::SelectTrack(id) => {
+                let id = self.tracks.number_now(id);
+                numbers().find(|other| *other == id && id != now)
+            }
             TargetRequest::Next => {
                 let next = numbers().filter(|id| *id > now).min().or_else(|| numbers().min());
                 next.filter(|id| *id != now)

@@ -12,6 +12,8 @@ const SIZE: (usize, usize) = (480, 320);
 const PERSON: (f32, f32) = (40.0, 90.0);
 const DT: f64 = 0.1;
 
+mod requests;
+
 fn config() -> Config {
     Config {
         profile: Profile::Robust,
@@ -652,6 +654,19 @@ fn looks_alone_keep_nobody_where_the_background_is_not_known() {
     assert_eq!(process(&[detected(200.0, PERSON.0)]).changes, [TargetChange::Acquired]);
     let lost = (0..200).find(|_| process(&[]).changes.contains(&TargetChange::Lost));
     assert!(lost.is_some_and(|pictures| pictures > 20), "{lost:?}");
+}
+
+/// The same where whoever is hidden is waited for for long: that is no evidence of anybody.
+#[test]
+fn looks_alone_keep_nobody_however_long_the_hidden_are_coasted() {
+    let picture = street((0.0, 0.0), &[(200.0, 100.0, 7)]);
+    let mut tracker = Tracker::new(Config { coast_s: 10.0, ..config() });
+    let mut process = |detections: &[Detection]| {
+        let seen = Observation { luma: picture.luma(), scene: None };
+        tracker.process(&seen, DT, detections).expect("track")
+    };
+    assert_eq!(process(&[detected(200.0, PERSON.0)]).changes, [TargetChange::Acquired]);
+    assert!((0..700).any(|_| process(&[]).changes.contains(&TargetChange::Lost)));
 }
 
 /// Where the camera turns, and a plain wall or blur fills the picture for a moment.

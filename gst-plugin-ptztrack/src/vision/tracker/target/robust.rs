@@ -96,12 +96,12 @@ impl Follow for Robust {
         let stands_out = known.unwrap_or(NOT_KNOWN);
         let is_there = place.share >= FOUND && !is_wall && (is_alone || !tracks.is_anothers(place.bounds));
         self.estimate.is_borne_out = is_measured || (is_there && stands_out >= FAINT);
+        if is_there && !is_alone && stands_out >= FAINT {
+            tracks.stand_out(id, stands_out, dt_s);
+        }
         let Some(track) = tracks.get_mut(id) else { return Ok(Sight::Gone) };
         if is_there && !is_alone {
             track.measure_place(centre(place.bounds), place.share);
-            if stands_out >= FAINT {
-                track.stand_out(stands_out, dt_s);
-            }
         }
         self.unseen_s = if is_measured || is_there { 0.0 } else { self.unseen_s + dt_s };
         let is_hidden = self.unseen_s > DOUBT_S;

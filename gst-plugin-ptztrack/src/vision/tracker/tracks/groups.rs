@@ -82,7 +82,7 @@ impl Partings {
             for other in tracks.iter().filter(|other| {
                 one.id < other.id
                     && matches!(other.evidence, Evidence::Alone(_))
-                    && one.companions.contains(&other.id)
+                    && (one.companions.contains(&other.id) || other.companions.contains(&one.id))
             }) {
                 let ids = (one.id, other.id);
                 if !self.0.iter().any(|parting| parting.ids == ids) {

@@ -113,6 +113,9 @@ impl Tracks {
     pub(super) fn merge(&mut self, part: usize, whole: usize, keeps_number: bool) {
         let (part_id, whole_id) = (self.tracks[part].id, self.tracks[whole].id);
         self.tracks[part].end();
+        let companions = std::mem::take(&mut self.tracks[part].companions);
+        self.tracks[whole].companions.extend(companions);
+        self.tracks[whole].companions.retain(|id| *id != part_id && *id != whole_id);
         let &Journey { age_s, pictures, farthest, .. } = &self.tracks[part].journey;
         let journey = &mut self.tracks[whole].journey;
         journey.age_s = journey.age_s.max(age_s);

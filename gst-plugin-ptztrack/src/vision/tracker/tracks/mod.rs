@@ -96,6 +96,8 @@ pub(super) struct Tracks {
     /// Memory: who is seen in one region.
     members: Vec<usize>,
     last_id: u64,
+    /// As the rules were last.
+    coast_s: f64,
 }
 
 impl Tracks {
@@ -122,6 +124,7 @@ impl Tracks {
     ) {
         let frame = Frame { width: seen.luma.width() as f32, height: seen.luma.height() as f32 };
         self.events.clear();
+        self.coast_s = rules.coast_s;
         self.tracks.retain(|track| !track.is_gone());
         self.tracks.iter_mut().for_each(|track| track.predict(ego, dt_s));
         self.places.carry(ego, dt_s);
@@ -179,6 +182,14 @@ impl Tracks {
     /// How much of what is in `bounds` stands out from the background, 0 to 1; `None` where that is hardly known.
     pub fn stands_out(&mut self, seen: &Observation, bounds: Rect2f) -> Option<f32> {
         self.viewer.stands_out(seen, bounds)
+    }
+
+    /// No region shows that track alone, but where its looks say that it is so much stands out, 0 to 1, for `dt_s`.
+    pub fn stand_out(&mut self, id: u64, shown: f32, dt_s: f32) {
+        let share = dt_s / self.coast_s as f32;
+        if let Some(track) = self.get_mut(id) {
+            track.stand_out(shown, share);
+        }
     }
 
     /// Whether somebody else than the target is in `area`.

@@ -81,6 +81,36 @@ fn somebody_small_is_not_lost_among_many_who_are_larger() {
     }
 }
 
+/// As whoever was found again behind somebody is: only one of the two knows of it.
+#[test]
+fn who_is_who_is_weighed_whichever_of_two_knows_that_they_met() {
+    for knows in [0, 1] {
+        let mut tracks = Tracks::default();
+        let see = |tracks: &mut Tracks| {
+            for _ in 0..15 {
+                seen_in(tracks, &[person(100.0), person(300.0)], STILL, DT);
+            }
+        };
+        see(&mut tracks);
+        let other = tracks.tracks[1 - knows].id;
+        tracks.tracks[knows].companions.push(other);
+        see(&mut tracks);
+        assert!(tracks.iter().all(|track| track.companions.is_empty() && track.is_seen_whole()));
+    }
+}
+
+#[test]
+fn whoever_goes_into_another_leaves_them_whom_it_met() {
+    let mut tracks = Tracks::default();
+    for _ in 0..5 {
+        seen_in(&mut tracks, &[person(100.0), person(200.0), person(300.0)], STILL, DT);
+    }
+    let ids: Vec<_> = tracks.tracks.iter().map(|track| track.id).collect();
+    tracks.tracks[0].companions = vec![ids[1], ids[2]];
+    tracks.merge(0, 1, true);
+    assert_eq!((tracks.tracks[1].id, &tracks.tracks[1].companions), (ids[0], &vec![ids[2]]));
+}
+
 #[test]
 fn the_cameras_own_motion_is_no_motion_of_theirs() {
     let mut tracks = Tracks::default();

@@ -29,8 +29,8 @@ const CUT_SIZE: f32 = 0.6;
 const FIRST_EXISTENCE: f32 = 0.4;
 const MOST_EXISTENCE: f32 = 3.0;
 const SEEN_PER_S: f32 = 6.0;
-/// What it adds in a second that all of it stands out from the background.
-const STANDS_OUT_PER_S: f32 = 4.0;
+/// What it adds that all of it stands out from the background, for as long as it takes to be gone where it does not.
+const STANDS_OUT: f32 = 12.0;
 /// Deviation of where somebody is by their looks, in heights.
 const LOOKS_NOISE: f32 = 0.08;
 /// How much of the height must be seen for looks to be learned.
@@ -69,9 +69,8 @@ pub(in super::super) struct Journey {
     /// How long it was seen alone, and in one region with others.
     pub alone_s: f64,
     pub shared_s: f64,
-    /// Pictures in which it was seen, and those in a row in which it was seen alone.
+    /// Pictures in which it was seen alone.
     pub pictures: u32,
-    pub in_a_row: u32,
     /// For how long what is seen of it has had another size, seconds.
     pub(super) unlike_s: f64,
     /// And, of that, has stood on the floor as others do.
@@ -131,7 +130,6 @@ impl Track {
                 alone_s: 0.0,
                 shared_s: 0.0,
                 pictures: 1,
-                in_a_row: 1,
                 unlike_s: 0.0,
                 stands_s: 0.0,
                 origin: middle,
@@ -262,7 +260,6 @@ impl Track {
         self.see(Evidence::Alone(number));
         self.journey.alone_s += dt_s;
         self.journey.pictures += 1;
-        self.journey.in_a_row += 1;
         self.journey.way.push_back((bounds, 0.0));
         let away = length(centre(self.bounds()) - self.journey.origin);
         self.journey.farthest = self.journey.farthest.max(away);
@@ -273,7 +270,6 @@ impl Track {
     pub fn see_shared(&mut self, number: usize, measured: bool, dt_s: f64) {
         self.see(Evidence::Shared(number, measured));
         self.journey.shared_s += dt_s;
-        self.journey.in_a_row = 0;
     }
 
     fn see(&mut self, evidence: Evidence) {
@@ -284,7 +280,6 @@ impl Track {
     /// Is not seen for that share of the time after which nobody is there for certain.
     pub fn miss(&mut self, hidden: bool, share: f64) {
         let hidden = if hidden { HIDDEN_SHARE } else { 1.0 };
-        self.journey.in_a_row = 0;
         self.existence -= hidden * MOST_EXISTENCE * share as f32;
     }
 
@@ -311,10 +306,10 @@ impl Track {
         self.down.measure_middle(middle.y, deviation);
     }
 
-    /// No region shows it alone, but where its looks say that it is so much stands out, 0 to 1, for `dt_s`.
-    pub fn stand_out(&mut self, share: f32, dt_s: f32) {
-        let evidence = STANDS_OUT_PER_S * share;
-        self.existence = (self.existence + evidence * dt_s).min(MOST_EXISTENCE);
+    /// No region shows it alone, but where its looks say that it is so much is `shown`, 0 to 1, to stand out, for that share of the time
+    /// after which nobody is there for certain.
+    pub fn stand_out(&mut self, shown: f32, share_of_coast: f32) {
+        self.existence = (self.existence + STANDS_OUT * share_of_coast * shown).min(MOST_EXISTENCE);
     }
 
     /// What it was until now is no part of its way: it was seen in pieces.
