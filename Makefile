@@ -188,7 +188,7 @@ prove: export DURATION := 600
 prove: packages-test
 	@$(CARGO) +nightly miri --version >/dev/null 2>&1 || rustup toolchain install nightly --profile minimal --component miri
 	@$(CARGO) deny --version >/dev/null 2>&1 || $(CARGO) install --locked cargo-deny
-	@scripts/install-packages iproute2 systemd
+	@scripts/install-packages iproute2 iptables systemd
 	$(CARGO) build --workspace --all-targets
 	INPUTS=$(INPUTS) INPUTS_SECONDS=$(INPUTS_SECONDS) scripts/prove $(CHECKS)
 

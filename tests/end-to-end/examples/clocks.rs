@@ -18,8 +18,8 @@ use std::time::Duration;
 
 use chrono::DateTime;
 use end_to_end::{
-    GstLaunch, InView, PATIENCE, Program, Running, Viewer, Watchdog, plugin_folder, scene, scratch, signal,
-    tool,
+    GstLaunch, InView, PATIENCE, Program, Running, Viewer, Watchdog, complaints_in, plugin_folder, scene,
+    scratch, signal, tool,
 };
 use gst::prelude::*;
 use ptztrack_contract::{TargetMessage, TargetState};
@@ -152,9 +152,7 @@ fn machine_jumps(what: &str, settings: Settings, protocol: &str, off_s: i64) {
     assert!(newest.is_some(), "{what}: it tells of the same time as before");
     drop(viewer);
     let said = program.end("TERM");
-    let is_complaint = |line: &&str| line.contains("warning: ") || line.contains("error: ");
-    let complaints: Vec<_> = said.lines().filter(is_complaint).map(str::to_owned).collect();
-    print(what, seen, &complaints);
+    print(what, seen, &complaints_in(&said));
 }
 
 /// When what a document tells of was, in seconds since 1970.

@@ -1,19 +1,22 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! Follows over networks that lose, delay and hold back what they carry, and prints a table in Markdown of how long who is followed is out
-//! of view, how fast the camera turned, and what the user is told:
+//! of view, or off the middle of it with nobody steering the camera, how fast that turned, and what the user is told:
 //!
 //! ```sh
-//! cargo build --workspace --lib --bins && cargo run --example lossy [NETWORK]
+//! cargo build --workspace --lib --bins && sudo -E cargo run --example lossy [NETWORK]
 //! ```
-//! Packets are lost where UDP hands them over; what goes by TCP is late in a proxy, video and control alike.
+//! A pipeline loses packets where UDP hands them over, and has what goes by TCP come late from a proxy, video and control alike. The program
+//! `ptztrack run` has video and control by a cable that loses packets of both directions, which takes root, iproute2 and iptables.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::path::Path;
 use std::sync::Mutex;
 use std::thread;
 use std::time::Duration;
 
-use end_to_end::{Chance, Front, InView, Running, Way, scene};
+use end_to_end::following::Network;
+use end_to_end::{Cable, Chance, Front, InView, Program, Running, Way, complaints_in, scene};
 use gst::prelude::*;
 use virtual_camera::VirtualCamera;
 
@@ -26,7 +29,8 @@ const PACKETS: u64 = 1000;
 
 fn main() {
     println!(
-        "| network | in view | out of view for at most | turns at most | what the user is told |\n|---|---|---|---|---|"
+        "| network | in view | out of view for at most | not steered for at most | turns at most | what the user is told |\n\
+         |---|---|---|---|---|---|"
     );
     let only = std::env::args().nth(1).unwrap_or_default();
     let is_wanted = |network: &str| network.contains(&only);
@@ -35,6 +39,18 @@ fn main() {
         let network = format!("{share} % of packets lost, UDP");
         if is_wanted(&network) {
             by_udp(&network, lost);
+        }
+    }
+    let codecs = [("mjpeg", "MJPEG by HTTP"), ("h264", "H.264 by RTSP")];
+    let by_program = [1, 10, 50].into_iter().flat_map(|lost| codecs.map(|codec| (lost, codec)));
+    for (number, (lost, (codec, by))) in (0..).zip(by_program) {
+        let share = lost as f64 / PACKETS as f64;
+        let network = format!("{} % of packets lost, `ptztrack run`, {by}", share * 100.0);
+        if is_wanted(&network) {
+            let not_run = |reason| {
+                format!("| {network} | not run: {reason}. It takes root, iproute2 and iptables | | | | |")
+            };
+            println!("{}", by_cable(&network, number, share, codec).unwrap_or_else(not_run));
         }
     }
     let ms = Duration::from_millis;
@@ -73,6 +89,26 @@ fn lose(socket: &gst::Element, lost: u64) {
     });
 }
 
+/// The program, which has everything by a cable that loses this share of all packets.
+///
+/// # Errors
+/// Why there is no such cable here.
+fn by_cable(network: &str, number: u8, share: f64, codec: &str) -> Result<String, String> {
+    let cable = Cable::lay(number)?;
+    cable.lose(share)?;
+    let camera = VirtualCamera::start(scene::far_person()).unwrap();
+    let ways = Network::at(cable.camera_side(), &camera);
+    let file = |folder: &Path| {
+        let video = format!("codec = {codec:?}\nrtsp = \"rtsp://{}\"\n", ways.rtsp.address());
+        Program::entry("door", &ways.url(), &folder.join("password")) + &video
+    };
+    let test = format!("lossy-{number}");
+    let program = Program::start_as(&test, file, &[], |command| cable.at_the_end(&command));
+    scene::wait_until_following(&camera);
+    let seen = InView::watch(&camera, WATCHED);
+    Ok(row(network, seen, &complaints_in(&program.end("TERM"))))
+}
+
 /// MJPEG and control by HTTP, over a network that is like this for so long and free again.
 fn by_tcp(what: &str, way: Way, lasts: Duration) {
     let camera = VirtualCamera::start(scene::far_person()).unwrap();
@@ -85,22 +121,26 @@ fn by_tcp(what: &str, way: Way, lasts: Duration) {
     front.set(way);
     let worse = InView::watch(&camera, lasts);
     front.set(Way::Open);
-    println!("{}", row(what, worse, &mut running));
+    println!("{}", row(what, worse, &told(&mut running)));
     if lasts < WATCHED {
         print("after that", &camera, &mut running, WATCHED);
     }
 }
 
 fn print(what: &str, camera: &VirtualCamera, running: &mut Running, time: Duration) {
-    println!("{}", row(what, InView::watch(camera, time), running));
+    println!("{}", row(what, InView::watch(camera, time), &told(running)));
 }
 
-fn row(what: &str, seen: InView, running: &mut Running) -> String {
-    let told = [running.complaints(), running.infos().to_vec()].concat();
+fn told(running: &mut Running) -> Vec<String> {
+    [running.complaints(), running.infos().to_vec()].concat()
+}
+
+fn row(what: &str, seen: InView, told: &[String]) -> String {
     format!(
-        "| {what} | {:.1} % | {:.1} s | {:.0}°/s | {} |",
+        "| {what} | {:.1} % | {:.1} s | {:.1} s | {:.0}°/s | {} |",
         100.0 * seen.share,
         seen.longest_out.as_secs_f64(),
+        seen.longest_unsteered.as_secs_f64(),
         seen.fastest_deg_s,
         told.join("; ")
     )

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! A cable between an application and its camera that can be pulled: packets are lost, and nobody is told.
+//! A cable between an application and its camera that loses some packets, or all when it is pulled, and nobody is told.
 
 use std::net::Ipv4Addr;
 use std::path::Path;
@@ -46,6 +46,26 @@ impl Cable {
     /// Where the application finds the camera.
     pub fn camera_side(&self) -> Ipv4Addr {
         self.side(1)
+    }
+
+    /// Loses this share of all packets from now on, by chance and in both directions; to be said once.
+    ///
+    /// Each end loses what it receives: who sends a packet that its own end refuses is told so, and sends it again at once. A packet is
+    /// what a wire takes, and not what a kernel would hand on in one piece.
+    ///
+    /// # Errors
+    /// What `iptables` says where this process may not, or it is missing.
+    pub fn lose(&self, share: f64) -> Result<(), String> {
+        let Self { namespace, .. } = self;
+        let loss = format!("--match statistic --mode random --probability {share} --jump DROP");
+        ip(&format!("link set {namespace} gso_max_segs 1"))?;
+        ip(&format!("-n {namespace} link set cable gso_max_segs 1"))?;
+        ip(&format!("netns exec {namespace} iptables --append INPUT --in-interface cable {loss}"))?;
+        // Here by a chain of its own, which is found by its name.
+        iptables(&format!("--new-chain {namespace}"))?;
+        iptables(&format!("--append {namespace} {loss}"))?;
+        iptables(&format!("--insert INPUT --in-interface {namespace} --jump {namespace}"))?;
+        Ok(())
     }
 
     fn side(&self, host: u32) -> Ipv4Addr {
@@ -106,11 +126,22 @@ fn take_away(namespace: &str) {
     // One end of the link takes the other with it. What was never made cannot be taken away.
     let _ = ip(&format!("link delete {namespace}"));
     let _ = ip(&format!("netns delete {namespace}"));
+    let _ = iptables(&format!("--delete INPUT --in-interface {namespace} --jump {namespace}"));
+    let _ = iptables(&format!("--flush {namespace}"));
+    let _ = iptables(&format!("--delete-chain {namespace}"));
 }
 
 fn ip(arguments: &str) -> Result<String, String> {
-    let done = Command::new("ip").args(arguments.split(' ')).output();
-    let done = done.map_err(|err| format!("ip cannot be run: {err}"))?;
-    let said = || format!("ip {arguments}: {}", String::from_utf8_lossy(&done.stderr).trim());
+    run("ip", arguments)
+}
+
+fn iptables(arguments: &str) -> Result<String, String> {
+    run("iptables", &format!("--wait {arguments}"))
+}
+
+fn run(program: &str, arguments: &str) -> Result<String, String> {
+    let done = Command::new(program).args(arguments.split(' ')).output();
+    let done = done.map_err(|err| format!("{program} cannot be run: {err}"))?;
+    let said = || format!("{program} {arguments}: {}", String::from_utf8_lossy(&done.stderr).trim());
     if done.status.success() { Ok(String::from_utf8_lossy(&done.stdout).into_owned()) } else { Err(said()) }
 }

@@ -2,6 +2,7 @@
 
 //! Whoever follows with a camera behind a network that fails.
 
+use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Duration;
@@ -21,7 +22,13 @@ pub struct Network {
 impl Network {
     /// Both are open.
     pub fn before(camera: &VirtualCamera) -> Self {
-        Self { http: Front::new(camera.http_address()), rtsp: Front::new(camera.rtsp_address()) }
+        Self::at(Ipv4Addr::LOCALHOST, camera)
+    }
+
+    /// The same, that begin at this address.
+    pub fn at(address: Ipv4Addr, camera: &VirtualCamera) -> Self {
+        let front = |camera| Front::at((address, 0), camera);
+        Self { http: front(camera.http_address()), rtsp: front(camera.rtsp_address()) }
     }
 
     /// Both lead to another camera from now on.

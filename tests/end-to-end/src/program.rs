@@ -6,7 +6,7 @@ use std::fs;
 use std::io::{Read, Write};
 use std::net::TcpStream;
 use std::path::{Path, PathBuf};
-use std::process::ExitStatus;
+use std::process::{Command, ExitStatus};
 use std::time::Instant;
 
 use crate::{GstLaunch, PATIENCE, plugin_folder, scene, scratch, tool};
@@ -35,6 +35,20 @@ impl Program {
         more: &[&str],
         environment: &[(&str, &Path)],
     ) -> Self {
+        Self::start_as(test, file, more, |mut command| {
+            command.envs(environment.iter().copied());
+            command
+        })
+    }
+
+    /// The same by what is made of its command: in a network of its own, nobody can ask its page.
+    #[track_caller]
+    pub fn start_as(
+        test: &str,
+        file: impl FnOnce(&Path) -> String,
+        more: &[&str],
+        made: impl FnOnce(Command) -> Command,
+    ) -> Self {
         let folder = scratch(&format!("program-{test}"));
         fs::create_dir_all(&folder).unwrap();
         fs::write(folder.join("password"), scene::PASSWORD).unwrap();
@@ -43,8 +57,7 @@ impl Program {
         let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
         command.arg("run").arg(&cameras).args(["--http", "127.0.0.1:0"]).args(more);
         command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
-        command.envs(environment.iter().copied());
-        let mut launch = GstLaunch::spawn(command);
+        let mut launch = GstLaunch::spawn(made(command));
         let line = launch.wait_for_line("/healthz at http://");
         // A camera may have spoken before the page.
         launch.rewind();
@@ -138,6 +151,13 @@ impl Program {
         fs::remove_dir_all(&self.folder).unwrap();
         ended
     }
+}
+
+/// The warnings and errors in its log, without their times.
+pub fn complaints_in(log: &str) -> Vec<String> {
+    let is_complaint = |line: &&str| line.contains("warning: ") || line.contains("error: ");
+    let without_time = |line: &str| line.split_once(' ').map(|(_, complaint)| complaint.to_owned());
+    log.lines().filter(is_complaint).filter_map(without_time).collect()
 }
 
 /// Of the lines `name{labels} value` of OpenMetrics.
