@@ -10,6 +10,7 @@
 //! `ptztrack run` has video and control by a cable that loses packets of both directions, which takes root, iproute2 and iptables.
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
+use std::mem;
 use std::path::Path;
 use std::sync::Mutex;
 use std::thread;
@@ -76,7 +77,8 @@ fn by_udp(network: &str, lost: u64) {
     });
     running.pipeline().set_state(gst::State::Playing).unwrap();
     scene::wait_until_following(&camera);
-    print(network, &camera, &mut running, WATCHED);
+    let seen = InView::watch(&camera, WATCHED);
+    println!("{}", row(network, seen, &told(&mut running, &mut [0; 2])));
 }
 
 /// Loses packets by chance.
@@ -121,18 +123,19 @@ fn by_tcp(what: &str, way: Way, lasts: Duration) {
     front.set(way);
     let worse = InView::watch(&camera, lasts);
     front.set(Way::Open);
-    println!("{}", row(what, worse, &told(&mut running)));
+    let mut known = [0; 2];
+    println!("{}", row(what, worse, &told(&mut running, &mut known)));
     if lasts < WATCHED {
-        print("after that", &camera, &mut running, WATCHED);
+        let after = InView::watch(&camera, WATCHED);
+        println!("{}", row("after that", after, &told(&mut running, &mut known)));
     }
 }
 
-fn print(what: &str, camera: &VirtualCamera, running: &mut Running, time: Duration) {
-    println!("{}", row(what, InView::watch(camera, time), &told(running)));
-}
-
-fn told(running: &mut Running) -> Vec<String> {
-    [running.complaints(), running.infos().to_vec()].concat()
+/// The warnings and infos of a pipeline after so many of each, which those count then, too.
+fn told(running: &mut Running, known: &mut [usize; 2]) -> Vec<String> {
+    let all = [running.complaints(), running.infos().to_vec()];
+    let new = |(all, known): (&Vec<String>, &mut usize)| all[mem::replace(known, all.len())..].to_vec();
+    all.iter().zip(known).flat_map(new).collect()
 }
 
 fn row(what: &str, seen: InView, told: &[String]) -> String {
