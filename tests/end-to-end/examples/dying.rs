@@ -12,14 +12,17 @@
 use std::fs::File;
 use std::io::Write;
 use std::os::unix::fs::PermissionsExt;
+use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use end_to_end::following::script;
-use end_to_end::{GstLaunch, Held, PATIENCE, plugin_folder, scene, signal, tool};
-use virtual_camera::{Fault, VirtualCamera};
+use end_to_end::{
+    GstLaunch, Held, PATIENCE, Program, plugin_folder, process_of, scene, scratch, signal, tool,
+};
+use virtual_camera::{Fault, OnvifSettings, Quirk, Settings, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
 
@@ -42,6 +45,10 @@ the application, such as the end of PID 1 of a container. Run the watchdog outsi
 
 /// It must turn as fast as this to be left turning, °/s.
 const TURNS: f64 = 3.0;
+/// In the place of a watchdog that cannot be started.
+const NO_WATCHDOG: &str = "/nonexistent/watchdog";
+/// The program's name for its camera.
+const CAMERA: &str = "door";
 /// A process that asks for memory without end gets no more.
 const MEMORY: u64 = 400 << 20;
 /// So long a slow watchdog takes to start: far longer than the camera is held at rest for it, so that it turns before that. Who takes
@@ -73,6 +80,10 @@ enum Application {
     Container,
     /// The same with the watchdog outside.
     ContainerOnly,
+    /// `ptztrack run`, with this in the camera's entry.
+    Run(&'static str),
+    /// `gst-launch-1.0`, with a camera by ONVIF that ignores `Timeout`.
+    Onvif,
 }
 
 /// What becomes of it.
@@ -92,6 +103,8 @@ enum Death {
     ThreadsHang(&'static str),
     /// It is killed for what it does when the camera first moves.
     Killed,
+    /// The process that the program has for the camera is killed; the program is held, as it would start another.
+    OwnProcessKilled,
 }
 
 /// A way to die.
@@ -112,10 +125,12 @@ const PLAIN: Application = Application::Launch("");
 const CAMERA_TASK: Death = Death::ThreadsHang("ptz-camera");
 /// It has a child that holds what it had open.
 const FORKED: Application = Application::Program("fork");
+/// The camera has a process of its own.
+const ISOLATED: Application = Application::Run("isolation = \"process\"\n");
 const UNAVAILABLE: fn() -> Fault = || Fault::Status(503);
 const ERROR: fn() -> Fault = || Fault::ErrorBody("Error: busy".to_owned());
 
-const CASES: [Case; 22] = [
+const CASES: &[Case] = &[
     case("Ctrl-C", Application::Script, Signal("INT")),
     case(
         "Ctrl-C, the first stops are answered by 503",
@@ -146,6 +161,16 @@ const CASES: [Case; 22] = [
         Application::ContainerOnly,
         Signal("KILL"),
     ),
+    case("`ptztrack run`: SIGKILL", Application::Run(""), Signal("KILL")),
+    case("`ptztrack run`: SIGSTOP", Application::Run(""), Signal("STOP")),
+    case("`ptztrack run`, `isolation = \"process\"`: SIGKILL", ISOLATED, Signal("KILL")),
+    case(
+        "`ptztrack run`, `isolation = \"process\"`: SIGKILL of the camera's process",
+        ISOLATED,
+        Death::OwnProcessKilled,
+    ),
+    case("SIGKILL, the camera speaks ONVIF and ignores `Timeout`", Application::Onvif, Signal("KILL")),
+    case("SIGSTOP, the camera speaks ONVIF and ignores `Timeout`", Application::Onvif, Signal("STOP")),
     case("SIGKILL, `mode=absolute`", Application::Launch("mode=absolute"), Signal("KILL")),
 ];
 
@@ -204,6 +229,7 @@ impl Case {
     fn stopped_by(&self, with: Option<Rests>, without: Option<Rests>) -> &'static str {
         match (with, without, self.application) {
             (None, ..) => "nothing",
+            (Some(_), None, Application::Onvif) => "`onvif-watchdog`",
             (Some(_), None, _) => "`vapix-watchdog`",
             (Some(_), Some(_), Application::Launch("mode=absolute")) => {
                 "`vapix-watchdog`; without it the camera itself, as it arrives"
@@ -217,16 +243,19 @@ impl Case {
         let is_slow = matches!(self.death, Death::SlowWatchdog(_));
         // Who is in view all the time has the camera wait for the watchdog once, and turn before that is there.
         let scene = if is_slow { scene::near_person() } else { scene::walking_person() };
-        let camera = VirtualCamera::start(scene).unwrap();
+        let onvif =
+            (self.application == Application::Onvif).then(|| OnvifSettings::with(&[Quirk::TimeoutIgnored]));
+        let camera = VirtualCamera::start(Settings { onvif, ..scene }).unwrap();
         let id = format!("{}-{run}", std::process::id());
         let socket = std::env::temp_dir().join(format!("ptztrack-dying-{id}"));
         let elsewhere = self.application == Application::ContainerOnly && watchdog;
         let _elsewhere = elsewhere.then(|| listen(&socket));
         let confinement = self.application.is_confined().then(|| Confinement::new(&id).unwrap());
-        let mut command = self.application.command(&camera, &socket, confinement.as_ref());
+        let folder = scratch(&format!("dying-{id}"));
+        let mut command = self.application.command(&camera, &socket, confinement.as_ref(), &folder);
         let slow = (is_slow && watchdog).then(|| SlowWatchdog::new(&id));
         if !watchdog {
-            command.env("VAPIX_WATCHDOG", "/nonexistent/vapix-watchdog");
+            command.env("VAPIX_WATCHDOG", NO_WATCHDOG).env("ONVIF_WATCHDOG", NO_WATCHDOG);
         } else if let Some(slow) = &slow {
             command.env("VAPIX_WATCHDOG", &slow.script);
         }
@@ -244,7 +273,7 @@ impl Case {
         if let Some(child) = child {
             signal(child, "KILL");
         }
-        let _ = std::fs::remove_file(socket);
+        let _ = (std::fs::remove_file(socket), std::fs::remove_dir_all(folder));
         rests.map(|after| Rests { after, after_start: ran.map(|ran| (since + after).saturating_sub(ran)) })
     }
 
@@ -281,8 +310,16 @@ impl Case {
                 (now, Some((Some(held), launch)))
             }
             Death::Killed => {
-                launch.finish();
+                let (status, output) = launch.finish();
+                assert_eq!(status.signal(), Some(libc::SIGKILL), "{}: {status}\n{output}", self.name);
                 (camera.now(), None)
+            }
+            Death::OwnProcessKilled => {
+                let process = process_of(launch.id(), CAMERA);
+                launch.signal("STOP");
+                let now = camera.now();
+                signal(process, "KILL");
+                (now, Some((None, launch)))
             }
         }
     }
@@ -296,7 +333,14 @@ impl Application {
         matches!(self, Self::Confined(_))
     }
 
-    fn command(self, camera: &VirtualCamera, socket: &Path, confinement: Option<&Confinement>) -> Command {
+    /// What starts it; where it has files, they are in `folder`.
+    fn command(
+        self,
+        camera: &VirtualCamera,
+        socket: &Path,
+        confinement: Option<&Confinement>,
+        folder: &Path,
+    ) -> Command {
         let pipeline = format!("{} {}", scene::follow(camera), self.properties(socket));
         match self {
             Self::Script => {
@@ -315,6 +359,14 @@ impl Application {
                 let mut command = confinement.map_or_else(with_default_signals, Confinement::enter);
                 command.arg(application).args([what, &camera.url(), scene::USER]);
                 command.env("CAMERA_PASSWORD", scene::PASSWORD);
+                command
+            }
+            Self::Run(more) => Program::command(folder, |folder| {
+                Program::entry(CAMERA, &camera.url(), &folder.join("password")) + more
+            }),
+            Self::Onvif => {
+                let mut command = tool("gst-launch-1.0");
+                command.args(scene::follow_onvif(camera, "").split_whitespace());
                 command
             }
             Self::Container | Self::ContainerOnly => {
@@ -363,7 +415,7 @@ struct SlowWatchdog {
 
 impl SlowWatchdog {
     fn new(id: &str) -> Self {
-        let script = end_to_end::scratch(&format!("slow-watchdog-{id}"));
+        let script = scratch(&format!("slow-watchdog-{id}"));
         let [begun, ran] = ["begun", "ran"].map(|what| script.with_extension(what));
         let watchdog = plugin_folder().join("vapix-watchdog");
         let (begin, run) = (begun.display(), ran.display());

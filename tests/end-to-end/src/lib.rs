@@ -31,7 +31,7 @@ pub use held::Held;
 pub use in_view::InView;
 pub use launch::{GstLaunch, certificate, plugin_folder, scratch, signal, tool};
 pub use pipeline::{Running, init};
-pub use program::{Program, ask_page, complaints_in};
+pub use program::{Program, ask_page, complaints_in, process_of};
 pub use recording::pictures_in;
 pub use usage::{Growth, Usage, growths};
 pub use viewer::{Times, Viewer};

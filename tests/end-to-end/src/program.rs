@@ -50,19 +50,26 @@ impl Program {
         made: impl FnOnce(Command) -> Command,
     ) -> Self {
         let folder = scratch(&format!("program-{test}"));
-        fs::create_dir_all(&folder).unwrap();
-        fs::write(folder.join("password"), scene::PASSWORD).unwrap();
-        let cameras = folder.join("cameras.toml");
-        fs::write(&cameras, file(&folder)).unwrap();
-        let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
-        command.arg("run").arg(&cameras).args(["--http", "127.0.0.1:0"]).args(more);
-        command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
+        let mut command = Self::command(&folder, file);
+        command.args(["--http", "127.0.0.1:0"]).args(more);
         let mut launch = GstLaunch::spawn(made(command));
         let line = launch.wait_for_line("/healthz at http://");
         // A camera may have spoken before the page.
         launch.rewind();
         let page = line.split("http://").nth(1).and_then(|page| page.split('/').next()).unwrap().to_owned();
         Self { launch, folder, page }
+    }
+
+    /// What starts it with what `file` makes for it in this folder, and without a page.
+    pub fn command(folder: &Path, file: impl FnOnce(&Path) -> String) -> Command {
+        fs::create_dir_all(folder).unwrap();
+        fs::write(folder.join("password"), scene::PASSWORD).unwrap();
+        let cameras = folder.join("cameras.toml");
+        fs::write(&cameras, file(folder)).unwrap();
+        let mut command = tool(plugin_folder().join("ptztrack").to_str().unwrap());
+        command.arg("run").arg(&cameras);
+        command.env("XDG_STATE_HOME", folder.join("state")).env_remove("STATE_DIRECTORY");
+        command
     }
 
     /// A camera's entry in the file.
@@ -116,22 +123,7 @@ impl Program {
     /// The process of a camera that has one of its own.
     #[track_caller]
     pub fn process_of(&self, camera: &str) -> u32 {
-        let wanted = format!("ptztrack\0camera\0{camera}\0");
-        let parent = format!("PPid:\t{}", self.launch.id());
-        let is = |process: &u32| {
-            let read = |file: &str| fs::read_to_string(format!("/proc/{process}/{file}")).unwrap_or_default();
-            read("cmdline") == wanted && read("status").lines().any(|line| line == parent)
-        };
-        let begin = Instant::now();
-        loop {
-            let processes = fs::read_dir("/proc").unwrap();
-            let numbers = processes.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
-            if let Some(found) = numbers.into_iter().find(is) {
-                return found;
-            }
-            assert!(begin.elapsed() < PATIENCE, "no process for {camera}");
-            std::thread::sleep(std::time::Duration::from_millis(20));
-        }
+        process_of(self.launch.id(), camera)
     }
 
     /// Ends it by a signal; gives what it said.
@@ -150,6 +142,27 @@ impl Program {
         // Where a test fails, it stays for a look.
         fs::remove_dir_all(&self.folder).unwrap();
         ended
+    }
+}
+
+/// The process of its own that this program has for a camera.
+#[track_caller]
+pub fn process_of(program: u32, camera: &str) -> u32 {
+    let wanted = format!("ptztrack\0camera\0{camera}\0");
+    let parent = format!("PPid:\t{program}");
+    let is = |process: &u32| {
+        let read = |file: &str| fs::read_to_string(format!("/proc/{process}/{file}")).unwrap_or_default();
+        read("cmdline") == wanted && read("status").lines().any(|line| line == parent)
+    };
+    let begin = Instant::now();
+    loop {
+        let processes = fs::read_dir("/proc").unwrap();
+        let numbers = processes.filter_map(|entry| entry.unwrap().file_name().to_str()?.parse().ok());
+        if let Some(found) = numbers.into_iter().find(is) {
+            return found;
+        }
+        assert!(begin.elapsed() < PATIENCE, "no process for {camera}");
+        std::thread::sleep(std::time::Duration::from_millis(20));
     }
 }
 
