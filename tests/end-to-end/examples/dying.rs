@@ -22,7 +22,7 @@ use end_to_end::following::script;
 use end_to_end::{
     GstLaunch, Held, PATIENCE, Program, plugin_folder, process_of, scene, scratch, signal, tool,
 };
-use virtual_camera::{Fault, OnvifSettings, Quirk, Settings, VirtualCamera};
+use virtual_camera::{Fault, OnvifSettings, Quirk, Settings, Status, VirtualCamera};
 
 const HEADER: &str = "# Ways to die
 
@@ -35,9 +35,8 @@ end of that) until the camera is at rest. In the last column the watchdog could 
 
 const FOOTER: &str = "
 `vapix-watchdog` notices at once that a process has ended; that a process is stopped or hangs, it notices when the lease runs out,
-after 2 s. A camera at rest waits 2 s for a watchdog that is slow to start, then one warning says that there is none, and it is moved: if
-the application dies then, the camera turns on until the watchdog runs, which stops it as soon as that, or 2 s later where the application
-is stopped or hangs. In an outage it retries twice a second, for a minute.
+after 2 s. A camera at rest is not moved while its watchdog starts, so that there is nothing to stop if the application dies then. One that
+takes 10 s is given up in words, and the camera is moved without. In an outage it retries twice a second, for a minute.
 
 What is not covered: loss of power or of the network for longer than that minute, and everything that ends the watchdog together with
 the application, such as the end of PID 1 of a container. Run the watchdog outside that container, with `vapix-watchdog --listen` and
@@ -51,13 +50,12 @@ const NO_WATCHDOG: &str = "/nonexistent/watchdog";
 const CAMERA: &str = "door";
 /// A process that asks for memory without end gets no more.
 const MEMORY: u64 = 400 << 20;
-/// So long a slow watchdog takes to start: far longer than the camera is held at rest for it, so that it turns before that. Who takes
-/// 10 s is given up.
+/// So long a slow watchdog takes to start. Who takes 10 s is given up.
 const SLOW_START_S: u32 = 8;
-/// So long nothing moves the camera once that has begun, of the 2 s that it is held at rest.
-const HELD: Duration = Duration::from_secs(1);
-/// What is said then.
-const GIVEN_UP: &str = "no answer for 2 s";
+/// So long it is then seen that nothing moves the camera, of the 6 s that are left.
+const HELD: Duration = Duration::from_secs(2);
+/// What is said of it after 2 s.
+const STARTS: &str = "a camera that rests is not moved before it does";
 /// Stops that a camera refuses before it takes one.
 const REFUSED_STOPS: u64 = 3;
 /// A camera that nobody tried to stop for so long is left alone.
@@ -91,7 +89,7 @@ enum Application {
 enum Death {
     /// It gets this signal, ...
     Signal(&'static str),
-    /// ... while its watchdog takes long to start, and the camera turns without one, ...
+    /// ... while its watchdog takes long to start, and the camera is held at rest for that, ...
     SlowWatchdog(&'static str),
     /// ... while nobody can reach the camera, which answers again when the process has ended, ...
     Outage(&'static str),
@@ -190,7 +188,7 @@ fn main() {
             (with.map(|run| run.join().unwrap()), without.join().unwrap())
         });
         // `None` is the worst.
-        let worst = with.into_iter().reduce(|a, b| Some(a?.or_worse(b?))).flatten();
+        let worst = with.into_iter().reduce(|a, b| Some(a?.max(b?))).flatten();
         println!(
             "| {} | {} | {} | {} |",
             case.name,
@@ -202,33 +200,18 @@ fn main() {
     println!("{FOOTER}");
 }
 
-/// How soon a camera came to rest.
-#[derive(Clone, Copy)]
-struct Rests {
-    /// The death.
-    after: Duration,
-    /// The watchdog ran, where it only started at that time.
-    after_start: Option<Duration>,
-}
-
-impl Rests {
-    /// The worse of two, in each.
-    fn or_worse(self, other: Self) -> Self {
-        Self { after: self.after.max(other.after), after_start: self.after_start.max(other.after_start) }
-    }
-}
-
-fn text(rests: Option<Rests>) -> String {
-    let Some(Rests { after, after_start }) = rests else { return "it turns on".to_owned() };
-    let started = after_start.map(|time| format!(", {:.1} s after the watchdog ran", time.as_secs_f64()));
-    format!("{:.1} s{}", after.as_secs_f64(), started.unwrap_or_default())
+fn text(rests: Option<Duration>) -> String {
+    rests.map_or_else(|| "it turns on".to_owned(), |after| format!("{:.1} s", after.as_secs_f64()))
 }
 
 impl Case {
     /// What only happens with the watchdog is its doing.
-    fn stopped_by(&self, with: Option<Rests>, without: Option<Rests>) -> &'static str {
+    fn stopped_by(&self, with: Option<Duration>, without: Option<Duration>) -> &'static str {
         match (with, without, self.application) {
             (None, ..) => "nothing",
+            (Some(_), None, _) if matches!(self.death, Death::SlowWatchdog(_)) => {
+                "nothing: it is not moved yet"
+            }
             (Some(_), None, Application::Onvif) => "`onvif-watchdog`",
             (Some(_), None, _) => "`vapix-watchdog`",
             (Some(_), Some(_), Application::Launch("mode=absolute")) => {
@@ -239,9 +222,9 @@ impl Case {
     }
 
     /// How long the camera takes to rest, where it does.
-    fn run(&self, run: usize, watchdog: bool) -> Option<Rests> {
+    fn run(&self, run: usize, watchdog: bool) -> Option<Duration> {
         let is_slow = matches!(self.death, Death::SlowWatchdog(_));
-        // Who is in view all the time has the camera wait for the watchdog once, and turn before that is there.
+        // Whoever is in view all the time is somebody to turn to all the time.
         let scene = if is_slow { scene::near_person() } else { scene::walking_person() };
         let onvif =
             (self.application == Application::Onvif).then(|| OnvifSettings::with(&[Quirk::TimeoutIgnored]));
@@ -264,17 +247,20 @@ impl Case {
             .then(|| launch.wait_for_line("child ").trim_start_matches("child ").parse().unwrap());
         if let Some(slow) = &slow {
             slow.is_awaited(&camera, &mut launch);
+        } else {
+            let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > TURNS);
+            assert!(turns, "{}: the camera never turned", self.name);
         }
-        let turns = camera.wait_for(PATIENCE, |status| status.pan_rate_deg_s.abs() > TURNS);
-        assert!(turns, "{}: the camera never turned", self.name);
         let (since, _alive) = self.die(&camera, launch);
-        let ran = slow.as_ref().map(|slow| slow.runs(&camera));
         let rests = scene::rests(&camera, since);
+        if let Some(slow) = &slow {
+            slow.runs(&camera);
+        }
         if let Some(child) = child {
             signal(child, "KILL");
         }
         let _ = (std::fs::remove_file(socket), std::fs::remove_dir_all(folder));
-        rests.map(|after| Rests { after, after_start: ran.map(|ran| (since + after).saturating_sub(ran)) })
+        rests
     }
 
     /// When it was dead, or the camera could be stopped again; and what may live on.
@@ -428,18 +414,19 @@ impl SlowWatchdog {
         Self { script, begun, ran }
     }
 
-    /// The camera is not moved before this is given up in words.
+    /// The camera is not moved before it runs.
     fn is_awaited(&self, camera: &VirtualCamera, launch: &mut GstLaunch) {
         wait_for_file(&self.begun);
+        launch.wait_for_line(STARTS);
         assert!(!camera.wait_for(HELD, |status| status.moving), "moved before there was a watchdog");
-        launch.wait_for_line(GIVEN_UP);
+        assert!(!self.ran.exists(), "it runs before the death");
     }
 
-    /// When it runs, which it did not before.
-    fn runs(&self, camera: &VirtualCamera) -> Duration {
-        assert!(!self.ran.exists(), "it ran before the death");
+    /// Nor after that, when all that it is told is to stop.
+    fn runs(&self, camera: &VirtualCamera) {
         wait_for_file(&self.ran);
-        camera.now()
+        let turns = |status: &Status| status.pan_rate_deg_s != 0.0 || status.tilt_rate_deg_s != 0.0;
+        assert!(!camera.wait_for(LEFT_ALONE, turns), "moved after the death");
     }
 }
 

@@ -13,6 +13,9 @@ use virtual_camera::{Fault, VirtualCamera};
 /// How often the stick that an operator holds says where to.
 const HELD: Duration = Duration::from_millis(50);
 
+/// So long each of two cameras is seen to rest, of the 8 s that are left for a watchdog to start.
+const REST: Duration = Duration::from_secs(2);
+
 /// `gst-launch-1.0` that follows, with a watchdog of its own.
 struct Application {
     camera: VirtualCamera,
@@ -219,31 +222,45 @@ fn without_a_watchdog_one_warning_says_so() {
     );
 }
 
-/// Neither does the picture wait for it, nor the camera for long; and two cameras have no worker more than there are.
+/// Nobody would stop a camera that turned as this process died; once that is given up they are followed, without being held back
+/// for the next one. Neither does the picture wait, and two cameras have no worker more than there are.
 #[test]
-fn a_watchdog_that_never_starts_keeps_no_camera_from_following() {
-    let cameras = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+fn a_watchdog_that_never_starts_is_waited_for_once_and_keeps_no_camera_from_following() {
+    let cameras = [(); 2].map(|()| VirtualCamera::start(scene::near_person()).unwrap());
     let program = scratch("sleeper");
-    std::fs::write(&program, "#!/bin/sh\nexec sleep 60\n").unwrap();
+    let starts = program.with_extension("starts");
+    let script = format!("#!/bin/sh\necho started >> {}\nexec sleep 60\n", starts.display());
+    std::fs::write(&program, script).unwrap();
+    let started = || std::fs::read_to_string(&starts).unwrap_or_default().lines().count();
     std::fs::set_permissions(&program, std::fs::Permissions::from_mode(0o755)).unwrap();
     let mut command = tool("gst-launch-1.0");
     command.env("VAPIX_WATCHDOG", &program);
     let pipelines = cameras.each_ref().map(|camera| scene::follow(camera).replace(" name=servo", ""));
     command.arg("-m").args(pipelines.join(" ").split_whitespace());
     let mut launch = GstLaunch::spawn(command);
-    launch.wait_for_line(
-        "no watchdog process: the watchdog process ended or does not listen: no answer for 2 s",
-    );
+    for _ in &cameras {
+        launch.wait_for_line("has said nothing for 2 s; a camera that rests is not moved before it does");
+    }
+    cameras.iter().for_each(|camera| assert!(!camera.wait_for(REST, |status| status.moving), "too early"));
+    for _ in &cameras {
+        launch.wait_for_line("cannot be started: it says nothing for 10 s");
+    }
     cameras.iter().for_each(wait_until_following);
+    let begin = Instant::now();
+    while started() < 2 {
+        assert!(begin.elapsed() < PATIENCE, "it is not tried again");
+        std::thread::sleep(HELD);
+    }
     // They are followed, not only set going once.
     for camera in &cameras {
         let before = camera.status().commands;
         assert!(camera.wait_for(PATIENCE, |status| status.commands > before + 10), "not steered");
     }
     launch.signal("INT");
-    launch.finish();
+    let (_, output) = launch.finish();
     cameras.iter().for_each(assert_left_at_rest);
-    std::fs::remove_file(program).unwrap();
+    assert_eq!(output.matches("no watchdog process").count(), 2 * cameras.len(), "{output}");
+    [program, starts].iter().for_each(|file| std::fs::remove_file(file).unwrap());
 }
 
 /// Not by who only looks, nor before there is something to stop.

@@ -38,6 +38,8 @@ impl DeadManState {
 pub struct DeadMan {
     lease: Option<Lease>,
     state: DeadManState,
+    /// There is none, and that was told: a camera at rest does not wait for whether the next one answers.
+    gave_up: bool,
     /// What the watchdog was told last ...
     order: Option<StopOrder>,
     /// ... which does not hold any more.
@@ -48,7 +50,7 @@ impl DeadMan {
     /// Nothing is held yet, nor started. Without a watchdog there is nothing to be held.
     pub fn new(watchdog: Option<Arc<Watchdog>>) -> Self {
         let state = if watchdog.is_some() { DeadManState::Ready } else { DeadManState::Off };
-        Self { lease: watchdog.map(Lease::new), state, order: None, is_outdated: false }
+        Self { lease: watchdog.map(Lease::new), state, gave_up: false, order: None, is_outdated: false }
     }
 
     /// What is to be said of it.
@@ -76,11 +78,12 @@ impl DeadMan {
         if lease.renew_at().is_some_and(|at| at <= Instant::now())
             && let Some(order) = &self.order
         {
-            lease.hold(order.clone());
+            lease.renew(order.clone());
         }
         match lease.standing()? {
-            Standing::Held => self.state = DeadManState::Armed,
+            Standing::Held => (self.state, self.gave_up) = (DeadManState::Armed, false),
             Standing::Awaited => {}
+            Standing::Starting(why) => return self.waits(why),
             Standing::Failed(failure) => return self.failed(failure),
         }
         None
@@ -88,8 +91,10 @@ impl DeadMan {
 
     /// Whether a camera at rest is not to be moved yet: it is not known whether there is a watchdog to stop it.
     pub fn is_awaited(&self) -> bool {
-        let awaited = || matches!(self.lease.as_ref().and_then(Lease::standing), Some(Standing::Awaited));
-        self.state != DeadManState::Unavailable && awaited()
+        match self.lease.as_ref().and_then(Lease::standing) {
+            Some(Standing::Awaited) => !self.gave_up,
+            standing => matches!(standing, Some(Standing::Starting(_))),
+        }
     }
 
     /// Whether the watchdog knows something else of what is in doubt, or nothing.
@@ -125,8 +130,123 @@ impl DeadMan {
         }
     }
 
-    fn failed(&mut self, failure: Unavailable) -> Option<Unavailable> {
+    /// The watchdog only starts: a camera that moves is not stopped for that, and one that rests waits.
+    fn waits(&mut self, why: Unavailable) -> Option<Unavailable> {
         let before = std::mem::replace(&mut self.state, DeadManState::Unavailable);
-        (before != DeadManState::Unavailable).then_some(failure)
+        (before != DeadManState::Unavailable).then_some(why)
+    }
+
+    fn failed(&mut self, failure: Unavailable) -> Option<Unavailable> {
+        self.state = DeadManState::Unavailable;
+        (!std::mem::replace(&mut self.gave_up, true)).then_some(failure)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+    use crate::Stop;
+    use crate::fixtures::client_settings;
+    use crate::http::ClientSettings;
+    use crate::watchdog::WatchdogAddress;
+
+    /// Only a failure takes this long.
+    const PATIENCE: Duration = Duration::from_secs(60);
+
+    /// A shell in a watchdog's place takes it for a command that does not exist, runs what is in it, and never says anything.
+    fn order(channel: &str) -> StopOrder {
+        let settings =
+            ClientSettings { channel: channel.to_owned(), ..client_settings("http://camera.test") };
+        StopOrder { identity: settings.into(), words: Stop::AllAxes, in_doubt: true }
+    }
+
+    fn dead_man() -> DeadMan {
+        DeadMan::new(Some(Watchdog::new(WatchdogAddress::Program("/bin/sh".into()))))
+    }
+
+    fn standing(dead_man: &DeadMan) -> Standing {
+        dead_man.lease.as_ref().and_then(Lease::standing).unwrap()
+    }
+
+    /// What is told next.
+    fn told(dead_man: &mut DeadMan) -> String {
+        let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
+        let told = async {
+            loop {
+                if let Some(told) = dead_man.keep() {
+                    return told.to_string();
+                }
+                dead_man.due().await;
+            }
+        };
+        runtime.block_on(async { tokio::time::timeout(PATIENCE, told).await }).unwrap()
+    }
+
+    /// Were it moved before, nobody would stop it if this process died, until the program runs.
+    #[test]
+    fn a_camera_at_rest_waits_for_a_program_that_is_slow_to_start_until_that_is_given_up() {
+        let mut dead_man = dead_man();
+        dead_man.hold(order("1"));
+        let slow = told(&mut dead_man);
+        assert!(slow.contains("`/bin/sh` has said nothing for 2 s"), "{slow}");
+        assert!(dead_man.is_awaited() && dead_man.state() == DeadManState::Unavailable);
+        let end = told(&mut dead_man);
+        assert!(end.contains("it says nothing for 10 s") && !dead_man.is_awaited(), "{end}");
+    }
+
+    /// Else whoever is followed would be lost at each try.
+    #[test]
+    fn one_that_was_given_up_is_not_waited_for_while_it_is_tried_again() {
+        let mut dead_man = dead_man();
+        dead_man.hold(order("$(kill -KILL $$)"));
+        let end = told(&mut dead_man);
+        assert!(end.contains("signal: 9") && !dead_man.is_awaited(), "{end}");
+        let begin = Instant::now();
+        while matches!(standing(&dead_man), Standing::Failed(_)) {
+            assert!(begin.elapsed() < PATIENCE, "it is not tried again");
+            assert!(!dead_man.is_awaited());
+            dead_man.hold(order("1"));
+        }
+        while matches!(standing(&dead_man), Standing::Awaited) {
+            assert!(dead_man.keep().is_none() && !dead_man.is_awaited());
+            std::thread::yield_now();
+        }
+        assert!(matches!(standing(&dead_man), Standing::Failed(_)), "no longer than a connection");
+        assert!(dead_man.keep().is_none() && !dead_man.is_awaited(), "told once");
+    }
+
+    /// As one who is out of view when the first one is given up.
+    #[test]
+    fn nor_by_who_did_not_hear_of_that() {
+        let watchdog = Watchdog::new(WatchdogAddress::Program("/bin/sh".into()));
+        let [mut first, mut other] = [(); 2].map(|()| DeadMan::new(Some(watchdog.clone())));
+        first.hold(order("$(kill -KILL $$)"));
+        let begin = Instant::now();
+        while !matches!(standing(&first), Standing::Failed(_)) {
+            assert!(begin.elapsed() < PATIENCE, "it never ends");
+            std::thread::yield_now();
+        }
+        first.release();
+        while !matches!(other.lease.as_ref().and_then(Lease::standing), Some(Standing::Awaited)) {
+            assert!(begin.elapsed() < PATIENCE, "it is not tried again");
+            other.release();
+            other.hold(order("1"));
+        }
+        let end = told(&mut other);
+        assert!(end.contains("no answer for 2 s") && !other.is_awaited(), "{end}");
+    }
+
+    /// The socket of one that reads nothing is full at some time. Were it ended for that, it would be started anew for ever.
+    #[test]
+    fn a_program_that_starts_is_not_ended_for_what_it_does_not_read_yet() {
+        let mut dead_man = dead_man();
+        for _ in 0..1000 {
+            dead_man.hold(order("$(exec sleep 60)"));
+            assert!(matches!(standing(&dead_man), Standing::Awaited));
+        }
+        let heard = told(&mut dead_man);
+        assert!(heard.contains("has said nothing for 2 s"), "{heard}");
     }
 }

@@ -20,7 +20,7 @@ use super::protocol::Answer;
 use super::{LEASE, Unavailable, WatchdogAddress};
 
 /// A program that says nothing for so long after its start is ended.
-const LONGEST_START: Duration = Duration::from_secs(10);
+pub(super) const LONGEST_START: Duration = Duration::from_secs(10);
 
 /// A line that is longer is none.
 const MAX_LINE_BYTES: u64 = 1024;
@@ -32,6 +32,19 @@ pub struct Heard {
     held: HashMap<u64, Instant>,
     /// Why it is not there any more, where it says nothing of that.
     end: Option<Unavailable>,
+    /// How far its start is, where it is a program that was started for this connection.
+    start: Option<Start>,
+}
+
+/// How far the start of a program is.
+#[derive(Debug, Clone, Copy)]
+pub struct Start {
+    /// When it was started.
+    pub at: Instant,
+    /// No camera at rest is moved before it says something, or is given up.
+    pub is_waited_for: bool,
+    /// When it said its first word.
+    first_word: Option<Instant>,
 }
 
 /// What is heard over one connection; it closes with it.
@@ -45,19 +58,20 @@ pub struct Connection {
 }
 
 impl Connection {
-    /// With this as the first that is said. Whether anybody hears it, and why not, is heard later.
+    /// With this as the first that is said. Whether anybody hears it, and why not, is heard later; whether a program that starts is
+    /// waited for, the caller knows.
     ///
     /// # Errors
     /// What the system says where there is nobody to connect to.
-    pub fn begin(address: &WatchdogAddress, line: &[u8]) -> io::Result<Self> {
-        let (stream, its) = match address {
+    pub fn begin(address: &WatchdogAddress, line: &[u8], is_waited_for: bool) -> io::Result<Self> {
+        let (stream, its, start) = match address {
             WatchdogAddress::Program(_) => {
                 let (ours, its) = UnixStream::pair()?;
-                (ours, Some(its))
+                (ours, Some(its), Some(Start { at: Instant::now(), is_waited_for, first_word: None }))
             }
-            WatchdogAddress::Socket(socket) => (connect(socket)?, None),
+            WatchdogAddress::Socket(socket) => (connect(socket)?, None, None),
         };
-        let (report, heard) = watch::channel(Heard::default());
+        let (report, heard) = watch::channel(Heard { start, ..Heard::default() });
         let connection = Self { stream, heard };
         // From its first instruction on a program knows what to do, even if this process dies while it starts.
         connection.say(line)?;
@@ -83,7 +97,8 @@ impl Connection {
     pub fn say(&self, line: &[u8]) -> io::Result<()> {
         let said =
             SockRef::from(&self.stream).send_with_flags(line, libc::MSG_DONTWAIT | libc::MSG_NOSIGNAL)?;
-        if said == line.len() { Ok(()) } else { Err(io::ErrorKind::WouldBlock.into()) }
+        // After half a line there is no other.
+        if said == line.len() { Ok(()) } else { Err(io::ErrorKind::WriteZero.into()) }
     }
 
     /// What is heard over it.
@@ -101,6 +116,9 @@ impl Drop for Connection {
 
 impl Heard {
     fn add(&mut self, answer: Answer) {
+        if let Some(start) = &mut self.start {
+            start.first_word.get_or_insert_with(Instant::now);
+        }
         match answer {
             Answer::Held { lease } => self.held.insert(lease, Instant::now()),
             Answer::Released { lease } => self.held.remove(&lease),
@@ -115,6 +133,21 @@ impl Heard {
     /// Whether it has said so since then.
     pub fn held_since(&self, lease: u64, since: Instant) -> bool {
         self.held.get(&lease).is_some_and(|said| *said >= since)
+    }
+
+    /// Whether it is a program that was started, and has neither said anything yet nor ended.
+    pub fn is_starting(receiver: &HeardReceiver) -> bool {
+        receiver.borrow().silent_start().is_some() && Self::end(receiver).is_none()
+    }
+
+    /// Its start, where that is one that has said nothing.
+    pub fn silent_start(&self) -> Option<Start> {
+        self.start.filter(|start| start.first_word.is_none())
+    }
+
+    /// When one that was started said its first word: to what it was told before, it could not answer earlier.
+    pub fn first_word(&self) -> Option<Instant> {
+        self.start?.first_word
     }
 
     /// Why there is no connection, where there is none any more.
@@ -166,11 +199,13 @@ fn first_byte(stream: &UnixStream) -> io::Result<bool> {
     let peeked = SockRef::from(stream).peek(&mut [std::mem::MaybeUninit::uninit()]);
     match peeked {
         Ok(bytes) => Ok(bytes > 0),
-        Err(err) if err.kind() == io::ErrorKind::WouldBlock => {
-            Err(io::Error::other(format!("it says nothing for {} s", LONGEST_START.as_secs())))
-        }
+        Err(err) if err.kind() == io::ErrorKind::WouldBlock => Err(says_nothing()),
         Err(err) => Err(err),
     }
+}
+
+pub(super) fn says_nothing() -> io::Error {
+    io::Error::other(format!("it says nothing for {} s", LONGEST_START.as_secs()))
 }
 
 /// A watchdog goes into the background before it says anything, by a fork: it is nobody's child, and no host that waits for
@@ -218,7 +253,7 @@ mod tests {
 
     /// Why the program is no watchdog.
     fn end_of(program: &str, line: &[u8]) -> String {
-        end(program, &Connection::begin(&WatchdogAddress::Program(program.into()), line).unwrap())
+        end(program, &Connection::begin(&WatchdogAddress::Program(program.into()), line, true).unwrap())
     }
 
     /// Why there is no connection any more, to `whom`.
@@ -249,7 +284,8 @@ mod tests {
         let socket = std::env::temp_dir().join(format!("ptztrack-old-watchdog-{}", std::process::id()));
         let listener = std::os::unix::net::UnixListener::bind(&socket).unwrap();
         let connection =
-            Connection::begin(&WatchdogAddress::Socket(socket.clone()), b"words of a newer one\n").unwrap();
+            Connection::begin(&WatchdogAddress::Socket(socket.clone()), b"words of a newer one\n", true)
+                .unwrap();
         let (old, _) = listener.accept().unwrap();
         BufReader::new(old).read_until(b'\n', &mut Vec::new()).unwrap();
         let said = end("it", &connection);
@@ -268,7 +304,8 @@ mod tests {
     #[test]
     fn a_program_that_is_not_in_the_background_once_it_answers_is_ended() {
         let script = b"echo '{\"held\":{\"lease\":3}}' >&0; exec sleep 1000\n";
-        let connection = Connection::begin(&WatchdogAddress::Program("/bin/sh".into()), script).unwrap();
+        let connection =
+            Connection::begin(&WatchdogAddress::Program("/bin/sh".into()), script, true).unwrap();
         let mut heard = connection.heard();
         let runtime = tokio::runtime::Builder::new_current_thread().enable_time().build().unwrap();
         // With it the socket closes.

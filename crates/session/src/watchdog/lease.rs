@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use tokio::time::timeout_at;
 
-use super::connection::{Heard, HeardReceiver};
+use super::connection::{Heard, HeardReceiver, LONGEST_START, Start, says_nothing};
 use super::protocol::{Message, StopOrder};
 use super::{RENEWAL, Unavailable, Watchdog};
 use crate::http::Trust;
@@ -39,6 +39,8 @@ pub enum Standing {
     Held,
     /// The watchdog has said nothing yet.
     Awaited,
+    /// The same for longer than it takes to answer, of a program that was started and has not said its first word: it is waited for.
+    Starting(Unavailable),
     /// There is no watchdog, or none that answers.
     Failed(Unavailable),
 }
@@ -79,24 +81,46 @@ impl Lease {
         self.asked = Some(Asked { at, since, heard });
     }
 
+    /// Asks for it again, as is to be done at [`Self::renew_at`]. A program that starts has been told, and reads nothing yet: its socket
+    /// would only fill.
+    pub fn renew(&mut self, order: StopOrder) {
+        match &mut self.asked {
+            Some(Asked { at, heard: Ok(heard), .. }) if Heard::is_starting(heard) => *at = Instant::now(),
+            _ => self.hold(order),
+        }
+    }
+
     /// How it stands with it, where it was asked for.
     pub fn standing(&self) -> Option<Standing> {
         let asked = self.asked.as_ref()?;
-        let failure = match &asked.heard {
+        let heard = match &asked.heard {
             Ok(_) if asked.is_held(self.number) => return Some(Standing::Held),
-            Ok(heard) => Heard::end(heard).or_else(|| asked.is_overdue().then(no_answer)),
-            Err(failure) => Some(failure.clone()),
+            Ok(heard) => heard,
+            Err(failure) => return Some(Standing::Failed(failure.clone())),
         };
-        Some(failure.map_or(Standing::Awaited, Standing::Failed))
+        if let Some(end) = Heard::end(heard) {
+            return Some(Standing::Failed(end));
+        }
+        let now = Instant::now();
+        Some(match waited_for(heard) {
+            None if asked.answer_due_at(heard) <= now => Standing::Failed(no_answer()),
+            Some(start) if start.at + LONGEST_START <= now => {
+                Standing::Failed(self.watchdog.address().unavailable(&says_nothing()))
+            }
+            Some(start) if start.at + Self::LONGEST_WAIT <= now => {
+                Standing::Starting(self.watchdog.address().starting(Self::LONGEST_WAIT))
+            }
+            _ => Standing::Awaited,
+        })
     }
 
-    /// Resolves when it is held, or will not be; never where it was not asked for.
+    /// Resolves when it may stand otherwise with it; never where it was not asked for.
     pub async fn settled(&self) {
         let Some(asked) = &self.asked else { return pending().await };
         if let Ok(heard) = &asked.heard {
             let held = |heard: &Heard| heard.holds(self.number);
             // Whether it is, `standing` tells.
-            let _ = timeout_at(asked.longest().into(), heard.clone().wait_for(held)).await;
+            let _ = timeout_at(asked.changes_at(heard).into(), heard.clone().wait_for(held)).await;
         }
     }
 
@@ -118,13 +142,25 @@ impl Asked {
         self.heard.as_ref().is_ok_and(|heard| heard.borrow().holds(lease))
     }
 
-    fn longest(&self) -> Instant {
-        self.since + Lease::LONGEST_WAIT
+    /// When silence of whoever listens is a failure.
+    fn answer_due_at(&self, heard: &HeardReceiver) -> Instant {
+        let listens_since = heard.borrow().first_word().map_or(self.since, |first| first.max(self.since));
+        listens_since + Lease::LONGEST_WAIT
     }
 
-    fn is_overdue(&self) -> bool {
-        self.longest() <= Instant::now()
+    /// When silence means something else than now.
+    fn changes_at(&self, heard: &HeardReceiver) -> Instant {
+        match waited_for(heard) {
+            None => self.answer_due_at(heard),
+            Some(start) if Instant::now() < start.at + Lease::LONGEST_WAIT => start.at + Lease::LONGEST_WAIT,
+            Some(start) => start.at + LONGEST_START,
+        }
     }
+}
+
+/// A program that only starts, and is waited for.
+fn waited_for(heard: &HeardReceiver) -> Option<Start> {
+    heard.borrow().silent_start().filter(|start| start.is_waited_for)
 }
 
 fn no_answer() -> Unavailable {

@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use super::connection::{Connection, Heard, HeardReceiver};
+use super::connection::{Connection, Heard, HeardReceiver, LONGEST_START};
 use super::protocol::Message;
 
 /// Where an application has its watchdog.
@@ -28,6 +28,17 @@ pub enum Unavailable {
         program: PathBuf,
         /// What the system says.
         reason: String,
+    },
+    /// It was started, and may yet come.
+    #[error(
+        "`{}` has said nothing for {} s; a camera that rests is not moved before it does, for {} s at most",
+        program.display(), waited.as_secs(), LONGEST_START.as_secs()
+    )]
+    Starting {
+        /// As was asked for.
+        program: PathBuf,
+        /// For so long.
+        waited: Duration,
     },
     /// Nobody listens.
     #[error("no watchdog at socket `{}`: {reason}", socket.display())]
@@ -56,6 +67,8 @@ struct Link {
     connection: Option<Connection>,
     tried: Option<Instant>,
     failure: Option<Unavailable>,
+    /// The program that was started last never said anything: the next one is not waited for.
+    was_in_vain: bool,
 }
 
 impl Watchdog {
@@ -87,9 +100,14 @@ impl Watchdog {
         if let Some(connection) = &link.connection {
             match connection.say(&line) {
                 Ok(()) => return Ok(connection.heard()),
-                Err(err) => link.failure = Some(ended(connection, &err)),
+                // A program that starts reads nothing yet. What it could not be told is said again once it runs.
+                Err(err)
+                    if err.kind() == io::ErrorKind::WouldBlock && Heard::is_starting(&connection.heard()) =>
+                {
+                    return Ok(connection.heard());
+                }
+                Err(err) => link.lose(&err),
             }
-            link.connection = None;
         }
         if link.tried.is_some_and(|tried| tried.elapsed() < Self::PAUSE)
             && let Some(failure) = &link.failure
@@ -97,7 +115,7 @@ impl Watchdog {
             return Err(failure.clone());
         }
         link.tried = Some(Instant::now());
-        match Connection::begin(&self.address, &line) {
+        match Connection::begin(&self.address, &line, !link.was_in_vain) {
             Ok(connection) => Ok(link.connection.insert(connection).heard()),
             Err(err) => Err(link.failure.insert(self.address.unavailable(&err)).clone()),
         }
@@ -110,8 +128,7 @@ impl Watchdog {
         if let Some((line, connection)) = said
             && let Err(err) = connection.say(&line)
         {
-            link.failure = Some(ended(connection, &err));
-            link.connection = None;
+            link.lose(&err);
         }
     }
 
@@ -120,8 +137,13 @@ impl Watchdog {
     }
 }
 
-fn ended(connection: &Connection, err: &io::Error) -> Unavailable {
-    Heard::end(&connection.heard()).unwrap_or_else(|| Unavailable::Broken(err.to_string()))
+impl Link {
+    /// Nothing can be said over the connection, for this reason.
+    fn lose(&mut self, err: &io::Error) {
+        let Some(heard) = self.connection.take().map(|connection| connection.heard()) else { return };
+        self.failure = Some(Heard::end(&heard).unwrap_or_else(|| Unavailable::Broken(err.to_string())));
+        self.was_in_vain = heard.borrow().silent_start().is_some();
+    }
 }
 
 impl WatchdogAddress {
@@ -134,6 +156,12 @@ impl WatchdogAddress {
             Self::Program(program) => program.metadata().map(drop).map_err(|err| self.unavailable(&err)),
             Self::Socket(_) => Ok(()),
         }
+    }
+
+    /// A program that was started has said nothing for so long.
+    pub(super) fn starting(&self, waited: Duration) -> Unavailable {
+        let (Self::Program(program) | Self::Socket(program)) = self;
+        Unavailable::Starting { program: program.clone(), waited }
     }
 
     /// It is not to be had, for this reason.
