@@ -12,13 +12,14 @@ use std::sync::{Arc, Mutex};
 use std::{fs, io};
 
 use ptztrack_contract::lock::lock;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
 
 use crate::camera::Control;
 use crate::log::Log;
 use crate::shard::Shard;
 
-/// Of a process that has all cameras.
-const OF_ALL: &str = "control.json";
+const KIND: &str = "control";
 
 const NO_FOLDER: &str = "STATE_DIRECTORY names no folder to keep it in";
 
@@ -48,16 +49,9 @@ struct Last {
 }
 
 impl ControlFile {
-    /// Of a process that has this share of the cameras, or all of them.
-    pub fn new(shard: Option<Shard>, log: Arc<Log>) -> Self {
-        Self::at(std::env::var_os("STATE_DIRECTORY").map(PathBuf::from), shard, log)
-    }
-
-    /// The same, in this folder, if any.
-    pub fn at(folder: Option<PathBuf>, shard: Option<Shard>, log: Arc<Log>) -> Self {
-        let of = |shard: Shard| format!("control.{}-of-{}.json", shard.number(), shard.of());
-        let name = shard.map_or_else(|| OF_ALL.to_owned(), of);
-        let path = folder.map(|folder| folder.join(name));
+    /// Of a process that has this share of the cameras, or all of them; in this folder, if any.
+    pub fn at(folder: Option<&Path>, shard: Option<Shard>, log: Arc<Log>) -> Self {
+        let path = folder.map(|folder| path(folder, KIND, shard));
         Self { path, log, had: Mutex::default(), last: Mutex::default() }
     }
 
@@ -73,29 +67,15 @@ impl ControlFile {
             // old then. The cameras of other shares are theirs to remember.
             Err(err) if err.kind() == io::ErrorKind::NotFound && !has_others(path) => {
                 *had = Some(Kept::new());
-                self.read(&path.with_file_name(OF_ALL)).unwrap_or_default()
+                let of_all = path.with_file_name(format!("{KIND}.json"));
+                self.read(&of_all).unwrap_or_default()
             }
             kept => had.insert(kept.unwrap_or_default()).clone(),
         }
     }
 
-    /// One that makes no sense or cannot be read is moved aside, so that it is not written over.
     fn read(&self, path: &Path) -> io::Result<Kept> {
-        let read = fs::read(path).and_then(|text| Ok(serde_json::from_slice(&text)?));
-        if let Err(err) = &read
-            && err.kind() != io::ErrorKind::NotFound
-        {
-            let aside = path.with_extension("json.aside");
-            // Where that fails, it is written over.
-            let _ = fs::rename(path, &aside);
-            let detail = format!(
-                "who had which camera is not known: {}: {err}; it is kept as {}",
-                path.display(),
-                aside.display()
-            );
-            self.log.error("control-not-read", detail);
-        }
-        read
+        read(path, "who had which camera", "control-not-read", &self.log)
     }
 
     /// Remembers who has these cameras, which may be gone from now on.
@@ -158,12 +138,45 @@ fn has_others(path: &Path) -> bool {
     })
 }
 
+/// The folder that systemd has for what outlives the program.
+pub fn state_folder() -> Option<PathBuf> {
+    std::env::var_os("STATE_DIRECTORY").map(PathBuf::from)
+}
+
+/// Where a process that has this share of the cameras, or all of them, keeps what is of this kind.
+pub fn path(folder: &Path, kind: &str, shard: Option<Shard>) -> PathBuf {
+    let of = |shard: Shard| format!("{kind}.{}-of-{}.json", shard.number(), shard.of());
+    folder.join(shard.map_or_else(|| format!("{kind}.json"), of))
+}
+
+/// What was kept. A file that makes no sense or cannot be read is moved aside, so that it is not written over, and said in an event.
+///
+/// # Errors
+/// Where there is no such file, or why it cannot be read.
+pub fn read<T: DeserializeOwned>(path: &Path, what: &str, event: &str, log: &Log) -> io::Result<T> {
+    let read = fs::read(path).and_then(|text| Ok(serde_json::from_slice(&text)?));
+    if let Err(err) = &read
+        && err.kind() != io::ErrorKind::NotFound
+    {
+        let aside = path.with_extension("json.aside");
+        // Where that fails, it is written over.
+        let _ = fs::rename(path, &aside);
+        let detail =
+            format!("{what} is not known: {}: {err}; it is kept as {}", path.display(), aside.display());
+        log.error(event, detail);
+    }
+    read
+}
+
 /// The new file is named after the share, too. It is on the disk before it has the last one's name: that could stand for an empty
 /// file after a power cut.
-fn write(path: &Path, control: &Kept) -> io::Result<()> {
+///
+/// # Errors
+/// Why it cannot be written; the last one is still there.
+pub fn write(path: &Path, what: &impl Serialize) -> io::Result<()> {
     let new = path.with_extension("new");
     let mut file = File::create(&new)?;
-    file.write_all(&serde_json::to_vec(control)?)?;
+    file.write_all(&serde_json::to_vec(what)?)?;
     file.sync_all()?;
     fs::rename(new, path)?;
     if let Some(folder) = path.parent() {
@@ -177,12 +190,14 @@ fn write(path: &Path, control: &Kept) -> io::Result<()> {
 mod tests {
     use super::*;
 
+    const OF_ALL: &str = "control.json";
+
     fn scratch(name: &str) -> PathBuf {
         std::env::temp_dir().join(format!("ptztrack-control-{name}-{}", std::process::id()))
     }
 
     fn file(folder: &Path) -> ControlFile {
-        ControlFile::at(Some(folder.to_owned()), None, Arc::new(Log::unwritten()))
+        ControlFile::at(Some(folder), None, Arc::new(Log::unwritten()))
     }
 
     fn kept(control: &[(&str, Control)]) -> Kept {
@@ -250,7 +265,7 @@ mod tests {
         fs::create_dir_all(&folder).unwrap();
         let of = |shard: Option<&str>| {
             let shard = shard.map(|shard| shard.parse().unwrap());
-            ControlFile::at(Some(folder.clone()), shard, Arc::new(Log::unwritten()))
+            ControlFile::at(Some(&folder), shard, Arc::new(Log::unwritten()))
         };
         let kept = |camera: &str| kept(&[(camera, Control::HandedOver)]);
         let files = [(None, "hall"), (Some("0/2"), "door"), (Some("1/2"), "yard")];

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: MPL-2.0
 
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::thread::{self, JoinHandle};
 
 use ptztrack_contract::lock::lock;
 
+use crate::accounts_file::{Account, Accounts, AccountsFile};
 #[cfg(test)]
 use crate::camera::Control;
 use crate::camera::{Camera, Known};
 use crate::config::{CameraSettings, Codec, Kind};
-use crate::control_file::{ControlFile, Kept};
+use crate::control_file::{ControlFile, Kept, state_folder};
 use crate::event::{Event, Level};
 use crate::log::Log;
 use crate::shard::Shard;
@@ -28,18 +30,30 @@ pub struct Fleet {
     /// Those that were told to end and have no successor.
     ending: Mutex<Vec<JoinHandle<()>>>,
     had: ControlFile,
+    accounts: AccountsFile,
     log: Arc<Log>,
 }
 
 impl Fleet {
     pub fn new(log: Arc<Log>) -> Self {
-        let had = ControlFile::new(None, log.clone());
-        Self { cameras: Mutex::default(), ended: AtomicBool::new(false), ending: Mutex::default(), had, log }
+        Self::of_share(None, log)
     }
 
-    /// The same, of a process that has this share of the cameras.
-    pub fn of_share(self, shard: Option<Shard>) -> Self {
-        Self { had: ControlFile::new(shard, self.log.clone()), ..self }
+    /// Of a process that has this share of the cameras.
+    pub fn of_share(shard: Option<Shard>, log: Arc<Log>) -> Self {
+        Self::at(state_folder().as_deref(), shard, log)
+    }
+
+    /// The same, with what outlives it in this folder, if any.
+    fn at(folder: Option<&Path>, shard: Option<Shard>, log: Arc<Log>) -> Self {
+        Self {
+            cameras: Mutex::default(),
+            ended: AtomicBool::new(false),
+            ending: Mutex::default(),
+            had: ControlFile::at(folder, shard, log.clone()),
+            accounts: AccountsFile::at(folder, shard, log.clone()),
+            log,
+        }
     }
 
     /// A camera of this name that is never started.
@@ -48,7 +62,7 @@ impl Fleet {
         let text = format!("[camera.{name}]\naddress = \"http://127.0.0.1:1\"\n");
         let settings = crate::config::Config::parse(&text).unwrap().cameras.remove(0);
         let fleet = Self::new(Arc::new(Log::unwritten()));
-        let camera = Camera::new(settings, Control::Ours, fleet.log.clone(), None);
+        let camera = Camera::new(settings, Control::Ours, false, fleet.log.clone(), None);
         lock(&fleet.cameras).insert(name.to_owned(), camera);
         fleet
     }
@@ -57,7 +71,7 @@ impl Fleet {
     /// none that ends: who takes a camera over does.
     pub fn apply(&self, wanted: Vec<CameraSettings>) {
         // Who has a camera has it whatever becomes of its entry.
-        let had = self.had.load();
+        let (had, accounts) = (self.had.load(), self.accounts.load());
         let mut cameras = lock(&self.cameras);
         // Nobody would end those that begin now.
         if self.ended.load(Ordering::SeqCst) {
@@ -68,14 +82,15 @@ impl Fleet {
             std::mem::take(&mut *cameras).into_iter().partition(|(_, camera)| stays(camera));
         *cameras = stay;
         go.values().for_each(Camera::end);
-        let has = control_of(&go);
+        let (has, worked) = (control_of(&go), worked_of(&go));
         for settings in wanted {
             if cameras.contains_key(&settings.name) {
                 continue;
             }
             let name = settings.name.clone();
             let control = has.get(&name).or_else(|| had.get(&name)).copied().unwrap_or_default();
-            let camera = Camera::new(settings, control, self.log.clone(), go.remove(&name));
+            let has_worked = accounts.get(&name) == Some(&Account::of(&settings));
+            let camera = Camera::new(settings, control, has_worked, self.log.clone(), go.remove(&name));
             cameras.insert(name, camera);
         }
         let mut ending = lock(&self.ending);
@@ -83,6 +98,7 @@ impl Fleet {
         ending.extend(go.into_values().filter_map(Camera::into_thread));
         drop((ending, cameras));
         self.had.remember(has);
+        self.accounts.remember(worked);
         self.start_all();
     }
 
@@ -108,9 +124,14 @@ impl Fleet {
         (!self.ended.load(Ordering::SeqCst)).then(|| control_of(&cameras))
     }
 
-    /// Keeps who has which camera, for after a restart.
+    /// Keeps who has which camera, and which accounts have worked, for after a restart.
     pub fn keep_control(&self) {
         self.keep(|| self.control());
+        self.accounts.remember(worked_of(&lock(&self.cameras)));
+        if let Err(err) = self.accounts.keep() {
+            let detail = format!("which accounts have worked is forgotten at a restart: {err}");
+            self.log.tell(&Event::new(Level::Warning, None, "not-kept", detail));
+        }
     }
 
     fn keep(&self, control: impl FnOnce() -> Option<Kept>) {
@@ -190,10 +211,15 @@ fn control_of(cameras: &BTreeMap<String, Camera>) -> Kept {
     cameras.iter().map(|(name, camera)| (name.clone(), camera.known.control())).collect()
 }
 
+/// Where pictures have come by it.
+fn worked_of(cameras: &BTreeMap<String, Camera>) -> Accounts {
+    let worked = cameras.iter().filter(|(_, camera)| camera.known.worked.load(Ordering::Relaxed));
+    worked.map(|(name, camera)| (name.clone(), Account::of(&camera.settings))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::Path;
     use std::process::Command;
 
     use rustix::process::{Resource, Rlimit, Uid, getrlimit, getuid, setrlimit};
@@ -238,9 +264,7 @@ mod tests {
 
     /// One that keeps who has which camera in this folder.
     fn fleet_in(folder: &Path) -> Fleet {
-        let log = Arc::new(Log::unwritten());
-        let had = ControlFile::at(Some(folder.to_owned()), None, log.clone());
-        Fleet { had, ..Fleet::new(log) }
+        Fleet::at(Some(folder), None, Arc::new(Log::unwritten()))
     }
 
     fn control(fleet: &Fleet) -> Control {
@@ -263,6 +287,36 @@ mod tests {
         assert!(changed(|camera| camera.rate = Some(5)));
         assert!(!changed(|camera| camera.address = "http://127.0.0.1:2".to_owned()));
         fleet.end();
+    }
+
+    /// As after a power cut, when a camera that boots refuses everybody.
+    #[test]
+    fn an_account_that_worked_is_known_to_after_a_restart_and_no_other() {
+        gst::init().unwrap();
+        let folder = std::env::temp_dir().join(format!("ptztrack-fleet-worked-{}", std::process::id()));
+        fs::create_dir_all(&folder).unwrap();
+        let worked = |fleet: &Fleet, cameras: Vec<CameraSettings>| {
+            fleet.apply(cameras);
+            fleet.of("door").unwrap().worked.load(Ordering::Relaxed)
+        };
+        let before = fleet_in(&folder);
+        assert!(!worked(&before, door("http://127.0.0.1:1")));
+        before.of("door").unwrap().worked.store(true, Ordering::Relaxed);
+        before.keep_control();
+        before.end();
+        let after = fleet_in(&folder);
+        assert!(worked(&after, door("http://127.0.0.1:1")));
+        // Nor is it forgotten before a picture has come.
+        after.keep_control();
+        assert!(worked(&after, door("http://127.0.0.1:1")));
+        after.end();
+        let changed = fleet_in(&folder);
+        assert!(!worked(&changed, door("http://127.0.0.1:2")), "somebody else's");
+        changed.keep_control();
+        changed.apply(Vec::new());
+        assert!(worked(&changed, door("http://127.0.0.1:1")), "its entry is back");
+        changed.end();
+        fs::remove_dir_all(&folder).unwrap();
     }
 
     #[test]

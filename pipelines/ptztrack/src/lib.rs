@@ -4,6 +4,7 @@
 //!
 //! This is a program, and a library for who examines it only.
 
+mod accounts_file;
 mod ask_events;
 mod camera;
 mod cli;

@@ -74,7 +74,7 @@ pub async fn run(origin: Arc<Origin>, config: Config, log: Arc<Log>) -> Result<(
     let (mut terminate, mut interrupt) = (terminate.map_err(said)?, interrupt.map_err(said)?);
     let mut hangup = signal(SignalKind::hangup()).map_err(said)?;
 
-    let fleet = Arc::new(Fleet::new(log.clone()).of_share(origin.shard()));
+    let fleet = Arc::new(Fleet::of_share(origin.shard(), log.clone()));
     tell_waiting(&config, None, &log);
     let (exchange, saying) = exchange(&origin, &config, &log).unzip();
     let mut services =

@@ -35,6 +35,67 @@ fn a_camera_that_refuses_an_account_that_worked_is_tried_again() {
     scene::assert_left_at_rest(&camera);
 }
 
+/// As after a power cut: the camera boots with the machine, and refuses everybody for its first seconds. One that never worked is
+/// given up at once, as it may be misspelt.
+#[track_caller]
+fn is_followed_after_both_were_restarted(test: &str, entry: &str, more: &[&str]) {
+    let [camera, never] = [(); 2].map(|()| VirtualCamera::start(scene::walking_person()).unwrap());
+    never.set_fault(Fault::Locked);
+    let state = end_to_end::scratch(&format!("state-{test}"));
+    fs::create_dir_all(&state).unwrap();
+    let environment = [("STATE_DIRECTORY", state.as_path())];
+    let file = |folder: &Path| {
+        let password = folder.join("password");
+        [("door", &camera), ("never", &never)]
+            .map(|(name, camera)| Program::entry(name, &camera.url(), &password) + entry)
+            .concat()
+    };
+    let mut program = Program::start_in(test, file, more, &environment);
+    program.launch.wait_for_line("never: error: given up: ");
+    scene::wait_until_following(&camera);
+    let kept = || {
+        let files = fs::read_dir(&state).unwrap().map(|file| file.unwrap().path());
+        let texts = files.filter_map(|file| fs::read_to_string(file).ok());
+        texts.collect::<String>()
+    };
+    let begin = Instant::now();
+    while !kept().contains(&camera.url()) {
+        assert!(begin.elapsed() < PATIENCE, "not kept: {}", kept());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    assert!(!kept().contains(scene::PASSWORD) && !kept().contains("never"), "{}", kept());
+    program.launch.signal("KILL");
+    program.launch.finish();
+    scene::assert_left_at_rest(&camera);
+
+    camera.set_fault(Fault::Locked);
+    let mut program = Program::start_in(test, file, more, &environment);
+    let line = program.launch.wait_for_line("it is tried again");
+    assert!(line.contains("door: ") && line.contains("the camera refuses user"), "{line}");
+    program.launch.rewind();
+    program.launch.wait_for_line("never: error: given up: ");
+    camera.set_fault(Fault::None);
+    program.launch.wait_for_line("door: the picture is there");
+    scene::wait_until_following(&camera);
+    program.end("TERM");
+    scene::assert_left_at_rest(&camera);
+    fs::remove_dir_all(state).unwrap();
+}
+
+#[test]
+fn an_account_that_worked_before_a_restart_is_tried_again() {
+    is_followed_after_both_were_restarted("both-restart", "", &[]);
+}
+
+#[test]
+fn so_is_that_of_a_camera_with_a_process_of_its_own_in_a_share() {
+    is_followed_after_both_were_restarted(
+        "both-restart-process",
+        "isolation = \"process\"\n",
+        &["--shard", "0/1"],
+    );
+}
+
 /// Somebody in a camera's place who, by RTSP, takes no user and password for right; and when whom he has refused went away.
 fn locked() -> (SocketAddr, Receiver<Instant>) {
     const CHALLENGE: &[u8] =

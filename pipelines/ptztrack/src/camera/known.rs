@@ -36,7 +36,7 @@ pub struct Known {
     pub running: Mutex<Option<Arc<dyn Running>>>,
     pub pictures: AtomicU64,
     pub processed: AtomicU64,
-    /// User and password have worked, since the program was started.
+    /// User and password have worked, if not in this program, then in one before it.
     pub worked: AtomicBool,
     /// By the pipelines before this one; between two, more than there can be.
     processed_before: AtomicU64,

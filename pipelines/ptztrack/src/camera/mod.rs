@@ -109,32 +109,43 @@ impl Runner {
 }
 
 impl Camera {
-    /// One that can be started, with who had it before.
-    pub fn new(settings: CameraSettings, control: Control, log: Arc<Log>, predecessor: Option<Self>) -> Self {
+    /// One that can be started, with who had it before, and whether the account has worked.
+    pub fn new(
+        settings: CameraSettings,
+        control: Control,
+        worked: bool,
+        log: Arc<Log>,
+        predecessor: Option<Self>,
+    ) -> Self {
         let runner = Runner::of(settings.isolation);
-        Self::with(runner, settings, control, log, predecessor)
+        Self::with(runner, settings, control, worked, log, predecessor)
     }
 
     /// The same, in this process in any case, and nobody's successor.
-    pub fn here(settings: CameraSettings, control: Control, log: Arc<Log>) -> Self {
-        Self::with(Runner::here(), settings, control, log, None)
+    pub fn here(settings: CameraSettings, control: Control, worked: bool, log: Arc<Log>) -> Self {
+        Self::with(Runner::here(), settings, control, worked, log, None)
     }
 
     fn with(
         runner: Runner,
         settings: CameraSettings,
         control: Control,
+        worked: bool,
         log: Arc<Log>,
         predecessor: Option<Self>,
     ) -> Self {
         let known = Arc::new(Known::new(&settings.name));
         known.take_control(control);
         // User and password that were right are tried again, where the camera refuses them for a while.
-        let worked = predecessor.as_ref().is_some_and(|before| {
+        let worked = predecessor.as_ref().map_or(worked, |before| {
             let (was, is) = (&before.settings, &settings);
-            (was.protocol, &was.address, &was.rtsp, &was.credentials)
+            if (was.protocol, &was.address, &was.rtsp, &was.credentials)
                 == (is.protocol, &is.address, &is.rtsp, &is.credentials)
-                && before.known.worked.load(Ordering::Relaxed)
+            {
+                return before.known.worked.load(Ordering::Relaxed);
+            }
+            // Another password than one that is known has not worked.
+            was.no_password.is_some() && worked
         });
         known.worked.store(worked, Ordering::Relaxed);
         let predecessor = Arc::new(Mutex::new(predecessor.and_then(Self::into_thread)));

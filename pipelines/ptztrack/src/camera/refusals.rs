@@ -3,7 +3,11 @@
 use std::time::{Duration, Instant};
 
 /// When a camera that refuses user and password is tried again, though they have worked: one that is starting may refuse everybody, and
-/// one that was attacked may have locked the account for a while.
+/// one that was attacked may have locked the account for a while. Whether they have worked outlives the program, and what is kept says
+/// nothing of the password: one that was changed in the meantime, for a wrong one, is tried as often. That is seven times in the first
+/// ten and a half minutes, and then every ten minutes: cameras that lock an account after five or ten such tries do so for minutes,
+/// to others as well who use it; which an account of its own for this program avoids. To give up a camera after a power cut, until
+/// somebody comes, costs more.
 #[derive(Debug, Default)]
 pub struct Refusals {
     pause: Option<Duration>,

@@ -6,7 +6,6 @@ use std::io;
 use std::os::fd::AsFd;
 use std::os::unix::net::UnixStream as StdUnixStream;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::Duration;
 
 use rustix::process::{Resource, Rlimit, setrlimit};
@@ -46,9 +45,8 @@ pub async fn run() -> io::Result<()> {
     let mut events = log.subscribe();
     let sightings = log.sightings();
     let hands_over = start.settings.hands_over;
-    let mut camera = Camera::here(start.settings, start.control, log);
+    let mut camera = Camera::here(start.settings, start.control, start.worked, log);
     let known = camera.known.clone();
-    known.worked.store(start.worked, Ordering::Relaxed);
     camera.start()?;
     let mut process = Child { words, heard: 0 };
     let mut terminate = signal(SignalKind::terminate())?;
