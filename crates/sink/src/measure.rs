@@ -59,7 +59,7 @@ pub trait Measuring: PtzSink {
         }
         if age > stale_timeout {
             return self.warn(Fault::OldPictures, || {
-                format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. Put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of what is slow")
+                format!("pictures arrive {age:.1?} late, which is more than `stale-timeout` ({stale_timeout:?}): the camera is not steered by them. If the network is slow, lower the stream's bit rate, or reduce other traffic; if an element of the pipeline is, put a leaky queue (`queue leaky=downstream max-size-buffers=1`) in front of it")
             });
         }
         // Who is lost as the picture has become another one has not gone out of view.

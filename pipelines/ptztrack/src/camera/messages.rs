@@ -50,6 +50,7 @@ impl Listener {
                 }
                 self.trouble(Level::Warning, "warning", warning.error().message().to_owned(), "");
             }
+            MessageView::Info(info) => self.trouble(Level::Info, "info", info.error().message().to_owned(), ""),
             MessageView::Element(element) => {
                 if let Some(structure) = element.structure() {
                     self.element(structure);
@@ -197,6 +198,17 @@ mod tests {
         listener.out_of_reach("cannot connect. Check `location`, the cable; retrying.".to_owned());
         let told = events.try_recv().unwrap().detail;
         assert_eq!(told, "cannot connect. Check `address`, the cable; it is tried again until it is back");
+    }
+
+    /// As of pictures that did not come for long, or of a mode that the camera does not have.
+    #[test]
+    fn what_an_element_only_informs_of_is_told_and_is_no_trouble() {
+        let log = Arc::new(Log::unwritten());
+        let (mut events, mut listener) = (log.subscribe(), listener(&log));
+        listener.hear(&gst::message::Info::new(gst::StreamError::Failed, "no picture came for 2 s"));
+        let told = events.try_recv().unwrap();
+        assert_eq!((told.level, &*told.event, &*told.detail), (Level::Info, "info", "no picture came for 2 s"));
+        assert_eq!(lock(&listener.known.state).trouble, None);
     }
 
     #[test]
