@@ -50,7 +50,9 @@ impl Listener {
                 }
                 self.trouble(Level::Warning, "warning", warning.error().message().to_owned(), "");
             }
-            MessageView::Info(info) => self.trouble(Level::Info, "info", info.error().message().to_owned(), ""),
+            MessageView::Info(info) => {
+                self.trouble(Level::Info, "info", info.error().message().to_owned(), "")
+            }
             MessageView::Element(element) => {
                 if let Some(structure) = element.structure() {
                     self.element(structure);
@@ -207,7 +209,10 @@ mod tests {
         let (mut events, mut listener) = (log.subscribe(), listener(&log));
         listener.hear(&gst::message::Info::new(gst::StreamError::Failed, "no picture came for 2 s"));
         let told = events.try_recv().unwrap();
-        assert_eq!((told.level, &*told.event, &*told.detail), (Level::Info, "info", "no picture came for 2 s"));
+        assert_eq!(
+            (told.level, &*told.event, &*told.detail),
+            (Level::Info, "info", "no picture came for 2 s")
+        );
         assert_eq!(lock(&listener.known.state).trouble, None);
     }
 
