@@ -254,6 +254,7 @@ impl Experiment {
             others,
             estimate: None,
             coverage: Vec::new(),
+            best_region: None,
             size: self.size,
             focal_px: camera.focal_px(&pose, self.size),
             pan_deg: pose.pan_deg,

@@ -230,6 +230,10 @@ pub struct FrameRecord {
     pub estimate: Option<Estimate>,
     /// What the estimate holds of anybody, judged by their silhouettes; nothing where it holds no place at all.
     pub coverage: Vec<Coverage>,
+    /// How well the best region of the detector fits the person's box (intersection over union); `None` where nobody heard the
+    /// detector, or there is no person.
+    #[serde(default)]
+    pub best_region: Option<f64>,
     /// Width and height of the picture in pixels.
     pub size: (u32, u32),
     /// Focal length of the view, in pixels.

@@ -127,6 +127,7 @@ impl<'a> Screening<'a> {
             others,
             estimate: None,
             coverage: Vec::new(),
+            best_region: None,
             size,
             focal_px: f64::from(size.0),
             pan_deg: 0.0,

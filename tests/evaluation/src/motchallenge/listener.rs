@@ -7,7 +7,11 @@ use std::sync::{Arc, Mutex};
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, MotionMeta, Rect, TargetMeta, TargetState, TracksMeta};
 
-use crate::pipeline::{Elements, Pipeline, PipelineError, SINK, lock};
+use crate::{
+    metrics::overlap_with,
+    pipeline::{Elements, Pipeline, PipelineError, SINK, lock},
+    record::Bounds,
+};
 
 /// Boxes of one picture, in frame sizes.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -54,6 +58,21 @@ impl Said {
         }
     }
 
+    /// How well the best region fits a box in a picture of that size, pixels: intersection over union, 0 where there is none.
+    pub fn best_region(&self, bounds: &Bounds, size: (u32, u32)) -> f64 {
+        let (width, height) = (f64::from(size.0), f64::from(size.1));
+        let fits = self.regions.iter().map(|region| {
+            let region = Bounds {
+                left: region.x * width,
+                top: region.y * height,
+                width: region.width * width,
+                height: region.height * height,
+            };
+            overlap_with(&region, bounds)
+        });
+        fits.fold(0.0, f64::max)
+    }
+
     /// Of a tracker that tells of its target alone.
     fn target(buffer: &gst::BufferRef) -> Option<(u64, Rect)> {
         let target = TargetMeta::of(buffer)?.ok()?;
@@ -88,6 +107,16 @@ mod tests {
             assert_eq!(said(state).tracks, []);
         }
         assert_eq!(Said::of(gst::Buffer::new().as_ref()), Said::default());
+    }
+
+    #[test]
+    fn a_region_fits_by_what_it_shares_with_a_box() {
+        let region = |x| Rect { x, y: 0.2, width: 0.1, height: 0.4 };
+        let said = Said { regions: vec![region(0.6), region(0.1)], tracks: vec![] };
+        let bounds = Bounds { left: 10.0, top: 10.0, width: 10.0, height: 40.0 };
+        // They have 30 of 50 rows in common.
+        assert!((said.best_region(&bounds, (100, 100)) - 0.6).abs() < 1e-9);
+        assert_eq!(Said::default().best_region(&bounds, (100, 100)), 0.0);
     }
 
     #[test]

@@ -104,7 +104,9 @@ impl<'a> Screening<'a> {
             self.pipeline.send_upstream(state.event())?;
         }
         let said = target.map(|target| self.placement.replaced(estimate(&target, size), &picture.truth));
-        let record = picture.truth.clone().judged(said, &picture.people);
-        Ok((record, self.listener.take()))
+        let mut record = picture.truth.clone().judged(said, &picture.people);
+        let heard = self.listener.take();
+        record.best_region = record.truth.as_ref().map(|person| heard.best_region(&person.bounds, size));
+        Ok((record, heard))
     }
 }

@@ -36,6 +36,7 @@ pub(crate) fn frame(size: (u32, u32)) -> FrameRecord {
         others: Vec::new(),
         estimate: None,
         coverage: Vec::new(),
+        best_region: None,
         size,
         focal_px: f64::from(size.0),
         pan_deg: 0.0,

@@ -1,16 +1,18 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! What a scene is judged by. These four figures were fixed before anything was compared by them; nothing else decides.
+//! What a scene is judged by. The first four figures were fixed before anything was compared by them; nothing else decides.
 
 use std::collections::BTreeSet;
 
 use crate::{
-    metrics::{contains_target, d_gc, is_out, mean, overlap_with},
+    metrics::{LASTING_S, SPECK, contains_target, d_gc, holds, is_out, mean, overlap_with},
     record::{Estimate, FrameRecord, Run, Suite},
 };
 
 /// A box holds somebody whose true box it overlaps by this much (intersection over union) or more.
 const HELD_IOU: f64 = 0.3;
+/// A region shows somebody whole whose box it overlaps by this much or more, as boxes are held against each other (PETS).
+const SHOWN_IOU: f64 = 0.4;
 /// What is followed is somebody if their part in the box is this much or more.
 const SOMEBODY: f64 = 0.1;
 
@@ -27,6 +29,9 @@ pub struct Endpoints {
     pub changes: Option<usize>,
     /// How often something was followed that never was anybody.
     pub pursuits: usize,
+    /// Whether the target was elsewhere for more than half a second on end although the person was whole in view and a region showed
+    /// them; `None` where nobody heard the detector.
+    pub elsewhere: Option<bool>,
     /// For how long was counted, seconds.
     pub seconds: f64,
 }
@@ -48,6 +53,10 @@ impl Endpoints {
             distance,
             changes: frames.iter().any(|frame| !frame.others.is_empty()).then(|| changes(frames)),
             pursuits: pursuits_of_nobody(frames),
+            elsewhere: frames
+                .iter()
+                .any(|frame| frame.best_region.is_some())
+                .then(|| is_lastingly_elsewhere(frames, run.frame_rate)),
             seconds: frames.len() as f64 / run.frame_rate,
         }
     }
@@ -75,6 +84,19 @@ fn off(frame: &FrameRecord) -> f64 {
         let radius = f64::from(frame.size.0).hypot(f64::from(frame.size.1)) / 2.0;
         ((x - u).hypot(y - v) / radius).min(1.0)
     })
+}
+
+fn is_lastingly_elsewhere(frames: &[FrameRecord], frame_rate: f64) -> bool {
+    frames
+        .chunk_by(|one, next| is_elsewhere(one) == is_elsewhere(next))
+        .any(|same| is_elsewhere(&same[0]) && same.len() as f64 / frame_rate > LASTING_S)
+}
+
+/// There is a target, and it is not the person, who is whole in view in a region.
+fn is_elsewhere(frame: &FrameRecord) -> bool {
+    let is_whole = frame.truth.as_ref().is_some_and(|person| person.visible > 1.0 - SPECK);
+    let is_shown = frame.best_region.is_some_and(|overlap| overlap >= SHOWN_IOU);
+    is_whole && is_shown && placed(frame).is_some() && !holds(frame)
 }
 
 /// Number of whom the box holds: of several it stays with whom it held `before`, else it is who it holds best.
@@ -160,6 +182,22 @@ mod tests {
             truth.centroid = (-1.0, 30.0);
         }
         assert_eq!(of(Suite::ClosedLoop, &[tracked(), unseen(), away]).distance, Some(1.0 / 3.0));
+    }
+
+    #[test]
+    fn the_target_is_elsewhere_where_a_region_shows_the_whole_person_beside_it() {
+        let away = |best_region| FrameRecord { best_region, coverage: Vec::new(), ..tracked() };
+        let (shown, parts) = (away(Some(0.5)), away(Some(0.2)));
+        let is_elsewhere = |frames: &[FrameRecord]| of(Suite::OpenLoop, frames).elsewhere;
+        assert_eq!(is_elsewhere(&vec![shown.clone(); 6]), Some(true));
+        assert_eq!(is_elsewhere(&vec![shown.clone(); 5]), Some(false), "no longer than half a second");
+        assert_eq!(is_elsewhere(&vec![parts; 20]), Some(false));
+        assert_eq!(is_elsewhere(&vec![away(None); 20]), None);
+        let held = FrameRecord { best_region: Some(0.5), ..tracked() };
+        assert_eq!(
+            is_elsewhere(&[vec![shown; 4], vec![held], vec![away(Some(0.5)); 4]].concat()),
+            Some(false)
+        );
     }
 
     #[test]

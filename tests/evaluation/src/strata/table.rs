@@ -18,7 +18,7 @@ pub const SCENES: &str = "scenes.csv";
 const TABLE: &str = "strata.md";
 
 /// What the columns of [`SCENES`] are called.
-const COLUMNS: [&str; 18] = [
+const COLUMNS: [&str; 19] = [
     "suite",
     "tracker",
     "stratum",
@@ -30,6 +30,7 @@ const COLUMNS: [&str; 18] = [
     "changes",
     "pursuits",
     "losses",
+    "elsewhere",
     "pictures",
     "seconds",
     "codec",
@@ -87,6 +88,7 @@ fn line(one: &SceneRun) -> Vec<String> {
         endpoints.changes.map(|changes| changes.to_string()).unwrap_or_default(),
         endpoints.pursuits.to_string(),
         losses.to_string(),
+        endpoints.elsewhere.map(|elsewhere| u8::from(elsewhere).to_string()).unwrap_or_default(),
         run.frames.len().to_string(),
         csv::number(Some(endpoints.seconds)),
         run.codec.to_string(),
@@ -128,6 +130,15 @@ fn table_of(suite: Suite, tracker: TrackerName, runs: &[&SceneRun]) -> String {
     let failed = runs.iter().filter_map(|one| Some((one.id, one.run.error.as_deref()?)));
     for (id, error) in failed {
         let _ = writeln!(text, "\n{id} failed: {error}");
+    }
+    let elsewhere: Vec<_> = runs.iter().filter_map(|one| Endpoints::of(&one.run).elsewhere).collect();
+    if !elsewhere.is_empty() {
+        let count = elsewhere.iter().filter(|elsewhere| **elsewhere).count();
+        let _ = writeln!(
+            text,
+            "\nA region showed the person, whole in view, while the target was elsewhere for more than half a second: in {count} of {} scenes.",
+            elsewhere.len()
+        );
     }
     if let Some(error) =
         pointing_error(runs.iter().map(|one| &one.run)).filter(|_| suite == Suite::ClosedLoop)
