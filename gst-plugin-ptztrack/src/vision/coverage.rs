@@ -35,18 +35,18 @@ pub(super) struct Coverage {
     touched: Vec<Place>,
 }
 
-/// Which block of which row.
+/// Which block of which row, and which of all.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Place {
     pub y: usize,
     pub block: usize,
+    index: usize,
 }
 
 impl Coverage {
     /// Nothing of `area` is covered.
     pub fn clear(&mut self, area: Rect) {
-        for Place { y, block } in &self.touched {
-            let index = y * self.stride + block;
+        for &Place { index, .. } in &self.touched {
             (self.blocks[index], self.is_touched[index]) = ([[0; TOGETHER]; LAYERS], false);
         }
         self.touched.clear();
@@ -73,7 +73,7 @@ impl Coverage {
                     },
                 );
             for y in top..top + inside.height as usize {
-                let pixels = &mut self.touch(Place { y, block })[layer];
+                let pixels = &mut self.touch(y, block)[layer];
                 pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| *pixel |= covered);
             }
         }
@@ -102,43 +102,25 @@ impl Coverage {
 
     /// A block, to be covered.
     #[inline(always)]
-    fn touch(&mut self, place: Place) -> &mut [Block; LAYERS] {
-        let index = place.y * self.stride + place.block;
+    fn touch(&mut self, y: usize, block: usize) -> &mut [Block; LAYERS] {
+        let index = y * self.stride + block;
         if !std::mem::replace(&mut self.is_touched[index], true) {
-            self.touched.push(place);
+            self.touched.push(Place { y, block, index });
         }
         &mut self.blocks[index]
     }
 
     /// The blocks of which anything may be covered. The last of a row may reach beyond the area, where nothing is.
     pub fn touched(&self) -> impl Iterator<Item = (Place, &[Block; LAYERS])> {
-        self.touched.iter().map(|place| (*place, &self.blocks[place.y * self.stride + place.block]))
+        self.touched.iter().map(|place| (*place, &self.blocks[place.index]))
     }
 
     /// The means of blocks of pixels, `across` and `down` times halved, into `out`.
     pub fn reduce(&self, (across, down): (u32, u32), out: &mut Self) {
         match across {
-            0 => self.reduce_by::<1>(down, out),
-            1 => self.reduce_by::<2>(down, out),
-            _ => self.reduce_by::<4>(down, out),
-        }
-    }
-
-    /// The same of blocks that are `SIDE` pixels wide.
-    fn reduce_by<const SIDE: usize>(&self, down: u32, out: &mut Self) {
-        let (width, height) = (self.width().div_ceil(SIDE), self.height().div_ceil(1 << down));
-        out.clear(Rect::new(0, 0, width as i32, height as i32));
-        for Place { y, block } in &self.touched {
-            out.touch(Place { y: y >> down, block: block / SIDE });
-        }
-        let shift = SIDE.ilog2() + down;
-        for Place { y, block } in &out.touched {
-            let mut sums = [[0; TOGETHER]; LAYERS];
-            for row in (y << down)..((y + 1) << down).min(self.height()) {
-                let blocks = self.blocks[row * self.stride + block * SIDE..].first_chunk::<SIDE>();
-                blocks.into_iter().for_each(|blocks| add_blocks(&mut sums, blocks));
-            }
-            out.blocks[y * out.stride + block] = sums.map(|sums| sums.map(|sum| (sum >> shift) as u8));
+            0 => reduce::<1>(self, down, out),
+            1 => reduce::<2>(self, down, out),
+            _ => reduce::<4>(self, down, out),
         }
     }
 
@@ -156,8 +138,7 @@ impl Coverage {
                 let left = block * TOGETHER;
                 let inside = columns.start.max(left)..columns.end.min(left + TOGETHER);
                 let covered = &line[inside.start - first..];
-                let pixels =
-                    &mut self.touch(Place { y, block })[BARE][inside.start - left..inside.end - left];
+                let pixels = &mut self.touch(y, block)[BARE][inside.start - left..inside.end - left];
                 pixels.iter_mut().zip(covered).for_each(|(pixel, covered)| *pixel = (*pixel).max(*covered));
             }
         }
@@ -169,19 +150,42 @@ fn blocks_of(columns: &Range<usize>) -> Range<usize> {
     columns.start / TOGETHER..columns.end.div_ceil(TOGETHER)
 }
 
-/// Adds what is covered in blocks of `SIDE` pixels beside each other.
-#[inline(always)]
-fn add_blocks<const SIDE: usize>(sums: &mut [[u16; TOGETHER]; LAYERS], covered: &[[Block; LAYERS]; SIDE]) {
-    for (layer, sums) in sums.iter_mut().enumerate() {
-        let pixels = covered.map(|block| block[layer]);
-        let pixels = pixels.as_flattened();
-        // Counted out, which the compiler makes into vector code: of chunks it does not.
-        for (index, sum) in sums.iter_mut().enumerate() {
-            for beside in 0..SIDE {
-                *sum += u16::from(pixels[index * SIDE + beside]);
+/// The means of blocks of pixels that are `SIDE` wide, and high as `down` says, into `out`.
+#[multiversion(targets("x86_64+avx2"))]
+fn reduce<const SIDE: usize>(coverage: &Coverage, down: u32, out: &mut Coverage) {
+    let (width, height) = (coverage.width().div_ceil(SIDE), coverage.height().div_ceil(1 << down));
+    out.clear(Rect::new(0, 0, width as i32, height as i32));
+    for Place { y, block, .. } in &coverage.touched {
+        out.touch(y >> down, block / SIDE);
+    }
+    let shift = SIDE.ilog2() + down;
+    for &Place { y, block, index } in &out.touched {
+        // Of columns first: side by side they are added once, not in each row. Below the last row nothing is covered.
+        let mut sums = [[[0; TOGETHER]; LAYERS]; SIDE];
+        let first = (y << down) * coverage.stride + block * SIDE;
+        let rows = coverage.blocks[first..].chunks(coverage.stride).take(1 << down);
+        // Copied, so that the compiler knows that the sums do not lie on them.
+        for blocks in rows.map_while(|row| row.first_chunk::<SIDE>().copied()) {
+            let pixels = blocks.as_flattened().as_flattened();
+            for (sum, &pixel) in sums.as_flattened_mut().as_flattened_mut().iter_mut().zip(pixels) {
+                *sum += u16::from(pixel);
             }
         }
+        for layer in 0..LAYERS {
+            let columns = sums.map(|sums| sums[layer]);
+            out.blocks[index][layer] = means::<SIDE>(columns.as_flattened().as_chunks().0, shift);
+        }
     }
+}
+
+/// Sums of columns, so many side by side of 2 to the power of `shift` pixels.
+#[inline(always)]
+fn means<const SIDE: usize>(columns: &[[u16; SIDE]], shift: u32) -> Block {
+    let mut means = [0; TOGETHER];
+    for (mean, columns) in means.iter_mut().zip(columns) {
+        *mean = (columns.iter().sum::<u16>() >> shift) as u8;
+    }
+    means
 }
 
 /// The pixels that `low` to `high` touch, and at most one more, counted from `start` on, of which there are `size`.
@@ -244,8 +248,7 @@ pub(super) fn add_stroke(
     strength: f64,
 ) {
     let (area, width, height) = (coverage.area, coverage.width(), coverage.height());
-    let reaches = radii.map(|radius| radius + 0.5);
-    let [reach, _] = reaches;
+    let [reach, inner_reach] = radii.map(|radius| radius + 0.5);
     let (dx, dy) = (to.x - from.x, to.y - from.y);
     let stroke = Stroke::new((dx, dy), strength);
     let (left, right) = limits(from.x.min(to.x) - reach, from.x.max(to.x) + reach, area.x, width);
@@ -263,13 +266,16 @@ pub(super) fn add_stroke(
             let first = block * TOGETHER;
             let mut distances = stroke.distances((origin + first as f64) as f32, down as f32);
             // Nothing is covered beyond the area.
-            distances[TOGETHER.min(width - first)..].fill(f32::INFINITY);
-            let covered = reaches.map(|reach| stroke.covered(&distances, reach as f32));
+            if let Some(beyond) = distances.get_mut(width - first..) {
+                beyond.fill(f32::INFINITY);
+            }
+            let covered =
+                [stroke.covered(&distances, reach as f32), stroke.covered(&distances, inner_reach as f32)];
             // What reaches less far covers nothing either.
             if covered[0].iter().fold(0, |any, covered| any | covered) == 0 {
                 continue;
             }
-            let pixels = coverage.touch(Place { y, block }).as_flattened_mut();
+            let pixels = coverage.touch(y, block).as_flattened_mut();
             pixels
                 .iter_mut()
                 .zip(covered.as_flattened())

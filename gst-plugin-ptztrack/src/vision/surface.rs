@@ -111,7 +111,7 @@ fn blend_blocks(
     coverage: &Coverage,
     paints: [Paint; LAYERS],
 ) {
-    for (Place { y, block }, covered) in coverage.touched() {
+    for (Place { y, block, .. }, covered) in coverage.touched() {
         let Some(pixels) = component.get_mut(y * stride + block * TOGETHER * step..) else { continue };
         match pixels.first_chunk_mut::<TOGETHER>() {
             // Of a length that is known, the compiler makes vector code.
