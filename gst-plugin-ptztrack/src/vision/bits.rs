@@ -49,6 +49,10 @@ impl Bits {
     pub fn store(&self, mask: &mut [u8]) {
         let rows = self.words.chunks_exact(self.stride.max(1)).skip(self.origin.1);
         for (words, row) in rows.zip(mask.chunks_exact_mut(self.size.0.max(1))) {
+            if is_black(words) {
+                row.fill(0);
+                continue;
+            }
             for (index, pixels) in row.chunks_mut(WORD).enumerate() {
                 unpack(farther(words, index, self.origin.0, 0), pixels);
             }
@@ -95,6 +99,10 @@ impl Bits {
     fn reduce(&mut self, side: Size, colour: u64, combine: fn(u64, u64) -> u64) {
         let stride = self.stride.max(1);
         for row in self.words.chunks_exact_mut(stride) {
+            // Nothing in it can become white, whatever lies beyond.
+            if is_black(row) {
+                continue;
+            }
             for distance in distances(side.0) {
                 for index in 0..row.len() {
                     row[index] = combine(row[index], farther(row, index, distance, colour));
@@ -120,6 +128,10 @@ fn distances(side: usize) -> impl Iterator<Item = usize> {
         combined += distance;
         (distance > 0).then_some(distance)
     })
+}
+
+fn is_black(words: &[u64]) -> bool {
+    words.iter().all(|word| *word == 0)
 }
 
 /// The word of pixels that lie `distance` to the right of those of a word.

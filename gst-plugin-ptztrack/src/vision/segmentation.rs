@@ -49,7 +49,7 @@ impl Segmentation {
         self.components.find(mask, width);
         for runs in self.components.parts() {
             let columns = extent(runs);
-            let is_sure = count(runs, &self.strong, width) >= needed;
+            let is_sure = holds(runs, &self.strong, width, needed);
             let kept = if is_sure { upright(runs, columns.clone(), &mut self.heights) } else { 0..0 };
             if kept != columns {
                 keep(runs, &kept, mask, width);
@@ -117,10 +117,15 @@ fn extent(runs: &[Run]) -> Range<usize> {
     start..runs.iter().map(|run| run.columns.end).max().unwrap_or(start)
 }
 
-/// How many pixels of a part are set in another mask, whose rows are `width` pixels.
-fn count(runs: &[Run], other: &[u8], width: usize) -> usize {
-    let pixels = runs.iter().flat_map(|run| &other[run.row * width..][run.columns.clone()]);
-    pixels.map(|pixel| usize::from(*pixel > 0)).sum()
+/// Whether so many pixels of a part are set in another mask, whose rows are `width` pixels.
+fn holds(runs: &[Run], other: &[u8], width: usize, needed: usize) -> bool {
+    let mut count = 0;
+    // A few rows of somebody are enough.
+    runs.iter().any(|run| {
+        let pixels = &other[run.row * width..][run.columns.clone()];
+        count += pixels.iter().filter(|pixel| **pixel > 0).count();
+        count >= needed
+    })
 }
 
 /// The `columns` of a part without a long low tail on either side: somebody stands upright, and their shadow lies (by the heights of
