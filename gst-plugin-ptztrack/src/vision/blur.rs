@@ -17,6 +17,8 @@ pub(super) const SIDE: usize = 2 * REACH + 1;
 pub(super) struct Blur {
     /// Sums of the columns of pixels around the last row, with those of the mirrored border.
     columns: Vec<u16>,
+    /// Which of them is which one's mirror.
+    mirrors: [(usize, usize); 2 * REACH],
     row: Vec<u8>,
 }
 
@@ -29,16 +31,18 @@ impl Blur {
         self.row.resize(width, 0);
         self.columns.resize(width + 2 * REACH, 0);
         if y == 0 {
+            self.mirrors = std::array::from_fn(|border| {
+                let mirror = if border < REACH { border } else { width + border };
+                (mirror, REACH + mirrored(mirror as isize - REACH as isize, width))
+            });
             self.columns.fill(0);
             (first..last).for_each(|y| add(&mut self.columns[REACH..], row(y)));
         } else {
             subtract(&mut self.columns[REACH..], row(first - 1));
         }
         add(&mut self.columns[REACH..], row(last));
-        for off in 1..=REACH {
-            let inside = |place: isize| REACH + mirrored(place, width);
-            self.columns[REACH - off] = self.columns[inside(-(off as isize))];
-            self.columns[REACH + width + off - 1] = self.columns[inside((width + off - 1) as isize)];
+        for (mirror, inside) in self.mirrors {
+            self.columns[mirror] = self.columns[inside];
         }
         means(&self.columns, &mut self.row);
         &self.row

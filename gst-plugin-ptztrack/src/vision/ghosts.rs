@@ -53,12 +53,15 @@ impl Ghosts {
         let [picture, known] = [scene.luma, scene.background]
             .map(|plane| plane.crop(x as usize, y as usize, columns as usize, rows as usize));
         let [of_picture, of_known] = &mut self.blurs;
-        let (mut fine, mut coarse) = (0, 0);
-        for y in 0..picture.height() {
-            fine += difference(picture.row(y), known.row(y));
+        let mut rows = 0..picture.height();
+        let fine: u32 = rows.clone().map(|y| difference(picture.row(y), known.row(y))).sum();
+        let mut coarse = 0;
+        // It only grows: of somebody, a few rows are enough.
+        let stays_less = |y| {
             coarse += difference(of_picture.row(&picture, y), of_known.row(&known, y));
-        }
-        f64::from(coarse) < UNSHARP * f64::from(fine)
+            f64::from(coarse) < UNSHARP * f64::from(fine)
+        };
+        fine > 0 && rows.all(stays_less)
     }
 }
 
@@ -70,38 +73,48 @@ fn difference(a: &[u8], b: &[u8]) -> u32 {
 
 /// Whether the contour of `region` is an edge of the background, not of the picture.
 fn is_ghost(scene: &SceneView, region: &Region) -> bool {
-    let (mut picture, mut background, mut places) = (0.0, 0.0, 0_u32);
-    let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
-    across(&region.contour, grid, |inside, outside| {
-        let step = |plane: &Luma| Some((level(plane, inside)? - level(plane, outside)?).abs());
-        if let (Some(seen), Some(known)) = (step(&scene.luma), step(&scene.background)) {
-            (picture, background, places) = (picture + seen, background + known, places + 1);
-        }
+    let (mut picture, mut background, mut places) = (0, 0, 0);
+    across(&region.contour, &scene.luma, |inside, outside| {
+        let step = |plane: &Luma| u32::from(level(plane, inside).abs_diff(level(plane, outside)));
+        picture += step(&scene.luma);
+        background += step(&scene.background);
+        places += 1;
     });
+    let [picture, background] = [picture, background].map(f64::from);
     places >= LEAST_PLACES && background >= LEAST_EDGE * f64::from(places) && background > STRONGER * picture
 }
 
 /// Whether picture and background go on differing beyond the contour of `region`, all in one direction: light has changed there, as it
 /// fades out over more pixels than the outline of anybody.
 pub fn is_light(scene: &SceneView, region: &Region) -> bool {
-    let (mut lighter, mut inside_sum, mut outside_sum, mut places) = (0.0_f64, 0.0, 0.0, 0_u32);
-    let grid = Grid { width: scene.luma.width() as f64, height: scene.luma.height() as f64 };
-    across(&region.contour, grid, |inside, outside| {
-        let off = |place| {
-            let is_known = level(&scene.foreground, place)? != f64::from(UNKNOWN);
-            is_known.then_some(level(&scene.luma, place)? - level(&scene.background, place)?)
-        };
-        if let (Some(inside), Some(outside)) = (off(inside), off(outside)) {
+    let (mut lighter, mut inside_sum, mut outside_sum, mut places) = (0, 0, 0, 0);
+    across(&region.contour, &scene.luma, |inside, outside| {
+        let is_known = |place| level(&scene.foreground, place) != UNKNOWN;
+        let off = |place| i32::from(level(&scene.luma, place)) - i32::from(level(&scene.background, place));
+        if is_known(inside) && is_known(outside) {
+            let (inside, outside) = (off(inside), off(outside));
             (lighter, places) = (lighter + inside, places + 1);
             (inside_sum, outside_sum) = (inside_sum + inside.abs(), outside_sum + outside.abs());
         }
     });
+    let [lighter, inside_sum, outside_sum] = [lighter, inside_sum, outside_sum].map(f64::from);
     let is_soft = inside_sum - outside_sum < SOFT * inside_sum;
     places >= LEAST_PLACES && is_soft && lighter.abs() >= ONE_WAY * inside_sum
 }
 
-/// Calls `compare` with a place inside and one outside of a closed contour (normalised), at each pixel along it.
-fn across(contour: &[Point], grid: Grid, mut compare: impl FnMut(Point, Point)) {
+/// Column and row of a pixel.
+type Pixel = (usize, usize);
+
+/// Calls `compare` with a pixel inside and one outside of a closed contour (normalised) of a `picture`, which holds both, at each pixel
+/// along it.
+fn across(contour: &[Point], picture: &Luma, mut compare: impl FnMut(Pixel, Pixel)) {
+    let (width, height) = (picture.width() as f64, picture.height() as f64);
+    let grid = Grid { width, height };
+    let pixel = |x: f64, y: f64| {
+        // Halves lie where two pixels meet.
+        let (x, y) = (x + 0.5, y + 0.5);
+        (x > 0.0 && y > 0.0 && x < width && y < height).then_some((x as usize, y as usize))
+    };
     let places = || contour.iter().map(|point| grid.place(point));
     let sides = || places().zip(places().cycle().skip(1));
     let signed_area: f64 = sides().map(|(a, b)| a.x * b.y - b.x * a.y).sum();
@@ -112,20 +125,17 @@ fn across(contour: &[Point], grid: Grid, mut compare: impl FnMut(Point, Point)) 
         for step in 0..length.round() as u32 {
             let share = f64::from(step) * along;
             let place = (from.x + (to.x - from.x) * share, from.y + (to.y - from.y) * share);
-            compare(
-                Point { x: place.0 - normal.0, y: place.1 - normal.1 },
-                Point { x: place.0 + normal.0, y: place.1 + normal.1 },
-            );
+            let inside = pixel(place.0 - normal.0, place.1 - normal.1);
+            let outside = pixel(place.0 + normal.0, place.1 + normal.1);
+            if let (Some(inside), Some(outside)) = (inside, outside) {
+                compare(inside, outside);
+            }
         }
     }
 }
 
-/// The grey level of the pixel at a place; `None` outside of the picture.
-fn level(plane: &Luma, place: Point) -> Option<f64> {
-    // Halves lie where two pixels meet.
-    let (x, y) = (place.x + 0.5, place.y + 0.5);
-    let inside = x > 0.0 && y > 0.0 && x < plane.width() as f64 && y < plane.height() as f64;
-    inside.then(|| f64::from(plane.row(y as usize)[x as usize]))
+fn level(plane: &Luma, (x, y): Pixel) -> u8 {
+    plane.row(y)[x]
 }
 
 #[cfg(test)]
