@@ -50,10 +50,11 @@ impl Columns {
     }
 }
 
-/// Leaves a row of cells, from the sums of the columns.
+/// Leaves a row of cells from the one `left` on, from the sums of the columns.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn pool(
     columns: &Columns,
+    left: usize,
     off: &mut [f32],
     spread: &mut [f32],
     bin: &mut [u8],
@@ -62,9 +63,9 @@ pub(super) fn pool(
     let count = off.len();
     let (spread, bin, is_plain) = (&mut spread[..count], &mut bin[..count], &mut is_plain[..count]);
     let [differences, spreads] =
-        [&columns.off, &columns.spread].map(|plane| &plane.as_chunks::<CELL>().0[..count]);
-    let [textures, knowns, plains] =
-        [&columns.texture, &columns.known, &columns.plain].map(|plane| &plane.as_chunks::<CELL>().0[..count]);
+        [&columns.off, &columns.spread].map(|plane| &plane.as_chunks::<CELL>().0[left..][..count]);
+    let [textures, knowns, plains] = [&columns.texture, &columns.known, &columns.plain]
+        .map(|plane| &plane.as_chunks::<CELL>().0[left..][..count]);
     for cell in 0..count {
         let sum = |columns: &[[u16; CELL]]| columns[cell].iter().sum::<u16>();
         let (texture, known, plain) = (sum(textures), sum(knowns), sum(plains));

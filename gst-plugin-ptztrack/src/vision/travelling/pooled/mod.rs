@@ -7,6 +7,8 @@
 mod cell_noise;
 mod columns;
 
+use std::ops::Range;
+
 use multiversion::multiversion;
 use ptztrack_contract::{Point, Rect};
 
@@ -24,7 +26,32 @@ const EVEN: f32 = 6.0;
 /// a shadow. It makes nobody taller: below a head that is plain there is a trunk that is not.
 const PLAIN: f32 = 0.5;
 
-/// What the cells of the canvas show, row after row.
+/// Cells of the canvas: those that hold some of the picture, and one more on each side, of which nothing is known.
+#[derive(Debug, Default)]
+struct Area {
+    left: usize,
+    top: usize,
+    across: usize,
+    down: usize,
+}
+
+impl Area {
+    /// Of a picture that covers these `spans` of the canvas' rows.
+    fn of(spans: &[(usize, usize)], (width, height): (usize, usize)) -> Self {
+        let covered = || spans.iter().enumerate().filter(|(_, (start, end))| start < end);
+        let cells = |first: Option<usize>, last: Option<usize>, size: usize| -> Range<usize> {
+            let (Some(first), Some(last)) = (first, last) else { return 0..0 };
+            (first / CELL).saturating_sub(1)..(last / CELL + 2).min(size / CELL)
+        };
+        let (start, last) =
+            (covered().map(|(_, span)| span.0).min(), covered().map(|(_, span)| span.1 - 1).max());
+        let columns = cells(start, last, width);
+        let rows = cells(covered().map(|(y, _)| y).next(), covered().map(|(y, _)| y).next_back(), height);
+        Self { left: columns.start, top: rows.start, across: columns.len(), down: rows.len() }
+    }
+}
+
+/// What the cells of an area show, row after row.
 #[derive(Debug, Default)]
 struct Cells {
     /// How much lighter each is than the background, but for the light, grey levels; NaN where that is not known.
@@ -54,6 +81,7 @@ impl Cells {
 pub(super) struct Pooled {
     at_rest: CellNoise,
     turning: CellNoise,
+    area: Area,
     cells: Cells,
     /// Memory: sums over a row of cells, by columns of pixels; what is known of a tile and around it; medians of tiles, and the light
     /// of each.
@@ -71,30 +99,25 @@ impl Pooled {
     /// Looks where cells of the picture, which the `model` was compared with, tell of somebody; learns their noise, apart for a camera that
     /// `rests` and one that turns.
     pub fn look(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)], rests: bool) {
-        let (across, down) = (model.size.0 / CELL, model.size.1 / CELL);
-        self.gather(model, picture, spans, (across, down));
-        self.subtract_light(across, down);
+        self.area = Area::of(spans, model.size);
+        self.gather(model, picture, spans);
+        self.subtract_light();
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
         noise.weigh(&mut self.cells);
-        noise.weigh_together(&mut self.cells, &mut self.together, across);
+        noise.weigh_together(&mut self.cells, &mut self.together, self.area.across);
         for sign in [1.0, -1.0] {
-            self.forget_shadows(across, sign);
+            self.forget_shadows(self.area.across, sign);
         }
     }
 
     /// What each cell shows, where it is known and its pixels say nothing by themselves.
-    fn gather(
-        &mut self,
-        model: &Model,
-        picture: &Sampled,
-        spans: &[(usize, usize)],
-        (across, down): (usize, usize),
-    ) {
+    fn gather(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)]) {
+        let Area { left, top, across, down } = self.area;
         let width = model.size.0;
         self.cells.resize(across * down);
         for y in 0..down {
             self.columns.clear(width);
-            for (row, &(start, end)) in spans.iter().enumerate().skip(y * CELL).take(CELL) {
+            for (row, &(start, end)) in spans.iter().enumerate().skip((top + y) * CELL).take(CELL) {
                 if start < end {
                     self.columns.add(
                         model.row(row, start..end),
@@ -106,20 +129,26 @@ impl Pooled {
             let row = y * across..(y + 1) * across;
             let Cells { off, spread, bin, is_plain, .. } = &mut self.cells;
             let [off, spread] = [off, spread].map(|plane| &mut plane[row.clone()]);
-            pool(&self.columns, off, spread, &mut bin[row.clone()], &mut is_plain[row]);
+            pool(&self.columns, left, off, spread, &mut bin[row.clone()], &mut is_plain[row]);
         }
     }
 
     /// Takes from each cell how much lighter its tile is as a whole: the median of its cells, and of the tiles around it.
-    fn subtract_light(&mut self, across: usize, down: usize) {
-        let (wide, high) = (across.div_ceil(TILE), down.div_ceil(TILE));
+    fn subtract_light(&mut self) {
+        let Area { left, top, across, down } = self.area;
+        // Tiles are those of the canvas: the first ones may begin before the area.
+        let (left, top) = (left % TILE, top % TILE);
+        let (wide, high) = ((left + across).div_ceil(TILE), (top + down).div_ceil(TILE));
+        let cells = |tile: usize, before: usize, count: usize| {
+            (tile * TILE).saturating_sub(before)..((tile + 1) * TILE - before).min(count)
+        };
         let known = &mut self.known;
         self.tiles.clear();
         for tile in 0..wide * high {
-            let (left, top) = (tile % wide * TILE, tile / wide * TILE);
+            let (columns, rows) = (cells(tile % wide, left, across), cells(tile / wide, top, down));
             known.clear();
-            for row in self.cells.off.chunks_exact(across).skip(top).take(TILE) {
-                let tile = &row[left..(left + TILE).min(across)];
+            for row in rows {
+                let tile = &self.cells.off[row * across..][columns.clone()];
                 tile.iter().filter(|off| !off.is_nan()).for_each(|off| known.push(*off));
             }
             self.tiles.push(median(known).unwrap_or(f32::NAN));
@@ -134,9 +163,9 @@ impl Pooled {
             }
             self.light.push(median(known).unwrap_or(0.0));
         }
-        for (y, row) in self.cells.off.chunks_exact_mut(across).enumerate() {
-            for (tile, light) in row.chunks_mut(TILE).zip(&self.light[y / TILE * wide..]) {
-                tile.iter_mut().for_each(|off| *off -= light);
+        for (y, row) in self.cells.off.chunks_exact_mut(across.max(1)).enumerate() {
+            for (tile, light) in self.light[(top + y) / TILE * wide..][..wide].iter().enumerate() {
+                row[cells(tile, left, across)].iter_mut().for_each(|off| *off -= light);
             }
         }
     }
@@ -144,40 +173,48 @@ impl Pooled {
     /// Forgets cells that tell of somebody lighter or darker, as `sign` says, and hang together with plain foreground. What is lighter and
     /// what is darker never hang together: a shadow beside somebody's light clothes is not theirs.
     fn forget_shadows(&mut self, across: usize, sign: f32) {
-        let Cells { z, is_plain, .. } = &mut self.cells;
         self.looked_at.clear();
-        self.looked_at.resize(z.len(), false);
-        for first in 0..z.len() {
-            if !tells(sign * z[first]) || self.looked_at[first] {
-                continue;
+        self.looked_at.resize(self.cells.z.len(), false);
+        for row in (0..self.cells.z.len()).step_by(across.max(1)) {
+            // Most rows tell of nobody.
+            if any_tells(&self.cells.z[row..][..across]) {
+                (row..row + across).for_each(|first| self.forget_shadow(first, across, sign));
             }
-            self.component.clear();
-            self.component.push(first);
-            self.looked_at[first] = true;
-            let mut next = 0;
-            while let Some(&at) = self.component.get(next) {
-                next += 1;
-                for near in neighbours(at, across, z.len()) {
-                    if !self.looked_at[near] && (is_plain[near] || tells(sign * z[near])) {
-                        self.looked_at[near] = true;
-                        self.component.push(near);
-                    }
+        }
+    }
+
+    /// The same of what hangs together with one cell.
+    fn forget_shadow(&mut self, first: usize, across: usize, sign: f32) {
+        let Cells { z, is_plain, .. } = &mut self.cells;
+        if !tells(sign * z[first]) || self.looked_at[first] {
+            return;
+        }
+        self.component.clear();
+        self.component.push(first);
+        self.looked_at[first] = true;
+        let mut next = 0;
+        while let Some(&at) = self.component.get(next) {
+            next += 1;
+            for near in neighbours(at, across, z.len()) {
+                if !self.looked_at[near] && (is_plain[near] || tells(sign * z[near])) {
+                    self.looked_at[near] = true;
+                    self.component.push(near);
                 }
             }
-            self.component.sort_unstable();
-            let rows = || self.component.chunk_by(|a, b| a / across == b / across);
-            let plain = rows().filter(|row| row.iter().any(|&at| is_plain[at])).count();
-            if plain as f32 >= PLAIN * rows().count() as f32 {
-                self.component.iter().for_each(|&at| z[at] = 0.0);
-            }
+        }
+        self.component.sort_unstable();
+        let rows = || self.component.chunk_by(|a, b| a / across == b / across);
+        let plain = rows().filter(|row| row.iter().any(|&at| is_plain[at])).count();
+        if plain as f32 >= PLAIN * rows().count() as f32 {
+            self.component.iter().for_each(|&at| z[at] = 0.0);
         }
     }
 
     /// Raises the likelihood of foreground in the `model` where cells tell of somebody, between the middles of four cells each: `within` a
     /// box of the canvas, or everywhere.
     pub fn mark(&self, model: &mut Model, within: Option<Rect>) {
-        let width = model.size.0;
-        let rows = || self.cells.z.chunks_exact((width / CELL).max(1));
+        let Area { left, top, across, .. } = self.area;
+        let rows = || self.cells.z.chunks_exact(across.max(1));
         let mut lower_tells = rows().next().is_some_and(any_tells);
         for (y, (upper, lower)) in rows().zip(rows().skip(1)).enumerate() {
             // Most rows tell of nobody.
@@ -186,7 +223,7 @@ impl Pooled {
                 continue;
             }
             for (x, (upper, lower)) in upper.windows(2).zip(lower.windows(2)).enumerate() {
-                let first = (x * CELL + CELL / 2, y * CELL + CELL / 2);
+                let first = ((left + x) * CELL + CELL / 2, (top + y) * CELL + CELL / 2);
                 let is_within = || {
                     within
                         .is_none_or(|within| within.contains(Point { x: first.0 as f64, y: first.1 as f64 }))
@@ -266,6 +303,20 @@ mod tests {
         assert_eq!(left_of_somebody(6), 0, "a shadow");
         assert_eq!(left_of_somebody(1), 11, "all but the head, which is plain");
         assert_eq!(left_of_somebody(0), 12, "nothing of them is plain");
+    }
+
+    #[test]
+    fn the_area_is_what_the_picture_covers_and_a_cell_around() {
+        let size = (96, 64);
+        let area = |spans: &[(usize, usize)]| {
+            let Area { left, top, across, down } = Area::of(spans, size);
+            [left, top, across, down]
+        };
+        let mut spans = vec![(0, 0); size.1];
+        assert_eq!(area(&spans), [0; 4]);
+        spans[8..40].fill((13, 50));
+        assert_eq!(area(&spans), [2, 1, 12, 10]);
+        assert_eq!(area(&vec![(0, size.0); size.1]), [0, 0, size.0 / CELL, size.1 / CELL]);
     }
 
     #[test]
