@@ -10,8 +10,9 @@ use ptztrack_contract::{Homography, Point};
 /// Side of the squares that move as a whole: within one, a camera's map is a displacement. Small enough that
 /// this holds to a third of a pixel, large enough that the compiler makes vector code of a row of it.
 const BLOCK: usize = 8;
-/// Displacements are rounded to this part of a pixel, which also keeps a camera at rest from being resampled.
-const PARTS: i32 = 16;
+/// Displacements are rounded to 1/16 of a pixel, 4 bits, which also keeps a camera at rest from being resampled.
+const PART_BITS: u32 = 4;
+const PARTS: i32 = 1 << PART_BITS;
 
 /// Where a block's pixels come from: whole pixels and sixteenths.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -57,7 +58,7 @@ impl Warp {
                 let start = next;
                 next = (start + alike.len() * BLOCK).min(size.0);
                 let run = covered(alike[0], start..next, top..(top + BLOCK).min(size.1), source);
-                if !run.columns.is_empty() {
+                if !run.columns.is_empty() && !run.rows.is_empty() {
                     self.spans[run.rows.clone()].iter_mut().for_each(|span| widen(span, &run.columns));
                     self.runs.push(run);
                 }
@@ -152,8 +153,8 @@ fn shifts(columns: usize, top: usize, to_source: &Homography, out: &mut Vec<Shif
         let x = middle(column * BLOCK);
         let to = to_source.apply(Point { x, y });
         let (x, y) = (parts(to.x - x), parts(to.y - y));
-        let part = |parts: i32| parts.rem_euclid(PARTS) as u16;
-        out.push(Shift { x: x.div_euclid(PARTS), y: y.div_euclid(PARTS), part_x: part(x), part_y: part(y) });
+        let part = |parts: i32| (parts & (PARTS - 1)) as u16;
+        out.push(Shift { x: x >> PART_BITS, y: y >> PART_BITS, part_x: part(x), part_y: part(y) });
     }
 }
 
@@ -271,39 +272,33 @@ fn blend_runs<T: Mixed>(warp: &Warp, source: &[T], out: &mut [T]) {
 /// `N` columns of a run, from column `x` on.
 #[inline(always)]
 fn blend_columns<T: Mixed, const N: usize>(warp: &Warp, run: &Run, x: usize, source: &[T], out: &mut [T]) {
-    let Range { start: top, end: bottom } = run.rows;
-    if top >= bottom {
-        return;
-    }
-    let (part_x, part_y) = (run.shift.part_x, run.shift.part_y);
-    let first = warp.source_index(run, top) + (x - run.columns.start);
-    let mut upper = across::<T, N>(&source[first..], part_x);
-    for row in 0..bottom - top {
-        let next = if part_y > 0 || top + row + 1 < bottom {
-            across::<T, N>(&source[first + (row + 1) * warp.source.0..], part_x)
-        } else {
-            upper
-        };
-        let lower = if part_y > 0 { next } else { upper };
-        let first = (top + row) * warp.size.0 + x;
-        for (i, out) in out[first..first + N].iter_mut().enumerate() {
+    let Shift { part_x, part_y, .. } = run.shift;
+    // Where a weight is nothing, its column may lie outside.
+    let length = N + usize::from(part_x > 0);
+    let mixed = |first: usize| across::<T, N>(source.get(first..first + length)?, part_x);
+    let mut from = warp.source_index(run, run.rows.start) + (x - run.columns.start);
+    let mut to = run.rows.start * warp.size.0 + x;
+    let Some(mut upper) = mixed(from) else { return };
+    for _ in run.rows.clone() {
+        from += warp.source.0;
+        // Where a weight is nothing, its row may as well.
+        let lower = mixed(from).unwrap_or(upper);
+        for (i, out) in out[to..to + N].iter_mut().enumerate() {
             *out = T::down(upper[i], lower[i], part_y);
         }
-        upper = next;
+        (upper, to) = (lower, to + warp.size.0);
     }
 }
 
-/// Sixteen times what lies `part` sixteenths of the way from the first `N` pixels to the next ones.
+/// Sixteen times what lies `part` sixteenths of the way from the first `N` pixels to the last.
 #[inline(always)]
-fn across<T: Mixed, const N: usize>(pixels: &[T], part: u16) -> [T::Sum; N] {
-    // Where a weight is nothing, its column may lie outside.
-    let right = usize::from(part > 0);
-    let (left, right) = (&pixels[..N], &pixels[right..right + N]);
+fn across<T: Mixed, const N: usize>(pixels: &[T], part: u16) -> Option<[T::Sum; N]> {
+    let (left, right) = (pixels.first_chunk::<N>()?, pixels.last_chunk::<N>()?);
     let mut mixed = [T::Sum::default(); N];
     for (mixed, (&left, &right)) in mixed.iter_mut().zip(left.iter().zip(right)) {
         *mixed = left.across(right, part);
     }
-    mixed
+    Some(mixed)
 }
 
 #[cfg(test)]
@@ -329,6 +324,28 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn what_moves_as_a_whole_is_mixed_as_its_definition_says(
+            source in proptest::collection::vec(any::<u8>(), SIZE.0 * SIZE.1), x in -90..90i32, y in -90..90i32,
+        ) {
+            let parts = f64::from(PARTS);
+            let map = Homography::translation(f64::from(x) / parts, f64::from(y) / parts);
+            let (out, spans) = warped(&map, &source);
+            let at = |x: i32, y: i32, weight: i32| {
+                // What weighs nothing may lie outside.
+                if weight == 0 { 0 } else { weight * i32::from(source[y as usize * SIZE.0 + x as usize]) }
+            };
+            let (part_x, part_y) = (x & (PARTS - 1), y & (PARTS - 1));
+            for (row, (start, end)) in spans.into_iter().enumerate() {
+                for column in start..end {
+                    let (x, y) = (column as i32 + (x >> PART_BITS), row as i32 + (y >> PART_BITS));
+                    let line = |y: i32, part: i32| at(x, y, part * (PARTS - part_x)) + at(x + 1, y, part * part_x);
+                    let mixed = line(y, PARTS - part_y) + line(y + 1, part_y);
+                    prop_assert_eq!(i32::from(out[row * SIZE.0 + column]), (mixed + 128) >> (2 * PART_BITS));
+                }
+            }
+        }
+
         #[test]
         fn a_slope_is_sampled_between_its_pixels(x in -9.0..9.0f64, y in -9.0..9.0f64, zoom in 0.98..1.02f64) {
             let slope = |x: f64, y: f64| 60.0 + 3.0 * x + 2.0 * y;
