@@ -74,6 +74,10 @@ fn columns(bounds: Rect, row: usize, width: usize) -> Range<usize> {
 
 #[multiversion(targets("x86_64+avx2"))]
 fn learn(belief: &mut [u8], last: &mut [u8], now: &[u8], foreground: &[u8], gain: u8) {
+    // As at rest, mostly: there is nothing to gain and nothing to lose.
+    if gain == 0 && belief.iter().fold(0, |any, belief| any | belief) == 0 {
+        return last.copy_from_slice(now);
+    }
     for (belief, ((last, &now), &foreground)) in
         belief.iter_mut().zip(last.iter_mut().zip(now).zip(foreground))
     {

@@ -2,6 +2,8 @@
 
 //! What is known of each pixel of the background, and how a picture is held against it.
 
+use std::ops::Range;
+
 use opencv::core::{CV_8UC1, Mat, Point as Pixel, Rect as PixelRect, Scalar, Size, Vector};
 use opencv::imgproc;
 use opencv::prelude::*;
@@ -9,12 +11,12 @@ use opencv::prelude::*;
 use ptztrack_contract::{Point, Rect};
 
 use super::noise::Noise;
-use super::rows;
+use super::rows::{self, MIN_PATIENCE};
 use super::warp::Warp;
 use crate::vision::Luma;
 
 /// An apparent background that nobody has looked at yet has this age.
-const UNSEEN: u8 = 0;
+pub(super) const UNSEEN: u8 = 0;
 /// From this age (pictures) on, a pixel is known: before, who can tell what is foreground?
 pub(super) const KNOWN: u8 = 4;
 pub(super) const MAX_AGE: u8 = 250;
@@ -59,8 +61,6 @@ pub(super) struct Comparison {
 
 /// Pixels of a side over which light that changed is taken to be the same.
 const LIGHT_SIDE: i32 = 15;
-/// Ticks that every candidate waits: somebody walking past looks alike from picture to picture.
-const MIN_PATIENCE: u8 = 12;
 
 /// Units of time in which candidates wait.
 pub(super) const TICKS: f64 = 25.0;
@@ -116,7 +116,7 @@ impl Model {
     }
 
     /// These columns of a row.
-    pub fn row(&self, y: usize, columns: std::ops::Range<usize>) -> Row<'_> {
+    pub fn row(&self, y: usize, columns: Range<usize>) -> Row<'_> {
         let part = y * self.size.0 + columns.start..y * self.size.0 + columns.end;
         Row {
             mean: &self.luma[part.clone()],
@@ -236,20 +236,15 @@ impl Model {
         held: Option<Rect>,
     ) {
         let mut alphas = std::mem::take(&mut self.alphas);
-        let around = held.map(|held| Rect {
-            x: held.x - AROUND * held.width,
-            y: held.y - AROUND * held.height,
-            width: (1.0 + 2.0 * AROUND) * held.width,
-            height: (1.0 + 2.0 * AROUND) * held.height,
-        });
+        let (around_columns, around_rows) = held.map_or((0..0, 0..0), |held| around(held, self.size));
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
             alphas.resize(row.len(), 0);
             rows::alphas(&mut alphas, &self.likelihood[row.clone()], &self.age[row.clone()], how.min_weight);
-            if let Some(around) = around.filter(|_| self.age[row.clone()].contains(&UNSEEN)) {
-                let unseen = alphas.iter_mut().zip(&self.age[row.clone()]).zip(start..);
-                let unseen = unseen.filter(|((_, age), x)| **age == UNSEEN && lies_in(around, *x, y));
-                unseen.for_each(|((alpha, _), _)| *alpha = 0);
+            if around_rows.contains(&y) {
+                let column = |x: usize| x.clamp(start, end) - start;
+                let near = column(around_columns.start)..column(around_columns.end);
+                rows::leave_unseen(&mut alphas[near.clone()], &self.age[row.clone()][near]);
             }
             let (mean, spread) = (&mut self.luma[row.clone()], &mut self.spread[row.clone()]);
             rows::learn_spread(spread, mean, &picture.luma[row.clone()], &alphas);
@@ -288,15 +283,15 @@ impl Model {
         };
         let candidates = self.candidate.each_mut().map(|plane| &mut plane[part.clone()]);
         let seen = [&picture.luma[part.clone()], u, v];
-        let times = (how.ticks, how.patience.min(MIN_PATIENCE));
-        if !rows::wait(candidates, &mut self.waited[part.clone()], seen, alphas, times) {
+        let times = (how.ticks, how.patience);
+        let (waited, age) = (&mut self.waited[part.clone()], &self.age[part.clone()]);
+        if !rows::wait(candidates, waited, seen, alphas, age, times) {
             return;
         }
         for (at, _) in part.zip(alphas).filter(|(_, alpha)| **alpha == 0) {
-            // What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
-            let seen_for = self.age[at].saturating_mul(how.ticks).max(MIN_PATIENCE);
             let held = || held.is_some_and(|held| lies_in(held, x + at - first, y));
-            if self.waited[at] >= how.patience.min(seen_for) && (self.age[at] == UNSEEN || !held()) {
+            let is_due = self.waited[at] >= rows::patience(self.age[at], times);
+            if is_due && (self.age[at] == UNSEEN || !held()) {
                 self.adopt(at);
             }
         }
@@ -371,6 +366,16 @@ impl Model {
 
 /// How far around somebody's box nothing is learned that is seen for the first time, in sizes of the box.
 const AROUND: f64 = 0.4;
+
+/// Columns and rows of a canvas of that size that lie there.
+fn around(held: Rect, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let places = |start: f64, length: f64, size: usize| {
+        let (first, end) = (start - AROUND * length, start - AROUND * length + (1.0 + 2.0 * AROUND) * length);
+        let first = (first.ceil().max(0.0) as usize).min(size);
+        first..((end.floor() + 1.0).max(0.0) as usize).clamp(first, size)
+    };
+    (places(held.x, held.width, width), places(held.y, held.height, height))
+}
 
 fn lies_in(bounds: Rect, x: usize, y: usize) -> bool {
     bounds.contains(Point { x: x as f64, y: y as f64 })

@@ -5,7 +5,7 @@
 
 use multiversion::multiversion;
 
-use super::model::{KNOWN, MAX_AGE, UNKNOWN};
+use super::model::{KNOWN, MAX_AGE, UNKNOWN, UNSEEN};
 use super::noise::{Line, PER_MEAN_DEVIATION};
 
 /// Squared deviations (of luma and chroma together) at which foreground is as likely as background. The noise of
@@ -138,6 +138,14 @@ pub(super) fn alphas(out: &mut [u16], likelihood: &[u8], age: &[u8], min_weight:
     }
 }
 
+/// Nothing of what was never seen is learned.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn leave_unseen(alphas: &mut [u16], age: &[u8]) {
+    for (alpha, &age) in alphas.iter_mut().zip(age) {
+        *alpha = if age == UNSEEN { 0 } else { *alpha };
+    }
+}
+
 /// Pixels that are learned from grow older, and nothing waits to take their place.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn grow_older(age: &mut [u8], waited: &mut [u8], alphas: &[u16]) {
@@ -182,14 +190,15 @@ fn towards(from: u16, to: u16, alpha: u16) -> u16 {
 }
 
 /// What candidates make of a part of a row of the picture: `seen`, `ticks` after the picture before. Only those of foreground, whose
-/// `alphas` are nought, change. Whether any of these has been the same for so many ticks as is the least `patience`.
+/// `alphas` are nought, change. Whether any of these has been the same for so many ticks as its [`patience`], `most` of them at most.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn wait(
     candidates: [&mut [u8]; 3],
     waited: &mut [u8],
     seen: [&[u8]; 3],
     alphas: &[u16],
-    (ticks, patience): (u8, u8),
+    age: &[u8],
+    (ticks, most): (u8, u8),
 ) -> bool {
     // 255 for those that are as they were: few planes at a time, as the compiler has to know that none lies on another.
     let mut alike = [u8::MAX; PART];
@@ -206,12 +215,25 @@ pub(super) fn wait(
         }
     }
     let mut is_any_due = false;
-    for (waited, (&alike, &alpha)) in waited.iter_mut().zip(alike.iter().zip(alphas)) {
+    let pixels = waited.iter_mut().zip(age).zip(alike.iter().zip(alphas));
+    for ((waited, &age), (&alike, &alpha)) in pixels {
         let longer = waited.saturating_add(ticks) & alike;
         *waited = if alpha == 0 { longer } else { *waited };
-        is_any_due |= (alpha == 0) & (longer >= patience);
+        is_any_due |= (alpha == 0) & (longer >= patience(age, (ticks, most)));
     }
     is_any_due
+}
+
+/// Ticks that every candidate waits: somebody walking past looks alike from picture to picture.
+pub(super) const MIN_PATIENCE: u8 = 12;
+
+/// For how many ticks, `most` of them at most, a candidate has to stay the same to take the place of what is `age` pictures old, which
+/// come `ticks` after each other. What was hardly seen before has no more right to be there (Yi et al.: the older one is apparent).
+#[inline(always)]
+pub(super) fn patience(age: u8, (ticks, most): (u8, u8)) -> u8 {
+    // In more bits, as a product that saturates is not made into vector code.
+    let seen_for = (u16::from(age) * u16::from(ticks)).min(u16::from(u8::MAX)) as u8;
+    most.min(seen_for.max(MIN_PATIENCE))
 }
 
 /// Grey levels within which a candidate is still the same.
