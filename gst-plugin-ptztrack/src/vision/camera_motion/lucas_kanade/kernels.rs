@@ -9,7 +9,7 @@ use std::ops::Range;
 
 use multiversion::multiversion;
 
-use super::{LANES, MAX_ROW, MAX_SIDE};
+use super::{LANES, MAX_ROW};
 
 /// Parts of a grey level that a template tells apart.
 const SCALE: f32 = 64.0;
@@ -22,6 +22,8 @@ pub(super) fn row_length(side: usize) -> usize {
 /// A row of numbers; as long as is needed.
 type Row = [f32; MAX_ROW];
 const EMPTY: Row = [0.0; MAX_ROW];
+/// Numbers that are worked on at once.
+type Lanes = [f32; LANES];
 
 /// Takes a template of what lies `part` of a pixel right of and below the second pixel of the second row of `seen`, whose rows are
 /// `stride` apart. What is not `inside` (columns and rows) has no gradient. Gives the upper triangle of the gradient matrix (3.11),
@@ -35,28 +37,46 @@ pub(super) fn take(
     side: usize,
     rows: &mut [i16],
 ) -> [f32; 3] {
-    let lanes = side.next_multiple_of(LANES);
+    // Of a length that is known, a row is worked on without a loop.
+    let sums = match side.div_ceil(LANES) {
+        1 => take_of::<1>(seen, stride, part, inside, side, rows),
+        2 => take_of::<2>(seen, stride, part, inside, side, rows),
+        3 => take_of::<3>(seen, stride, part, inside, side, rows),
+        _ => take_of::<4>(seen, stride, part, inside, side, rows),
+    };
+    sums.map(|sums| per_pixel(sums.iter().sum(), side))
+}
+
+/// The same of a window that is so many `GROUPS` of lanes wide, summed in lanes.
+#[inline(always)]
+fn take_of<const GROUPS: usize>(
+    seen: &[u8],
+    stride: usize,
+    part: (f32, f32),
+    inside: (Range<usize>, Range<usize>),
+    side: usize,
+    rows: &mut [i16],
+) -> [Lanes; 3] {
     let count = (side + 2).next_multiple_of(LANES);
-    let (mut above, mut below) = (EMPTY, EMPTY);
+    let mut above = EMPTY;
+    across(seen, part.0, &mut above[..count]);
     let mut last = [EMPTY; 3];
     let mut sums = [[0.0; LANES]; 3];
-    across(seen, part.0, &mut above[..count]);
     for y in 0..side + 2 {
-        across(&seen[(y + 1) * stride..], part.0, &mut below[..count]);
-        last.rotate_left(1);
-        between(&above[..count], &below[..count], part.1, &mut last[2][..count]);
-        std::mem::swap(&mut above, &mut below);
+        next_row(&mut above[..count], &seen[(y + 1) * stride..], part, &mut last[y % 3][..count]);
         let Some(row) = y.checked_sub(2) else { continue };
-        let (known, gradients) = rows[row * 3 * lanes..][..3 * lanes].split_at_mut(lanes);
-        let (right, down) = gradients.split_at_mut(lanes);
+        let template = rows.as_chunks_mut::<LANES>().0[row * 3 * GROUPS..][..3 * GROUPS].as_flattened_mut();
+        let (known, gradients) = template.split_at_mut(GROUPS * LANES);
+        let (right, down) = gradients.split_at_mut(GROUPS * LANES);
         let columns = if inside.1.contains(&row) { inside.0.clone() } else { 0..0 };
-        gradient(&last, columns, (&mut *known, &mut *right, &mut *down), side);
+        let around = [y + 1, y + 2, y].map(|y| &last[y % 3]);
+        gradient::<GROUPS>(around, columns, (&mut *known, &mut *right, &mut *down), side);
         let [xx, xy, yy] = &mut sums;
         add_products(right, right, xx);
         add_products(right, down, xy);
         add_products(down, down, yy);
     }
-    sums.map(|sums| per_pixel(sums.iter().sum(), side))
+    sums
 }
 
 /// The mismatch (3.11): gradients times differences of what is seen and what is known, per pixel. The window starts `part` of a pixel
@@ -81,12 +101,13 @@ fn mismatch_of<const GROUPS: usize>(
     stride: usize,
     part: (f32, f32),
 ) -> [[f32; LANES]; 2] {
-    let off = differ::<GROUPS>(rows, seen, stride, part);
     let mut sums = [[0.0; LANES]; 2];
-    // Each by itself: a loop that adds to both is not made one of whole registers.
-    for (first, sums) in [GROUPS, 2 * GROUPS].into_iter().zip(&mut sums) {
-        for (off, row) in off.iter().zip(rows.as_chunks::<LANES>().0.chunks_exact(3 * GROUPS)) {
-            add_products(off.as_flattened(), row[first..first + GROUPS].as_flattened(), sums);
+    let mut above = first_row::<GROUPS>(seen, part);
+    for (y, row) in rows.as_chunks().0.chunks_exact(3 * GROUPS).enumerate() {
+        let (known, gradients) = row.split_at(GROUPS);
+        let off = differ(&mut above, &seen[(y + 1) * stride..], part, known);
+        for (gradient, sums) in gradients.chunks_exact(GROUPS).zip(&mut sums) {
+            add_products(off.as_flattened(), gradient.as_flattened(), sums);
         }
     }
     sums
@@ -113,10 +134,13 @@ fn residual_of<const GROUPS: usize>(
     part: (f32, f32),
     side: usize,
 ) -> f32 {
-    let off = differ::<GROUPS>(rows, seen, stride, part);
-    let row =
-        |off: &[[f32; LANES]; GROUPS]| off.as_flattened()[..side].iter().map(|off| off.abs()).sum::<f32>();
-    off[..side].iter().map(row).sum()
+    let mut above = first_row::<GROUPS>(seen, part);
+    let mut sum = 0.0;
+    for (y, row) in rows.as_chunks().0.chunks_exact(3 * GROUPS).enumerate() {
+        let off = differ(&mut above, &seen[(y + 1) * stride..], part, &row[..GROUPS]);
+        sum += off.as_flattened()[..side].iter().map(|off| off.abs()).sum::<f32>();
+    }
+    sum
 }
 
 /// The sum of products of two numbers in [`SCALE`]ths, over the pixels of a window.
@@ -145,79 +169,78 @@ fn across_lanes(seen: &[u8], part: f32) -> [f32; LANES] {
     out
 }
 
-/// How the rows of a window, each so many `GROUPS` of lanes, differ from what is known.
+/// The row of a window of so many `GROUPS` of lanes that [`differ`] starts from.
+#[inline(always)]
+fn first_row<const GROUPS: usize>(seen: &[u8], part: (f32, f32)) -> [Lanes; GROUPS] {
+    let mut above = [[0.0; LANES]; GROUPS];
+    across(seen, part.0, above.as_flattened_mut());
+    above
+}
+
+/// How the row of a window between the one `above` and the one that is `seen`, which is the one above from then on, differs from what is
+/// known: a row at a time, which stays in registers.
 #[inline(always)]
 fn differ<const GROUPS: usize>(
-    rows: &[i16],
+    above: &mut [Lanes; GROUPS],
     seen: &[u8],
-    stride: usize,
     part: (f32, f32),
-) -> [[[f32; LANES]; GROUPS]; MAX_SIDE] {
-    let mut off = [[[0.0; LANES]; GROUPS]; MAX_SIDE];
-    let mut above = [[0.0; LANES]; GROUPS];
-    for (group, above) in above.iter_mut().enumerate() {
-        *above = across_lanes(&seen[group * LANES..], part.0);
-    }
-    let known = rows.as_chunks::<LANES>().0.chunks_exact(3 * GROUPS);
-    for (y, (off, known)) in off.iter_mut().zip(known).enumerate() {
-        let seen = &seen[(y + 1) * stride..][..=GROUPS * LANES];
-        for group in 0..GROUPS {
-            let below = across_lanes(&seen[group * LANES..], part.0);
-            for lane in 0..LANES {
-                let value = above[group][lane] + part.1 * (below[lane] - above[group][lane]);
-                off[group][lane] = value * SCALE - f32::from(known[group][lane]);
-            }
-            above[group] = below;
-        }
+    known: &[[i16; LANES]],
+) -> [Lanes; GROUPS] {
+    let mut off = [[0.0; LANES]; GROUPS];
+    next_row(above.as_flattened_mut(), &seen[..=GROUPS * LANES], part, off.as_flattened_mut());
+    for (off, known) in off.as_flattened_mut().iter_mut().zip(known.as_flattened()) {
+        *off = *off * SCALE - f32::from(*known);
     }
     off
 }
 
-/// A row `part` of the way from one to the next.
+/// A row `part` of the way from the one `above` to the one that is `seen`, which is the one above from then on.
 #[inline(always)]
-fn between(above: &[f32], below: &[f32], part: f32, out: &mut [f32]) {
-    let rows = above.as_chunks::<LANES>().0.iter().zip(below.as_chunks::<LANES>().0);
-    for (out, (above, below)) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(rows) {
+fn next_row(above: &mut [f32], seen: &[u8], part: (f32, f32), out: &mut [f32]) {
+    let rows = above.as_chunks_mut::<LANES>().0.iter_mut().zip(out.as_chunks_mut::<LANES>().0);
+    for (index, (above, out)) in rows.enumerate() {
+        let below = across_lanes(&seen[index * LANES..], part.0);
         for lane in 0..LANES {
-            out[lane] = above[lane] + part * (below[lane] - above[lane]);
+            out[lane] = above[lane] + part.1 * (below[lane] - above[lane]);
         }
+        *above = below;
     }
 }
 
 /// The middle row of three and its gradients by Scharr's kernel, as OpenCV has it; none but in those `columns`.
 #[inline(always)]
-fn gradient(
-    rows: &[Row; 3],
+fn gradient<const GROUPS: usize>(
+    rows: [&Row; 3],
     columns: Range<usize>,
     (known, right, down): (&mut [i16], &mut [i16], &mut [i16]),
     side: usize,
 ) {
-    let count = known.len() + 2;
-    let [a, b, c] = rows.each_ref().map(|row| &row[..count]);
     let (mut smoothed, mut steps, mut out) = (EMPTY, EMPTY, EMPTY);
-    for ((smoothed, b), (a, c)) in smoothed.iter_mut().zip(b).zip(a.iter().zip(c)) {
-        *smoothed = 3.0 * (a + c) + 10.0 * b;
-    }
-    for (step, (a, c)) in steps.iter_mut().zip(a.iter().zip(c)) {
-        *step = c - a;
-    }
-    for (out, (before, after)) in out.iter_mut().zip(smoothed.iter().zip(&smoothed[2..count])) {
-        *out = after - before;
-    }
+    let count = GROUPS * LANES;
+    combine(rows.map(|row| &row[..]), &mut smoothed[..count + LANES], |a, b, c| 3.0 * (a + c) + 10.0 * b);
+    combine(rows.map(|row| &row[..]), &mut steps[..count + LANES], |a, _, c| c - a);
+    combine([0, 1, 2].map(|first| &smoothed[first..]), &mut out[..count], |a, _, c| c - a);
     round(&out, SCALE / 32.0, right);
-    for (out, (before, (here, after))) in
-        out.iter_mut().zip(steps.iter().zip(steps[1..].iter().zip(&steps[2..count])))
-    {
-        *out = 3.0 * (before + after) + 10.0 * here;
-    }
+    combine([0, 1, 2].map(|first| &steps[first..]), &mut out[..count], |a, b, c| 3.0 * (a + c) + 10.0 * b);
     round(&out, SCALE / 32.0, down);
-    round(&b[1..], SCALE, known);
+    round(&rows[1][1..], SCALE, known);
     let end = columns.end.min(side);
     let start = columns.start.min(end);
     known[side..].fill(0);
     for plane in [right, down] {
         plane[..start].fill(0);
         plane[end..].fill(0);
+    }
+}
+
+/// Makes one row of three.
+#[inline(always)]
+fn combine([a, b, c]: [&[f32]; 3], out: &mut [f32], with: impl Fn(f32, f32, f32) -> f32) {
+    let rows = a.as_chunks::<LANES>().0.iter().zip(b.as_chunks::<LANES>().0).zip(c.as_chunks::<LANES>().0);
+    for (out, ((a, b), c)) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(rows) {
+        for lane in 0..LANES {
+            out[lane] = with(a[lane], b[lane], c[lane]);
+        }
     }
 }
 
@@ -237,7 +260,9 @@ fn add_products<T: Copy + Into<f32>>(row: &[T], gradient: &[i16], sums: &mut [f3
 #[inline(always)]
 fn round(values: &[f32], scale: f32, out: &mut [i16]) {
     const NO_ROOM: f32 = 1.5 * (1 << 23) as f32;
-    for (out, value) in out.iter_mut().zip(values) {
-        *out = (value * scale + NO_ROOM).to_bits() as i16;
+    for (out, values) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(values.as_chunks::<LANES>().0) {
+        for lane in 0..LANES {
+            out[lane] = (values[lane] * scale + NO_ROOM).to_bits() as i16;
+        }
     }
 }

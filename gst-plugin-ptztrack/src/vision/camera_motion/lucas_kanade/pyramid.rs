@@ -97,6 +97,10 @@ impl Level {
         let last = border + width - 1;
         let columns: [usize; MAX_ROW] = std::array::from_fn(|off| mirrored(off + 1, width));
         for row in self.pixels.chunks_exact_mut(stride).skip(border).take(self.height) {
+            if width > border {
+                mirror_row(row, border);
+                continue;
+            }
             for (off, column) in (1..=border).zip(columns) {
                 row[border - off] = row[border + column];
                 row[last + off] = row[last - column];
@@ -110,6 +114,20 @@ impl Level {
             }
         }
     }
+}
+
+/// Fills both borders, whole lanes, of a row that is longer than one of them.
+fn mirror_row(row: &mut [u8], border: usize) {
+    let (left, inside) = row.split_at_mut(border);
+    let (inside, right) = inside.split_at_mut(inside.len() - border);
+    let reversed = |mut lanes: [u8; LANES]| {
+        lanes.reverse();
+        lanes
+    };
+    let first = inside[1..].as_chunks().0.iter();
+    left.as_chunks_mut().0.iter_mut().rev().zip(first).for_each(|(to, from)| *to = reversed(*from));
+    let last = inside[..inside.len() - 1].as_rchunks().1.iter().rev();
+    right.as_chunks_mut().0.iter_mut().zip(last).for_each(|(to, from)| *to = reversed(*from));
 }
 
 /// How far inside lies what shows so far outside of a picture of `size` pixels that is mirrored at its last one.
