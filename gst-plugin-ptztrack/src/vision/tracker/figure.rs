@@ -128,8 +128,24 @@ impl Cells {
             }
             None => colours.extend(first.iter().map(|grey| (*grey, None))),
         }
+        // Columns and rows each by themselves: there are thousands of cells.
+        let is_within = |place: f32, size: f32| place >= 0.0 && place < size;
+        let column_is_within = |column: &usize| is_within(lattice.place(*column).x, frame.width);
+        let first = (0..grid.columns).take_while(|column| !column_is_within(column)).count();
+        let columns = first..first + (first..grid.columns).take_while(column_is_within).count();
         inside.clear();
-        inside.extend((0..count).map(|index| frame.contains(lattice.place(index))));
+        inside.resize(count, false);
+        for (row, cells) in inside.chunks_exact_mut(grid.columns.max(1)).enumerate() {
+            let is_row_within = is_within(lattice.place(row * grid.columns).y, frame.height);
+            cells[columns.clone()].fill(is_row_within);
+        }
+    }
+
+    /// Whether there is a cell in that column and row, and it lies in the picture.
+    fn is_inside(&self, column: i32, row: i32) -> bool {
+        let Grid { columns, rows } = self.lattice.grid;
+        let is_there = (0..columns as i32).contains(&column) && (0..rows as i32).contains(&row);
+        is_there && self.inside[row as usize * columns + column as usize]
     }
 
     /// Size of a cell, pixels of the picture.
@@ -232,7 +248,7 @@ impl FigureMap {
 
     /// The same in the memory of another map.
     pub fn draw(&mut self, cells: &Cells, evidence: &Evidence, shape: &Shape) {
-        let odds = evidence.odds.iter().enumerate().map(|(index, odds)| odds + shape.log_odds(index));
+        let odds = evidence.odds.iter().zip(shape.log_odds()).map(|(odds, by_place)| odds + by_place);
         let probability = odds
             .zip(&cells.inside)
             .map(|(odds, inside)| if *inside { 1.0 / (1.0 + (-odds).exp()) } else { 0.0 });

@@ -13,19 +13,24 @@ const FIGURE: f32 = 0.5;
 /// A cell that is figure.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
-    index: usize,
+    column: i32,
+    row: i32,
+    index: i32,
     /// Those of all cells sum to 1.
     weight: f32,
     /// Less the mean of all.
     grey: f32,
+    /// The product of both.
+    weighted_grey: f32,
 }
 
 /// Greys of the cells around a target.
 #[derive(Debug, Clone, Default)]
 pub(in super::super) struct GreyTemplate {
-    columns: usize,
     greys: Vec<f32>,
     figure: Vec<Cell>,
+    /// The first and the last column and row of the figure.
+    corners: [(i32, i32); 2],
     /// Weighted variance of the figure's greys.
     variance: f32,
 }
@@ -39,45 +44,60 @@ impl GreyTemplate {
         } else {
             self.greys = greys.collect();
         }
-        self.columns = cells.lattice.grid.columns;
         let figure = || map.probability.iter().enumerate().filter(|(_, share)| **share >= FIGURE);
         let total = figure().map(|(_, share)| share).sum::<f32>().max(f32::EPSILON);
         let mean = figure().map(|(index, share)| share / total * self.greys[index]).sum::<f32>();
-        let cell = |(index, share): (usize, &f32)| Cell {
-            index,
-            weight: share / total,
-            grey: self.greys[index] - mean,
-        };
+        let columns = cells.lattice.grid.columns;
         self.figure.clear();
-        self.figure.extend(figure().map(cell));
-        self.variance = self.figure.iter().map(|cell| cell.weight * cell.grey * cell.grey).sum();
+        self.figure.extend(figure().map(|(index, share)| {
+            let (weight, grey) = (share / total, self.greys[index] - mean);
+            let (column, row) = ((index % columns) as i32, (index / columns) as i32);
+            Cell { column, row, index: index as i32, weight, grey, weighted_grey: weight * grey }
+        }));
+        self.variance = self.figure.iter().map(|cell| cell.weighted_grey * cell.grey).sum();
+        let extremes = |pick: fn(&Cell) -> i32| {
+            let places = || self.figure.iter().map(pick);
+            [places().min(), places().max()].map(Option::unwrap_or_default)
+        };
+        let ([left, right], [top, bottom]) = (extremes(|cell| cell.column), extremes(|cell| cell.row));
+        self.corners = [(left, top), (right, bottom)];
     }
 
     /// How well the greys of `cells`, from cells so many columns right and rows down on, correlate with the figure's: -1 to 1, and the nearer
     /// to 0 the less of it lies in the picture. `None` where there is nothing to correlate.
     pub fn correlation(&self, cells: &Cells, (right, down): (i32, i32)) -> Option<f32> {
-        let columns = self.columns as i32;
-        let (mut covered, mut own, mut sum, mut squares, mut product) = (0.0, 0.0, 0.0, 0.0, 0.0);
-        for Cell { index, weight, grey } in &self.figure {
-            let in_row = (0..columns).contains(&(*index as i32 % columns + right));
-            let moved = usize::try_from(*index as i32 + down * columns + right);
-            let Some(moved) = moved.ok().filter(|_| in_row) else { continue };
-            let (Some((seen, _)), Some(true)) = (cells.colours.get(moved), cells.inside.get(moved)) else {
-                continue;
+        let is_inside = |column: i32, row: i32| cells.is_inside(column + right, row + down);
+        let offset = down * cells.lattice.grid.columns as i32 + right;
+        // The picture has no holes.
+        let [covered, own, sum, squares, product] =
+            if self.corners.iter().all(|(column, row)| is_inside(*column, *row)) {
+                self.sums(cells, offset, |_| true)
+            } else {
+                self.sums(cells, offset, |cell| is_inside(cell.column, cell.row))
             };
-            let seen = f32::from(*seen);
-            covered += weight;
-            own += weight * grey;
-            sum += weight * seen;
-            squares += weight * seen * seen;
-            product += weight * grey * seen;
-        }
         if covered <= f32::EPSILON {
             return None;
         }
         let variance = squares - sum * sum / covered;
         (variance.min(self.variance) >= FLAT)
             .then(|| (product - own * sum / covered) / (variance * self.variance).sqrt())
+    }
+
+    /// Sums over the figure, moved by so many cells, of what is inside: of weights, of the figure's greys, of the greys that are seen, of
+    /// their squares and of the products of both.
+    #[inline(always)]
+    fn sums(&self, cells: &Cells, offset: i32, is_inside: impl Fn(&Cell) -> bool) -> [f32; 5] {
+        let (mut covered, mut own, mut sum, mut squares, mut product) = (0.0, 0.0, 0.0, 0.0, 0.0);
+        for cell in self.figure.iter().filter(|cell| is_inside(cell)) {
+            let (seen, _) = cells.colours[(cell.index + offset) as usize];
+            let seen = f32::from(seen);
+            covered += cell.weight;
+            own += cell.weighted_grey;
+            sum += cell.weight * seen;
+            squares += cell.weight * seen * seen;
+            product += cell.weighted_grey * seen;
+        }
+        [covered, own, sum, squares, product]
     }
 }
 
@@ -134,6 +154,32 @@ mod tests {
         assert_eq!(learned(&even).correlation(&cells(textured), (0, 0)), None);
         assert_eq!(learned(&cells(textured)).correlation(&even, (0, 0)), None);
         assert_eq!(GreyTemplate::default().correlation(&even, (0, 0)), None);
+    }
+
+    #[test]
+    fn it_is_what_its_definition_says_of_the_cells_that_are_inside() {
+        let template = learned(&cells(textured));
+        let mut seen = cells(|x, y| textured(x - 3, y + 2));
+        let is_inside = |x: i32, y: i32| (3..33).contains(&x) && (6..50).contains(&y);
+        for (index, inside) in seen.inside.iter_mut().enumerate() {
+            *inside = is_inside((index % GRID.columns) as i32, (index / GRID.columns) as i32);
+        }
+        for (right, down) in [(0, 0), (3, -2), (-12, 9), (20, -30)] {
+            let cells = template.figure.iter().filter(|cell| is_inside(cell.column + right, cell.row + down));
+            let pairs = cells.map(|cell| {
+                let at = (cell.row + down) as usize * GRID.columns + (cell.column + right) as usize;
+                [cell.weight, cell.grey, f32::from(seen.colours[at].0)].map(f64::from)
+            });
+            let pairs: Vec<[f64; 3]> = pairs.collect();
+            let sum = |of: fn(&[f64; 3]) -> f64| pairs.iter().map(of).sum::<f64>();
+            let (covered, grey) = (sum(|[weight, ..]| *weight), sum(|[weight, _, grey]| weight * grey));
+            let product = sum(|[weight, own, grey]| weight * own * grey)
+                - sum(|[weight, own, _]| weight * own) * grey / covered;
+            let variance = sum(|[weight, _, grey]| weight * grey * grey) - grey * grey / covered;
+            let expected = product / (variance * f64::from(template.variance)).sqrt();
+            let found = template.correlation(&seen, (right, down)).expect("textured");
+            assert!((f64::from(found) - expected).abs() < 1e-3, "{right}, {down}: {found}, {expected}");
+        }
     }
 
     /// Dark trousers and a bright coat before an even wall, of which no more is seen: what is not seen says nothing.

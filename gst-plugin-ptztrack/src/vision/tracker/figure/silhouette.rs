@@ -31,6 +31,8 @@ impl Halves {
 pub(in super::super) struct Shape {
     grid: Grid,
     share: Vec<f32>,
+    /// Logarithms of the odds that these shares are.
+    log_odds: Vec<f32>,
 }
 
 impl Shape {
@@ -41,13 +43,15 @@ impl Shape {
             let radius = x.hypot(y);
             (0.9 - 0.8 * ((radius - 0.85) / 0.3).clamp(0.0, 1.0)).max(0.05)
         });
-        Self { grid, share: share.collect() }
+        let share: Vec<f32> = share.collect();
+        Self { grid, log_odds: share.iter().copied().map(log_odds).collect(), share }
     }
 
     /// Learns the figure of `map`, which lies around the box.
     pub fn learn(&mut self, map: &FigureMap, rate: f32) {
-        for (share, new) in self.share.iter_mut().zip(&map.probability) {
+        for ((share, odds), new) in self.share.iter_mut().zip(&mut self.log_odds).zip(&map.probability) {
             *share += (*new - *share) * rate;
+            *odds = log_odds(*share);
         }
     }
 
@@ -83,11 +87,16 @@ impl Shape {
         *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
     }
 
-    /// Logarithm of the odds that a cell belongs to the target by its place alone.
-    pub(super) fn log_odds(&self, index: usize) -> f32 {
-        let share = self.share[index].clamp(0.05, 0.95);
-        (share / (1.0 - share)).ln()
+    /// Logarithm of the odds that each cell belongs to the target by its place alone.
+    pub(super) fn log_odds(&self) -> &[f32] {
+        &self.log_odds
     }
+}
+
+/// Logarithm of the odds; nothing is certain.
+fn log_odds(share: f32) -> f32 {
+    let share = share.clamp(0.05, 0.95);
+    (share / (1.0 - share)).ln()
 }
 
 /// A silhouette less its mean: made once, and held against the evidence at many places.
