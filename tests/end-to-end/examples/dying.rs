@@ -36,7 +36,8 @@ end of that) until the camera is at rest. In the last column the watchdog could 
 const FOOTER: &str = "
 `vapix-watchdog` notices at once that a process has ended; that a process is stopped or hangs, it notices when the lease runs out,
 after 2 s. A camera at rest is not moved while its watchdog starts, so that there is nothing to stop if the application dies then. One that
-takes 10 s is given up in words, and the camera is moved without. In an outage it retries twice a second, for a minute.
+takes 10 s, or ends, is given up in words, and the camera is moved without until the next one answers. In an outage it retries twice a
+second, for a minute.
 
 What is not covered: loss of power or of the network for longer than that minute, and everything that ends the watchdog together with
 the application, such as the end of PID 1 of a container. Run the watchdog outside that container, with `vapix-watchdog --listen` and

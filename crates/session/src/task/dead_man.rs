@@ -83,7 +83,8 @@ impl DeadMan {
         match lease.standing()? {
             Standing::Held => (self.state, self.gave_up) = (DeadManState::Armed, false),
             Standing::Awaited => {}
-            Standing::Starting(why) => return self.waits(why),
+            Standing::Starting(why) if !self.gave_up => return self.waits(why),
+            Standing::Starting(_) => {}
             Standing::Failed(failure) => return self.failed(failure),
         }
         None
@@ -91,10 +92,8 @@ impl DeadMan {
 
     /// Whether a camera at rest is not to be moved yet: it is not known whether there is a watchdog to stop it.
     pub fn is_awaited(&self) -> bool {
-        match self.lease.as_ref().and_then(Lease::standing) {
-            Some(Standing::Awaited) => !self.gave_up,
-            standing => matches!(standing, Some(Standing::Starting(_))),
-        }
+        let standing = || self.lease.as_ref().and_then(Lease::standing);
+        !self.gave_up && matches!(standing(), Some(Standing::Awaited | Standing::Starting(_)))
     }
 
     /// Whether the watchdog knows something else of what is in doubt, or nothing.
@@ -217,6 +216,21 @@ mod tests {
         assert!(dead_man.keep().is_none() && !dead_man.is_awaited(), "told once");
     }
 
+    /// Whoever was told that the camera turns on where this process dies is not to lose whom it follows as well.
+    #[test]
+    fn nor_is_one_that_comes_after_one_that_died() {
+        let mut dead_man = dead_man();
+        dead_man.gave_up = true;
+        dead_man.hold(order("$(exec sleep 60)"));
+        let begin = Instant::now();
+        while matches!(standing(&dead_man), Standing::Awaited) {
+            assert!(!dead_man.is_awaited() && begin.elapsed() < PATIENCE);
+            std::thread::yield_now();
+        }
+        assert!(matches!(standing(&dead_man), Standing::Starting(_)));
+        assert!(dead_man.keep().is_none() && !dead_man.is_awaited());
+    }
+
     /// As one who is out of view when the first one is given up.
     #[test]
     fn nor_by_who_did_not_hear_of_that() {
@@ -246,6 +260,10 @@ mod tests {
             dead_man.hold(order("$(exec sleep 60)"));
             assert!(matches!(standing(&dead_man), Standing::Awaited));
         }
+        // Nor for a release, by whoever shares it.
+        dead_man.release();
+        dead_man.hold(order("$(exec sleep 60)"));
+        assert!(matches!(standing(&dead_man), Standing::Awaited));
         let heard = told(&mut dead_man);
         assert!(heard.contains("has said nothing for 2 s"), "{heard}");
     }

@@ -100,12 +100,8 @@ impl Watchdog {
         if let Some(connection) = &link.connection {
             match connection.say(&line) {
                 Ok(()) => return Ok(connection.heard()),
-                // A program that starts reads nothing yet. What it could not be told is said again once it runs.
-                Err(err)
-                    if err.kind() == io::ErrorKind::WouldBlock && Heard::is_starting(&connection.heard()) =>
-                {
-                    return Ok(connection.heard());
-                }
+                // What it could not be told is said again once it runs.
+                Err(err) if is_only_starting(connection, &err) => return Ok(connection.heard()),
                 Err(err) => link.lose(&err),
             }
         }
@@ -127,6 +123,7 @@ impl Watchdog {
         let said = message.to_line().ok().zip(link.connection.as_ref());
         if let Some((line, connection)) = said
             && let Err(err) = connection.say(&line)
+            && !is_only_starting(connection, &err)
         {
             link.lose(&err);
         }
@@ -140,10 +137,18 @@ impl Watchdog {
 impl Link {
     /// Nothing can be said over the connection, for this reason.
     fn lose(&mut self, err: &io::Error) {
-        let Some(heard) = self.connection.take().map(|connection| connection.heard()) else { return };
+        // Asked before it is closed, which ends it as well.
+        let Some(connection) = &self.connection else { return };
+        let heard = connection.heard();
         self.failure = Some(Heard::end(&heard).unwrap_or_else(|| Unavailable::Broken(err.to_string())));
         self.was_in_vain = heard.borrow().silent_start().is_some();
+        self.connection = None;
     }
+}
+
+/// A program that starts reads nothing yet, and its socket may be full: it is not lost.
+fn is_only_starting(connection: &Connection, err: &io::Error) -> bool {
+    err.kind() == io::ErrorKind::WouldBlock && Heard::is_starting(&connection.heard())
 }
 
 impl WatchdogAddress {
