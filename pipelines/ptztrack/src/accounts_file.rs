@@ -95,6 +95,13 @@ impl AccountsFile {
         }
     }
 
+    /// Those of these cameras have not, as they are now.
+    pub fn forget(&self, cameras: &[String]) {
+        self.load();
+        let mut worked = lock(&self.worked);
+        worked.get_or_insert_default().retain(|camera, _| !cameras.contains(camera));
+    }
+
     /// Keeps them, where they are not what is kept already.
     ///
     /// # Errors

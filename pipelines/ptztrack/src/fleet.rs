@@ -127,7 +127,11 @@ impl Fleet {
     /// Keeps who has which camera, and which accounts have worked, for after a restart.
     pub fn keep_control(&self) {
         self.keep(|| self.control());
-        self.accounts.remember(worked_of(&lock(&self.cameras)));
+        {
+            let cameras = lock(&self.cameras);
+            self.accounts.remember(worked_of(&cameras));
+            self.accounts.forget(&refused_of(&cameras));
+        }
         if let Err(err) = self.accounts.keep() {
             let detail = format!("which accounts have worked is forgotten at a restart: {err}");
             self.log.tell(&Event::new(Level::Warning, None, "not-kept", detail));
@@ -215,6 +219,13 @@ fn control_of(cameras: &BTreeMap<String, Camera>) -> Kept {
 fn worked_of(cameras: &BTreeMap<String, Camera>) -> Accounts {
     let worked = cameras.iter().filter(|(_, camera)| camera.known.worked.load(Ordering::Relaxed));
     worked.map(|(name, camera)| (name.clone(), Account::of(&camera.settings))).collect()
+}
+
+/// Which are given up, and their account has not worked: another password than the one that had is wrong.
+fn refused_of(cameras: &BTreeMap<String, Camera>) -> Vec<String> {
+    let is_refused =
+        |camera: &Camera| lock(&camera.known.state).given_up && !camera.known.worked.load(Ordering::Relaxed);
+    cameras.iter().filter(|(_, camera)| is_refused(camera)).map(|(name, _)| name.clone()).collect()
 }
 
 #[cfg(test)]
@@ -315,7 +326,15 @@ mod tests {
         changed.keep_control();
         changed.apply(Vec::new());
         assert!(worked(&changed, door("http://127.0.0.1:1")), "its entry is back");
+        // A wrong password was read since.
+        let known = changed.of("door").unwrap();
+        known.worked.store(false, Ordering::Relaxed);
+        lock(&known.state).given_up = true;
+        changed.keep_control();
         changed.end();
+        let refused = fleet_in(&folder);
+        assert!(!worked(&refused, door("http://127.0.0.1:1")), "it was refused");
+        refused.end();
         fs::remove_dir_all(&folder).unwrap();
     }
 
