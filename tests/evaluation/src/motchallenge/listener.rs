@@ -16,8 +16,8 @@ use crate::{
 /// Boxes of one picture, in frame sizes.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Said {
-    /// The moving regions of the detector.
-    pub regions: Vec<Rect>,
+    /// The moving regions of the detector, where there is one.
+    pub regions: Option<Vec<Rect>>,
     /// Number and box of each track.
     pub tracks: Vec<(u64, Rect)>,
 }
@@ -47,10 +47,10 @@ impl Listener {
 
 impl Said {
     fn of(buffer: &gst::BufferRef) -> Self {
-        let motion = MotionMeta::of(buffer).and_then(Result::ok).unwrap_or_default();
+        let motion = MotionMeta::of(buffer).and_then(Result::ok);
         let tracks = TracksMeta::of(buffer).and_then(Result::ok);
         Self {
-            regions: motion.regions.iter().map(|region| region.bounds).collect(),
+            regions: motion.map(|motion| motion.regions.iter().map(|region| region.bounds).collect()),
             tracks: match tracks {
                 Some(tracks) => tracks.tracks.iter().map(|track| (track.id, track.bounds)).collect(),
                 None => Self::target(buffer).into_iter().collect(),
@@ -58,10 +58,11 @@ impl Said {
         }
     }
 
-    /// How well the best region fits a box in a picture of that size, pixels: intersection over union, 0 where there is none.
-    pub fn best_region(&self, bounds: &Bounds, size: (u32, u32)) -> f64 {
+    /// How well the best region fits a box in a picture of that size, pixels: intersection over union, 0 where there
+    /// is none; `None` where there is no detector.
+    pub fn best_region(&self, bounds: &Bounds, size: (u32, u32)) -> Option<f64> {
         let (width, height) = (f64::from(size.0), f64::from(size.1));
-        let fits = self.regions.iter().map(|region| {
+        let fits = self.regions.as_ref()?.iter().map(|region| {
             let region = Bounds {
                 left: region.x * width,
                 top: region.y * height,
@@ -70,7 +71,7 @@ impl Said {
             };
             overlap_with(&region, bounds)
         });
-        fits.fold(0.0, f64::max)
+        Some(fits.fold(0.0, f64::max))
     }
 
     /// Of a tracker that tells of its target alone.
@@ -101,7 +102,7 @@ mod tests {
         };
         let tracks = vec![(3, rect(0.5))];
         for state in [TargetState::Tracking, TargetState::Occluded] {
-            assert_eq!(said(state), Said { regions: vec![rect(0.1)], tracks: tracks.clone() });
+            assert_eq!(said(state), Said { regions: Some(vec![rect(0.1)]), tracks: tracks.clone() });
         }
         for state in [TargetState::Searching, TargetState::Lost] {
             assert_eq!(said(state).tracks, []);
@@ -112,11 +113,11 @@ mod tests {
     #[test]
     fn a_region_fits_by_what_it_shares_with_a_box() {
         let region = |x| Rect { x, y: 0.2, width: 0.1, height: 0.4 };
-        let said = Said { regions: vec![region(0.6), region(0.1)], tracks: vec![] };
+        let said = Said { regions: Some(vec![region(0.6), region(0.1)]), tracks: vec![] };
         let bounds = Bounds { left: 10.0, top: 10.0, width: 10.0, height: 40.0 };
         // They have 30 of 50 rows in common.
-        assert!((said.best_region(&bounds, (100, 100)) - 0.6).abs() < 1e-9);
-        assert_eq!(Said::default().best_region(&bounds, (100, 100)), 0.0);
+        assert!((said.best_region(&bounds, (100, 100)).unwrap() - 0.6).abs() < 1e-9);
+        assert_eq!(Said::default().best_region(&bounds, (100, 100)), None);
     }
 
     #[test]

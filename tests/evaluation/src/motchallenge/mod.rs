@@ -55,7 +55,7 @@ impl Sequence {
                 person.visible
             );
         }
-        for region in &said.regions {
+        for region in said.regions.iter().flatten() {
             let _ = writeln!(self.regions, "{frame},-1,{},1,-1,-1,-1", corners(&self.pixels(region)));
         }
         for (track, bounds) in &said.tracks {
@@ -138,9 +138,13 @@ mod tests {
         let rect = Rect { x: 0.5, y: 0.25, width: 0.1, height: 0.5 };
         let mut sequence = Sequence::new((640, 480));
         let away = GroundTruth { in_view: 0.0, ..person(8, bounds, 0.0) };
-        sequence.add([&person(7, bounds, 0.5), &away], &Said { regions: vec![rect], tracks: vec![] }, None);
+        sequence.add(
+            [&person(7, bounds, 0.5), &away],
+            &Said { regions: Some(vec![rect]), tracks: vec![] },
+            None,
+        );
         let motion = [[1.0, 0.0, -2.5], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        sequence.add([], &Said { regions: vec![], tracks: vec![(4, rect), (9, rect)] }, Some(&motion));
+        sequence.add([], &Said { regions: None, tracks: vec![(4, rect), (9, rect)] }, Some(&motion));
         let folder = folder("layout");
         sequence.write(&folder, "walk", "ours", 12.5).unwrap();
         let read = |file: &str| fs::read_to_string(folder.join(file)).unwrap();

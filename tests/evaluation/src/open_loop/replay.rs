@@ -106,7 +106,7 @@ impl<'a> Screening<'a> {
         let said = target.map(|target| self.placement.replaced(estimate(&target, size), &picture.truth));
         let mut record = picture.truth.clone().judged(said, &picture.people);
         let heard = self.listener.take();
-        record.best_region = record.truth.as_ref().map(|person| heard.best_region(&person.bounds, size));
+        record.best_region = record.truth.as_ref().and_then(|person| heard.best_region(&person.bounds, size));
         Ok((record, heard))
     }
 }

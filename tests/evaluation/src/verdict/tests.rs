@@ -155,7 +155,7 @@ fn what_is_the_same_is_not_told_apart() {
 fn reports_are_read_and_recordings_of_a_scene_averaged() {
     let heading = crate::strata::table::heading();
     let line = |replicate: &str, held: &str, error: &str| {
-        format!("open-loop,ptztrack,alone,3,2,{replicate},{held},0.1,,1,0,250,10,mjpeg,t,s,g,{error}\n")
+        format!("open-loop,ptztrack,alone,3,2,{replicate},{held},0.1,,1,0,,250,10,mjpeg,t,s,g,{error}\n")
     };
     let path = Path::new("scenes.csv");
     let text = heading.clone() + &line("1", "0.8", "") + &line("2", "0.6", "") + &line("3", "0", "broke off");
