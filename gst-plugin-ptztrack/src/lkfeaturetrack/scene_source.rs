@@ -61,7 +61,8 @@ impl SceneSource {
             && meta.from_pts != *last_pts
         {
             meta.camera_motion = between(&last.luma, &meta.luma, expected)?;
-            meta.coasted_motion = None;
+            // At least so far it is taken to have moved, from the last picture that was dropped.
+            meta.coasted_motion = meta.coasted_motion.filter(|_| meta.camera_motion.is_none());
         }
         if before.is_none() {
             (meta.camera_motion, meta.coasted_motion) = (None, None);

@@ -41,16 +41,16 @@ impl Group {
         self.members.iter().copied()
     }
 
-    /// Whoever is `ready` to be followed joins, and is in it until there is nobody any more of that number or they are to be
-    /// `left_alone`. The target, where there is one, is in it at any rate.
+    /// Whoever is `ready` to be followed joins, and is in it until there is nobody any more of that number or nobody is to
+    /// follow them. The target, where there is one, is in it at any rate.
     pub fn gather<'a>(
         &mut self,
         tracks: &Tracks,
         ready: impl Iterator<Item = &'a Track>,
         target: Option<u64>,
-        left_alone: impl Fn(&Track) -> bool,
+        is_unwanted: impl Fn(&Track) -> bool,
     ) {
-        self.members.retain(|id| tracks.get(*id).is_some_and(|track| !left_alone(track)));
+        self.members.retain(|id| tracks.get(*id).is_some_and(|track| !is_unwanted(track)));
         for id in ready.map(|track| track.id).chain(target) {
             if !self.members.contains(&id) {
                 self.members.push(id);

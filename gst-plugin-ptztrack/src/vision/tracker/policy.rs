@@ -67,6 +67,7 @@ impl Policy {
     /// The track of that number is followed from now on.
     pub fn take(&mut self, id: u64) {
         self.parked.retain(|(parked, _)| *parked != id);
+        self.released.retain(|(released, _)| *released != id);
     }
 
     /// That track was let go because it stands: nobody is chosen there until it moves.
@@ -111,16 +112,15 @@ impl Policy {
                 && region
                     .is_some_and(|region| !region.outside && (!must_travel || region.restless <= RESTLESS))
                 && (track.journey.age_s >= EDGE_WAIT_S || !is_entering(tracks, bounds, frame))
-                && !self.leaves_alone(track)
+                && !self.released.iter().any(|(released, _)| *released == track.id)
+                && !self.is_unwanted(track)
                 && (!must_travel || track.travels())
         })
     }
 
-    /// Whether a track is followed only where an operator asks for it, as it is to be ignored, was let go, or stands.
-    pub fn leaves_alone(&self, track: &Track) -> bool {
-        self.released.iter().any(|(released, _)| *released == track.id)
-            || self.ignored.contains(&track.id)
-            || self.is_parked(track)
+    /// Whether a track is followed only where an operator asks for it, as it is to be ignored, or stands.
+    pub fn is_unwanted(&self, track: &Track) -> bool {
+        self.ignored.contains(&track.id) || self.is_parked(track)
     }
 
     /// Whether a track is where somebody stood that was let go, and may be a part of them: who has come from elsewhere is not.

@@ -300,7 +300,7 @@ impl Tracker {
             return self.group.disband();
         }
         let ready = self.policy.ready(&self.tracks, must_travel, frame);
-        self.group.gather(&self.tracks, ready, target, |track| self.policy.leaves_alone(track));
+        self.group.gather(&self.tracks, ready, target, |track| self.policy.is_unwanted(track));
         let group = self.group.follow(&self.tracks, self.ego_motion(seen), dt_s as f32);
         if let (Some(group), Some(_)) = (group, target) {
             tracked.become_group(&group, frame);

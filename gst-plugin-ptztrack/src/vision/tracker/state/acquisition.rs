@@ -11,6 +11,9 @@ use crate::vision::tracker::dwell_time::DwellTime;
 use crate::vision::tracker::geometry::Frame;
 use crate::vision::tracker::report::Tracked;
 
+/// Of those who may be followed so many are tried in one picture: to look for corners takes time.
+const TRIES: usize = 4;
+
 impl Tracker {
     /// Carries out what was asked for.
     pub(super) fn obey(
@@ -22,15 +25,19 @@ impl Tracker {
     ) -> opencv::Result<Phase> {
         let Some(request) = self.request.take() else { return Ok(phase) };
         if let TargetRequest::Release = request {
+            self.group.members().for_each(|id| self.policy.release(id));
+            self.group.disband();
             return Ok(self.let_go(phase, ReleaseReason::Request, frame, tracked));
         }
-        let Some(id) = self.requested(request, &phase, seen, frame) else { return Ok(phase) };
-        let Some(target) = self.acquire(seen, id)? else {
-            tracked.without_corners = Some(id);
-            return Ok(phase);
-        };
-        self.let_go(phase, ReleaseReason::Request, frame, tracked);
-        Ok(self.begin(target, frame, tracked))
+        let requested = self.requested(request, &phase, seen, frame);
+        for &id in &requested {
+            if let Some(target) = self.acquire(seen, id)? {
+                self.let_go(phase, ReleaseReason::Request, frame, tracked);
+                return Ok(self.begin(target, frame, tracked));
+            }
+        }
+        tracked.without_corners = requested.first().copied();
+        Ok(phase)
     }
 
     /// Lets the target go, where there is one.
@@ -53,8 +60,7 @@ impl Tracker {
         };
         if reason != ReleaseReason::Stationary {
             // It may move, and would be taken again at once.
-            self.group.members().chain([target.id]).for_each(|id| self.policy.release(id));
-            self.group.disband();
+            self.policy.release(target.id);
         }
         tracked.tell_of(TargetState::Searching, target.id, &*target.follow, frame);
         tracked.features.clear();
@@ -72,7 +78,7 @@ impl Tracker {
     ) -> opencv::Result<Phase> {
         let Config { choice, must_travel, .. } = self.config;
         let choices = self.policy.choices(&self.tracks, choice, lost, must_travel, frame);
-        let ids: Vec<u64> = choices.iter().map(|track| track.id).collect();
+        let ids: Vec<u64> = choices.iter().map(|track| track.id).take(TRIES).collect();
         for id in ids {
             let Some(mut target) = self.acquire(seen, id)? else { continue };
             if must_travel {

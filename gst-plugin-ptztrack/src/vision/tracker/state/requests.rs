@@ -12,32 +12,35 @@ use crate::vision::tracker::policy::clicked;
 use crate::vision::tracker::tracks::Track;
 
 impl Tracker {
-    /// The number of the track that was asked for, by place or number; at a place where nobody is seen, that of a new one.
+    /// The numbers of the tracks that were asked for, by place or number, of which the first is meant that can be followed; at a place
+    /// where nobody is seen, that of a new one.
     pub(super) fn requested(
         &mut self,
         request: TargetRequest,
         phase: &Phase,
         seen: &Observation,
         frame: Frame,
-    ) -> Option<u64> {
+    ) -> Vec<u64> {
         let now = phase.target().unwrap_or(0);
         let numbers = || self.told_of(now).map(|track| track.id);
         match request {
-            TargetRequest::Release => None,
+            TargetRequest::Release => Vec::new(),
             TargetRequest::SelectTrack(id) => {
                 let id = self.tracks.number_now(id);
-                numbers().find(|other| *other == id && id != now)
+                numbers().filter(|other| *other == id && id != now).collect()
             }
             TargetRequest::Next => {
-                let next = numbers().filter(|id| *id > now).min().or_else(|| numbers().min());
-                next.filter(|id| *id != now)
+                let mut others: Vec<_> = numbers().filter(|id| *id != now).collect();
+                // After the last comes the first.
+                others.sort_unstable_by_key(|id| (*id < now, *id));
+                others
             }
             TargetRequest::Select(place) => {
                 let place = frame.point_to_pixels(place);
                 let shown = clicked(&self.tracks, place).map(Track::seen_bounds);
                 let meant = shown.map(|shown| self.config.profile.body_at(place, shown));
                 let bounds = meant.unwrap_or_else(|| self.box_at(place, frame));
-                Some(self.tracks.number_at(seen, bounds, frame))
+                vec![self.tracks.number_at(seen, bounds, frame)]
             }
         }
     }

@@ -217,8 +217,8 @@ impl Track {
         }
     }
 
-    /// Goes on into the next picture, in which nothing was seen of it yet. Where nobody knows how the background moved, its way so
-    /// far says nothing.
+    /// Goes on into the next picture, in which nothing was seen of it yet. Where nobody saw how the background moved, its way so far
+    /// says nothing.
     pub fn predict(&mut self, ego: Option<EgoMotion>, dt_s: f64) {
         if let Some(ego) = ego {
             let middle = Point2f::new(self.across.middle, self.down.middle);
@@ -231,10 +231,9 @@ impl Track {
                 *bounds = ego.apply_to(*bounds);
                 *age_s += dt_s;
             }
-            self.journey.way.retain(|(_, age_s)| *age_s <= WAY_S);
-        } else {
-            self.journey.way.clear();
         }
+        let is_seen = ego.is_some_and(|ego| !ego.is_coasted());
+        self.journey.way.retain(|(_, age_s)| is_seen && *age_s <= WAY_S);
         let square = self.height() * self.height();
         let noise = ProcessNoise { acceleration: ACCELERATION * square, size: GROWTH * square };
         self.across.predict(dt_s as f32, noise);
@@ -260,9 +259,12 @@ impl Track {
         self.see(Evidence::Alone(number));
         self.journey.alone_s += dt_s;
         self.journey.pictures += 1;
+        // Of whose way nothing is known it is not known how far it went either.
+        if !self.journey.way.is_empty() {
+            let away = length(centre(self.bounds()) - self.journey.origin);
+            self.journey.farthest = self.journey.farthest.max(away);
+        }
         self.journey.way.push_back((bounds, 0.0));
-        let away = length(centre(self.bounds()) - self.journey.origin);
-        self.journey.farthest = self.journey.farthest.max(away);
         self.existence = (self.existence + SEEN_PER_S * dt_s as f32).min(MOST_EXISTENCE);
     }
 

@@ -60,6 +60,54 @@ fn the_next_target_is_one_that_is_told_of() {
     assert_eq!(ask(&[80.0], TargetRequest::SelectTrack(2)), 1);
 }
 
+/// Somebody who shows nothing to follow is passed over.
+#[test]
+fn the_next_target_is_one_that_can_be_followed() {
+    let mut chain = Chain { scene: SceneModel::default(), tracker: Tracker::new(config()) };
+    let shade = Rect2f::new(300.0, 60.0, 80.0, 200.0);
+    let see = |chain: &mut Chain| {
+        let seen = [detected(80.0, PERSON.0), detection(shade), detected(200.0, PERSON.0)];
+        chain.process(&before_a_wall(&[80.0, 200.0]), DT, &seen)
+    };
+    let ids: Vec<_> =
+        (0..5).map(|_| see(&mut chain)).last().unwrap().tracks.iter().map(|one| one.id).collect();
+    assert_eq!(ids.len(), 3);
+    let targets: std::collections::BTreeSet<_> = (0..4)
+        .map(|_| {
+            chain.tracker.request(TargetRequest::Next);
+            see(&mut chain).id
+        })
+        .collect();
+    assert_eq!(targets.len(), 2, "to and fro between those with corners: {targets:?} of {ids:?}");
+}
+
+#[test]
+fn who_is_selected_in_a_group_is_followed_with_the_others() {
+    let mut chain = two(Config { choice: Choice::Group, ..config() });
+    let first = see(&mut chain, &[80.0, 300.0]).id;
+    chain.tracker.request(TargetRequest::Next);
+    see(&mut chain, &[80.0, 300.0]);
+    for _ in 0..5 {
+        let after = see(&mut chain, &[80.0, 300.0]);
+        assert!(after.is_group && after.id != first, "{after:?}");
+    }
+}
+
+/// As an operator who looks at this one and that one.
+#[test]
+fn who_is_selected_again_is_not_left_alone() {
+    let mut chain = two(config());
+    let first = see(&mut chain, &[80.0, 300.0]).id;
+    let other = NAMES.into_iter().find(|id| *id != first).unwrap();
+    for id in [other, first] {
+        chain.tracker.request(TargetRequest::SelectTrack(id));
+        see(&mut chain, &[80.0, 300.0]);
+    }
+    let frame = Frame { width: SIZE.0 as f32, height: SIZE.1 as f32 };
+    let Tracker { policy, tracks, .. } = &chain.tracker;
+    assert!(policy.ready(tracks, false, frame).any(|track| track.id == first));
+}
+
 #[test]
 fn a_group_is_let_go_as_a_whole() {
     let mut chain = two(Config { choice: Choice::Group, ..config() });
