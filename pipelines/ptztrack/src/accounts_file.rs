@@ -13,7 +13,7 @@ use ptztrack_contract::lock::lock;
 use serde::{Deserialize, Serialize};
 
 use crate::config::{CameraSettings, Protocol};
-use crate::control_file::{path, read, write};
+use crate::control_file::{Last, path, read};
 use crate::log::Log;
 use crate::shard::Shard;
 
@@ -41,16 +41,7 @@ pub struct AccountsFile {
     /// Those of cameras that are gone from the configuration, too; `None` until it was read.
     worked: Mutex<Option<Accounts>>,
     /// Held while it is written, which a disk may delay for ever.
-    last: Mutex<Last>,
-}
-
-/// What was done last.
-#[derive(Debug, Default)]
-struct Last {
-    /// As it was written.
-    kept: Option<Accounts>,
-    /// It could not be written.
-    failed: bool,
+    last: Mutex<Last<Accounts>>,
 }
 
 impl Account {
@@ -86,9 +77,8 @@ impl AccountsFile {
 
     /// These have worked.
     pub fn remember(&self, accounts: Accounts) {
-        self.load();
         let mut worked = lock(&self.worked);
-        let worked = worked.get_or_insert_default();
+        let worked = worked.get_or_insert_with(|| self.read());
         worked.extend(accounts);
         while worked.len() > MOST {
             worked.pop_first();
@@ -97,9 +87,8 @@ impl AccountsFile {
 
     /// Those of these cameras have not, as they are now.
     pub fn forget(&self, cameras: &[String]) {
-        self.load();
         let mut worked = lock(&self.worked);
-        worked.get_or_insert_default().retain(|camera, _| !cameras.contains(camera));
+        worked.get_or_insert_with(|| self.read()).retain(|camera, _| !cameras.contains(camera));
     }
 
     /// Keeps them, where they are not what is kept already.
@@ -109,16 +98,7 @@ impl AccountsFile {
     pub fn keep(&self) -> io::Result<()> {
         let Some(path) = &self.path else { return Ok(()) };
         let mut last = lock(&self.last);
-        let worked = self.load();
-        if last.kept.as_ref() == Some(&worked) {
-            return Ok(());
-        }
-        let written = write(path, &worked);
-        let has_failed = std::mem::replace(&mut last.failed, written.is_err());
-        if written.is_ok() {
-            last.kept = Some(worked);
-        }
-        if has_failed { Ok(()) } else { written }
+        last.write(path, self.load())
     }
 }
 

@@ -36,16 +36,34 @@ pub struct ControlFile {
     /// Who had which camera last, those that are gone from the configuration, too; `None` until it was read.
     had: Mutex<Option<Kept>>,
     /// Held while it is written, which a disk may delay for ever.
-    last: Mutex<Last>,
+    last: Mutex<Last<Kept>>,
 }
 
-/// What was done last.
+/// What was done last with a file.
 #[derive(Debug, Default)]
-struct Last {
+pub struct Last<T> {
     /// As it was written.
-    kept: Option<Kept>,
+    kept: Option<T>,
     /// It could not be written.
     failed: bool,
+}
+
+impl<T: Serialize + PartialEq> Last<T> {
+    /// Writes what is to be kept, if it is not what is kept already.
+    ///
+    /// # Errors
+    /// Why it cannot be written: said once, and tried again every time.
+    pub fn write(&mut self, path: &Path, what: T) -> io::Result<()> {
+        if self.kept.as_ref() == Some(&what) {
+            return Ok(());
+        }
+        let written = write(path, &what);
+        let has_failed = std::mem::replace(&mut self.failed, written.is_err());
+        if written.is_ok() {
+            self.kept = Some(what);
+        }
+        if has_failed { Ok(()) } else { written }
+    }
 }
 
 impl ControlFile {
@@ -105,15 +123,7 @@ impl ControlFile {
             let is_new = is_handed_over && !std::mem::replace(&mut last.failed, true);
             return if is_new { Err(io::Error::other(NO_FOLDER)) } else { Ok(()) };
         };
-        if last.kept.as_ref() == Some(&control) {
-            return Ok(());
-        }
-        let written = write(path, &control);
-        let has_failed = std::mem::replace(&mut last.failed, written.is_err());
-        if written.is_ok() {
-            last.kept = Some(control);
-        }
-        if has_failed { Ok(()) } else { written }
+        last.write(path, control)
     }
 }
 
@@ -173,7 +183,7 @@ pub fn read<T: DeserializeOwned>(path: &Path, what: &str, event: &str, log: &Log
 ///
 /// # Errors
 /// Why it cannot be written; the last one is still there.
-pub fn write(path: &Path, what: &impl Serialize) -> io::Result<()> {
+fn write(path: &Path, what: &impl Serialize) -> io::Result<()> {
     let new = path.with_extension("new");
     let mut file = File::create(&new)?;
     file.write_all(&serde_json::to_vec(what)?)?;
