@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: MPL-2.0
 
-//! Twenty cameras that one program follows with for an hour, before a store of ten thousand events which it adds to; now and then
-//! somebody asks its page for all of them. Prints a table in Markdown of how long the page takes, how many pictures were looked at, and
-//! whether the program takes more and more:
+//! Twenty cameras that one program follows with for an hour, before a store of ten thousand events which it adds to. It records them
+//! and tells a broker; now and then somebody asks its page for all events and for a picture, and its file changes and is read again.
+//! Prints a table in Markdown of how long the page takes, how many pictures were looked at, and whether the program takes more and more:
 //!
 //! ```sh
 //! cargo build --release --workspace --lib --bins && cargo run --release --example site
-//! cargo run --release --example site -- --cameras 8 --frame-rate 25 --duration 3750    # as many pictures as of one camera in a night
+//! cargo run --release --example site -- --cameras 8 --frame-rate 25 --duration 3900    # as many pictures as of one camera in a night
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
@@ -19,7 +19,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use end_to_end::{Growth, Program, Usage, growths, scene, scratch};
+use end_to_end::{Broker, Growth, Program, Usage, growths, scene, scratch};
 use events::{Filter, Reader};
 use virtual_camera::VirtualCamera;
 
@@ -40,6 +40,8 @@ struct Options {
 const EVERY: Duration = Duration::from_secs(10);
 /// Of so many looks one is shown.
 const OFTEN: usize = 12;
+/// After so many the file is another, and is read again.
+const RELOAD: usize = 30;
 /// A camera rests by then.
 const AT_REST: Duration = Duration::from_secs(10);
 
@@ -50,9 +52,13 @@ fn main() -> ExitCode {
     let cameras: Vec<_> = (0..options.cameras).map(camera).collect();
     let folder = scratch("site");
     store::fill(&folder);
-    let program = Program::start("site", |own| file(&cameras, own, &folder), &[]);
+    let broker = Broker::start();
+    let mut heard = broker.listen("site/#");
+    let file = |own: &Path, changed| file(&cameras, own, &folder, &broker, changed);
+    let program = Program::start("site", |own| file(own, 0), &[]);
     let begin = Instant::now();
     let (mut moments, mut took_ms) = (Vec::new(), Vec::new());
+    let (mut shown, mut reloads) = (0, 0);
     while begin.elapsed() < duration {
         thread::sleep(EVERY);
         moments.extend(Usage::of(program.launch.id(), begin.elapsed(), moments.last()));
@@ -60,12 +66,25 @@ fn main() -> ExitCode {
         assert!(events >= store::EVENTS as usize, "{events}");
         took_ms.push(took);
         // Whoever is let go has been there, and is found again.
-        let one = store::name(moments.len() as i64 % options.cameras);
+        let number = moments.len() as i64 % options.cameras;
+        let one = store::name(number);
         program.ask("POST", &format!("/cameras/{one}/release"));
+        shown += usize::from(program.ask("GET", &format!("/cameras/{one}/picture")).0 == 200);
+        if moments.len().is_multiple_of(RELOAD) {
+            fs::write(program.folder().join("cameras.toml"), file(program.folder(), number)).unwrap();
+            program.launch.signal("HUP");
+            reloads += 1;
+        }
     }
     let metric = |name| program.metric(name) as u64;
     let pictures = metric("ptztrack_pictures_total") - metric("ptztrack_pictures_dropped_total");
     let unsteered = cameras.iter().filter(|camera| camera.status().commands == 0).count();
+    let pipelines = metric("ptztrack_pipelines_total");
+    let files = recordings(&program.folder().join("recordings"));
+    let unrecorded =
+        (0..options.cameras).map(store::name).filter(|name| !files.iter().any(|file| is_of(file, name)));
+    let unrecorded = unrecorded.count();
+    heard.read_for(Duration::ZERO);
     program.end("TERM");
     let turning = cameras.iter().filter(|camera| !scene::left_at_rest(camera, AT_REST)).count();
     let kept = Reader::open(&folder).unwrap().sightings(&Filter::default()).unwrap().len();
@@ -88,21 +107,48 @@ fn main() -> ExitCode {
     println!("| times that the page was asked for all events | {} |", took_ms.len());
     println!("| ms that it took: median | {} |", took_ms[took_ms.len() / 2]);
     println!("| ms that it took: at most | {} |", took_ms[took_ms.len() - 1]);
+    println!("| pictures that the page showed | {shown} |");
+    println!("| times that the file was read again | {reloads} |");
+    println!("| pipelines built | {pipelines} |");
+    println!("| messages to the broker | {} |", heard.seen().len());
+    println!("| files of recordings in the end | {} |", files.len());
     println!("| cameras that were never steered | {unsteered} |");
+    println!("| cameras that were not recorded | {unrecorded} |");
     println!("| cameras left turning | {turning} |");
     // A step has another cause than a slope.
     let memory: Vec<_> =
         moments.iter().step_by(OFTEN).map(|usage| format!("{:.1}", usage.memory_mb)).collect();
     println!("\nmemory, MB, every {} s: {}", (EVERY * OFTEN as u32).as_secs(), memory.join(", "));
-    let well = growths.iter().filter_map(Growth::fault).count() == 0 && unsteered + turning == 0;
+    let lost = unsteered + unrecorded + turning;
+    let went_on = shown > 0 && reloads > 0 && !heard.seen().is_empty();
+    let well = growths.iter().filter_map(Growth::fault).count() == 0 && lost == 0 && went_on;
     if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
 
-/// All of them, who keep what they see in one store.
-fn file(cameras: &[VirtualCamera], own: &Path, events: &Path) -> String {
+/// All of them, recorded, who keep what they see in one store; one has longer files than the others.
+fn file(cameras: &[VirtualCamera], own: &Path, events: &Path, broker: &Broker, changed: i64) -> String {
+    let recordings = own.join("recordings");
     let entry = |(camera, number): (&VirtualCamera, i64)| {
-        Program::entry(&store::name(number), &camera.url(), &own.join("password"))
+        let name = store::name(number);
+        let segment_s = if number == changed { 20 } else { 10 };
+        Program::entry(&name, &camera.url(), &own.join("password"))
+            + &format!(
+                "[camera.{name}.recording]\nfolder = {recordings:?}\nsegment = \"{segment_s}s\"\nkeep = \"1m\"\n"
+            )
     };
     let entries: String = cameras.iter().zip(0..).map(entry).collect();
-    entries + &format!("[events]\nfolder = {events:?}\nkeep = \"10000d\"\n")
+    entries
+        + &format!("[events]\nfolder = {events:?}\nkeep = \"10000d\"\n")
+        + &format!("[mqtt]\nhost = \"127.0.0.1\"\nport = {}\ntopic = \"site\"\n", broker.port)
+}
+
+/// The names of the files in a folder.
+fn recordings(folder: &Path) -> Vec<String> {
+    let names = fs::read_dir(folder).into_iter().flatten();
+    names.map(|file| file.unwrap().file_name().into_string().unwrap()).collect()
+}
+
+/// Whether a file is of this camera.
+fn is_of(file: &str, camera: &str) -> bool {
+    file.strip_prefix(camera).is_some_and(|rest| rest.starts_with('-'))
 }

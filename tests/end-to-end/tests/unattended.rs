@@ -8,7 +8,8 @@ mod browser;
 
 use std::collections::HashSet;
 use std::fs;
-use std::path::Path;
+use std::os::unix::fs::symlink;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use browser::Browser;
@@ -95,54 +96,122 @@ fn a_camera_with_a_wrong_password_is_given_up_and_no_matter_to_the_others() {
     }
 }
 
-#[test]
-fn a_camera_that_lacks_an_element_is_given_up_and_no_matter_to_the_others() {
-    // All plugins of this machine, but for the one that a recording needs.
+/// All plugins of this machine but for those of these elements, and where these would be.
+fn plugins_without(elements: &[&str], folder: &Path) -> Vec<(PathBuf, PathBuf)> {
     end_to_end::init();
-    let missing = gst::ElementFactory::find("jpegparse").unwrap().plugin().unwrap().filename().unwrap();
-    let plugins = scratch("lacking");
-    fs::create_dir_all(&plugins).unwrap();
-    let place = |plugin: &Path| plugins.join(plugin.file_name().unwrap());
-    for plugin in fs::read_dir(missing.parent().unwrap()).unwrap() {
+    let plugin = |element: &&str| gst::ElementFactory::find(element).unwrap().plugin().unwrap().filename();
+    let missing: Vec<PathBuf> = elements.iter().map(|element| plugin(element).unwrap()).collect();
+    let place = |plugin: &Path| folder.join(plugin.file_name().unwrap());
+    fs::create_dir_all(folder).unwrap();
+    for plugin in fs::read_dir(missing[0].parent().unwrap()).unwrap() {
         let plugin = plugin.unwrap().path();
-        if plugin != missing && plugin.extension().is_some_and(|extension| extension == "so") {
-            std::os::unix::fs::symlink(&plugin, place(&plugin)).unwrap();
+        if !missing.contains(&plugin) && plugin.extension().is_some_and(|extension| extension == "so") {
+            symlink(&plugin, place(&plugin)).unwrap();
         }
     }
-    let registry = plugins.join("registry.bin");
-    let environment = [("GST_PLUGIN_SYSTEM_PATH", plugins.as_path()), ("GST_REGISTRY", registry.as_path())];
+    missing.into_iter().map(|plugin| (plugin.clone(), place(&plugin))).collect()
+}
 
-    let (good, records) = (camera(), camera());
+fn only_plugins_of<'a>(folder: &'a Path, registry: &'a Path) -> [(&'static str, &'a Path); 2] {
+    [("GST_PLUGIN_SYSTEM_PATH", folder), ("GST_REGISTRY", registry)]
+}
+
+#[test]
+fn a_camera_that_lacks_an_element_is_given_up_and_no_matter_to_the_others() {
+    let plugins = scratch("lacking");
+    let missing = plugins_without(&["avdec_h264"], &plugins);
+    let registry = plugins.join("registry.bin");
+    let environment = only_plugins_of(&plugins, &registry);
+
+    let (good, other) = (camera(), camera());
     let file = |folder: &Path| {
-        let recording = folder.join("recordings");
-        let recording = format!("[camera.records.recording]\nfolder = {recording:?}\nkeep = \"1h\"\n");
         let password = folder.join("password");
+        let rtsp = other.rtsp_url();
         Program::entry("good", &good.url(), &password)
-            + &Program::entry("records", &records.url(), &password)
-            + &recording
+            + &Program::entry("other", &other.url(), &password)
+            + &format!("codec = \"h264\"\nrtsp = \"{rtsp}\"\n")
     };
     let mut program = Program::start_in("lacking", file, &[], &environment);
-    let line = program.launch.wait_for_line("records: error: given up: ");
-    let lack = "GStreamer has no element jpegparse; on Debian it is in the package gstreamer1.0-plugins-bad";
+    let line = program.launch.wait_for_line("other: error: given up: ");
+    let lack = "GStreamer has no element avdec_h264; on Debian it is in the package gstreamer1.0-libav";
     assert!(line.contains(lack), "{line}");
     follows(&good);
     let cameras = program.folder().join("cameras.toml");
     let check = || ptztrack().arg("check").arg(&cameras).envs(environment).output().unwrap();
     let said = check();
     assert_eq!(said.status.code(), Some(1), "{said:?}");
-    assert_eq!(String::from_utf8_lossy(&said.stderr), format!("camera `records`: {lack}\n"));
+    assert_eq!(String::from_utf8_lossy(&said.stderr), format!("camera `other`: {lack}\n"));
 
     // Once it is installed, the file is read again.
-    std::os::unix::fs::symlink(&missing, place(&missing)).unwrap();
+    missing.iter().for_each(|(plugin, place)| symlink(plugin, place).unwrap());
     assert!(check().status.success());
     program.launch.signal("HUP");
-    program.launch.wait_for_line("records: the picture is there");
-    follows(&records);
+    program.launch.wait_for_line("other: the picture is there");
+    follows(&other);
     program.end("TERM");
     fs::remove_dir_all(&plugins).unwrap();
-    for camera in [&good, &records] {
+    for camera in [&good, &other] {
         scene::assert_left_at_rest(camera);
     }
+}
+
+#[test]
+fn a_recording_that_lacks_an_element_costs_nobody_who_is_followed() {
+    let plugins = scratch("recording-lacks");
+    let missing = plugins_without(&["h264parse", "x264enc"], &plugins);
+    let registry = plugins.join("registry.bin");
+    let environment = only_plugins_of(&plugins, &registry);
+
+    let cameras = [("as-it-comes", camera(), "h264parse", "bad"), ("drawn-in", camera(), "x264enc", "ugly")];
+    let recordings = scratch("recordings-that-lack");
+    let file = |folder: &Path| {
+        let entry = |(name, camera, ..): &(&str, VirtualCamera, _, _)| {
+            let (rtsp, overlay) = (camera.rtsp_url(), *name == "drawn-in");
+            Program::entry(name, &camera.url(), &folder.join("password"))
+                + &format!("codec = \"h264\"\nrtsp = \"{rtsp}\"\n[camera.{name}.recording]\n")
+                + &format!("folder = {recordings:?}\nkeep = \"1h\"\noverlay = {overlay}\n")
+        };
+        cameras.iter().map(entry).collect()
+    };
+    let mut program = Program::start_in("recording-lacks", file, &[], &environment);
+    let mut lacks = String::new();
+    for (name, camera, element, package) in &cameras {
+        let lack = format!(
+            "GStreamer has no element {element}; on Debian it is in the package gstreamer1.0-plugins-{package}"
+        );
+        program.launch.wait_for_line(&format!(
+            "{name}: warning: nothing is recorded: {lack}; the camera keeps following; retrying"
+        ));
+        program.launch.rewind();
+        follows(camera);
+        lacks += &format!("camera `{name}`: {lack}\n");
+    }
+    let file = program.folder().join("cameras.toml");
+    let said = ptztrack().arg("check").arg(&file).envs(environment).output().unwrap();
+    assert_eq!(
+        (said.status.code(), String::from_utf8_lossy(&said.stderr).as_ref()),
+        (Some(1), lacks.as_str())
+    );
+
+    // Once they are installed and the file is read again, they are recorded without anybody's losing the picture.
+    missing.iter().for_each(|(plugin, place)| symlink(plugin, place).unwrap());
+    program.launch.signal("HUP");
+    for (name, ..) in &cameras {
+        program.launch.wait_for_line(&format!("{name}: it is recorded again"));
+        program.launch.rewind();
+    }
+    assert_eq!(program.metric("ptztrack_pipelines_total") as usize, cameras.len());
+    let said = program.end("TERM");
+    assert_eq!(said.matches("nothing is recorded").count(), cameras.len(), "{said}");
+    for (name, camera, ..) in &cameras {
+        scene::assert_left_at_rest(camera);
+        let files = fs::read_dir(&recordings).unwrap().map(|file| file.unwrap().path());
+        let of_camera = |file: &PathBuf| file.file_name().unwrap().to_string_lossy().starts_with(name);
+        let pictures: u32 = files.filter(of_camera).map(|file| pictures_in(&file).unwrap()).sum();
+        assert!(pictures > 0, "{name}");
+    }
+    fs::remove_dir_all(&recordings).unwrap();
+    fs::remove_dir_all(&plugins).unwrap();
 }
 
 #[test]

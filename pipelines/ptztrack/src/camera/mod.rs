@@ -214,17 +214,16 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
             }
         }
     });
-    let (recorder, recordings) = settings
-        .recording
-        .as_ref()
-        .map(|recording| Recorder::new(recording, settings.codec, &settings.name, log.clone()))
-        .unzip();
+    let (recorder, recordings) =
+        settings.recording.as_ref().map(|recording| Recorder::new(recording, settings, log.clone())).unzip();
+    // What only a recording lacks, it says itself.
+    let unrecorded = CameraSettings { recording: None, ..settings.clone() };
     let waits = listener.clone();
     let mut refusals = Refusals::default();
     let build = || {
         // The one before may have gone without a word.
         waits.borrow().ends();
-        if let Some(reason) = settings.lacks() {
+        if let Some(reason) = unrecorded.lacks() {
             return Err(reason.into());
         }
         // What ended the last one counts here, too.

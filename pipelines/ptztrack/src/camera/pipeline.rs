@@ -16,7 +16,7 @@ use ptztrack_contract::lock::lock;
 use super::bounds;
 use super::known::{Known, Steering};
 use super::packets::{self, DECODER};
-use super::recording::{self, Recorder};
+use super::recording::Recorder;
 use super::running::Running;
 use super::servo_stats::ServoStats;
 use super::sight;
@@ -57,11 +57,7 @@ pub fn description(camera: &CameraSettings) -> String {
         write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", sightings::SINK));
     }
     if recording.is_some_and(|recording| recording.overlay) {
-        let encoder = recording::ENCODER;
-        write_all(
-            &mut text,
-            &format!("followed. ! {NEWEST} ! ptzoverlay ! videoconvert ! {encoder} ! {TAP} "),
-        );
+        write_all(&mut text, &format!("followed. ! {NEWEST} ! {TAP} "));
     }
     if camera.show {
         write_all(

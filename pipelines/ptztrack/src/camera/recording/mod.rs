@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MPL-2.0
 
 //! What is recorded, in a pipeline and a thread of its own: a disk that is full, slow, broken or hangs costs the recording and
-//! nothing else. Copies reach it over an `appsrc` that takes them at once, and drops them where they are not written.
+//! nothing else, and so does an encoder or a parser that fails or is not installed. Copies reach it over an `appsrc` that takes them at
+//! once, and drops them where they are not written.
 //!
 //! ```text
-//! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ parser ─ splitmuxsink
+//! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ (ptzoverlay ─ encoder) ─ parser ─ splitmuxsink
 //! ```
 
 mod clip;
@@ -26,12 +27,13 @@ use ptztrack_contract::lock::lock;
 
 use self::segments::Arrivals;
 use super::bounds::{self, cost};
-use crate::config::{Codec, Recording};
+use crate::config::{CameraSettings, Codec, Recording};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
-/// The overlay, encoded, as it is recorded.
-pub const ENCODER: &str = "x264enc tune=zerolatency speed-preset=superfast key-int-max=30";
+/// From decoded pictures to the overlay as it is recorded, in H.264.
+const OVERLAY: &str =
+    "ptzoverlay ! videoconvert ! x264enc tune=zerolatency speed-preset=superfast key-int-max=30 !";
 
 /// So much waits for a disk that is slow for a moment, in bytes.
 const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
@@ -57,8 +59,7 @@ const LONGEST_END: Duration = Duration::from_secs(10);
 #[derive(Debug, Clone)]
 pub struct Recorder {
     settings: Recording,
-    codec: Codec,
-    camera: String,
+    camera: CameraSettings,
     log: Arc<Log>,
     /// Held by everybody who still writes.
     _writing: Sender<()>,
@@ -86,15 +87,12 @@ struct FeedState {
 
 impl Recorder {
     /// For one camera; nothing is written yet.
-    pub fn new(settings: &Recording, codec: Codec, camera: &str, log: Arc<Log>) -> (Self, Recordings) {
+    pub fn new(settings: &Recording, camera: &CameraSettings, log: Arc<Log>) -> (Self, Recordings) {
         let (writing, written) = channel();
-        let codec = if settings.overlay { Codec::H264 } else { codec };
-        let (settings, camera) = (settings.clone(), camera.to_owned());
         (
             Self {
-                settings,
-                codec,
-                camera,
+                settings: settings.clone(),
+                camera: camera.clone(),
                 log,
                 _writing: writing,
                 trouble: Arc::default(),
@@ -123,9 +121,9 @@ impl Recorder {
         };
         let callbacks = gst_app::AppSinkCallbacks::builder().new_sample(copy).eos(move |_| ends.end());
         tap.set_callbacks(callbacks.build());
-        let name = format!("{}-record", self.camera);
+        let name = format!("{}-record", self.camera.name);
         let log = self.log.clone();
-        let camera = self.camera.clone();
+        let camera = self.camera.name.clone();
         if let Err(err) = thread::Builder::new().name(name).spawn(move || self.run(&feed)) {
             let detail = format!("nothing is recorded: {err}");
             log.tell(&Event::new(Level::Error, Some(&camera), "recording-failed", &detail));
@@ -159,13 +157,17 @@ impl Recorder {
 
     /// Until the end of the stream.
     fn write(&self, feed: &Feed) -> Result<(), String> {
+        if let Some(lacks) = self.camera.lacks() {
+            return Err(lacks);
+        }
         self.make_room()?;
         let said = |err: glib::Error| err.message().to_owned();
-        let pipeline = gst::parse::launch(&description(self.codec)).map_err(said)?;
+        let pipeline =
+            gst::parse::launch(&description(self.camera.codec, self.settings.overlay)).map_err(said)?;
         let pipeline = pipeline.downcast::<gst::Pipeline>().map_err(|_| "no pipeline")?;
         let arrivals = Arc::new(Arrivals::default());
         let came = arrivals.clone();
-        files::configure(&pipeline, &self.settings, &self.camera, &self.segments, move |pts| {
+        files::configure(&pipeline, &self.settings, &self.camera.name, &self.segments, move |pts| {
             came.came_ms(pts)
         });
         let source = pipeline.by_name("feed").and_then(|source| source.downcast::<gst_app::AppSrc>().ok());
@@ -181,7 +183,7 @@ impl Recorder {
                     if let Err(short) = self.make_room() {
                         break Err(short.to_owned());
                     }
-                    if files::newest_grew(&self.settings, &self.camera, LOOK * 2)
+                    if files::newest_grew(&self.settings, &self.camera.name, LOOK * 2)
                         && std::mem::take(&mut *lock(&self.trouble))
                     {
                         self.tell(Level::Info, "recording", "it is recorded again");
@@ -199,7 +201,7 @@ impl Recorder {
 
     /// Says once where files go before their time.
     fn make_room(&self) -> Result<(), &'static str> {
-        let room = files::make_room(&self.settings, &self.camera, &self.segments);
+        let room = files::make_room(&self.settings, &self.camera.name, &self.segments);
         if room.deleted > 0 && !self.told_early.swap(true, Ordering::Relaxed) {
             self.tell(Level::Warning, "recording-deleted-early", files::EARLY);
         }
@@ -207,11 +209,12 @@ impl Recorder {
     }
 
     fn tell(&self, level: Level, event: &str, detail: &str) {
-        self.log.tell(&Event::new(level, Some(&self.camera), event, detail));
+        self.log.tell(&Event::new(level, Some(&self.camera.name), event, detail));
     }
 }
 
-fn description(codec: Codec) -> String {
+fn description(codec: Codec, overlay: bool) -> String {
+    let (encoder, codec) = if overlay { (OVERLAY, Codec::H264) } else { ("", codec) };
     let parser = match codec {
         Codec::Mjpeg => "jpegparse",
         Codec::Mpeg4 => "mpeg4videoparse",
@@ -220,7 +223,7 @@ fn description(codec: Codec) -> String {
     };
     format!(
         "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
-         max-buffers={MOST_QUEUED} ! {parser} ! splitmuxsink name=recording muxer-factory=matroskamux"
+         max-buffers={MOST_QUEUED} ! {encoder} {parser} name=parser ! splitmuxsink name=recording muxer-factory=matroskamux"
     )
 }
 
@@ -301,9 +304,10 @@ fn watch_groups(source: &gst_app::AppSrc, arrivals: Arc<Arrivals>) {
     });
 }
 
-/// Where pictures leave the parser, which is next to the source.
+/// Where pictures leave the parser.
 fn parsed(source: &gst_app::AppSrc) -> Option<gst::Pad> {
-    source.static_pad("src")?.peer()?.parent_element()?.static_pad("src")
+    let pipeline = source.parent()?.downcast::<gst::Bin>().ok()?;
+    pipeline.by_name("parser")?.static_pad("src")
 }
 
 /// Ends its feed when it is dropped.
@@ -321,7 +325,7 @@ mod tests {
 
     /// What waits of so many pictures of this size for a disk, where nothing runs that would write them: how many, and their bytes.
     fn waiting(number: u64, size: usize) -> (u64, u64) {
-        let pipeline = gst::parse::launch(&description(Codec::Mjpeg)).unwrap();
+        let pipeline = gst::parse::launch(&description(Codec::Mjpeg, false)).unwrap();
         let source = pipeline.downcast::<gst::Pipeline>().unwrap().by_name("feed").unwrap();
         let source = source.downcast::<gst_app::AppSrc>().unwrap();
         let feed = Feed::default();
@@ -360,7 +364,8 @@ mod tests {
     /// What is said of these pictures, and what memory those take that go on from where a parser stands.
     fn recorded<'a>(pictures: impl Iterator<Item = &'a gst::Sample>) -> (Option<String>, usize) {
         // Plays before anything comes: after an error it would not begin to, and so not end.
-        let text = "appsrc name=feed format=time ! identity ! fakesink name=recording async=false";
+        let text =
+            "appsrc name=feed format=time ! identity name=parser ! fakesink name=recording async=false";
         let pipeline = gst::parse::launch(text).unwrap().downcast::<gst::Pipeline>().unwrap();
         let written = Arc::new(AtomicUsize::new(0));
         let sink = pipeline.by_name("recording").unwrap().static_pad("sink").unwrap();
@@ -434,7 +439,7 @@ mod tests {
             let camera = gst::parse::launch(&text).unwrap().downcast::<gst::Pipeline>().unwrap();
             let tap = camera.by_name("tap").unwrap().downcast::<gst_app::AppSink>().unwrap();
             let pipeline =
-                gst::parse::launch(&description(codec)).unwrap().downcast::<gst::Pipeline>().unwrap();
+                gst::parse::launch(&description(codec, false)).unwrap().downcast::<gst::Pipeline>().unwrap();
             let recording = pipeline.by_name("recording").unwrap();
             let folder = std::env::temp_dir().join(format!("ptztrack-came-{}", std::process::id()));
             std::fs::create_dir_all(&folder).unwrap();
@@ -477,8 +482,9 @@ mod tests {
     #[test]
     fn pictures_are_looked_at_where_they_leave_the_parser() {
         gst::init().unwrap();
-        for codec in [Codec::Mjpeg, Codec::Mpeg4, Codec::H264, Codec::H265] {
-            let pipeline = gst::parse::launch(&description(codec)).unwrap();
+        let codecs = [Codec::Mjpeg, Codec::Mpeg4, Codec::H264, Codec::H265];
+        for (codec, overlay) in codecs.map(|codec| (codec, false)).into_iter().chain([(Codec::Mjpeg, true)]) {
+            let pipeline = gst::parse::launch(&description(codec, overlay)).unwrap();
             let pipeline = pipeline.downcast::<gst::Pipeline>().unwrap();
             let source = pipeline.by_name("feed").unwrap().downcast::<gst_app::AppSrc>().unwrap();
             let next = parsed(&source).unwrap().peer().unwrap().parent_element();
