@@ -19,7 +19,7 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use clap::Parser;
-use end_to_end::{Broker, Growth, Program, Usage, growths, scene, scratch};
+use end_to_end::{Broker, Counter, Growth, Program, Usage, growths, scene, scratch};
 use events::{Filter, Reader};
 use virtual_camera::VirtualCamera;
 
@@ -59,6 +59,7 @@ fn main() -> ExitCode {
     let begin = Instant::now();
     let (mut moments, mut took_ms) = (Vec::new(), Vec::new());
     let (mut shown, mut reloads) = (0, 0);
+    let mut counts = Counts::of((0..options.cameras).map(store::name).collect());
     while begin.elapsed() < duration {
         thread::sleep(EVERY);
         moments.extend(Usage::of(program.launch.id(), begin.elapsed(), moments.last()));
@@ -66,6 +67,7 @@ fn main() -> ExitCode {
         assert!(events >= store::EVENTS as usize, "{events}");
         took_ms.push(took);
         // Whoever is let go has been there, and is found again.
+        counts.look(&program);
         let number = moments.len() as i64 % options.cameras;
         let one = store::name(number);
         program.ask("POST", &format!("/cameras/{one}/release"));
@@ -76,10 +78,10 @@ fn main() -> ExitCode {
             reloads += 1;
         }
     }
-    let metric = |name| program.metric(name) as u64;
-    let pictures = metric("ptztrack_pictures_total") - metric("ptztrack_pictures_dropped_total");
     let unsteered = cameras.iter().filter(|camera| camera.status().commands == 0).count();
-    let pipelines = metric("ptztrack_pipelines_total");
+    counts.look(&program);
+    let [came, dropped, pipelines] = counts.totals();
+    let pictures = came - dropped;
     let files = recordings(&program.folder().join("recordings"));
     let unrecorded =
         (0..options.cameras).map(store::name).filter(|name| !files.iter().any(|file| is_of(file, name)));
@@ -123,6 +125,34 @@ fn main() -> ExitCode {
     let went_on = shown > 0 && reloads > 0 && !heard.seen().is_empty();
     let well = growths.iter().filter_map(Growth::fault).count() == 0 && lost == 0 && went_on;
     if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+/// What the program counts, summed up over cameras that begin anew: those whose entries change.
+struct Counts {
+    cameras: Vec<String>,
+    /// Of each name, of each camera.
+    counters: [Vec<Counter>; 3],
+}
+
+impl Counts {
+    const NAMES: [&str; 3] =
+        ["ptztrack_pictures_total", "ptztrack_pictures_dropped_total", "ptztrack_pipelines_total"];
+
+    fn of(cameras: Vec<String>) -> Self {
+        let counters = Self::NAMES.map(|_| cameras.iter().map(|_| Counter::default()).collect());
+        Self { cameras, counters }
+    }
+
+    fn look(&mut self, program: &Program) {
+        for (name, counters) in Self::NAMES.into_iter().zip(&mut self.counters) {
+            let counts = program.metric_of(name, &self.cameras);
+            counters.iter_mut().zip(counts).for_each(|(counter, count)| counter.is(count));
+        }
+    }
+
+    fn totals(&self) -> [u64; 3] {
+        self.counters.each_ref().map(|counters| counters.iter().map(Counter::total).sum())
+    }
 }
 
 /// All of them, recorded, who keep what they see in one store; one has longer files than the others.

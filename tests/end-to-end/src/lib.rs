@@ -7,6 +7,7 @@
 mod broker;
 mod cable;
 mod chance;
+mod counter;
 mod disk;
 pub mod following;
 mod front;
@@ -25,6 +26,7 @@ mod watchdog;
 pub use broker::Broker;
 pub use cable::Cable;
 pub use chance::Chance;
+pub use counter::Counter;
 pub use disk::Disk;
 pub use front::{Front, Way};
 pub use held::Held;

@@ -117,7 +117,14 @@ impl Program {
 
     /// What the page counts by this name, of all cameras together.
     pub fn metric(&self, name: &str) -> f64 {
-        sum_of(&self.ask("GET", "/metrics").1, name)
+        sum_of(&self.ask("GET", "/metrics").1, name, "")
+    }
+
+    /// The same of each of these cameras. A camera that is set otherwise begins anew.
+    pub fn metric_of(&self, name: &str, cameras: &[String]) -> Vec<u64> {
+        let metrics = self.ask("GET", "/metrics").1;
+        let of = |camera: &String| sum_of(&metrics, name, &format!("camera=\"{camera}\"")) as u64;
+        cameras.iter().map(of).collect()
     }
 
     /// The process of a camera that has one of its own.
@@ -173,9 +180,12 @@ pub fn complaints_in(log: &str) -> Vec<String> {
     log.lines().filter(is_complaint).filter_map(without_time).collect()
 }
 
-/// Of the lines `name{labels} value` of OpenMetrics.
-fn sum_of(metrics: &str, name: &str) -> f64 {
-    let labels = |line: &str| line.strip_prefix(name).is_some_and(|rest| rest.starts_with('{'));
+/// Of the lines `name{labels} value` of OpenMetrics whose labels begin with these.
+fn sum_of(metrics: &str, name: &str, labels: &str) -> f64 {
+    let labels = |line: &str| {
+        let found = line.strip_prefix(name).and_then(|rest| rest.strip_prefix('{'));
+        found.is_some_and(|found| found.starts_with(labels))
+    };
     let value = |line: &str| line.rsplit(' ').next()?.parse::<f64>().ok();
     metrics.lines().filter(|line| labels(line)).filter_map(value).sum()
 }
@@ -204,7 +214,8 @@ mod tests {
     fn a_metric_is_that_of_all_cameras_and_no_other() {
         let metrics = "# HELP p_total Pictures.\np_total{camera=\"a b\"} 3.0\np_total{camera=\"c\"} 4.0\n\
                        p_dropped_total{camera=\"c\"} 8.0\n# EOF\n";
-        assert_eq!(sum_of(metrics, "p_total"), 7.0);
-        assert_eq!(sum_of(metrics, "q_total"), 0.0);
+        assert_eq!(sum_of(metrics, "p_total", ""), 7.0);
+        assert_eq!(sum_of(metrics, "p_total", "camera=\"c\""), 4.0);
+        assert_eq!(sum_of(metrics, "q_total", ""), 0.0);
     }
 }

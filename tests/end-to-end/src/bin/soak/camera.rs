@@ -11,11 +11,10 @@ use std::time::{Duration, Instant};
 
 use end_to_end::following::{MJPEG, Network, RTSP};
 use end_to_end::scene::{self, left_at_rest};
-use end_to_end::{Broker, Chance, Program, Watchdog, Way};
+use end_to_end::{Broker, Chance, Counter, Program, Watchdog, Way};
 use virtual_camera::{Fault, VirtualCamera};
 
 use crate::account::Account;
-use crate::counter::Counter;
 use crate::fault::Happening;
 use crate::known::{Known, OF_RTSPSRC};
 

@@ -12,7 +12,6 @@
 
 mod account;
 mod camera;
-mod counter;
 mod fault;
 mod known;
 mod sample;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-/// What programs count one after the other, as one number.
+/// What programs, or cameras of one that begin anew, count one after the other, as one number.
 #[derive(Debug, Default)]
 pub struct Counter {
     /// By those before.
