@@ -6,7 +6,7 @@
 //!
 //! ```sh
 //! cargo build --release --workspace --lib --bins && cargo run --release --example site
-//! cargo run --release --example site -- --cameras 8 --frame-rate 25 --duration 3900    # as many pictures as of one camera in a night
+//! cargo run --release --example site -- --cameras 10 --frame-rate 25 --duration 3120    # as many pictures as of one camera in a night
 //! ```
 #![allow(clippy::unwrap_used, clippy::expect_used)]
 
