@@ -68,14 +68,14 @@ fn main() -> ExitCode {
         took_ms.push(took);
         // Whoever is let go has been there, and is found again.
         counts.look(&program);
-        let number = moments.len() as i64 % options.cameras;
-        let one = store::name(number);
+        let one = store::name(moments.len() as i64 % options.cameras);
         program.ask("POST", &format!("/cameras/{one}/release"));
         shown += usize::from(program.ask("GET", &format!("/cameras/{one}/picture")).0 == 200);
         if moments.len().is_multiple_of(RELOAD) {
-            fs::write(program.folder().join("cameras.toml"), file(program.folder(), number)).unwrap();
-            program.launch.signal("HUP");
             reloads += 1;
+            let changed = reloads % options.cameras;
+            fs::write(program.folder().join("cameras.toml"), file(program.folder(), changed)).unwrap();
+            program.launch.signal("HUP");
         }
     }
     let unsteered = cameras.iter().filter(|camera| camera.status().commands == 0).count();
@@ -122,7 +122,7 @@ fn main() -> ExitCode {
         moments.iter().step_by(OFTEN).map(|usage| format!("{:.1}", usage.memory_mb)).collect();
     println!("\nmemory, MB, every {} s: {}", (EVERY * OFTEN as u32).as_secs(), memory.join(", "));
     let lost = unsteered + unrecorded + turning;
-    let went_on = shown > 0 && reloads > 0 && !heard.seen().is_empty();
+    let went_on = shown > 0 && pipelines > cameras.len() as u64 && !heard.seen().is_empty();
     let well = growths.iter().filter_map(Growth::fault).count() == 0 && lost == 0 && went_on;
     if well { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }
@@ -144,9 +144,16 @@ impl Counts {
     }
 
     fn look(&mut self, program: &Program) {
-        for (name, counters) in Self::NAMES.into_iter().zip(&mut self.counters) {
-            let counts = program.metric_of(name, &self.cameras);
-            counters.iter_mut().zip(counts).for_each(|(counter, count)| counter.is(count));
+        let counts = Self::NAMES.map(|name| program.metric_of(name, &self.cameras));
+        for camera in 0..self.cameras.len() {
+            // Of pipelines there is one before, and one after.
+            let begins_anew = self.counters[0][camera].is_more_than(counts[0][camera]);
+            for (counters, counts) in self.counters.iter_mut().zip(&counts) {
+                if begins_anew {
+                    counters[camera].begin_anew();
+                }
+                counters[camera].is(counts[camera]);
+            }
         }
     }
 

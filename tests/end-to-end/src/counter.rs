@@ -11,10 +11,20 @@ pub struct Counter {
 impl Counter {
     /// So much is counted now. Where that is less than before, somebody has begun anew.
     pub fn is(&mut self, count: u64) {
-        if count < self.now {
-            self.before += self.now;
+        if self.is_more_than(count) {
+            self.begin_anew();
         }
         self.now = count;
+    }
+
+    /// Whether so much is less than was counted before.
+    pub fn is_more_than(&self, count: u64) -> bool {
+        count < self.now
+    }
+
+    /// What is counted next begins at nought, which cannot always be told by what it is.
+    pub fn begin_anew(&mut self) {
+        self.before += std::mem::take(&mut self.now);
     }
 
     /// At least so much was counted: what came between a look and a new beginning is not in it.

@@ -13,8 +13,8 @@ use super::{Event, IS_OURS};
 pub struct Outbox(Sender<Event>);
 
 impl Outbox {
-    /// `tell` is called with each event, with one after the other, in a thread of its own, until nobody can leave any more: of threads
-    /// that all cameras shared there were ever more, up to as many as have ever told something at once.
+    /// `tell` is called with each event, with one after the other, in a thread of its own, until nobody can leave any more. A shared pool
+    /// would keep as many threads as ever told something at once.
     ///
     /// # Errors
     /// Where there is no thread to be had.

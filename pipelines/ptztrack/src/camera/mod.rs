@@ -216,7 +216,7 @@ fn run(settings: &CameraSettings, known: &Arc<Known>, supervisor: &Supervisor, l
     });
     let (recorder, recordings) =
         settings.recording.as_ref().map(|recording| Recorder::new(recording, settings, log.clone())).unzip();
-    // What only a recording lacks, it says itself.
+    // Where only a recording lacks something, the recorder says so.
     let unrecorded = CameraSettings { recording: None, ..settings.clone() };
     let waits = listener.clone();
     let mut refusals = Refusals::default();

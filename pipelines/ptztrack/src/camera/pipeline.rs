@@ -57,7 +57,7 @@ pub fn description(camera: &CameraSettings) -> String {
         write_all(&mut text, &format!("followed. ! {NEWEST} ! {} ", sightings::SINK));
     }
     if recording.is_some_and(|recording| recording.overlay) {
-        write_all(&mut text, &format!("followed. ! {NEWEST} ! {TAP} "));
+        write_all(&mut text, &format!("followed. ! {NEWEST} ! ptzoverlay ! {TAP} "));
     }
     if camera.show {
         write_all(

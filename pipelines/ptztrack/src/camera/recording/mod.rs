@@ -5,7 +5,7 @@
 //! once, and drops them where they are not written.
 //!
 //! ```text
-//! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ (ptzoverlay ─ encoder) ─ parser ─ splitmuxsink
+//! pipeline of the camera ─ appsink ─ Feed ─ appsrc ─ (encoder) ─ parser ─ splitmuxsink
 //! ```
 
 mod clip;
@@ -18,7 +18,7 @@ pub use segments::Segments;
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Condvar, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -31,9 +31,8 @@ use crate::config::{CameraSettings, Codec, Recording};
 use crate::event::{Event, Level};
 use crate::log::Log;
 
-/// From decoded pictures to the overlay as it is recorded, in H.264.
-const OVERLAY: &str =
-    "ptzoverlay ! videoconvert ! x264enc tune=zerolatency speed-preset=superfast key-int-max=30 !";
+/// The overlay, encoded, as it is recorded.
+const ENCODER: &str = "videoconvert ! x264enc tune=zerolatency speed-preset=superfast key-int-max=30";
 
 /// So much waits for a disk that is slow for a moment, in bytes.
 const LONGEST_QUEUE: u64 = 16 * 1024 * 1024;
@@ -75,7 +74,10 @@ pub struct Recordings(Receiver<()>);
 
 /// Where copies go while there is somebody to write them.
 #[derive(Debug, Default)]
-struct Feed(Mutex<FeedState>);
+struct Feed {
+    state: Mutex<FeedState>,
+    ends: Condvar,
+}
 
 #[derive(Debug, Default)]
 struct FeedState {
@@ -150,7 +152,10 @@ impl Recorder {
                 let detail = format!("nothing is recorded: {failure}; the camera keeps following; retrying");
                 self.tell(Level::Warning, "recording-failed", &detail);
             }
-            thread::sleep(pause);
+            feed.wait(pause);
+            if feed.has_ended() {
+                return;
+            }
             pause = (pause * 2).min(LONGEST_PAUSE);
         }
     }
@@ -214,16 +219,26 @@ impl Recorder {
 }
 
 fn description(codec: Codec, overlay: bool) -> String {
-    let (encoder, codec) = if overlay { (OVERLAY, Codec::H264) } else { ("", codec) };
+    let codec = if overlay { Codec::H264 } else { codec };
     let parser = match codec {
         Codec::Mjpeg => "jpegparse",
         Codec::Mpeg4 => "mpeg4videoparse",
         Codec::H264 => "h264parse",
         Codec::H265 => "h265parse",
     };
+    // Pictures that are not encoded yet do not wait: few would fit, and they would be taken for later ones.
+    let (most, encoder) = match overlay {
+        true => (
+            1,
+            format!(
+                "{ENCODER} ! queue max-size-bytes={LONGEST_QUEUE} max-size-buffers={MOST_QUEUED} max-size-time=0 ! "
+            ),
+        ),
+        false => (MOST_QUEUED, String::new()),
+    };
     format!(
         "appsrc name=feed is-live=true format=time block=false leaky-type=downstream max-bytes={LONGEST_QUEUE} \
-         max-buffers={MOST_QUEUED} ! {encoder} {parser} name=parser ! splitmuxsink name=recording muxer-factory=matroskamux"
+         max-buffers={most} ! {encoder}{parser} name=parser ! splitmuxsink name=recording muxer-factory=matroskamux"
     )
 }
 
@@ -238,7 +253,7 @@ impl Recordings {
 impl Feed {
     /// Leaves a copy for whoever writes; waits for nothing.
     fn copy(&self, sample: &gst::Sample) {
-        let mut state = lock(&self.0);
+        let mut state = lock(&self.state);
         let Some(source) = state.source.clone() else { return };
         let delta =
             sample.buffer().is_none_or(|buffer| buffer.flags().contains(gst::BufferFlags::DELTA_UNIT));
@@ -251,7 +266,7 @@ impl Feed {
 
     fn start(&self, source: gst_app::AppSrc, arrivals: Arc<Arrivals>) {
         watch_groups(&source, arrivals);
-        let mut state = lock(&self.0);
+        let mut state = lock(&self.state);
         if state.ended {
             let _ = source.end_of_stream();
         }
@@ -259,19 +274,27 @@ impl Feed {
     }
 
     fn stop(&self) {
-        lock(&self.0).source = None;
+        lock(&self.state).source = None;
     }
 
     fn end(&self) {
-        let mut state = lock(&self.0);
+        let mut state = lock(&self.state);
         state.ended = true;
         if let Some(source) = &state.source {
             let _ = source.end_of_stream();
         }
+        self.ends.notify_all();
+    }
+
+    /// For so long, or until it ends.
+    fn wait(&self, longest: Duration) {
+        let state = lock(&self.state);
+        // Where somebody panicked meanwhile, it is not waited for.
+        let _ = self.ends.wait_timeout_while(state, longest, |state| !state.ended);
     }
 
     fn has_ended(&self) -> bool {
-        lock(&self.0).ended
+        lock(&self.state).ended
     }
 }
 
@@ -344,6 +367,19 @@ mod tests {
         assert!((LONGEST_QUEUE / 2..=LONGEST_QUEUE).contains(&bytes), "{bytes}");
         let (pictures, _) = waiting(3 * MOST_QUEUED, SMALL);
         assert!((MOST_QUEUED / 2..=MOST_QUEUED).contains(&pictures), "{pictures}");
+    }
+
+    /// Between two tries, also where a minute would pass until the next.
+    #[test]
+    fn who_waits_to_record_again_ends_with_the_camera() {
+        let feed = Arc::new(Feed::default());
+        let waits = thread::spawn({
+            let feed = feed.clone();
+            move || feed.wait(Duration::MAX)
+        });
+        feed.end();
+        waits.join().unwrap();
+        assert!(feed.has_ended());
     }
 
     /// A picture of H.264 in which nothing moves has as many bytes.
