@@ -4,7 +4,7 @@ use std::iter;
 
 use opencv::core::{self, CV_8UC1, Mat, Scalar};
 use opencv::prelude::*;
-use ptztrack_contract::{MotionMeta, Region};
+use ptztrack_contract::{Homography, MotionMeta, Region};
 
 use super::background::{Background, ForegroundTest};
 use super::bits::Bits;
@@ -190,6 +190,8 @@ impl Detector {
         self.find_regions(config, &mut found)?;
         self.spare.append(&mut self.light);
         self.light.extend(found.extract_if(.., |region| is_light(scene, region)));
+        let motion = scene.camera_motion.map(|motion| motion.homography).or(scene.coasted_motion);
+        self.persistence.carry(&motion.unwrap_or(Homography::IDENTITY));
         let mut regions = self.persistence.confirmed(found, config.confirm_pictures);
         outside.extend(regions.extract_if(.., |region| !zones.allow(region.centroid)));
         Ok(Some(MotionMeta { regions: config.choice.of(regions), outside }))

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use ptztrack_contract::{Rect, Region};
+use ptztrack_contract::{Homography, Rect, Region};
+
+use super::travelling::moved;
 
 /// Lets through what is there for several pictures in a row: sensor and coding noise comes and goes,
 /// somebody who walks overlaps with where they were a picture before.
@@ -16,6 +18,12 @@ impl Persistence {
     /// Forgets what was there.
     pub fn restart(&mut self) {
         self.seen.clear();
+    }
+
+    /// What was there goes with the background, which has moved by `motion` (normalised) since the last picture: while the camera turns,
+    /// who is narrow overlaps with nothing at the place of the picture where they were.
+    pub fn carry(&mut self, motion: &Homography) {
+        self.seen.iter_mut().for_each(|(bounds, _)| *bounds = moved(*bounds, motion));
     }
 
     /// Those of `regions` that have been there for `pictures` pictures, this one included.
@@ -51,6 +59,16 @@ mod tests {
         assert_eq!(persistence.confirmed(vec![at(0.1)], 3), []);
         assert_eq!(persistence.confirmed(vec![at(0.15)], 3), []);
         assert_eq!(persistence.confirmed(vec![at(0.2)], 3), [at(0.2)]);
+    }
+
+    #[test]
+    fn one_that_walks_before_a_camera_that_turns_is_let_through() {
+        let mut persistence = Persistence::default();
+        let let_through = [0.1, 0.3, 0.5].map(|x| {
+            persistence.carry(&Homography::translation(0.15, 0.0));
+            persistence.confirmed(vec![at(x)], 3).len()
+        });
+        assert_eq!(let_through, [0, 0, 1]);
     }
 
     #[test]

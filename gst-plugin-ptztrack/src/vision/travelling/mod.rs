@@ -341,7 +341,7 @@ fn shift_and_bend(map: &Homography, size: (usize, usize)) -> ((f64, f64), f64) {
 }
 
 /// A box after the camera moved.
-fn moved(bounds: Rect, motion: &Homography) -> Rect {
+pub fn moved(bounds: Rect, motion: &Homography) -> Rect {
     let first = motion.apply(Point { x: bounds.x, y: bounds.y });
     let last = motion.apply(Point { x: bounds.x + bounds.width, y: bounds.y + bounds.height });
     Rect { x: first.x, y: first.y, width: last.x - first.x, height: last.y - first.y }

@@ -2,7 +2,7 @@
 
 //! Who differs from the wall by less than the noise of a pixel: the signed differences of a cell of pixels are averaged, in which
 //! noise cancels and clothes do not, and held against what cells of the background differ by, which is measured. Where that is too
-//! little for one cell, it may be enough for those around it together.
+//! little for one cell, it may be enough for those around it together, and for all that hang together.
 
 mod cell_noise;
 mod columns;
@@ -20,8 +20,15 @@ use super::model::{Model, Row, Sampled, UNKNOWN};
 const CELL: usize = 4;
 /// Cells of a side of a tile, over which light may have changed.
 const TILE: usize = 8;
-/// Deviations at which foreground is as likely as background: there are thousands of cells in a picture.
+/// Deviations at which foreground is as likely as background.
 const EVEN: f32 = 6.0;
+/// Deviations at which it is certain.
+const CERTAIN: f32 = 8.5;
+/// Deviations from which a cell may be a part of somebody ...
+const PART: f32 = 5.0;
+/// ... and those, as the root of the sum of squares, from which cells that hang together are somebody (hysteresis, as Canny's edges have
+/// it): there are thousands of cells in a picture, and an edge of the background that lies a little off differs in a few side by side.
+const SOMEBODY: f32 = 30.0;
 /// Where so many rows of the cells that hang together have some that are foreground by themselves, as a share, what is faint beside those is
 /// a shadow. It makes nobody taller: below a head that is plain there is a trunk that is not.
 const PLAIN: f32 = 0.5;
@@ -106,7 +113,7 @@ impl Pooled {
         noise.weigh(&mut self.cells);
         noise.weigh_together(&mut self.cells, &mut self.together, self.area.across);
         for sign in [1.0, -1.0] {
-            self.forget_shadows(self.area.across, sign);
+            self.decide(self.area.across, sign);
         }
     }
 
@@ -170,21 +177,22 @@ impl Pooled {
         }
     }
 
-    /// Forgets cells that tell of somebody lighter or darker, as `sign` says, and hang together with plain foreground. What is lighter and
-    /// what is darker never hang together: a shadow beside somebody's light clothes is not theirs.
-    fn forget_shadows(&mut self, across: usize, sign: f32) {
+    /// Decides which cells that are lighter or darker, as `sign` says, and hang together are somebody. What is lighter and what is darker
+    /// never hang together: a shadow beside somebody's light clothes is not theirs.
+    fn decide(&mut self, across: usize, sign: f32) {
         self.looked_at.clear();
         self.looked_at.resize(self.cells.z.len(), false);
         for row in (0..self.cells.z.len()).step_by(across.max(1)) {
             // Most rows tell of nobody.
             if any_tells(&self.cells.z[row..][..across]) {
-                (row..row + across).for_each(|first| self.forget_shadow(first, across, sign));
+                (row..row + across).for_each(|first| self.decide_from(first, across, sign));
             }
         }
     }
 
-    /// The same of what hangs together with one cell.
-    fn forget_shadow(&mut self, first: usize, across: usize, sign: f32) {
+    /// The same of what hangs together with one cell. Beside plain foreground it is a shadow, and what says too little is noise: both are
+    /// nobody. All cells of somebody become certain.
+    fn decide_from(&mut self, first: usize, across: usize, sign: f32) {
         let Cells { z, is_plain, .. } = &mut self.cells;
         if !tells(sign * z[first]) || self.looked_at[first] {
             return;
@@ -205,8 +213,12 @@ impl Pooled {
         self.component.sort_unstable();
         let rows = || self.component.chunk_by(|a, b| a / across == b / across);
         let plain = rows().filter(|row| row.iter().any(|&at| is_plain[at])).count();
-        if plain as f32 >= PLAIN * rows().count() as f32 {
-            self.component.iter().for_each(|&at| z[at] = 0.0);
+        let is_shadow = plain as f32 >= PLAIN * rows().count() as f32;
+        let squares: f32 = self.component.iter().map(|&at| z[at] * z[at]).sum();
+        let is_somebody = !is_shadow && squares >= SOMEBODY * SOMEBODY;
+        for &at in &self.component {
+            // What is plain is foreground without this.
+            z[at] = if is_somebody && !is_plain[at] { sign * CERTAIN.max(sign * z[at]) } else { 0.0 };
         }
     }
 
@@ -236,10 +248,10 @@ impl Pooled {
     }
 }
 
-/// Whether so many deviations tell of somebody.
+/// Whether so many deviations may tell of somebody; they do, once it is decided.
 #[inline(always)]
 fn tells(z: f32) -> bool {
-    z >= EVEN
+    z >= PART
 }
 
 /// Whether any of a row does.
@@ -294,7 +306,7 @@ mod tests {
             pooled.cells.z[at] = if row <= plain_rows { 0.0 } else { -2.0 * EVEN };
             pooled.cells.z[at + 1] = -2.0 * EVEN;
         }
-        pooled.forget_shadows(ACROSS, -1.0);
+        pooled.decide(ACROSS, -1.0);
         pooled.cells.z.iter().filter(|z| **z != 0.0).count()
     }
 
@@ -303,6 +315,23 @@ mod tests {
         assert_eq!(left_of_somebody(6), 0, "a shadow");
         assert_eq!(left_of_somebody(1), 11, "all but the head, which is plain");
         assert_eq!(left_of_somebody(0), 12, "nothing of them is plain");
+    }
+
+    /// What is left of so many cells that hang together, each of which may only be a part of somebody.
+    fn left_of_faint(cells: usize) -> Vec<f32> {
+        let mut pooled = Pooled::default();
+        pooled.cells.resize(ACROSS * 8);
+        for cell in 0..cells {
+            pooled.cells.z[ACROSS * (1 + cell / 8) + 2 + cell % 8] = PART;
+        }
+        pooled.decide(ACROSS, 1.0);
+        pooled.cells.z.into_iter().filter(|z| *z != 0.0).collect()
+    }
+
+    #[test]
+    fn who_is_faint_in_each_cell_is_certain_in_all_and_a_few_cells_are_nobody() {
+        assert_eq!(left_of_faint(30), []);
+        assert_eq!(left_of_faint(40), [CERTAIN; 40]);
     }
 
     #[test]
@@ -326,10 +355,10 @@ mod tests {
         for row in 1..7 {
             let at = ACROSS * row + 4;
             pooled.cells.is_plain[at] = row < 6;
-            (pooled.cells.z[at + 1], pooled.cells.z[at + 2]) = (-2.0 * EVEN, 2.0 * EVEN);
+            (pooled.cells.z[at + 1], pooled.cells.z[at + 2]) = (-2.0 * EVEN, 3.0 * EVEN);
         }
-        pooled.forget_shadows(ACROSS, -1.0);
+        pooled.decide(ACROSS, -1.0);
         let left: Vec<f32> = pooled.cells.z.iter().copied().filter(|z| *z != 0.0).collect();
-        assert_eq!(left, [2.0 * EVEN; 6], "the shadow goes, what is lighter stays");
+        assert_eq!(left, [3.0 * EVEN; 6], "the shadow goes, what is lighter stays");
     }
 }
