@@ -66,8 +66,8 @@ fn main() -> ExitCode {
         let (took, events, _) = store::asked(&program, "");
         assert!(events >= store::EVENTS as usize, "{events}");
         took_ms.push(took);
-        // Whoever is let go has been there, and is found again.
         counts.look(&program);
+        // Whoever is let go has been there, and is found again.
         let one = store::name(moments.len() as i64 % options.cameras);
         program.ask("POST", &format!("/cameras/{one}/release"));
         shown += usize::from(program.ask("GET", &format!("/cameras/{one}/picture")).0 == 200);
@@ -144,7 +144,7 @@ impl Counts {
     }
 
     fn look(&mut self, program: &Program) {
-        let counts = Self::NAMES.map(|name| program.metric_of(name, &self.cameras));
+        let counts = program.metrics_of(Self::NAMES, &self.cameras);
         for camera in 0..self.cameras.len() {
             // Of pipelines there is one before, and one after.
             let begins_anew = self.counters[0][camera].is_more_than(counts[0][camera]);

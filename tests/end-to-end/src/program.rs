@@ -120,11 +120,11 @@ impl Program {
         sum_of(&self.ask("GET", "/metrics").1, name, "")
     }
 
-    /// The same of each of these cameras. A camera that is set otherwise begins anew.
-    pub fn metric_of(&self, name: &str, cameras: &[String]) -> Vec<u64> {
+    /// What it counts by each of these names at one moment, of each of these cameras. A camera that is set otherwise begins anew.
+    pub fn metrics_of<const N: usize>(&self, names: [&str; N], cameras: &[String]) -> [Vec<u64>; N] {
         let metrics = self.ask("GET", "/metrics").1;
-        let of = |camera: &String| sum_of(&metrics, name, &format!("camera=\"{camera}\"")) as u64;
-        cameras.iter().map(of).collect()
+        let of = |name, camera: &String| sum_of(&metrics, name, &format!("camera=\"{camera}\"")) as u64;
+        names.map(|name| cameras.iter().map(|camera| of(name, camera)).collect())
     }
 
     /// The process of a camera that has one of its own.

@@ -152,8 +152,7 @@ impl Recorder {
                 let detail = format!("nothing is recorded: {failure}; the camera keeps following; retrying");
                 self.tell(Level::Warning, "recording-failed", &detail);
             }
-            feed.wait(pause);
-            if feed.has_ended() {
+            if feed.ends_within(pause) {
                 return;
             }
             pause = (pause * 2).min(LONGEST_PAUSE);
@@ -286,11 +285,12 @@ impl Feed {
         self.ends.notify_all();
     }
 
-    /// For so long, or until it ends.
-    fn wait(&self, longest: Duration) {
+    /// Whether it ends, for which so long is waited.
+    fn ends_within(&self, longest: Duration) -> bool {
         let state = lock(&self.state);
         // Where somebody panicked meanwhile, it is not waited for.
-        let _ = self.ends.wait_timeout_while(state, longest, |state| !state.ended);
+        drop(self.ends.wait_timeout_while(state, longest, |state| !state.ended));
+        self.has_ended()
     }
 
     fn has_ended(&self) -> bool {
@@ -375,11 +375,10 @@ mod tests {
         let feed = Arc::new(Feed::default());
         let waits = thread::spawn({
             let feed = feed.clone();
-            move || feed.wait(Duration::MAX)
+            move || feed.ends_within(Duration::MAX)
         });
         feed.end();
-        waits.join().unwrap();
-        assert!(feed.has_ended());
+        assert!(waits.join().unwrap());
     }
 
     /// A picture of H.264 in which nothing moves has as many bytes.
