@@ -100,7 +100,7 @@ impl Walker {
         // Who wears another's clothes is not their twin.
         let own =
             Build::of(role.subject, &mut Seeded::new(settings.seed).fork(PERSON).fork(100 + number as u64));
-        let build = if clothes == number { build } else { own };
+        let build = if clothes == number || clothes >= SUBJECTS { build } else { own };
         Self::walking(settings, build, outfit, Walk::along(&role.way), number)
     }
 

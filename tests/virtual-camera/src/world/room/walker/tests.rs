@@ -338,8 +338,8 @@ fn who_is_alike_wears_what_the_person_wears_and_is_no_twin() {
     let shirt = |walker: &Walker| walker.outfit.cloths[clothes::SHIRT].level(1000.0).0.to_vec();
     for (number, role) in (1..).zip(&cast::others(&differ, 1)) {
         let [differ, alike] = [&differ, &alike].map(|settings| Walker::in_role(settings, number, role));
-        assert_ne!(shirt(&differ), shirt(&person));
-        assert_eq!(shirt(&alike), shirt(&person));
+        assert!(shirt(&differ) != shirt(&person));
+        assert!(shirt(&alike) == shirt(&person));
         assert_ne!(format!("{:?}", alike.build), format!("{:?}", person.build));
         assert_eq!(alike.walk().at(4.0), differ.walk().at(4.0));
     }
