@@ -41,6 +41,9 @@ pub struct Options {
     /// How many more people there are in the room: they walk along in a group, else they wander about
     #[arg(long, default_value_t = 0, value_name = "NUMBER", value_parser = clap::value_parser!(u8).range(0..=30))]
     others: u8,
+    /// Let all people in the room wear what the person to be followed wears
+    #[arg(long)]
+    alike: bool,
     /// Where the people are: hall, yard, night-yard or infrared-yard
     #[arg(long, value_name = "PLACE", value_parser = place)]
     place: Option<Place>,
@@ -404,6 +407,7 @@ impl Options {
         Ok(RoomSettings {
             action: self.action.unwrap_or_default(),
             others: usize::from(self.others),
+            alike: self.alike,
             place: self.place.unwrap_or_default(),
             stand: self.stand,
             vehicles: usize::from(self.vehicles),

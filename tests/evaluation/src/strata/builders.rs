@@ -36,9 +36,30 @@ pub(super) fn parting(draft: &mut Draft, _chance: &mut Seeded) {
     among_others(draft, Action::Part);
 }
 
+pub(super) fn parting_alike(draft: &mut Draft, chance: &mut Seeded) {
+    parting(draft, chance);
+    draft.room.alike = true;
+}
+
+pub(super) fn crowd(draft: &mut Draft, _chance: &mut Seeded) {
+    among_others(draft, Action::Test);
+    draft.room.others = 6;
+}
+
+pub(super) fn crowd_alike(draft: &mut Draft, chance: &mut Seeded) {
+    crowd(draft, chance);
+    draft.room.alike = true;
+}
+
 pub(super) fn groups(draft: &mut Draft, chance: &mut Seeded) {
     among_others(draft, chance.pick(&[Action::Group, Action::Test]));
     draft.room.others = 2 + chance.below(6);
+}
+
+pub(super) fn reflecting(draft: &mut Draft, _chance: &mut Seeded) {
+    draft.room.occlusion = Occlusion::None;
+    draft.room.lighting = Lighting::Optimal;
+    draft.room.reflections = true;
 }
 
 pub(super) fn dark(draft: &mut Draft, chance: &mut Seeded) {

@@ -34,7 +34,7 @@ named! {
         Hidden = "hidden",
         /// Two who pass each other, or one who overtakes another.
         Crossing = "crossing",
-        /// Two who walk side by side and part.
+        /// Two in different clothes who walk side by side and part.
         Parting = "parting",
         /// Three to eight who walk together, or one among others who wander about.
         Groups = "groups",
@@ -60,6 +60,14 @@ named! {
         Faults = "faults",
         /// One person who is little lighter or darker than the wall (6 to 12 grey levels), in the noise of little light.
         Pale = "pale",
+        /// One person among six who wander about, in other clothes.
+        Crowd = "crowd",
+        /// The same, all in the same clothes.
+        CrowdAlike = "crowd-alike",
+        /// Two in the same clothes who walk side by side and part.
+        PartingAlike = "parting-alike",
+        /// One person on a floor that reflects them.
+        Reflecting = "reflecting",
     }
 }
 
@@ -82,6 +90,10 @@ impl Stratum {
             Self::Reaching => builders::reaching,
             Self::Faults => faults::faults,
             Self::Pale => builders::pale,
+            Self::Crowd => builders::crowd,
+            Self::CrowdAlike => builders::crowd_alike,
+            Self::PartingAlike => builders::parting_alike,
+            Self::Reflecting => builders::reflecting,
         }
     }
 }

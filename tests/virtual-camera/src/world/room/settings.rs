@@ -101,6 +101,8 @@ pub struct RoomSettings {
     pub action: Action,
     /// How many more people there are: they walk along in a group, else they wander about before and behind the person.
     pub others: usize,
+    /// Whether all people wear what the person to be followed wears.
+    pub alike: bool,
     /// How many cars drive by on the street, out of doors: the first at once, the next some seconds later.
     pub vehicles: usize,
     /// How much people and vehicles differ from what is behind them, on the average, in grey levels of 219 as painted; as they do
@@ -132,6 +134,7 @@ impl Default for RoomSettings {
             subject: Subject::A,
             action: Action::Test,
             others: 0,
+            alike: false,
             vehicles: 0,
             faint: None,
             begins: Duration::ZERO,

@@ -9,6 +9,7 @@ use super::{
         action::Action,
         settings::{RoomSettings, Subject},
     },
+    SUBJECTS,
     route::{self, Leg, Leg::*, Way},
     walk::{ENTRY_DEG, TO_THE_EDGE},
 };
@@ -96,7 +97,8 @@ pub(super) fn others(settings: &RoomSettings, before: usize) -> Vec<Role> {
         // Two behind the person's way for each before it, where they may hide them.
         let band = if number % 3 == 2 { BEFORE } else { BEHIND };
         let way = about(band, &mut chance);
-        Role { subject, clothes: before + number, kind: Kind::Person, way }
+        // Nobody wears what one of the subjects wears, who may be the person to be followed.
+        Role { subject, clothes: SUBJECTS + before + number, kind: Kind::Person, way }
     };
     let vehicle = |number: usize| {
         let mut chance = seeded.fork(100 + number as u64);

@@ -94,11 +94,13 @@ impl Walker {
 
     /// Somebody of an action, by their number from 0.
     fn in_role(settings: &RoomSettings, number: usize, role: &Role) -> Self {
-        let (build, outfit) = person(settings, role.subject, role.clothes);
+        let (subject, clothes) =
+            if settings.alike { (settings.subject, 0) } else { (role.subject, role.clothes) };
+        let (build, outfit) = person(settings, subject, clothes);
         // Who wears another's clothes is not their twin.
         let own =
             Build::of(role.subject, &mut Seeded::new(settings.seed).fork(PERSON).fork(100 + number as u64));
-        let build = if role.clothes == number { build } else { own };
+        let build = if clothes == number || clothes >= SUBJECTS { build } else { own };
         Self::walking(settings, build, outfit, Walk::along(&role.way), number)
     }
 

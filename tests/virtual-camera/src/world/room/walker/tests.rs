@@ -331,6 +331,21 @@ fn the_same_seed_is_the_same_person_and_another_is_another() {
 }
 
 #[test]
+fn who_is_alike_wears_what_the_person_wears_and_is_no_twin() {
+    let differ = RoomSettings { others: 2, ..RoomSettings::test(2, 3).unwrap() };
+    let alike = RoomSettings { alike: true, ..differ.clone() };
+    let person = Walker::of_test(&alike);
+    let shirt = |walker: &Walker| walker.outfit.cloths[clothes::SHIRT].level(1000.0).0.to_vec();
+    for (number, role) in (1..).zip(&cast::others(&differ, 1)) {
+        let [differ, alike] = [&differ, &alike].map(|settings| Walker::in_role(settings, number, role));
+        assert!(shirt(&differ) != shirt(&person));
+        assert!(shirt(&alike) == shirt(&person));
+        assert_ne!(format!("{:?}", alike.build), format!("{:?}", person.build));
+        assert_eq!(alike.walk().at(4.0), differ.walk().at(4.0));
+    }
+}
+
+#[test]
 fn repeating_begins_again() {
     let settings = RoomSettings { repeats: true, ..RoomSettings::default() };
     let walker = Walker::of_test(&settings);
