@@ -9,7 +9,7 @@ SHELL := /bin/bash
 ANALYTICS_PACKAGES := $(shell . /etc/os-release; [ "$${VERSION_ID:-0}" -lt 13 ] || echo libgstreamer-plugins-bad1.0-dev)
 BUILD_PACKAGES := ca-certificates curl gcc g++ clang libclang-dev pkg-config git \
 	libgstreamer1.0-dev libgstreamer-plugins-base1.0-dev libgstrtspserver-1.0-dev \
-	libopencv-core-dev libopencv-imgproc-dev libopencv-video-dev $(ANALYTICS_PACKAGES)
+	libopencv-core-dev libopencv-imgproc-dev $(ANALYTICS_PACKAGES)
 RUN_PACKAGES := gstreamer1.0-tools gstreamer1.0-plugins-base gstreamer1.0-plugins-good \
 	gstreamer1.0-plugins-bad gstreamer1.0-plugins-ugly gstreamer1.0-libav
 EVALUATE_PACKAGES := $(RUN_PACKAGES) gstreamer1.0-opencv gnuplot-nox fonts-dejavu-core

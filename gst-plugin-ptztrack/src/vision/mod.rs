@@ -26,9 +26,9 @@
 //! | 3.2 | variance over the last pictures | `background` |
 //! | 3.3 | what lies far from the mean is foreground | `background` |
 //! | 3.4, 3.5 | dilation and erosion | `morphology`, `bits` |
-//! | 3.6, 3.7 | gradient matrix and corner strength; here its smaller eigenvalue (Shi and Tomasi) | `tracker/corners` (OpenCV) |
-//! | 3.8 to 3.11 | optical flow by least squares | `tracker/flow` (OpenCV), `camera_motion/lucas_kanade` |
-//! | 3.12 | mean-shift vector | `tracker/grey_histogram` (OpenCV) |
+//! | 3.6, 3.7 | gradient matrix and corner strength; here its smaller eigenvalue (Shi and Tomasi) | `tracker/corners`, `tracker/corner_strength` |
+//! | 3.8 to 3.11 | optical flow by least squares | `lucas_kanade`, for `tracker/flow` and `camera_motion/flow` |
+//! | 3.12 | mean-shift vector | `tracker/grey_histogram` |
 //! | 3.13 to 3.15 | moments, centre of mass | `tracker/grey_histogram`; of the figure in `tracker/figure` |
 //! | 3.16 | average over one second | `TargetEstimator` of crate `servo` |
 //!
@@ -50,6 +50,7 @@ mod draw;
 mod duty;
 mod font;
 mod ghosts;
+mod lucas_kanade;
 mod luma;
 mod morphology;
 mod observation;

@@ -198,7 +198,7 @@ fn reduce(samples: Samples, (width, height): (usize, usize), sums: &mut Vec<u16>
 
 /// Sums of the columns of some rows: at most 257 fit.
 #[multiversion(targets("x86_64+avx2"))]
-fn add_rows(bytes: Luma, top: usize, bottom: usize, sums: &mut Vec<u16>) {
+pub(super) fn add_rows(bytes: Luma, top: usize, bottom: usize, sums: &mut Vec<u16>) {
     sums.clear();
     sums.extend(bytes.row(top).iter().map(|&byte| u16::from(byte)));
     for y in top + 1..bottom.min(top + 257) {

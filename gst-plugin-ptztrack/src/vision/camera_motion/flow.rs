@@ -4,8 +4,8 @@
 
 use opencv::core::Point2f;
 
-use super::lucas_kanade::{Precision, Pyramid, Template};
 use crate::vision::Luma;
+use crate::vision::lucas_kanade::{Precision, Pyramid, Template};
 
 /// Side of the window of a point.
 const WINDOW: usize = 13;
@@ -18,12 +18,13 @@ const MAX_RESIDUAL: f32 = 24.0;
 
 /// Makes `pyramid` that of a picture.
 pub(super) fn fill(pyramid: &mut Pyramid, luma: &Luma) {
-    pyramid.fill(luma, WINDOW, HALVINGS);
+    let size = (luma.width(), luma.height());
+    pyramid.fill(size, WINDOW, HALVINGS, |y, row| row.copy_from_slice(luma.row(y)));
 }
 
 /// Makes `template` that of a point.
 pub(super) fn take(template: &mut Template, from: &Pyramid, point: Point2f) {
-    template.take(from, point, WINDOW);
+    template.take(from, point, WINDOW, HALVINGS);
 }
 
 /// Where a point is that is expected at its `guess`; `None` where it is lost.

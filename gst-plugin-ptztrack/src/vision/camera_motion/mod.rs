@@ -6,14 +6,13 @@
 //! |---|---|
 //! | where the picture shows nothing to hold on to, it without rain and snow | `opening` |
 //! | corners, one in each cell of a grid, topped up where they were lost | `corners` |
-//! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow`, `lucas_kanade` |
+//! | pyramidal Lucas-Kanade (thesis 3.5.2) from a key picture | `flow`, with `lucas_kanade` beside this module |
 //! | the motion that most of them share, and how well it is known | `fit` |
 
 mod corners;
 mod estimator;
 mod fit;
 mod flow;
-mod lucas_kanade;
 mod opening;
 
 pub use estimator::CameraMotionEstimator;

@@ -132,15 +132,15 @@ impl ColourModel {
         Self { figure, ground: ground.into(), anyone: Histogram::of_anyone().into() }
     }
 
-    /// Logarithm of the odds that a cell of that colour belongs to the target and not to the ground; `lower` 0 (upper body)
-    /// to 1 (lower).
-    pub fn log_odds(&self, colour: Colour, lower: f32) -> f32 {
-        self.ground.log_odds(&self.figure, colour, lower)
+    /// Logarithm of the odds that a cell of a colour belongs to the target and not to the ground; `lower` 0 (upper body) to 1 (lower), as
+    /// all cells of a row have it.
+    pub fn log_odds(&self, lower: f32) -> impl Fn(Colour) -> f32 {
+        self.ground.log_odds(&self.figure, lower)
     }
 
     /// The same against somebody of whom nothing is known.
-    pub fn log_odds_against_anyone(&self, colour: Colour, lower: f32) -> f32 {
-        self.anyone.log_odds(&self.figure, colour, lower)
+    pub fn log_odds_against_anyone(&self, lower: f32) -> impl Fn(Colour) -> f32 {
+        self.anyone.log_odds(&self.figure, lower)
     }
 
     /// Learns what is figure (upper and lower body) and ground now, at that rate from 0 to 1; what was not seen stays as it is.
@@ -179,15 +179,21 @@ impl From<Histogram> for Alternative {
 }
 
 impl Alternative {
-    fn log_odds(&self, figure: &[Histogram; 2], (grey, tint): Colour, lower: f32) -> f32 {
-        let tint = tint.map(tint_bin);
+    fn log_odds(&self, figure: &[Histogram; 2], lower: f32) -> impl Fn(Colour) -> f32 {
         // Near the middle of the body both halves count; everywhere else there is a table.
-        if lower == 0.0 || lower == 1.0 {
-            let odds = &self.odds.get_or_init(|| odds(figure, &self.colours))[usize::from(lower == 1.0)];
-            return odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]);
+        let halves =
+            (lower == 0.0 || lower == 1.0).then(|| self.odds.get_or_init(|| odds(figure, &self.colours)));
+        let table = halves.map(|[upper, below]| if lower == 0.0 { upper } else { below });
+        move |(grey, tint)| {
+            let tint = tint.map(tint_bin);
+            match table {
+                Some(odds) => odds.greys[usize::from(grey)] + tint.map_or(0.0, |bin| odds.tints[bin]),
+                None => {
+                    let tinted = tint.map_or(0.0, |bin| tint_odds(figure, &self.colours, bin, lower));
+                    grey_odds(figure, &self.colours, grey, lower) + tinted
+                }
+            }
         }
-        let tinted = tint.map_or(0.0, |bin| tint_odds(figure, &self.colours, bin, lower));
-        grey_odds(figure, &self.colours, grey, lower) + tinted
     }
 }
 
@@ -236,14 +242,14 @@ mod tests {
     #[test]
     fn each_half_knows_its_own_colour() {
         let model = model();
-        assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(DARK, 1.0) > 1.0);
-        assert!(model.log_odds(WALL, 0.0) < -1.0 && model.log_odds(WALL, 1.0) < -1.0);
-        assert!(model.log_odds(RED, 1.0) < model.log_odds(RED, 0.0));
+        assert!(model.log_odds(0.0)(RED) > 2.0 && model.log_odds(1.0)(DARK) > 1.0);
+        assert!(model.log_odds(0.0)(WALL) < -1.0 && model.log_odds(1.0)(WALL) < -1.0);
+        assert!(model.log_odds(1.0)(RED) < model.log_odds(0.0)(RED));
     }
 
     #[test]
     fn colours_that_it_does_not_wear_are_somebody_elses() {
-        let odds = |colour, lower| model().log_odds_against_anyone(colour, lower);
+        let odds = |colour, lower| model().log_odds_against_anyone(lower)(colour);
         assert!(odds(RED, 0.0) > 2.0 && odds(DARK, 1.0) > 1.0);
         assert!(odds(RED, 1.0) < -0.5 && odds(DARK, 0.0) < -2.0 && odds(WALL, 0.0) < -2.0);
         let anyone = Histogram::of_anyone();
@@ -260,7 +266,7 @@ mod tests {
     fn grey_video_is_told_apart_by_brightness() {
         let grey = |level| (level, None);
         let model = ColourModel::new([of(grey(60)), of(grey(60))], of(grey(160)));
-        assert!(model.log_odds(grey(60), 0.5) > 1.0 && model.log_odds(grey(160), 0.5) < -1.0);
+        assert!(model.log_odds(0.5)(grey(60)) > 1.0 && model.log_odds(0.5)(grey(160)) < -1.0);
     }
 
     #[test]
@@ -269,8 +275,8 @@ mod tests {
         for _ in 0..30 {
             model.learn([Some(of((90, None))), None], Some(of((150, None))), 0.2);
         }
-        assert!(model.log_odds(RED, 0.0) > 2.0 && model.log_odds(WALL, 0.0) < -1.0);
-        assert!(model.log_odds((90, None), 0.0) > 1.0, "brightness still counts");
+        assert!(model.log_odds(0.0)(RED) > 2.0 && model.log_odds(0.0)(WALL) < -1.0);
+        assert!(model.log_odds(0.0)((90, None)) > 1.0, "brightness still counts");
     }
 
     #[test]
@@ -279,7 +285,7 @@ mod tests {
         for _ in 0..30 {
             model.learn([Some(of(WALL)), None], Some(of(RED)), 0.2);
         }
-        assert!(model.log_odds(WALL, 0.0) > 1.0 && model.log_odds(RED, 0.0) < -1.0);
-        assert!(model.log_odds(DARK, 1.0) > 1.0, "the lower half was not seen");
+        assert!(model.log_odds(0.0)(WALL) > 1.0 && model.log_odds(0.0)(RED) < -1.0);
+        assert!(model.log_odds(1.0)(DARK) > 1.0, "the lower half was not seen");
     }
 }

@@ -7,13 +7,14 @@ use opencv::core::{CV_8UC1, Mat, Point, Point2f, Rect2f, Scalar, Vector};
 use opencv::imgproc;
 use opencv::prelude::*;
 
+use super::corner_strength::CornerStrength;
 use super::geometry::mean;
 use super::patch::Patch;
 
 /// A corner must have this share of the best corner's eigenvalue.
-const QUALITY: f64 = 0.03;
-/// Side in pixels of the neighbourhood that the gradient matrix (3.6) sums over.
-const BLOCK: i32 = 3;
+const QUALITY: f32 = 0.03;
+/// Pixels of a side of the least window that has a corner.
+const LEAST: i32 = 3;
 
 /// Corners of one patch in frame pixels, best first.
 #[derive(Debug, Default, PartialEq)]
@@ -36,30 +37,69 @@ pub(super) struct Search<'a> {
     pub distance: f32,
 }
 
-/// Leaves the best corners of `patch` inside the contour in `found`.
-pub(super) fn find(patch: &Patch, search: &Search, found: &mut Vec<Point2f>) -> opencv::Result<()> {
-    found.clear();
-    // Only the part of the patch around the contour is looked at: corner search is the dearest step.
-    let Some(window) = window_of(patch, search.contour).filter(|_| search.count > 0) else {
-        return Ok(());
-    };
-    let mask = mask(patch, search, window)?;
-    let grey = Mat::roi(patch.grey(), window)?;
-    let mut corners = Vector::<Point2f>::new();
-    imgproc::good_features_to_track(
-        &grey,
-        &mut corners,
-        i32::try_from(search.count).unwrap_or(i32::MAX),
-        QUALITY,
-        f64::from(search.distance) / patch.step() as f64,
-        &mask,
-        BLOCK,
-        false,
-        0.04,
-    )?;
-    let offset = Point2f::new(window.x as f32, window.y as f32);
-    found.extend(corners.iter().map(|corner| patch.leave(corner + offset)));
-    Ok(())
+/// Finds corners; kept as memory for the next search.
+#[derive(Debug, Default)]
+pub(super) struct CornerFinder {
+    strength: CornerStrength,
+    /// Pixels of the window that may be corners, and how good they are.
+    candidates: Vec<(usize, f32)>,
+    /// Those that are taken.
+    taken: Vec<(i32, i32)>,
+}
+
+impl CornerFinder {
+    /// Leaves the best corners of `patch` inside the contour in `found`, as OpenCV's `goodFeaturesToTrack` does it.
+    pub fn find(&mut self, patch: &Patch, search: &Search, found: &mut Vec<Point2f>) -> opencv::Result<()> {
+        found.clear();
+        // Only the part of the patch around the contour is looked at: corner search is the dearest step.
+        let Some(window) = window_of(patch, search.contour).filter(|_| search.count > 0) else {
+            return Ok(());
+        };
+        let mask = mask(patch, search, window)?;
+        self.strength.fill(patch, window);
+        self.rank(mask.data_bytes()?, window.width as usize);
+        let distance = search.distance / patch.step() as f32;
+        self.keep_apart(distance, search.count, window.width as usize);
+        let corner = |&(x, y): &(i32, i32)| Point2f::new((window.x + x) as f32, (window.y + y) as f32);
+        found.extend(self.taken.iter().map(|place| patch.leave(corner(place))));
+        Ok(())
+    }
+
+    /// Leaves the pixels within the mask, but for the outermost, that are better than their neighbours, best first.
+    fn rank(&mut self, mask: &[u8], width: usize) {
+        let strength = self.strength.all();
+        let best = strength.iter().zip(mask).filter(|(_, inside)| **inside > 0);
+        let least = QUALITY * best.fold(0.0, |best: f32, (strength, _)| best.max(*strength));
+        self.candidates.clear();
+        for first in (width..strength.len().saturating_sub(width)).step_by(width) {
+            for at in first + 1..first + width - 1 {
+                let here = strength[at];
+                let is_best = || {
+                    let rows = [at - width, at, at + width].map(|middle| &strength[middle - 1..=middle + 1]);
+                    rows.into_iter().flatten().all(|near| *near <= here)
+                };
+                if here > least && mask[at] > 0 && is_best() {
+                    self.candidates.push((at, here));
+                }
+            }
+        }
+        self.candidates.sort_unstable_by(|a, b| b.1.total_cmp(&a.1).then(b.0.cmp(&a.0)));
+    }
+
+    /// Takes the best, up to so many that keep that distance, pixels of the patch, from each other.
+    fn keep_apart(&mut self, distance: f32, count: usize, width: usize) {
+        self.taken.clear();
+        for (at, _) in &self.candidates {
+            let (x, y) = ((at % width) as i32, (at / width) as i32);
+            let apart = |taken: &(i32, i32)| ((x - taken.0).pow(2) + (y - taken.1).pow(2)) as f32;
+            if self.taken.iter().all(|taken| apart(taken) >= distance * distance) {
+                self.taken.push((x, y));
+            }
+            if self.taken.len() >= count {
+                break;
+            }
+        }
+    }
 }
 
 /// Splits ranked corners into those near their common middle and outliers.
@@ -100,9 +140,10 @@ fn window_of(patch: &Patch, contour: &[Point2f]) -> Option<opencv::core::Rect> {
     }
     let (first, last) = (patch.enter(Point2f::new(left, top)), patch.enter(Point2f::new(right, bottom)));
     let (x, y) = (first.x.floor().max(0.0) as i32, first.y.floor().max(0.0) as i32);
-    let width = (last.x.ceil() as i32).min(patch.grey().cols()) - x;
-    let height = (last.y.ceil() as i32).min(patch.grey().rows()) - y;
-    (width >= BLOCK && height >= BLOCK).then(|| opencv::core::Rect::new(x, y, width, height))
+    let (columns, rows) = patch.size();
+    let width = (last.x.ceil() as i32).min(columns as i32) - x;
+    let height = (last.y.ceil() as i32).min(rows as i32) - y;
+    (width >= LEAST && height >= LEAST).then(|| opencv::core::Rect::new(x, y, width, height))
 }
 
 fn mask(patch: &Patch, search: &Search, window: opencv::core::Rect) -> opencv::Result<Mat> {
@@ -147,11 +188,12 @@ mod tests {
     use super::super::patch::Cut;
     use super::super::synthetic::Scene;
     use super::*;
+    use crate::vision::Luma;
     use proptest::prelude::*;
 
     fn found(patch: &Patch, search: &Search) -> Vec<Point2f> {
         let mut found = Vec::new();
-        find(patch, search, &mut found).expect("corners");
+        CornerFinder::default().find(patch, search, &mut found).expect("corners");
         found
     }
 
@@ -159,7 +201,7 @@ mod tests {
         let scene = Scene::new(160, 120);
         let picture = scene.background((0.0, 0.0));
         let cut = Cut::new(&picture.luma(), Rect2f::new(20.0, 10.0, 100.0, 90.0), 1);
-        Patch::cut(&picture.luma(), cut, 15).expect("cut")
+        Patch::cut(&picture.luma(), cut, 0)
     }
 
     #[test]
@@ -171,6 +213,32 @@ mod tests {
         for (index, corner) in corners.iter().enumerate() {
             assert!(in_ellipse(Rect2f::new(38.0, 28.0, 44.0, 64.0), *corner));
             assert!(corners[..index].iter().all(|other| length(*corner - *other) >= 4.9));
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(24))]
+        #[test]
+        fn the_best_are_those_of_opencv(
+            data in prop::collection::vec(any::<u8>(), 60 * 50), count in 1_usize..12, distance in 1_u8..8,
+        ) {
+            let luma = Luma::new(&data, 60, 50, 60).expect("fits");
+            let patch = Patch::cut(&luma, Cut::new(&luma, Rect2f::new(3.0, 2.0, 50.0, 40.0), 1), 0);
+            let distance = f32::from(distance);
+            // At the edge of a picture OpenCV sums other gradients.
+            let contour = [(8.0, 7.0), (47.0, 7.0), (47.0, 36.0), (8.0, 36.0)].map(|(x, y)| Point2f::new(x, y));
+            let search = Search { contour: &contour, taken: &[], count, distance };
+            let mut mask = Mat::new_rows_cols_with_default(40, 50, CV_8UC1, Scalar::all(0.0)).expect("a mask");
+            let inside = opencv::core::Rect::new(6, 6, 38, 28);
+            imgproc::rectangle(&mut mask, inside, Scalar::all(255.0), imgproc::FILLED, imgproc::LINE_8, 0).expect("drawn");
+            let mut theirs = Vector::<Point2f>::new();
+            let quality = f64::from(QUALITY);
+            let search_by_opencv = |grey: &Mat| imgproc::good_features_to_track(
+                grey, &mut theirs, count as i32, quality, distance.into(), &mask, 3, false, 0.04,
+            );
+            patch.grey().with_mat(search_by_opencv).expect("OpenCV");
+            let ours: Vec<Point2f> = found(&patch, &search).iter().map(|corner| patch.enter(*corner)).collect();
+            prop_assert_eq!(ours, theirs.to_vec());
         }
     }
 
@@ -193,7 +261,7 @@ mod tests {
         }
         picture.replace(pixels);
         let cut = Cut::new(&picture.luma(), Rect2f::new(0.0, 0.0, 60.0, 60.0), 1);
-        let patch = Patch::cut(&picture.luma(), cut, 15).expect("cut");
+        let patch = Patch::cut(&picture.luma(), cut, 0);
         let search = Search { contour: &[], taken: &[], count: 1, distance: 5.0 };
         let corner = found(&patch, &search)[0];
         assert!(length(corner - Point2f::new(30.0, 20.0)) < 2.0, "{corner:?}");
@@ -203,7 +271,7 @@ mod tests {
     fn flat_and_tiny_windows_have_none() {
         let picture = Scene::new(64, 64).flat(90);
         let cut = Cut::new(&picture.luma(), Rect2f::new(0.0, 0.0, 40.0, 40.0), 1);
-        let patch = Patch::cut(&picture.luma(), cut, 15).expect("cut");
+        let patch = Patch::cut(&picture.luma(), cut, 0);
         let point = [Point2f::new(5.0, 5.0); 3];
         for contour in [&[][..], &point[..]] {
             let search = Search { contour, taken: &[], count: 9, distance: 3.0 };

@@ -19,6 +19,8 @@ use super::geometry::{centre, scaled};
 use super::sample::Sampler;
 use crate::vision::{Luma, Observation};
 
+/// Cells that are worked on at once: a row of cells that are weighed is filled up to a multiple of that with some that weigh nothing.
+const LANES: usize = 8;
 /// What is looked at around the target, in widths and heights of it.
 pub(super) const CONTEXT: (f32, f32) = (2.4, 1.6);
 /// Logarithm of the odds where a cell is surely not the known background, and where it surely is: dark clothes before a
@@ -162,23 +164,32 @@ impl Cells {
 
     /// The same in the memory of other evidence.
     pub fn weigh(&self, looks: Option<Looks>, evidence: &mut Evidence) {
-        let odds = (0..self.colours.len()).map(|index| {
-            let both = looks.map_or(self.motion[index], |Looks { colours, alone }| {
-                let (colour, lower) = (self.colours[index], self.lattice.lower(index));
-                let not_ground = self.motion[index] + colours.log_odds(colour, lower);
-                // Somebody else moves against the background as well: only colours tell who it is. The larger of both
-                // doubts counts.
-                if alone.is_finite() {
-                    not_ground.min(alone + colours.log_odds_against_anyone(colour, lower))
-                } else {
-                    not_ground
-                }
-            });
-            if self.inside[index] { both.clamp(-LARGEST, LARGEST) } else { 0.0 }
-        });
         evidence.grid = self.lattice.grid;
         evidence.odds.clear();
-        evidence.odds.extend(odds);
+        let columns = self.lattice.grid.columns.max(1);
+        let rows = self.colours.chunks_exact(columns).zip(self.motion.chunks_exact(columns));
+        for (row, ((colours, motion), inside)) in rows.zip(self.inside.chunks_exact(columns)).enumerate() {
+            let limited =
+                |(odds, inside): (f32, &bool)| if *inside { odds.clamp(-LARGEST, LARGEST) } else { 0.0 };
+            let Some(Looks { colours: model, alone }) = looks else {
+                evidence.odds.extend(motion.iter().copied().zip(inside).map(limited));
+                continue;
+            };
+            let lower = self.lattice.lower(row * columns);
+            let (against_ground, against_anyone) =
+                (model.log_odds(lower), alone.is_finite().then(|| model.log_odds_against_anyone(lower)));
+            let both = colours.iter().zip(motion).map(|(colour, motion)| {
+                let not_ground = motion + against_ground(*colour);
+                // Somebody else moves against the background as well: only colours tell who it is. The larger of both
+                // doubts counts.
+                match &against_anyone {
+                    Some(against_anyone) => not_ground.min(alone + against_anyone(*colour)),
+                    None => not_ground,
+                }
+            });
+            evidence.odds.extend(both.zip(inside).map(limited));
+        }
+        evidence.odds.extend([0.0; LANES]);
     }
 
     /// Figure (upper and lower half) and ground by their colours, as `map` has them.
@@ -215,10 +226,18 @@ fn motion_log_odds(likelihood: u8) -> f32 {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Evidence {
     grid: Grid,
+    /// And some room beyond the last of them.
     odds: Vec<f32>,
 }
 
 impl Evidence {
+    /// The cells from that place on, row after row, where all of so many columns and rows are there.
+    fn whole(&self, (column, row): (i32, i32), (columns, rows): (usize, usize)) -> Option<&[f32]> {
+        let (column, row) = (usize::try_from(column).ok()?, usize::try_from(row).ok()?);
+        let is_there = column + columns <= self.grid.columns && row + rows <= self.grid.rows;
+        is_there.then(|| &self.odds[row * self.grid.columns + column..])
+    }
+
     /// The cells of a row from a column on, and how many columns before the first cell there are.
     fn row(&self, column: i32, row: i32) -> (&[f32], usize) {
         let Some(cells) =

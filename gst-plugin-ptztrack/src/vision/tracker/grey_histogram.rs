@@ -2,9 +2,8 @@
 
 //! Centre of mass by mean-shift over the back-projected grey histogram (thesis 3.5.3, equations 3.12 to 3.15; Comaniciu).
 
-use opencv::core::{Mat, Point2f, Rect, Rect2f, TermCriteria, TermCriteria_COUNT, TermCriteria_EPS};
-use opencv::prelude::*;
-use opencv::{imgproc, video};
+use opencv::core::{Mat, Point2f, Rect, Rect2f};
+use opencv::imgproc;
 
 use super::geometry::centre;
 use super::patch::Patch;
@@ -13,10 +12,9 @@ use super::patch::Patch;
 const BINS: usize = 32;
 const GREYS_A_BIN: usize = 256 / BINS;
 /// "This process is repeated until the mean-shift vector converges to 0."
-const ITERATIONS: i32 = 15;
-const PRECISION: f64 = 0.5;
+const ITERATIONS: usize = 15;
 /// Half the side of the neighbourhood of a feature point that is counted as target, patch pixels.
-const REACH: i32 = 2;
+const REACH: f32 = 2.0;
 
 /// Share of each grey level on the target: the look-up table from pixel to probability.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,17 +24,17 @@ pub(super) struct GreyHistogram {
 
 impl GreyHistogram {
     /// Counts the surroundings of `points` in the patch; `None` where no point lies in it.
-    pub fn new(patch: &Patch, points: &[Point2f]) -> opencv::Result<Option<Self>> {
+    pub fn new(patch: &Patch, points: &[Point2f]) -> Option<Self> {
         let mut target = [0.0; BINS];
         for point in points {
-            count(patch, *point, &mut target)?;
+            count(patch, *point, &mut target);
         }
         let total: f32 = target.iter().sum();
         if total == 0.0 {
-            return Ok(None);
+            return None;
         }
         target.iter_mut().for_each(|share| *share /= total);
-        Ok(Some(Self { shares: target }))
+        Some(Self { shares: target })
     }
 
     /// The probability picture: 255 for the grey that is most typical of the target.
@@ -45,7 +43,8 @@ impl GreyHistogram {
         let table: Vec<u8> =
             (0..256).map(|grey| (255.0 * self.shares[grey / GREYS_A_BIN] / best).round() as u8).collect();
         let mut probability = Mat::default();
-        opencv::core::lut(patch.grey(), &Mat::from_slice(&table)?, &mut probability)?;
+        let table = Mat::from_slice(&table)?;
+        patch.grey().with_mat(|grey| opencv::core::lut(grey, &table, &mut probability))?;
         Ok(probability)
     }
 
@@ -54,14 +53,25 @@ impl GreyHistogram {
     pub fn centre_of_mass(&self, patch: &Patch, start: Rect2f) -> opencv::Result<Option<Point2f>> {
         let Some(mut window) = pixels(patch, start) else { return Ok(None) };
         let probability = self.back_project(patch)?;
-        let criteria = TermCriteria {
-            typ: TermCriteria_COUNT | TermCriteria_EPS,
-            max_count: ITERATIONS,
-            epsilon: PRECISION,
-        };
-        video::mean_shift(&probability, &mut window, criteria)?;
-        Ok(mass_centre(&probability, window)?.map(|middle| patch.leave(middle)))
+        let mut middle = mass_centre(&probability, window)?;
+        for _ in 0..ITERATIONS {
+            let Some(moved) = middle.map(|middle| shifted(window, middle, patch.size())) else { break };
+            if std::mem::replace(&mut window, moved) == moved {
+                break;
+            }
+            middle = mass_centre(&probability, window)?;
+        }
+        Ok(middle.map(|middle| patch.leave(middle)))
     }
+}
+
+/// A window moved by the mean-shift vector (3.12), so that the centre of its mass is its middle, as far as a picture of that size goes.
+fn shifted(window: Rect, middle: Point2f, (columns, rows): (usize, usize)) -> Rect {
+    let place = |middle: f32, length: i32, size: usize| {
+        let start = (middle - 0.5 * length as f32).round() as i32;
+        start.clamp(0, (size as i32 - length).max(0))
+    };
+    Rect { x: place(middle.x, window.width, columns), y: place(middle.y, window.height, rows), ..window }
 }
 
 /// Equations 3.13 to 3.15 inside a window, in pixels of the picture.
@@ -76,28 +86,28 @@ fn mass_centre(probability: &Mat, window: Rect) -> opencv::Result<Option<Point2f
 /// The box in whole pixels of the patch, cut to it; `None` where nothing of it lies inside.
 fn pixels(patch: &Patch, bounds: Rect2f) -> Option<Rect> {
     let (first, last) = (patch.enter(bounds.tl()), patch.enter(bounds.br()));
-    let x = (first.x.round() as i32).clamp(0, patch.grey().cols());
-    let y = (first.y.round() as i32).clamp(0, patch.grey().rows());
-    let width = (last.x.round() as i32).min(patch.grey().cols()) - x;
-    let height = (last.y.round() as i32).min(patch.grey().rows()) - y;
+    let (columns, rows) = patch.size();
+    let x = (first.x.round() as i32).clamp(0, columns as i32);
+    let y = (first.y.round() as i32).clamp(0, rows as i32);
+    let width = (last.x.round() as i32).min(columns as i32) - x;
+    let height = (last.y.round() as i32).min(rows as i32) - y;
     (width > 0 && height > 0).then(|| Rect::new(x, y, width, height))
 }
 
-fn count(patch: &Patch, point: Point2f, counts: &mut [f32; BINS]) -> opencv::Result<()> {
+fn count(patch: &Patch, point: Point2f, counts: &mut [f32; BINS]) {
     let middle = patch.enter(point);
-    let reach = REACH as f32;
-    let window = Rect2f::new(middle.x - reach, middle.y - reach, 2.0 * reach + 1.0, 2.0 * reach + 1.0);
-    let first = (window.y.round().max(0.0) as i32).min(patch.grey().rows());
-    let last = ((window.y + window.height).round() as i32).clamp(first, patch.grey().rows());
-    let left = (window.x.round().max(0.0) as usize).min(patch.grey().cols() as usize);
-    let right =
-        ((window.x + window.width).round().max(0.0) as usize).clamp(left, patch.grey().cols() as usize);
-    for y in first..last {
-        for grey in &patch.grey().at_row::<u8>(y)?[left..right] {
+    let side = 2.0 * REACH + 1.0;
+    let window = Rect2f::new(middle.x - REACH, middle.y - REACH, side, side);
+    let (columns, rows) = patch.size();
+    let span = |start: f32, length: f32, size: usize| {
+        let first = (start.round().max(0.0) as usize).min(size);
+        first..((start + length).round().max(0.0) as usize).clamp(first, size)
+    };
+    for y in span(window.y, window.height, rows) {
+        for grey in &patch.grey().row(y)[span(window.x, window.width, columns)] {
             counts[usize::from(*grey) / GREYS_A_BIN] += 1.0;
         }
     }
-    Ok(())
 }
 
 /// Where mass was found, kept near the middle of the box: limbs and shadows pull, a camera should not swing.
@@ -136,14 +146,14 @@ mod tests {
         let mut picture = Scene::new(120, 90).flat(0);
         picture.replace(pixels);
         let area = Rect2f::new(0.0, 0.0, 120.0, 90.0);
-        Patch::cut(&picture.luma(), Cut::new(&picture.luma(), area, 1), 15).expect("cut")
+        Patch::cut(&picture.luma(), Cut::new(&picture.luma(), area, 1), 0)
     }
 
     #[test]
     fn the_window_climbs_onto_the_target() {
         let patch = square();
         let on_square = [Point2f::new(48.0, 38.0), Point2f::new(52.0, 44.0)];
-        let model = GreyHistogram::new(&patch, &on_square).expect("counts").expect("points inside");
+        let model = GreyHistogram::new(&patch, &on_square).expect("points inside");
         let start = Rect2f::new(28.0, 22.0, 24.0, 24.0);
         let mass = model.centre_of_mass(&patch, start).expect("shift").expect("mass");
         assert!((mass.x - 49.5).abs() < 1.0 && (mass.y - 39.5).abs() < 1.0, "{mass:?}");
@@ -153,8 +163,8 @@ mod tests {
     fn no_points_and_no_window_are_no_model_and_no_mass() {
         let patch = square();
         let outside = [Point2f::new(-60.0, 900.0)];
-        assert_eq!(GreyHistogram::new(&patch, &outside).expect("counts"), None);
-        let model = GreyHistogram::new(&patch, &[Point2f::new(48.0, 38.0)]).expect("counts").expect("inside");
+        assert_eq!(GreyHistogram::new(&patch, &outside), None);
+        let model = GreyHistogram::new(&patch, &[Point2f::new(48.0, 38.0)]).expect("inside");
         let away = Rect2f::new(500.0, 22.0, 24.0, 24.0);
         assert_eq!(model.centre_of_mass(&patch, away).expect("shift"), None);
     }

@@ -20,6 +20,7 @@
 
 mod colour;
 mod config;
+mod corner_strength;
 mod corners;
 mod dwell_time;
 mod ego_motion;

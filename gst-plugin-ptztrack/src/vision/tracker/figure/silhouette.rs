@@ -2,7 +2,9 @@
 
 //! The silhouette of a target, and how well it fits what is seen.
 
-use super::{CONTEXT, Evidence, FigureMap, Grid, LARGEST};
+use multiversion::multiversion;
+
+use super::{CONTEXT, Evidence, FigureMap, Grid, LANES, LARGEST};
 
 /// Silhouettes are compared in this surrounding of the box, in widths and heights of it.
 const COMPARED: (f32, f32) = (1.3, 1.15);
@@ -78,13 +80,17 @@ impl Shape {
         let mean = window_y.clone().map(|y| row(y).map(|(x, y)| at(x, y)).sum::<f32>()).sum::<f32>() / count;
         let mut weights = std::mem::take(&mut template.weights);
         weights.clear();
-        weights.extend(window_y.clone().flat_map(row).map(|(x, y)| at(x, y) - mean));
+        let stride = window_x.len().next_multiple_of(LANES);
+        for y in window_y.clone() {
+            weights.extend(row(y).map(|(x, y)| at(x, y) - mean));
+            weights.resize(weights.len().next_multiple_of(stride.max(1)), 0.0);
+        }
         let first = (window_x.start as i32, window_y.start as i32);
         let upper_rows = window_y.filter(|y| 2 * y < rows).count();
-        let (upper, lower) = weights.split_at(upper_rows * window_x.len());
+        let (upper, lower) = weights.split_at(upper_rows * stride);
         let norm = |weights: &[f32]| weights.iter().map(|weight| weight.abs()).sum::<f32>();
         let norm = Halves { upper: norm(upper), lower: norm(lower) };
-        *template = Template { first, columns: window_x.len(), upper_rows, weights, norm };
+        *template = Template { first, columns: window_x.len(), stride, upper_rows, weights, norm };
     }
 
     /// Logarithm of the odds that each cell belongs to the target by its place alone.
@@ -107,7 +113,9 @@ pub(in super::super) struct Template {
     columns: usize,
     /// Rows that belong to the upper half of the body.
     upper_rows: usize,
+    /// Row after row, each filled up to `stride`.
     weights: Vec<f32>,
+    stride: usize,
     /// Sum of the weights' magnitudes.
     norm: Halves,
 }
@@ -115,16 +123,49 @@ pub(in super::super) struct Template {
 impl Template {
     /// How well the silhouette, moved by so many cells, fits the evidence: -1 to 1, near 0 before a wall of one colour.
     pub fn fit(&self, evidence: &Evidence, moved: (i32, i32)) -> Halves {
-        let (left, top) = (self.first.0 + moved.0, self.first.1 + moved.1);
+        let first = (self.first.0 + moved.0, self.first.1 + moved.1);
+        let sums = match evidence.whole(first, (self.columns, self.weights.len() / self.stride.max(1))) {
+            Some(odds) => self.sums(odds, evidence.grid.columns),
+            None => self.sums_within(evidence, first),
+        };
+        sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
+    }
+
+    /// Sums of weighted evidence, of which all is there.
+    fn sums(&self, odds: &[f32], across: usize) -> Halves {
+        let (upper, lower) = self.weights.split_at(self.upper_rows * self.stride);
+        Halves {
+            upper: sum_of_rows(upper, self.stride, odds, across),
+            lower: sum_of_rows(lower, self.stride, &odds[self.upper_rows * across..], across),
+        }
+    }
+
+    /// The same of what is there.
+    fn sums_within(&self, evidence: &Evidence, (left, top): (i32, i32)) -> Halves {
         let mut sums = Halves::default();
-        for (y, weights) in self.weights.chunks_exact(self.columns).enumerate() {
+        for (y, weights) in self.weights.chunks_exact(self.stride).enumerate() {
             let (odds, skipped) = evidence.row(left, top + y as i32);
-            let seen = weights.iter().skip(skipped).zip(odds);
+            let seen = weights[..self.columns].iter().skip(skipped).zip(odds);
             let sum = if y < self.upper_rows { &mut sums.upper } else { &mut sums.lower };
             *sum += seen.map(|(weight, odds)| weight * odds).sum::<f32>();
         }
-        sums.with(self.norm, |sum, norm| sum / (norm * LARGEST).max(f32::EPSILON))
+        sums
     }
+}
+
+/// The sum of weighted odds, over rows of so many `columns` of weights and such that are `across` apart of odds.
+#[multiversion(targets("x86_64+avx2"))]
+fn sum_of_rows(weights: &[f32], columns: usize, odds: &[f32], across: usize) -> f32 {
+    let mut sums = [0.0; LANES];
+    for (y, weights) in weights.chunks_exact(columns.max(1)).enumerate() {
+        let odds = &odds[y * across..][..columns];
+        for (weights, odds) in weights.as_chunks::<LANES>().0.iter().zip(odds.as_chunks::<LANES>().0) {
+            for lane in 0..LANES {
+                sums[lane] += weights[lane] * odds[lane];
+            }
+        }
+    }
+    sums.iter().sum()
 }
 
 /// Place of a cell in half sizes of the box from its middle: -1 to 1 inside.

@@ -21,8 +21,6 @@ use crate::vision::{Luma, Observation};
 pub(super) const YOUNG_S: f32 = 1.0;
 /// Part of the box that must be in the picture.
 const MIN_INSIDE: f32 = 0.35;
-/// Window for lost points in the second attempt; the pyramids are built for it.
-const GROWN_WINDOW: i32 = 25;
 /// Points followed at most: more cost time and add nothing to their median.
 const MAX_POINTS: usize = 64;
 
@@ -99,9 +97,9 @@ fn is_gone(bounds: Rect2f, luma: &Luma) -> bool {
 }
 
 /// A window that sees a part of the body, not the street on both sides of it.
-fn window_for(bounds: Rect2f, step: usize) -> i32 {
+fn window_for(bounds: Rect2f, step: usize) -> usize {
     let side = bounds.width.min(bounds.height) / step as f32;
-    2 * (side / 6.0).clamp(4.0, 8.0) as i32 + 1
+    2 * (side / 6.0).clamp(4.0, 8.0) as usize + 1
 }
 
 /// Distance between points so that some sixty fit onto the target.

@@ -4,12 +4,13 @@
 
 use opencv::core::{Point2f, Rect2f};
 
-use super::{GROWN_WINDOW, MAX_POINTS, spacing, window_for};
+use super::{MAX_POINTS, spacing, window_for};
 use crate::vision::Luma;
-use crate::vision::tracker::corners::{self, Search};
+use crate::vision::lucas_kanade::Precision;
+use crate::vision::tracker::corners::{self, CornerFinder, Search};
 use crate::vision::tracker::ego_motion::EgoMotion;
 use crate::vision::tracker::figure::FigureMap;
-use crate::vision::tracker::flow::{Criteria, Flow, Followed};
+use crate::vision::tracker::flow::{Flow, Followed};
 use crate::vision::tracker::geometry::{centre, in_ellipse, length, scaled};
 use crate::vision::tracker::patch::{Patch, cut_around};
 use crate::vision::tracker::points::Points;
@@ -17,8 +18,9 @@ use crate::vision::tracker::points::Points;
 /// Grey levels of mean absolute difference from which a point is lost, and pixels it may be off going forth and back.
 const MAX_RESIDUAL: f32 = 25.0;
 const MAX_RETURN_ERROR: f32 = 0.8;
-/// The target is within twice the window of where it is expected, and what is left after so small a step is far below `NOISE`.
-const CRITERIA: Criteria = Criteria { levels: 2, iterations: 10, precision: 0.1 };
+/// The target is within a window of where it is expected, and what is left after so small a step is far below `NOISE`.
+const HALVINGS: usize = 2;
+const PRECISION: Precision = Precision { steps: 10, step: 0.03 };
 /// Share of the points that must agree for them to be believed alone.
 const BELIEVED_SHARE: f32 = 0.5;
 /// New points are looked for when fewer than this share of them is left, every so many seconds.
@@ -51,7 +53,9 @@ pub(super) struct PointFlow {
     patch: Patch,
     replenished_s: f32,
     /// Memory for the next picture.
+    next: Patch,
     followed: Followed,
+    finder: CornerFinder,
     taken: Vec<Point2f>,
     corners: Vec<Point2f>,
 }
@@ -59,15 +63,17 @@ pub(super) struct PointFlow {
 impl PointFlow {
     /// Of a target in `bounds`; `None` where it has no corner on its figure.
     pub fn new(luma: &Luma, bounds: Rect2f, figure: &FigureMap) -> opencv::Result<Option<Self>> {
-        let patch = Patch::cut(luma, cut_around(luma, bounds), GROWN_WINDOW)?;
+        let patch = Patch::cut(luma, cut_around(luma, bounds), HALVINGS);
         if patch.is_empty() {
             return Ok(None);
         }
         let mut flow = Self {
             points: Points::default(),
             patch,
+            next: Patch::default(),
             replenished_s: 0.0,
             followed: Followed::default(),
+            finder: CornerFinder::default(),
             taken: Vec::new(),
             corners: Vec::new(),
         };
@@ -93,18 +99,18 @@ impl PointFlow {
         dt_s: f32,
     ) -> opencv::Result<Option<Motion>> {
         let carried = ego.at(centre(bounds));
-        let next = self.patch.as_cut().moved(luma, carried + expected);
-        let next = Patch::cut(luma, next, GROWN_WINDOW)?;
+        let moved = self.patch.as_cut().moved(luma, carried + expected);
+        self.next.fill(luma, moved, HALVINGS);
         self.followed.begin(self.points.positions().map(|start| (start, ego.apply(start) + expected)));
         let flow = Flow {
             window: window_for(bounds, self.patch.step()),
-            grown_window: GROWN_WINDOW,
-            criteria: CRITERIA,
+            halvings: HALVINGS,
+            precision: PRECISION,
             max_residual: MAX_RESIDUAL,
             max_return_error: Some(MAX_RETURN_ERROR),
         };
-        flow.follow(&self.patch, &next, &mut self.followed)?;
-        self.patch = next;
+        flow.follow(&self.patch, &self.next, &mut self.followed);
+        std::mem::swap(&mut self.patch, &mut self.next);
         let on_figure = |point| figure.at(point);
         let consensus = self.points.advance(&self.followed.found, ego, expected, bounds.height, on_figure);
         self.replenished_s += dt_s;
@@ -131,7 +137,7 @@ impl PointFlow {
     ) -> opencv::Result<()> {
         let wanted = cut_around(luma, bounds);
         if !self.patch.as_cut().serves(&wanted) {
-            self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
+            self.patch.fill(luma, wanted, HALVINGS);
         }
         let body = scaled(bounds, 1.2, 1.1);
         self.points.retain(|point| in_ellipse(body, point));
@@ -155,12 +161,12 @@ impl PointFlow {
     /// Finds corners on the figure.
     fn find_corners(&mut self, bounds: Rect2f, figure: &FigureMap) -> opencv::Result<()> {
         let body = corners::ellipse(scaled(bounds, 0.95, 1.0));
-        let Self { points, patch, taken, corners, .. } = self;
+        let Self { points, patch, finder, taken, corners, .. } = self;
         taken.clear();
         taken.extend(points.positions());
         let count = MAX_POINTS.saturating_sub(taken.len());
         let search = Search { contour: &body, taken, count, distance: spacing(bounds) };
-        corners::find(patch, &search, corners)?;
+        finder.find(patch, &search, corners)?;
         corners.retain(|corner| figure.at(*corner) >= ON_FIGURE);
         Ok(())
     }

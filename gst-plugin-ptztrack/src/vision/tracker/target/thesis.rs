@@ -4,9 +4,10 @@
 
 use opencv::core::{Point2f, Rect2f};
 
-use super::{Estimate, Follow, GROWN_WINDOW, MAX_POINTS, Sight, is_gone, spacing, window_for};
-use crate::vision::tracker::corners::{self, Search};
-use crate::vision::tracker::flow::{Criteria, Flow, Followed};
+use super::{Estimate, Follow, MAX_POINTS, Sight, is_gone, spacing, window_for};
+use crate::vision::lucas_kanade::Precision;
+use crate::vision::tracker::corners::{self, CornerFinder, Search};
+use crate::vision::tracker::flow::{Flow, Followed};
 use crate::vision::tracker::geometry::{around, centre, mean};
 use crate::vision::tracker::grey_histogram::{GreyHistogram, near_the_middle};
 use crate::vision::tracker::patch::{Patch, cut_around};
@@ -19,7 +20,8 @@ const DEVIATION_RANGE: f32 = 1.2;
 /// Grey levels of mean absolute difference from which a point is lost.
 const MAX_RESIDUAL: f32 = 20.0;
 /// Nobody says where a target goes while the camera turns: it is looked for far off, and to the end.
-const CRITERIA: Criteria = Criteria { levels: 4, iterations: 20, precision: 0.03 };
+const HALVINGS: usize = 4;
+const PRECISION: Precision = Precision { steps: 20, step: 0.03 };
 /// How far the centre of mass may lie from the middle of the box, as a share of its sides.
 const CENTROID_REACH: f32 = 0.5;
 /// Time constant of the velocity that says where to look next, seconds.
@@ -38,7 +40,7 @@ impl Thesis {
     /// Takes up a track, whose `contour` may be empty; `None` where it has no corner.
     pub fn acquire(luma: &Luma, track: &Track, contour: &[Point2f]) -> opencv::Result<Option<Self>> {
         let bounds = track.seen_bounds();
-        let patch = Patch::cut(luma, cut_around(luma, bounds), GROWN_WINDOW)?;
+        let patch = Patch::cut(luma, cut_around(luma, bounds), HALVINGS);
         if patch.is_empty() {
             return Ok(None);
         }
@@ -46,12 +48,12 @@ impl Thesis {
         let contour = if contour.len() >= 3 { contour } else { &ellipse[..] };
         let search = Search { contour, taken: &[], count: MAX_POINTS, distance: spacing(bounds) };
         let mut corners = Vec::new();
-        corners::find(&patch, &search, &mut corners)?;
+        CornerFinder::default().find(&patch, &search, &mut corners)?;
         let found = corners::reject_outliers(corners, DEVIATION_RANGE);
         if found.kept.is_empty() {
             return Ok(None);
         }
-        let greys = GreyHistogram::new(&patch, &found.kept)?;
+        let greys = GreyHistogram::new(&patch, &found.kept);
         let mut points = Points::on_target(found.kept);
         points.reject(found.rejected);
         let estimate = Estimate::begun(bounds, track.velocity());
@@ -73,16 +75,16 @@ impl Follow for Thesis {
         let luma = &seen.luma;
         let expected = self.estimate.own_velocity * dt_s;
         let start = centre(self.estimate.bounds);
-        let next = Patch::cut(luma, self.patch.as_cut().moved(luma, expected), GROWN_WINDOW)?;
+        let next = Patch::cut(luma, self.patch.as_cut().moved(luma, expected), HALVINGS);
         self.followed.begin(self.points.positions().map(|start| (start, start + expected)));
         let flow = Flow {
             window: window_for(self.estimate.bounds, self.patch.step()),
-            grown_window: GROWN_WINDOW,
-            criteria: CRITERIA,
+            halvings: HALVINGS,
+            precision: PRECISION,
             max_residual: MAX_RESIDUAL,
             max_return_error: None,
         };
-        flow.follow(&self.patch, &next, &mut self.followed)?;
+        flow.follow(&self.patch, &next, &mut self.followed);
         let consensus = self.points.average(&self.followed.found);
         self.patch = next;
         if let Some(consensus) = consensus {
@@ -104,7 +106,7 @@ impl Follow for Thesis {
         }
         let wanted = cut_around(luma, self.estimate.bounds);
         if self.patch.as_cut() != wanted {
-            self.patch = Patch::cut(luma, wanted, GROWN_WINDOW)?;
+            self.patch.fill(luma, wanted, HALVINGS);
         }
         self.estimate.centroid = self.centre_of_mass()?;
         Ok(Sight::Seen)

@@ -8,7 +8,7 @@ use crate::vision::Luma;
 /// A picture and its halvings, each with its border mirrored around it, so that windows may reach beyond. Kept as memory for another
 /// picture.
 #[derive(Debug, Default)]
-pub(in super::super) struct Pyramid {
+pub struct Pyramid {
     levels: Vec<Level>,
     /// How many of `levels` are of this picture.
     count: usize,
@@ -26,11 +26,18 @@ pub(super) struct Level {
 }
 
 impl Pyramid {
-    /// Of this picture, for windows of `side` pixels; with so many halvings at most, fewer where the picture is small.
-    pub fn fill(&mut self, luma: &Luma, side: usize, halvings: usize) {
+    /// Of a picture of that `size` (width and height), of which `copy` writes each row, for windows of `side` pixels; with so many
+    /// halvings at most, fewer where the picture is small.
+    pub fn fill(
+        &mut self,
+        size: (usize, usize),
+        side: usize,
+        halvings: usize,
+        mut copy: impl FnMut(usize, &mut [u8]),
+    ) {
         let border = (side + 2).next_multiple_of(LANES);
         self.count = 0;
-        let (mut width, mut height) = (luma.width(), luma.height());
+        let (mut width, mut height) = size;
         while width > 0 && height > 0 && self.count <= halvings {
             if self.count == self.levels.len() {
                 self.levels.push(Level::default());
@@ -40,7 +47,7 @@ impl Pyramid {
             level.fit(width, height, border);
             match finer.last() {
                 Some(finer) => level.halve(finer, &mut self.sums),
-                None => (0..height).for_each(|y| level.row_mut(y).copy_from_slice(luma.row(y))),
+                None => (0..height).for_each(|y| copy(y, level.row_mut(y))),
             }
             level.mirror();
             self.count += 1;
@@ -49,6 +56,16 @@ impl Pyramid {
                 break;
             }
         }
+    }
+
+    /// The picture itself.
+    pub fn luma(&self) -> Luma<'_> {
+        self.levels().first().map_or(Luma::packed(&[], 0), Level::luma)
+    }
+
+    /// So many pixels of a row of the picture; they may lie in the border, which is as wide as a window.
+    pub fn around(&self, x: isize, y: isize, count: usize) -> &[u8] {
+        self.levels().first().map_or(&[], |level| &level.from(x, y)[..count])
     }
 
     /// The picture first.
@@ -72,6 +89,11 @@ impl Level {
     pub fn from(&self, x: isize, y: isize) -> &[u8] {
         let border = self.border as isize;
         &self.pixels[((y + border) * self.stride() as isize + x + border) as usize..]
+    }
+
+    fn luma(&self) -> Luma<'_> {
+        let padded = Luma::packed(&self.pixels, self.stride());
+        padded.crop(self.border, self.border, self.width, self.height)
     }
 
     fn row_mut(&mut self, y: usize) -> &mut [u8] {

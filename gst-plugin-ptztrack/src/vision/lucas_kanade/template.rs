@@ -12,7 +12,7 @@ const MIN_EIGENVALUE: f32 = 0.1;
 
 /// When a level is left for the next finer one.
 #[derive(Debug, Clone, Copy)]
-pub(in super::super) struct Precision {
+pub struct Precision {
     /// Steps at most, ...
     pub steps: usize,
     /// ... or when one is no longer than so many pixels.
@@ -28,7 +28,7 @@ impl Precision {
 
 /// Where a point was found.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in super::super) struct Found {
+pub struct Found {
     pub place: Point2f,
     /// Mean absolute difference of both windows, grey levels.
     pub residual: f32,
@@ -36,7 +36,7 @@ pub(in super::super) struct Found {
 
 /// What is around a point, at every level of a pyramid; kept as memory for another.
 #[derive(Debug, Default)]
-pub(in super::super) struct Template {
+pub struct Template {
     /// Inverse of the gradient matrix G at each level, per pixel (3.11): its upper triangle; `None` where that is not worth solving, or
     /// the point lies outside.
     inverses: Vec<Option<[f32; 3]>>,
@@ -46,14 +46,14 @@ pub(in super::super) struct Template {
 }
 
 impl Template {
-    /// Of a window of `side` pixels (odd, at most [`super::MAX_SIDE`]) around `point`.
-    pub fn take(&mut self, from: &Pyramid, point: Point2f, side: usize) {
+    /// Of a window of `side` pixels (odd, at most 31) around `point`, in the picture and so many halvings of it.
+    pub fn take(&mut self, from: &Pyramid, point: Point2f, side: usize, halvings: usize) {
         self.side = side;
         let length = side * kernels::row_length(side);
-        self.rows.resize(from.levels().len() * length, 0);
+        let levels = from.levels().iter().take(halvings + 1);
+        self.rows.resize(levels.len() * length, 0);
         self.inverses.clear();
-        for ((index, level), rows) in from.levels().iter().enumerate().zip(self.rows.chunks_exact_mut(length))
-        {
+        for ((index, level), rows) in levels.enumerate().zip(self.rows.chunks_exact_mut(length)) {
             let first = first_pixel(point * scale(index), side);
             let matrix = start(first, level, side).map(|(x, y, part)| {
                 let inside = (inside(x, level.width), inside(y, level.height));
