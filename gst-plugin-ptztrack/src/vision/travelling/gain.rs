@@ -2,6 +2,7 @@
 
 //! How much lighter or darker the pictures have become as a whole: lamps, clouds, and cameras that expose anew as they turn.
 
+use super::median::Median;
 use super::samples::{MIN_SAMPLES, Sample};
 
 /// Grey levels within which a pixel shows the background.
@@ -9,15 +10,15 @@ const ALIKE: f32 = 6.0;
 
 /// The factor by which the background's mean has to be multiplied to look like what is seen: the median ratio, where
 /// that explains more than half of what differs; else 1. Somebody who comes before the background is no change of light,
-/// however much of it they hide. Puts the samples in another order.
-pub(super) fn light_gain(samples: &mut [Sample]) -> f32 {
+/// however much of it they hide. `median` is memory.
+pub(super) fn light_gain(samples: &[Sample], median: &mut Median) -> f32 {
     if samples.len() < MIN_SAMPLES {
         return 1.0;
     }
-    let middle = samples.len() / 2;
-    let ratio = |sample: &Sample| sample.seen / sample.mean;
-    let (_, median, _) = samples.select_nth_unstable_by(middle, |a, b| ratio(a).total_cmp(&ratio(b)));
-    let gain = ratio(median);
+    let ratios = samples.iter().map(|sample| sample.seen / sample.mean);
+    median.clear();
+    median.extend(ratios);
+    let Some(gain) = median.take() else { return 1.0 };
     let differ =
         |gain: f32| samples.iter().filter(|sample| (sample.seen - gain * sample.mean).abs() > ALIKE).count();
     if 2 * differ(gain) < differ(1.0) { gain } else { 1.0 }
@@ -40,7 +41,7 @@ mod tests {
         let mean: Vec<u16> = room().iter().map(|&grey| u16::from(grey) << 8).collect();
         let mut samples = Vec::new();
         samples::take(seen, &mean, &vec![age; mean.len()], &vec![(0, SIZE.0); SIZE.1], &mut samples);
-        light_gain(&mut samples)
+        light_gain(&samples, &mut Median::default())
     }
 
     #[test]

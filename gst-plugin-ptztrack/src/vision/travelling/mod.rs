@@ -8,6 +8,7 @@
 mod another_view;
 mod burned_in;
 mod gain;
+mod median;
 mod model;
 mod noise;
 mod pooled;
@@ -22,6 +23,7 @@ use opencv::core::{Point as Pixel, Vector};
 use ptztrack_contract::{Homography, Point, Rect};
 
 use self::burned_in::BurnedIn;
+use self::median::Median;
 pub use self::model::UNKNOWN;
 use self::model::{Comparison, Model, Sampled, TICKS};
 use self::noise::Noise;
@@ -86,6 +88,8 @@ pub struct TravellingBackground {
     shown: Vec<u8>,
     /// Pixels of the last picture beside what was known of them.
     samples: Vec<Sample>,
+    /// Memory for what they differ by.
+    median: Median,
     /// Of the canvas onto another.
     anew: Warp,
 }
@@ -271,7 +275,7 @@ impl TravellingBackground {
     /// Makes what is known as light as the picture.
     fn heed_light(&mut self) {
         self.sample();
-        self.model.relight(gain::light_gain(&mut self.samples));
+        self.model.relight(gain::light_gain(&self.samples, &mut self.median));
     }
 
     /// Takes pixels all over the picture beside what is known of them.

@@ -5,7 +5,7 @@
 use std::ops::Range;
 
 use multiversion::multiversion;
-use ptztrack_contract::{Homography, Point};
+use ptztrack_contract::Homography;
 
 /// Side of the squares that move as a whole: within one, a camera's map is a displacement. Small enough that
 /// this holds to a third of a pixel, large enough that the compiler makes vector code of a row of it.
@@ -23,6 +23,16 @@ struct Shift {
     part_y: u16,
 }
 
+/// A shift across and down in sixteenths of a pixel.
+type Parts = [i32; 2];
+
+impl From<Parts> for Shift {
+    fn from([x, y]: Parts) -> Self {
+        let part = |parts: i32| (parts & (PARTS - 1)) as u16;
+        Self { x: x >> PART_BITS, y: y >> PART_BITS, part_x: part(x), part_y: part(y) }
+    }
+}
+
 /// Blocks beside each other that move alike.
 #[derive(Debug, Clone)]
 struct Run {
@@ -38,7 +48,7 @@ pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
     /// Of one row of blocks, kept as memory.
-    shifts: Vec<Shift>,
+    shifts: Vec<Parts>,
     runs: Vec<Run>,
     /// For every row, from where to where it is covered by the source.
     spans: Vec<(usize, usize)>,
@@ -52,12 +62,13 @@ impl Warp {
         self.spans.clear();
         self.spans.resize(size.1, (0, 0));
         for top in (0..size.1).step_by(BLOCK) {
-            shifts(size.0.div_ceil(BLOCK), top, to_source, &mut self.shifts);
+            self.shifts.resize(size.0.div_ceil(BLOCK), [0; 2]);
+            shifts(top, to_source, &mut self.shifts);
             let mut next = 0;
             for alike in self.shifts.chunk_by(|a, b| a == b) {
                 let start = next;
                 next = (start + alike.len() * BLOCK).min(size.0);
-                let run = covered(alike[0], start..next, top..(top + BLOCK).min(size.1), source);
+                let run = covered(alike[0].into(), start..next, top..(top + BLOCK).min(size.1), source);
                 if !run.columns.is_empty() && !run.rows.is_empty() {
                     self.spans[run.rows.clone()].iter_mut().for_each(|span| widen(span, &run.columns));
                     self.runs.push(run);
@@ -145,25 +156,28 @@ impl Shift {
 }
 
 /// The shifts of the blocks from row `top` on.
-fn shifts(columns: usize, top: usize, to_source: &Homography, out: &mut Vec<Shift>) {
+#[multiversion(targets("x86_64+avx2"))]
+fn shifts(top: usize, to_source: &Homography, out: &mut [Parts]) {
     let middle = |first: usize| first as f64 + (BLOCK as f64 - 1.0) / 2.0;
     let y = middle(top);
-    out.clear();
-    for column in 0..columns {
+    let [across, down, depth] = to_source.0.map(|[a, b, c]| (a, b * y + c));
+    for (column, out) in out.iter_mut().enumerate() {
         let x = middle(column * BLOCK);
-        let to = to_source.apply(Point { x, y });
-        let (x, y) = (parts(to.x - x), parts(to.y - y));
-        let part = |parts: i32| (parts & (PARTS - 1)) as u16;
-        out.push(Shift { x: x >> PART_BITS, y: y >> PART_BITS, part_x: part(x), part_y: part(y) });
+        let at = |(slope, start): (f64, f64)| slope * x + start;
+        let depth = at(depth);
+        *out = [parts(at(across) / depth - x), parts(at(down) / depth - y)];
     }
 }
 
-/// The nearest whole number of parts.
+/// The nearest whole number of parts; what goes to infinity is outside. A cast, which saturates, is not made into vector code.
+#[allow(clippy::manual_clamp, reason = "which lets through what is no number")]
 #[inline(always)]
 fn parts(pixels: f64) -> i32 {
-    // As `round`, which is a function of a library. `as` saturates: what goes to infinity is outside.
-    let half = 0.5_f64.next_down().copysign(pixels);
-    ((pixels * f64::from(PARTS) + half) as i32).clamp(-1 << 24, 1 << 24)
+    // So large that a number with it added has no room for fractions, and the nearest whole one in its lowest bits.
+    const NO_ROOM: f64 = 1.5 * (1_u64 << 52) as f64;
+    const MOST: f64 = (1 << 24) as f64;
+    let parts = (pixels * f64::from(PARTS)).max(-MOST).min(MOST);
+    (parts + NO_ROOM).to_bits() as i32
 }
 
 /// What of these columns and rows a source of that size covers.
@@ -305,6 +319,7 @@ fn across<T: Mixed, const N: usize>(pixels: &[T], part: u16) -> Option<[T::Sum; 
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use ptztrack_contract::Point;
 
     const SIZE: (usize, usize) = (37, 21);
 

@@ -14,6 +14,7 @@ use ptztrack_contract::{Point, Rect};
 
 use self::cell_noise::CellNoise;
 use self::columns::{Columns, pool};
+use super::median::Median;
 use super::model::{Model, Row, Sampled, UNKNOWN};
 
 /// Pixels of a side of a cell: two blocks of coding side by side in a picture that was reduced by two.
@@ -90,10 +91,10 @@ pub(super) struct Pooled {
     turning: CellNoise,
     area: Area,
     cells: Cells,
-    /// Memory: sums over a row of cells, by columns of pixels; what is known of a tile and around it; medians of tiles, and the light
+    /// Memory: sums over a row of cells, by columns of pixels; medians of tiles, and the light
     /// of each.
     columns: Columns,
-    known: Vec<f32>,
+    median: Median,
     tiles: Vec<f32>,
     light: Vec<f32>,
     /// What cells say together with those around them; cells that hang together, and which have been looked at.
@@ -149,26 +150,25 @@ impl Pooled {
         let cells = |tile: usize, before: usize, count: usize| {
             (tile * TILE).saturating_sub(before)..((tile + 1) * TILE - before).min(count)
         };
-        let known = &mut self.known;
+        let median = &mut self.median;
         self.tiles.clear();
         for tile in 0..wide * high {
             let (columns, rows) = (cells(tile % wide, left, across), cells(tile / wide, top, down));
-            known.clear();
+            median.clear();
             for row in rows {
-                let tile = &self.cells.off[row * across..][columns.clone()];
-                tile.iter().filter(|off| !off.is_nan()).for_each(|off| known.push(*off));
+                median.extend(self.cells.off[row * across..][columns.clone()].iter().copied());
             }
-            self.tiles.push(median(known).unwrap_or(f32::NAN));
+            self.tiles.push(median.take().unwrap_or(f32::NAN));
         }
         self.light.clear();
         for tile in 0..wide * high {
             let (x, y) = (tile % wide, tile / wide);
-            known.clear();
+            median.clear();
             for row in y.saturating_sub(1)..(y + 2).min(high) {
                 let near = &self.tiles[row * wide..][x.saturating_sub(1)..(x + 2).min(wide)];
-                known.extend(near.iter().filter(|off| !off.is_nan()));
+                median.extend(near.iter().copied());
             }
-            self.light.push(median(known).unwrap_or(0.0));
+            self.light.push(median.take().unwrap_or(0.0));
         }
         for (y, row) in self.cells.off.chunks_exact_mut(across.max(1)).enumerate() {
             for (tile, light) in self.light[(top + y) / TILE * wide..][..wide].iter().enumerate() {
@@ -279,15 +279,6 @@ fn blend(model: &mut Model, corners: [f32; 4], (left, top): (usize, usize)) {
             *likelihood = (*likelihood).max((z * z * (f32::from(UNKNOWN) / (EVEN * EVEN))).min(255.0) as u8);
         }
     }
-}
-
-/// The middle of some values, which are sorted in part for it.
-fn median(values: &mut [f32]) -> Option<f32> {
-    if values.is_empty() {
-        return None;
-    }
-    let middle = values.len() / 2;
-    Some(*values.select_nth_unstable_by(middle, f32::total_cmp).1)
 }
 
 #[cfg(test)]
