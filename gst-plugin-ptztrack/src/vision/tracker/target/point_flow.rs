@@ -18,7 +18,7 @@ use crate::vision::tracker::points::Points;
 /// Grey levels of mean absolute difference from which a point is lost, and pixels it may be off going forth and back.
 const MAX_RESIDUAL: f32 = 25.0;
 const MAX_RETURN_ERROR: f32 = 0.8;
-/// The target is within a window of where it is expected, and what is left after so small a step is far below `NOISE`.
+/// The target is within twice the window of where it is expected, and what is left after so small a step is far below `NOISE`.
 const HALVINGS: usize = 2;
 const PRECISION: Precision = Precision { steps: 10, step: 0.03 };
 /// Share of the points that must agree for them to be believed alone.
