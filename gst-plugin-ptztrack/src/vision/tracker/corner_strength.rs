@@ -19,7 +19,8 @@ type Products = [Vec<f32>; 3];
 
 impl CornerStrength {
     /// Works out the smaller eigenvalue (3.7; Shi and Tomasi) of the gradient matrix (3.6), summed over 3x3 pixels, at each pixel of a
-    /// `window` of `patch`: as OpenCV's `cornerMinEigenVal` does it, but for a factor.
+    /// `window` of `patch`: as OpenCV's `cornerMinEigenVal` does it, but for a factor, and for the outermost pixels, which are no
+    /// corners.
     pub fn fill(&mut self, patch: &Patch, window: Rect) {
         let (left, top) = (window.x as isize, window.y as isize);
         let (width, height) = (window.width as usize, window.height as usize);

@@ -176,3 +176,34 @@ fn normalised(index: usize, grid: Grid) -> (f32, f32) {
     };
     (at(column, grid.columns, CONTEXT.0), at(row, grid.rows, CONTEXT.1))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_fits_as_its_definition_says_wherever_it_is_moved() {
+        let grid = Grid { columns: 36, rows: 60 };
+        let template = Shape::upright(grid).template();
+        // What is kept beyond the last cell weighs nothing.
+        let cells = (0..grid.columns * grid.rows).map(|index| (index * 37 % 97) as f32 / 48.0 - 1.0);
+        let evidence = Evidence { grid, odds: cells.chain([9.0; LANES]).collect() };
+        for moved in [(0, 0), (8, -8), (-8, 8), (9, 0), (-9, 3), (3, 9), (0, 20), (-30, -50), (40, 0)] {
+            let mut sums = Halves::default();
+            for (y, weights) in template.weights.chunks_exact(template.stride).enumerate() {
+                for (x, weight) in weights[..template.columns].iter().enumerate() {
+                    let column = template.first.0 + moved.0 + x as i32;
+                    let row = template.first.1 + moved.1 + y as i32;
+                    if (0..grid.columns as i32).contains(&column) && (0..grid.rows as i32).contains(&row) {
+                        let sum = if y < template.upper_rows { &mut sums.upper } else { &mut sums.lower };
+                        *sum += weight * evidence.odds[row as usize * grid.columns + column as usize];
+                    }
+                }
+            }
+            let fit = template.fit(&evidence, moved);
+            let found = fit.with(template.norm, |fit, norm| fit * norm * LARGEST);
+            let off = (found.upper - sums.upper).abs().max((found.lower - sums.lower).abs());
+            assert!(off < 1e-2, "{moved:?}: {found:?}, {sums:?}");
+        }
+    }
+}
