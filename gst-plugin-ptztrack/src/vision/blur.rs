@@ -50,7 +50,7 @@ impl Blur {
 }
 
 /// The place inside that a place beyond the border shows, of which the border itself is the mirror.
-fn mirrored(place: isize, size: usize) -> usize {
+pub(super) fn mirrored(place: isize, size: usize) -> usize {
     let last = size.saturating_sub(1);
     let place = place.unsigned_abs() % (2 * last).max(1);
     place.min(2 * last - place)

@@ -6,6 +6,7 @@ use multiversion::multiversion;
 
 use super::Luma;
 use super::bits::Bits;
+use super::blur::mirrored;
 use super::components::{Components, Run};
 use super::morphology::clean;
 
@@ -68,13 +69,6 @@ impl Segmentation {
         });
         count.sum()
     }
-}
-
-/// A place just beyond the border stands for the one as far inside, the border itself not repeated.
-fn mirrored(place: isize, size: usize) -> usize {
-    let last = size.saturating_sub(1);
-    let place = place.unsigned_abs();
-    if place > last { (2 * last).saturating_sub(place) } else { place }
 }
 
 /// Marks in a row, of which and of its neighbours the likelihoods are given, what is likely and what is sure, by the means of

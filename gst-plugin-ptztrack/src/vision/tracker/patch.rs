@@ -7,6 +7,7 @@ use opencv::core::{Point2f, Rect2f};
 
 use super::geometry::grown;
 use crate::vision::Luma;
+use crate::vision::blur::mirrored;
 use crate::vision::lucas_kanade::Pyramid;
 use crate::vision::picture::add_rows;
 
@@ -184,11 +185,10 @@ pub(super) fn cut_around(luma: &Luma, bounds: Rect2f) -> Cut {
 
 /// Row `y` of a picture smoothed by (1 2 1) / 4 either way, as OpenCV's `GaussianBlur` does it.
 fn smooth(luma: &Luma, y: usize, sums: &mut Vec<u16>, out: &mut [u8]) {
-    let last = luma.height() - 1;
-    let [above, below] = [y.abs_diff(1).min(last), if y < last { y + 1 } else { last.saturating_sub(1) }];
+    let rows = [-1, 0, 1].map(|off| luma.row(mirrored(y as isize + off, luma.height())));
     let width = luma.width();
     sums.resize(width + 2, 0);
-    smooth_down([above, y, below].map(|y| luma.row(y)), &mut sums[1..=width]);
+    smooth_down(rows, &mut sums[1..=width]);
     // What is beyond the border is as what is before it.
     (sums[0], sums[width + 1]) = (sums[2.min(width)], sums[width.max(2) - 1]);
     smooth_across(sums, out);

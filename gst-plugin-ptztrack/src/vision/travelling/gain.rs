@@ -15,9 +15,7 @@ pub(super) fn light_gain(samples: &[Sample], median: &mut Median) -> f32 {
     if samples.len() < MIN_SAMPLES {
         return 1.0;
     }
-    let ratios = samples.iter().map(|sample| sample.seen / sample.mean);
-    median.clear();
-    median.extend(ratios);
+    median.extend(samples.iter().map(|sample| sample.seen / sample.mean));
     let Some(gain) = median.take() else { return 1.0 };
     let differ =
         |gain: f32| samples.iter().filter(|sample| (sample.seen - gain * sample.mean).abs() > ALIKE).count();

@@ -7,24 +7,19 @@ pub(super) struct Median {
 }
 
 impl Median {
-    /// Of no numbers.
-    pub fn clear(&mut self) {
-        self.keys.clear();
-    }
-
-    /// Of these numbers too; NaN is none.
+    /// Adds these numbers; NaN is none.
     pub fn extend(&mut self, numbers: impl Iterator<Item = f32>) {
         self.keys
             .extend(numbers.filter(|number| !number.is_nan()).map(|number| ordered(number.to_bits() as i32)));
     }
 
-    /// The middle one; `None` where there are none. Of an even number of them it is the larger one in the middle.
+    /// The middle one of those that were added since it was taken last; `None` where there are none. Of an even number of them it is the
+    /// larger one in the middle.
     pub fn take(&mut self) -> Option<f32> {
         let middle = self.keys.len() / 2;
-        (!self.keys.is_empty()).then(|| {
-            let (_, key, _) = self.keys.select_nth_unstable(middle);
-            f32::from_bits(ordered(*key) as u32)
-        })
+        let key = (!self.keys.is_empty()).then(|| *self.keys.select_nth_unstable(middle).1);
+        self.keys.clear();
+        key.map(|key| f32::from_bits(ordered(key) as u32))
     }
 }
 
@@ -46,6 +41,7 @@ mod tests {
             let found = median.take();
             numbers.sort_by(f32::total_cmp);
             prop_assert_eq!(found, numbers.get(numbers.len() / 2).copied());
+            prop_assert_eq!(median.take(), None);
         }
     }
 }

@@ -91,8 +91,7 @@ pub(super) struct Pooled {
     turning: CellNoise,
     area: Area,
     cells: Cells,
-    /// Memory: sums over a row of cells, by columns of pixels; medians of tiles, and the light
-    /// of each.
+    /// Memory: sums over a row of cells, by columns of pixels; medians of tiles, and the light of each.
     columns: Columns,
     median: Median,
     tiles: Vec<f32>,
@@ -154,7 +153,6 @@ impl Pooled {
         self.tiles.clear();
         for tile in 0..wide * high {
             let (columns, rows) = (cells(tile % wide, left, across), cells(tile / wide, top, down));
-            median.clear();
             for row in rows {
                 median.extend(self.cells.off[row * across..][columns.clone()].iter().copied());
             }
@@ -163,7 +161,6 @@ impl Pooled {
         self.light.clear();
         for tile in 0..wide * high {
             let (x, y) = (tile % wide, tile / wide);
-            median.clear();
             for row in y.saturating_sub(1)..(y + 2).min(high) {
                 let near = &self.tiles[row * wide..][x.saturating_sub(1)..(x + 2).min(wide)];
                 median.extend(near.iter().copied());
