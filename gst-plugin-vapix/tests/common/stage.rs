@@ -43,8 +43,9 @@ pub fn pacing(stands_s: u64, stretch_s: u64, wide_fov_deg: f64, kinematics: Kine
 
 /// A stepped camera and a sink in lockstep with it; or both by the clock.
 pub struct Stage {
-    pub camera: VirtualCamera,
+    /// Goes before the camera: a sink whose last stop nobody answers tries again, and may meet the next test's camera at that port.
     pub rig: Rig,
+    pub camera: VirtualCamera,
     pub now: Duration,
     /// What was on the bus so far.
     pub heard: Vec<Heard>,
