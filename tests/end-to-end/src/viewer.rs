@@ -27,14 +27,26 @@ const NTP_TO_UNIX: Duration = Duration::from_secs(2_208_988_800);
 
 impl Viewer {
     /// Begins to watch, with an `rtspsrc` that is set up by `set_up`.
+    ///
+    /// Its pads are linked here: where two come at once, from two threads, what GStreamer makes of two links in a description ends twice.
     #[track_caller]
     pub fn start(url: &str, set_up: impl FnOnce(&gst::Element)) -> Self {
         let running = Running::parse(&format!(
             "rtspsrc name=source location={url} protocols=tcp latency=0 add-reference-timestamp-meta=true \
-             source. ! application/x-rtp,media=video ! appsink name=video sync=false \
-             source. ! application/x-rtp,media=application ! appsink name=metadata sync=false"
+             appsink name=video sync=false appsink name=metadata sync=false"
         ));
-        set_up(&running.element("source"));
+        let source = running.element("source");
+        let sinks = [("video", "video"), ("application", "metadata")].map(|(media, sink)| {
+            (media, running.element(sink).static_pad("sink").expect("every sink has one"))
+        });
+        source.connect_pad_added(move |_, pad| {
+            let caps = pad.current_caps().unwrap_or_else(|| pad.query_caps(None));
+            let media = caps.structure(0).and_then(|caps| caps.get::<&str>("media").ok());
+            if let Some((_, sink)) = sinks.iter().find(|(carried, _)| media == Some(*carried)) {
+                pad.link(sink).expect("an `appsink` takes anything");
+            }
+        });
+        set_up(&source);
         running.pipeline().set_state(gst::State::Playing).unwrap();
         Self { running }
     }
