@@ -185,7 +185,7 @@ impl Detector {
         }
         let [open_size, close_size] = self.sizes(config);
         self.fit_mask(foreground.width(), foreground.height())?;
-        self.segmentation.segment(foreground, open_size, close_size, self.mask.data_bytes_mut()?);
+        self.segmentation.segment(scene, open_size, close_size, self.mask.data_bytes_mut()?);
         let MotionMeta { regions: mut found, mut outside } = std::mem::take(&mut self.told);
         self.find_regions(config, &mut found)?;
         self.spare.append(&mut self.light);

@@ -58,6 +58,7 @@ mod persistence;
 mod picture;
 mod presence;
 mod reduce;
+mod reflections;
 mod scene;
 mod scene_model;
 mod segmentation;

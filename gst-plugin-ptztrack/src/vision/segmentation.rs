@@ -9,10 +9,12 @@ use super::bits::Bits;
 use super::blur::mirrored;
 use super::components::{Components, Run};
 use super::morphology::clean;
+use super::reflections::{Extent, Reflections};
+use super::scene_model::SceneView;
 
 /// Likelihood, averaged over 3x3 pixels, from which a pixel may belong to a region: just above that of what is
 /// unknown ...
-const WEAK: u16 = 137;
+pub(super) const WEAK: u16 = 137;
 /// ... and from which it makes one by itself.
 const STRONG: u16 = 241;
 /// Pixels that make a region, as a part of the picture: a few bright specks do not.
@@ -24,6 +26,9 @@ pub struct Segmentation {
     strong: Vec<u8>,
     bits: Bits,
     components: Components,
+    reflections: Reflections,
+    /// Who has a reflection: the number of their part, what there is of it, and the row at which the reflection begins.
+    reflected: Vec<(usize, Extent, usize)>,
     /// Of one row: sums of three pixels above each other.
     sums: Vec<u16>,
     /// Of a part's columns.
@@ -31,29 +36,51 @@ pub struct Segmentation {
 }
 
 impl Segmentation {
-    /// The foreground as a `mask` of 255 and 0, of the size of `likelihood`: what is likely, cleaned by opening and closing
-    /// (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it).
+    /// The foreground as a `mask` of 255 and 0, of the size of `scene`: what is likely, cleaned by opening and closing
+    /// (thesis 3.3.1), where part of it is sure (hysteresis, as Canny's edges have it). Shadows and reflections of somebody are not.
     pub fn segment(
         &mut self,
-        likelihood: &Luma,
+        scene: &SceneView,
         open_size: (usize, usize),
         close_size: (usize, usize),
         mask: &mut [u8],
     ) {
-        let (width, height) = (likelihood.width(), likelihood.height());
+        let (width, height) = (scene.foreground.width(), scene.foreground.height());
         let needed = (MIN_STRONG * (width * height) as f64).ceil() as usize;
-        if self.threshold(likelihood, mask) < needed {
+        if self.threshold(&scene.foreground, mask) < needed {
             mask.fill(0);
             return;
         }
         clean(mask, width, open_size, close_size, &mut self.bits);
         self.components.find(mask, width);
-        for runs in self.components.parts() {
-            let columns = extent(runs);
+        self.reflected.clear();
+        self.reflections.next_picture();
+        for (number, runs) in self.components.parts().enumerate() {
+            let Extent { rows, columns } = extent(runs);
             let is_sure = holds(runs, &self.strong, width, needed);
             let kept = if is_sure { upright(runs, columns.clone(), &mut self.heights) } else { 0..0 };
             if kept != columns {
                 keep(runs, &kept, mask, width);
+            }
+            let part = Extent { rows, columns: kept };
+            if is_sure && let Some(feet) = self.reflections.feet(&part, scene) {
+                self.reflected.push((number, part, feet));
+            }
+        }
+        self.clear_reflections(mask, width);
+    }
+
+    /// Clears the reflections in the mask: what hangs together with whoever it is of, and what lies by itself.
+    fn clear_reflections(&self, mask: &mut [u8], width: usize) {
+        for (owner, part, feet) in &self.reflected {
+            let reflection =
+                Extent { rows: *feet..2 * feet - part.rows.start, columns: part.columns.clone() };
+            for (number, runs) in self.components.parts().enumerate() {
+                if number == *owner || reflection.holds(&extent(runs)) {
+                    for Run { row, columns, .. } in runs.iter().filter(|run| run.row >= *feet) {
+                        mask[row * width..][columns.clone()].fill(0);
+                    }
+                }
             }
         }
     }
@@ -105,10 +132,14 @@ const LOW: f32 = 0.3;
 /// ... and are one where they go on for so many heights of it: farther than a foot or a hand reaches.
 const LONG: f32 = 0.25;
 
-/// The columns of a part.
-fn extent(runs: &[Run]) -> Range<usize> {
-    let start = runs.iter().map(|run| run.columns.start).min().unwrap_or(0);
-    start..runs.iter().map(|run| run.columns.end).max().unwrap_or(start)
+/// What there is of a part.
+fn extent(runs: &[Run]) -> Extent {
+    let around = |start: Option<usize>, end: Option<usize>| start.unwrap_or(0)..end.unwrap_or(0);
+    let (rows, columns) = (|| runs.iter().map(|run| run.row), || runs.iter().map(|run| &run.columns));
+    Extent {
+        rows: around(rows().min(), rows().max().map(|last| last + 1)),
+        columns: around(columns().map(|run| run.start).min(), columns().map(|run| run.end).max()),
+    }
 }
 
 /// Whether so many pixels of a part are set in another mask, whose rows are `width` pixels.
@@ -174,7 +205,15 @@ mod tests {
         }
         let mut mask = vec![0; SIZE.0 * SIZE.1];
         let luma = Luma::packed(&likelihood, SIZE.0);
-        Segmentation::default().segment(&luma, open_size, (3, 7), &mut mask);
+        let scene = SceneView {
+            camera_motion: None,
+            coasted_motion: None,
+            luma,
+            chroma: None,
+            foreground: luma,
+            background: luma,
+        };
+        Segmentation::default().segment(&scene, open_size, (3, 7), &mut mask);
         mask.iter().map(|pixel| i32::from(*pixel > 0)).sum()
     }
 
@@ -185,6 +224,50 @@ mod tests {
         let alone = segmented(&[(head, 255)]);
         let both = segmented(&[(body, 180), (head, 255)]);
         assert!(alone > 40 && both > 400, "{alone} {both}");
+    }
+
+    /// What is segmented below the feet of somebody on a floor that reflects 30 % of what is above it, once the floor is known to shine, where
+    /// their reflection is likely from this row on.
+    fn segmented_of_reflection(likely_from: usize) -> i32 {
+        let (columns, top, feet) = (70..86, 8, 48);
+        let mut picture = vec![120; SIZE.0 * SIZE.1];
+        let (background, mut likelihood) = (picture.clone(), vec![20; SIZE.0 * SIZE.1]);
+        for row in top..feet {
+            let worn = if row < 30 { 200 } else { 50 };
+            let mirrored = 2 * feet - 1 - row;
+            for column in columns.clone() {
+                picture[row * SIZE.0 + column] = worn;
+                picture[mirrored * SIZE.0 + column] = (120 + 3 * (i32::from(worn) - 120) / 10) as u8;
+                likelihood[row * SIZE.0 + column] = 255;
+                likelihood[mirrored * SIZE.0 + column] = if mirrored >= likely_from { 255 } else { 20 };
+            }
+        }
+        let [luma, background, foreground] =
+            [&picture, &background, &likelihood].map(|plane| Luma::packed(plane, SIZE.0));
+        let scene = SceneView {
+            camera_motion: None,
+            coasted_motion: None,
+            luma,
+            chroma: None,
+            foreground,
+            background,
+        };
+        let (mut segmentation, mut mask) = (Segmentation::default(), vec![0; SIZE.0 * SIZE.1]);
+        let below = |mask: &[u8]| mask[(feet + 2) * SIZE.0..].iter().map(|pixel| i32::from(*pixel > 0)).sum();
+        segmentation.segment(&scene, (1, 3), (3, 7), &mut mask);
+        let first: i32 = below(&mask);
+        assert!(first > 200, "one picture tells nothing of the floor: {first}");
+        for _ in 0..40 {
+            segmentation.segment(&scene, (1, 3), (3, 7), &mut mask);
+        }
+        assert!(mask[top * SIZE.0..feet * SIZE.0].iter().filter(|pixel| **pixel > 0).count() > 500);
+        below(&mask)
+    }
+
+    #[test]
+    fn where_the_floor_shines_reflections_are_nobody() {
+        assert_eq!(segmented_of_reflection(48), 0, "with whoever it is of");
+        assert_eq!(segmented_of_reflection(66), 0, "by itself");
     }
 
     #[test]

@@ -9,7 +9,7 @@ const GATE: f32 = 3.0;
 const ANOTHER_SIZE: f32 = 1.5;
 /// The deviation of that side then, in differences of the size: what hides somebody often does so for a second, what is seen beside
 /// them is sooner their own.
-const HIDDEN: f32 = 4.0;
+const HIDDEN: f32 = 2.0;
 const WIDER: f32 = 1.0;
 
 /// A side of the box along an axis.
