@@ -136,6 +136,7 @@ impl Detector {
     pub fn relearn(&mut self) {
         self.background.restart();
         self.persistence.restart();
+        self.segmentation.restart();
         self.learned = 0;
         self.mask = Mat::default();
     }
