@@ -172,14 +172,7 @@ mod tests {
     }
 
     fn scene<'a>(picture: &'a Canvas, background: &'a Canvas) -> SceneView<'a> {
-        SceneView {
-            camera_motion: None,
-            coasted_motion: None,
-            luma: picture.luma(),
-            chroma: None,
-            foreground: Luma::packed(&[255; SIZE.0 * SIZE.1], SIZE.0),
-            background: background.luma(),
-        }
+        SceneView::of_greys(picture.luma(), background.luma(), Luma::packed(&[255; SIZE.0 * SIZE.1], SIZE.0))
     }
 
     fn judge(picture: &Canvas, background: &Canvas, region: &Region) -> bool {

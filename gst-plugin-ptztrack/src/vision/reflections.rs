@@ -275,18 +275,16 @@ mod tests {
             let seen = known + reflected * (f32::from(worn) - before);
             picture[below * SIZE.0 + column] = seen.round() as u8;
         }
-        let planes = [&picture, &background, &foreground].map(|plane| Luma::packed(plane, SIZE.0));
+        let [luma, background, foreground] =
+            [&picture, &background, &foreground].map(|plane| Luma::packed(plane, SIZE.0));
+        let scene = SceneView::of_greys(luma, background, foreground);
         let rows = BODY.1.start..if reflected > 0.0 { 2 * feet - BODY.1.start } else { feet };
         let look = |_| {
             reflections.next_picture();
-            reflections.feet(&Extent { rows: rows.clone(), columns: BODY.0 }, &scene(planes))
+            reflections.feet(&Extent { rows: rows.clone(), columns: BODY.0 }, &scene)
         };
         let found = (0..pictures).map(look).last().flatten();
         (found, reflections)
-    }
-
-    fn scene([luma, background, foreground]: [Luma<'_>; 3]) -> SceneView<'_> {
-        SceneView { camera_motion: None, coasted_motion: None, luma, chroma: None, foreground, background }
     }
 
     const SOMEBODY: ([u8; 3], bool) = ([170, 200, 40], true);
@@ -319,7 +317,8 @@ mod tests {
     #[test]
     fn in_a_crowd_two_regions_are_looked_at_in_each_picture_and_all_in_turn() {
         let plane = vec![100; SIZE.0 * SIZE.1];
-        let planes = [Luma::packed(&plane, SIZE.0); 3];
+        let luma = Luma::packed(&plane, SIZE.0);
+        let scene = SceneView::of_greys(luma, luma, luma);
         let mut reflections = Reflections { share: 0.1, ..Reflections::default() };
         let mut looked_at = [0; 5];
         for _ in 0..6 {
@@ -328,7 +327,7 @@ mod tests {
                 let before = reflections.share;
                 let left = 10 * number;
                 assert_eq!(
-                    reflections.feet(&Extent { rows: 10..50, columns: left..left + 10 }, &scene(planes)),
+                    reflections.feet(&Extent { rows: 10..50, columns: left..left + 10 }, &scene),
                     None
                 );
                 *looks += u32::from(reflections.share < before);
@@ -353,8 +352,8 @@ mod tests {
             };
             let region = Extent { rows: part(top, bottom, height), columns: part(left, right, width) };
             let mut reflections = Reflections { share: 1.0, ..Reflections::default() };
-            let planes = [&planes[0], &planes[1], &planes[2]].map(|plane| Luma::packed(plane, width));
-            let found = reflections.feet(&region, &scene(planes));
+            let [luma, background, foreground] = planes.each_ref().map(|plane| Luma::packed(plane, width));
+            let found = reflections.feet(&region, &SceneView::of_greys(luma, background, foreground));
             prop_assert!(found.is_none_or(|row| row > region.rows.start && row <= height));
             prop_assert!(reflections.share.is_finite());
         }

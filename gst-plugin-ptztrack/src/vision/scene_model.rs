@@ -28,6 +28,14 @@ pub struct SceneView<'a> {
     pub background: Luma<'a>,
 }
 
+#[cfg(test)]
+impl<'a> SceneView<'a> {
+    /// Of a picture without colour, where nobody knows how the camera moved.
+    pub fn of_greys(luma: Luma<'a>, background: Luma<'a>, foreground: Luma<'a>) -> Self {
+        Self { camera_motion: None, coasted_motion: None, luma, chroma: None, foreground, background }
+    }
+}
+
 /// Reduces pictures, measures the motion of the camera and carries the background along: all that looks at
 /// whole pictures, in the order in which one needs the other.
 #[derive(Debug, Default)]

@@ -226,14 +226,7 @@ mod tests {
         }
         let mut mask = vec![0; SIZE.0 * SIZE.1];
         let luma = Luma::packed(&likelihood, SIZE.0);
-        let scene = SceneView {
-            camera_motion: None,
-            coasted_motion: None,
-            luma,
-            chroma: None,
-            foreground: luma,
-            background: luma,
-        };
+        let scene = SceneView::of_greys(luma, luma, luma);
         Segmentation::default().segment(&scene, open_size, (3, 7), &mut mask);
         mask.iter().map(|pixel| i32::from(*pixel > 0)).sum()
     }
@@ -265,14 +258,7 @@ mod tests {
         }
         let [luma, background, foreground] =
             [&picture, &background, &likelihood].map(|plane| Luma::packed(plane, SIZE.0));
-        let scene = SceneView {
-            camera_motion: None,
-            coasted_motion: None,
-            luma,
-            chroma: None,
-            foreground,
-            background,
-        };
+        let scene = SceneView::of_greys(luma, background, foreground);
         let (mut segmentation, mut mask) = (Segmentation::default(), vec![0; SIZE.0 * SIZE.1]);
         let below = |mask: &[u8]| mask[(feet + 2) * SIZE.0..].iter().map(|pixel| i32::from(*pixel > 0)).sum();
         segmentation.segment(&scene, (1, 3), (3, 7), &mut mask);

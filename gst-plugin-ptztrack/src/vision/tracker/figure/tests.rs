@@ -28,14 +28,7 @@ impl Scene {
     fn cells(&self, bounds: Rect2f) -> Cells {
         let plane = |data| Luma::new(data, Self::SIZE.0, Self::SIZE.1, Self::SIZE.0).expect("whole");
         let luma = plane(&self.luma);
-        let scene = SceneView {
-            camera_motion: None,
-            coasted_motion: None,
-            luma,
-            chroma: None,
-            foreground: plane(&self.foreground),
-            background: luma,
-        };
+        let scene = SceneView::of_greys(luma, luma, plane(&self.foreground));
         let seen = Observation { luma, scene: Some(scene) };
         Cells::observe(&seen, bounds, GRID)
     }
