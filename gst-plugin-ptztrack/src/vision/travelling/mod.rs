@@ -53,6 +53,9 @@ const PATIENCE: Duration = Duration::from_secs(6);
 /// Parts of a pixel by which a picture may lie beside the model: at rest, and turning.
 const MISPLACED_AT_REST: f32 = 0.2;
 const MISPLACED: f32 = 1.0;
+/// What differs from the background counts so many times as much where the target is, as a fraction: somebody is expected there (Senior et
+/// al., "Appearance models for occlusion handling", 2006).
+const EXPECTED: (u16, u16) = (8, 5);
 /// Foreground beyond this fraction of the picture is a new picture: lights, a cut.
 const NEW_PICTURE: f64 = 0.6;
 
@@ -159,6 +162,7 @@ impl TravellingBackground {
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.pooled.mark(&mut self.model, None);
         self.show();
+        self.expect_target();
         self.forget_burned_in(&picture.luma(), travel);
         Ok(())
     }
@@ -299,6 +303,20 @@ impl TravellingBackground {
             (known, changed) = (known + some, changed + foreground);
         }
         f64::from(changed) / f64::from(known)
+    }
+
+    /// Makes likelier foreground of what differs from the background where the target is.
+    fn expect_target(&mut self) {
+        let (width, height) = self.size;
+        let Some(held) = self.held.map(|held| in_pixels(held, (width as f64, height as f64))) else { return };
+        let within = |from: f64, length: f64, size: usize| {
+            let place = |at: f64| at.clamp(0.0, size as f64) as usize;
+            place(from)..place(from + length.max(0.0))
+        };
+        let (columns, rows) = (within(held.x, held.width, width), within(held.y, held.height, height));
+        for row in self.foreground.chunks_exact_mut(width).take(rows.end).skip(rows.start) {
+            rows::expect(&mut row[columns.clone()], EXPECTED);
+        }
     }
 
     /// Takes out of the foreground what stays put in the picture while the world moves.

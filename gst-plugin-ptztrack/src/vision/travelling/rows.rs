@@ -65,6 +65,15 @@ pub(super) fn likelihoods(
     }
 }
 
+/// Makes foreground likelier by a fraction, but for what nothing is known of.
+#[multiversion(targets("x86_64+avx2"))]
+pub(super) fn expect(likelihoods: &mut [u8], (times, of): (u16, u16)) {
+    for likelihood in likelihoods {
+        let likelier = (u16::from(*likelihood) * times / of).min(255) as u8;
+        *likelihood = if *likelihood == UNKNOWN { UNKNOWN } else { likelier };
+    }
+}
+
 /// What is before the point of a number from 0 to 65535. A cast, which saturates, is not made into vector code.
 #[inline(always)]
 pub(super) fn whole_part(number: f32) -> u16 {

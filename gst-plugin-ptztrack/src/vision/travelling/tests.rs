@@ -310,6 +310,34 @@ fn somebody_fainter_than_the_noise_is_foreground() {
     }
 }
 
+/// A coat of fine checks, lighter and darker than the wall by as much, of which cells of pixels tell nothing: how much of it is foreground,
+/// where that box is the target's.
+fn seen_of_checks(target: Option<Bounds>) -> f64 {
+    let mut background = learned_plain();
+    let mut picture = plain(100.0, &[], 100);
+    let is_light = |u: f64, v: f64| (u as usize + v as usize).is_multiple_of(2);
+    picture.paint(PERSON, |u, v| if is_light(u, v) { 118.0 } else { 82.0 });
+    background.protect(target.map(normalised));
+    look(&mut background, &picture, Some((0.0, 0.0)));
+    foreground(&background, PERSON)
+}
+
+#[test]
+fn where_the_target_is_less_is_enough_for_foreground() {
+    let (anywhere, expected) = (seen_of_checks(None), seen_of_checks(Some(PERSON)));
+    assert!(anywhere < 0.3 && expected > 0.7, "{anywhere} {expected}");
+    assert_eq!(seen_of_checks(Some((0.0, 0.0, 20.0, 20.0))), anywhere, "elsewhere");
+}
+
+#[test]
+fn where_the_target_was_an_empty_room_is_background_and_the_unknown_stays_so() {
+    let mut background = learned();
+    background.protect(Some(normalised(ALL)));
+    look(&mut background, &seen(-10.0, 0.0, 99), Some((-10.0, 0.0)));
+    assert!(foreground(&background, (0.0, 0.0, 140.0, 120.0)) < 0.01);
+    assert!(foreground(&background, (152.0, 0.0, 6.0, 120.0)) < 0.01);
+}
+
 #[test]
 fn light_that_changes_by_little_is_nobody() {
     let mut background = learned_plain();

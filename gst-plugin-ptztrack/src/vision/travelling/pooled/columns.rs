@@ -50,7 +50,8 @@ impl Columns {
     }
 }
 
-/// Leaves a row of cells from the one `left` on, from the sums of the columns.
+/// Leaves a row of cells from the one `left` on, from the sums of the columns. What a cell differs by is the mean of its columns but for the
+/// least and the greatest: a streak of rain, or an upright edge that lies a little off, is one column.
 #[multiversion(targets("x86_64+avx2"))]
 pub(super) fn pool(
     columns: &Columns,
@@ -72,12 +73,26 @@ pub(super) fn pool(
         let is_known = known >= LEAST_KNOWN;
         let known = f32::from(known);
         let mean = |columns: &[[i32; CELL]]| columns[cell].iter().sum::<i32>() as f32 / (256.0 * known);
-        off[cell] = if is_known { mean(differences) } else { f32::NAN };
+        let whole = mean(differences);
+        let of_columns = differences[cell]
+            .iter()
+            .zip(&knowns[cell])
+            .map(|(&sum, &known)| if known > 0 { sum as f32 / (256.0 * f32::from(known)) } else { whole });
+        off[cell] = if is_known { trimmed_mean(of_columns) } else { f32::NAN };
         spread[cell] = if is_known { mean(spreads) } else { 0.0 };
         let texture = (f32::from(texture) / known / BIN).min((BINS - 1) as f32);
         bin[cell] = if is_known { whole_part(texture) as u8 } else { 0 };
         is_plain[cell] = !is_known && plain >= LEAST_KNOWN;
     }
+}
+
+/// The mean without the least and the greatest of the means of a cell's columns (Tukey's trimmed mean).
+#[inline(always)]
+fn trimmed_mean(columns: impl Iterator<Item = f32>) -> f32 {
+    let extremes = (f32::INFINITY, f32::NEG_INFINITY);
+    let (sum, (least, most)) = columns
+        .fold((0.0, extremes), |(sum, (least, most)), mean| (sum + mean, (mean.min(least), mean.max(most))));
+    (sum - least - most) / (CELL - 2) as f32
 }
 
 /// Adds what is known of a row of pixels, and says nothing by itself, to the sums of the columns.
@@ -114,5 +129,35 @@ fn add_plain(plain: &mut [u16], likelihood: &[u8]) {
 fn add_spread(sums: &mut [i32], spread: &[u16], likelihood: &[u8]) {
     for (sum, (&spread, &likely)) in sums.iter_mut().zip(spread.iter().zip(likelihood)) {
         *sum += i32::from(spread) * i32::from(likely < UNKNOWN);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a cell differs by whose columns of known pixels do, before a background of 100.
+    fn off(columns: [u8; CELL], likelihood: [u8; CELL]) -> f32 {
+        let mean = [100 << 8; CELL];
+        let background = Row { mean: &mean, spread: &[0; CELL], range: &[0; CELL], likelihood: &likelihood };
+        let mut sums = Columns::default();
+        sums.clear(CELL);
+        (0..CELL).for_each(|_| sums.add(background, &columns, 0));
+        let (mut off, mut spread, mut bin, mut is_plain) = ([0.0], [0.0], [0], [false]);
+        pool(&sums, 0, &mut off, &mut spread, &mut bin, &mut is_plain);
+        off[0]
+    }
+
+    #[test]
+    fn a_streak_of_rain_says_nothing_and_somebody_does() {
+        assert_eq!(off([100, 140, 100, 100], [0; CELL]), 0.0, "a streak");
+        assert_eq!(off([94; CELL], [0; CELL]), -6.0, "somebody");
+        assert_eq!(off([92, 94, 96, 94], [0; CELL]), -6.0);
+    }
+
+    #[test]
+    fn columns_of_which_nothing_is_known_stand_for_the_others() {
+        assert_eq!(off([104, 104, 200, 200], [0, 0, 255, 255]), 4.0);
+        assert!(off([104, 200, 200, 200], [0, 255, 255, 255]).is_nan(), "too few are known");
     }
 }
