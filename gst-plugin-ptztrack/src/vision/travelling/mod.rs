@@ -99,7 +99,7 @@ pub struct TravellingBackground {
 
 impl TravellingBackground {
     /// How likely each pixel of the last picture is foreground: 0 for known background, 128 where nothing is known,
-    /// 255 for what is surely not background; `None` before the first picture. Neither smoothed nor cleaned.
+    /// 255 for what is surely not background; `None` before the first picture. More so where the target is. Neither smoothed nor cleaned.
     pub fn foreground(&self) -> Option<Luma<'_>> {
         (!self.foreground.is_empty()).then(|| Luma::packed(&self.foreground, self.size.0))
     }
