@@ -61,8 +61,8 @@ const LEFT: f32 = 0.35;
 const REACH: (f32, f32) = (0.5, 2.3);
 /// Intersection over union with somebody else from which it is they who are seen.
 const TAKEN: f32 = 0.4;
-/// How alike in colours somebody new must be to be who is not seen, more than anybody is to anybody (0.7), and what part of their height must
-/// have come out.
+/// How alike in colours somebody new must be to be who is not seen, more than anybody is to anybody (`ANYBODY` of `association`), and what part
+/// of their height must have come out.
 const ALIKE: f32 = 0.8;
 const REAPPEARED: f32 = 0.5;
 

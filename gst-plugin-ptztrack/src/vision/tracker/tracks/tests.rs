@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
+use super::looks::Looks;
 use super::*;
 use crate::vision::Luma;
 use opencv::core::Point2f;
@@ -79,6 +80,25 @@ fn somebody_small_is_not_lost_among_many_who_are_larger() {
         let track = tracks.get(1).expect("there");
         assert!(track.region().is_some(), "{track:?}");
     }
+}
+
+/// The numbers of those who are there after number 1, in dark clothes, was not seen for half a second, in which somebody came whose clothes
+/// are white by that share.
+fn numbers_after(white: f32) -> Vec<u64> {
+    let mut tracks = Tracks::default();
+    for regions in [[person(100.0)], [person(200.0)]] {
+        (0..5).for_each(|_| seen_in(&mut tracks, &regions, STILL, DT));
+    }
+    tracks.tracks[0].views.learn(&Looks::of_greys(&[(40, 1.0)]), 0.0);
+    tracks.regions[0].looks = Looks::of_greys(&[(40, 1.0 - white), (200, white)]);
+    tracks.find_again(1, false);
+    numbers(&tracks)
+}
+
+#[test]
+fn somebody_new_is_who_is_not_seen_only_where_they_look_more_like_it_than_anybody() {
+    assert_eq!(numbers_after(0.1), [1]);
+    assert_eq!(numbers_after(0.45), [1, 2]);
 }
 
 /// As whoever was found again behind somebody is: only one of the two knows of it.
