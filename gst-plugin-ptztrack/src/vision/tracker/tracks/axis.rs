@@ -38,6 +38,8 @@ pub(super) struct Axis {
     pub rate: f32,
     pub size: f32,
     covariance: [[f32; 3]; 3],
+    /// How far both sides were seen from where they were expected in this picture, in their deviations; 0 where not both were.
+    innovation: f32,
 }
 
 /// How much an axis changes by itself, as spectral densities per second.
@@ -56,7 +58,7 @@ impl Axis {
         for (place, deviation) in deviations.into_iter().enumerate() {
             covariance[place][place] = deviation * deviation;
         }
-        Self { middle, rate: 0.0, size, covariance }
+        Self { middle, rate: 0.0, size, covariance, innovation: 0.0 }
     }
 
     /// The place of a side, pixels.
@@ -80,6 +82,7 @@ impl Axis {
     /// Goes on for `dt_s`.
     pub fn predict(&mut self, dt_s: f32, noise: ProcessNoise) {
         self.middle += self.rate * dt_s;
+        self.innovation = 0.0;
         let c = &mut self.covariance;
         c[0][0] += dt_s * (c[0][1] + c[1][0] + dt_s * c[1][1]);
         c[0][1] += dt_s * c[1][1];
@@ -117,9 +120,10 @@ impl Axis {
         } else {
             WIDER * change
         };
-        let off = |side: Side, place: f32| (place - self.side(side)).abs();
+        let off = |(side, place): (Side, f32)| place - self.side(side);
         let (near, far) = ((Side::Low, low), (Side::High, high));
-        let (near, far) = if off(near.0, near.1) <= off(far.0, far.1) { (near, far) } else { (far, near) };
+        let (near, far) = if off(near).abs() <= off(far).abs() { (near, far) } else { (far, near) };
+        self.innovation = if off(near) * off(far) > 0.0 { off(near) / deviation } else { 0.0 };
         self.measure(near.0, near.1, deviation);
         self.measure(far.0, far.1, doubtful.max(deviation));
     }
@@ -130,8 +134,12 @@ impl Axis {
         self.correct(gain, place - self.middle, gain[0] + deviation * deviation);
     }
 
-    /// Takes a rate, pixels per second.
+    /// Takes a rate, pixels per second, that was measured in the picture in which the sides were. One that holds the box back where
+    /// its sides were seen ahead of it says the less the farther they were: it is of something else, as the wall behind.
     pub fn measure_rate(&mut self, rate: f32, deviation: f32) {
+        let holds_back = (rate - self.rate) * self.innovation < 0.0;
+        let doubt = if holds_back { 1.0 + self.innovation * self.innovation } else { 1.0 };
+        let deviation = doubt * deviation;
         let gain: [f32; 3] = std::array::from_fn(|row| self.covariance[row][1]);
         self.correct(gain, rate - self.rate, gain[1] + deviation * deviation);
     }
@@ -208,6 +216,19 @@ mod tests {
             }
             assert!((axis.size - (high - 80.0)).abs() < 5.0, "{axis:?}");
         }
+    }
+
+    /// Somebody walks before a wall that the points were taken on, which never moves.
+    #[test]
+    fn points_on_the_wall_hold_nobody_back() {
+        let mut axis = axis();
+        let at = |n: usize| 80.0 + 60.0 * DT * n as f32;
+        for n in 1..=75 {
+            axis.predict(DT, NOISE);
+            axis.measure_both(at(n), at(n) + 40.0, 3.0);
+            axis.measure_rate(0.0, 5.0);
+        }
+        assert!((axis.side(Side::Low) - at(75)).abs() < 6.0 && axis.rate > 20.0, "{axis:?}");
     }
 
     #[test]
