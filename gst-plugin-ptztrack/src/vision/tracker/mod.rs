@@ -29,6 +29,7 @@ mod flow;
 mod geometry;
 mod grey_histogram;
 mod group;
+mod outline;
 mod patch;
 mod points;
 mod policy;

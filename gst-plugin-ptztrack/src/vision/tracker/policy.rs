@@ -176,12 +176,14 @@ fn is_entering(tracks: &Tracks, bounds: Rect2f, frame: Frame) -> bool {
     })
 }
 
-/// The smallest of the tracks seen in this picture that a click at `point` means, a little beside it too.
+/// Which of the tracks seen in this picture a click at `point` means: the smallest of those whose outline it is in, or else of those
+/// whose box it is in, or a little beside.
 pub(super) fn clicked(tracks: &Tracks, point: Point2f) -> Option<&Track> {
-    tracks
-        .seen()
-        .filter(|track| grown(track.seen_bounds(), CLICK_REACH).contains(point))
-        .min_by(|a, b| a.seen_bounds().area().total_cmp(&b.seen_bounds().area()))
+    let is_shown = |track: &Track| tracks.region(track).is_some_and(|region| region.shows(point));
+    tracks.seen().filter(|track| grown(track.seen_bounds(), CLICK_REACH).contains(point)).min_by(|a, b| {
+        let smaller = a.seen_bounds().area().total_cmp(&b.seen_bounds().area());
+        is_shown(b).cmp(&is_shown(a)).then(smaller)
+    })
 }
 
 /// The target is seen at `bounds`: who is seen beside it is somebody else, wherever they go from then on. What is above or below

@@ -45,9 +45,10 @@ impl Profile {
         match self {
             Self::Thesis => regions.push(Region::new(bounds, contour.collect(), detection.outside)),
             Self::Robust => {
-                people(bounds, contour, memory);
-                let each = memory.iter().map(|bounds| Region::new(*bounds, Vec::new(), detection.outside));
-                regions.extend(each);
+                people(bounds, contour.clone(), memory);
+                let outline: Vec<_> = contour.collect();
+                let of_one = |bounds: &Rect2f| Region::new(*bounds, outline.clone(), detection.outside);
+                regions.extend(memory.iter().map(of_one));
             }
         }
     }

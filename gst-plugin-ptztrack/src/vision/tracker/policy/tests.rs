@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MPL-2.0
 
-use super::super::tracks::seen_in;
+use super::super::tracks::{Region, seen_as, seen_in};
 use super::*;
 
 const FRAME: Frame = Frame { width: 640.0, height: 480.0 };
@@ -22,6 +22,11 @@ impl Chain {
     fn see(&mut self, regions: &[Rect2f], ego: Option<EgoMotion>) {
         seen_in(&mut self.tracks, regions, ego, DT);
         self.policy.pass(&self.tracks, ego, DT);
+    }
+
+    fn see_outlines<const COUNT: usize>(&mut self, regions: [(Rect2f, Vec<Point2f>); COUNT]) {
+        let regions = regions.into_iter().map(|(bounds, outline)| Region::new(bounds, outline, false));
+        seen_as(&mut self.tracks, regions, DT);
     }
 
     fn choose(&self, choice: Choice, must_travel: bool) -> Option<&Track> {
@@ -209,6 +214,20 @@ fn a_click_means_the_smallest_track_there() {
     assert_eq!(x(405.0, 220.0), Some(400.0));
     assert_eq!(x(220.0, 120.0), Some(100.0));
     assert_eq!(x(600.0, 20.0), None);
+}
+
+/// Somebody far away is seen between the arm and the legs of somebody near, whose box is around both.
+#[test]
+fn a_click_means_whose_outline_it_is_in() {
+    let corners = |points: &[(f32, f32)]| points.iter().map(|(x, y)| Point2f::new(*x, *y)).collect();
+    let near = corners(&[(100.0, 100.0), (160.0, 100.0), (110.0, 130.0), (120.0, 300.0), (100.0, 300.0)]);
+    let far = corners(&[(130.0, 150.0), (200.0, 150.0), (200.0, 350.0), (130.0, 350.0)]);
+    let mut chain = Chain::default();
+    chain.see_outlines([(at(100.0, 100.0, 60.0, 200.0), near), (at(130.0, 150.0, 70.0, 200.0), far)]);
+    let x = |x, y| clicked(&chain.tracks, Point2f::new(x, y)).map(|track| track.seen_bounds().x);
+    assert_eq!(x(140.0, 200.0), Some(130.0), "of the two boxes the larger one's");
+    assert_eq!(x(105.0, 200.0), Some(100.0));
+    assert_eq!(x(95.0, 120.0), Some(100.0), "beside both");
 }
 
 #[test]

@@ -2,9 +2,10 @@
 
 //! What somebody looks like: colours of the upper and the lower body, from a few sides.
 
-use opencv::core::Rect2f;
+use opencv::core::{Point2f, Rect2f};
 
 use crate::vision::tracker::colour::Histogram;
+use crate::vision::tracker::outline::{crossings, is_inside};
 use crate::vision::tracker::sample::Sampler;
 use crate::vision::travelling::UNKNOWN;
 use crate::vision::{Luma, Observation};
@@ -41,13 +42,16 @@ impl Looks {
 pub(super) struct Viewer {
     sampler: Sampler,
     planes: [Vec<u8>; 4],
+    /// Where an outline crosses a row.
+    row: Vec<f32>,
 }
 
 impl Viewer {
-    /// What the foreground in `bounds` (pixels of the picture) looks like; nothing where nobody told the foreground.
-    pub fn look(&mut self, seen: &Observation, bounds: Rect2f) -> Looks {
+    /// What the foreground in `bounds` (pixels of the picture) looks like that lies inside of an `outline`, where one is known; nothing where
+    /// nobody told the foreground.
+    pub fn look(&mut self, seen: &Observation, bounds: Rect2f, outline: &[Point2f]) -> Looks {
         let Some(scene) = seen.scene else { return Looks::default() };
-        let Self { sampler, planes: [foreground, luma, u, v] } = self;
+        let Self { sampler, planes: [foreground, luma, u, v], row } = self;
         let mut sample = |plane: &Luma, out: &mut Vec<u8>| {
             sampler.sample(plane, in_plane(plane, seen, bounds), GRID, out);
         };
@@ -57,6 +61,9 @@ impl Viewer {
             sample(&u_plane, u);
             sample(&v_plane, v);
         });
+        if !outline.is_empty() {
+            mask(foreground, bounds, outline, row);
+        }
         let half = GRID.0 * GRID.1 / 2;
         Looks([0..half, half..2 * half].map(|samples| {
             let person = samples.filter(|&index| foreground[index] >= PERSON);
@@ -77,6 +84,19 @@ impl Viewer {
         let known = samples.iter().filter(|likelihood| **likelihood != UNKNOWN);
         let (sum, count) = known.fold((0, 0), |(sum, count), one| (sum + u32::from(*one), count + 1));
         (2 * count >= samples.len()).then(|| sum as f32 / (255.0 * count as f32))
+    }
+}
+
+/// Leaves nothing of the samples of `bounds` that lie outside of an outline: they are somebody else's.
+fn mask(samples: &mut [u8], bounds: Rect2f, outline: &[Point2f], row: &mut Vec<f32>) {
+    let (across, down) = (bounds.width / GRID.0 as f32, bounds.height / GRID.1 as f32);
+    for (number, samples) in samples.chunks_exact_mut(GRID.0).enumerate() {
+        row.clear();
+        row.extend(crossings(outline, bounds.y + (number as f32 + 0.5) * down));
+        for (column, sample) in samples.iter_mut().enumerate() {
+            let x = bounds.x + (column as f32 + 0.5) * across;
+            *sample = if is_inside(row.iter().copied(), x) { *sample } else { 0 };
+        }
     }
 }
 
@@ -158,6 +178,17 @@ mod tests {
 
     fn of(upper: u8, lower: u8) -> Looks {
         Looks([upper, lower].map(|grey| Histogram::of([((grey, Some([128, 128])), 1.0)].into_iter())))
+    }
+
+    #[test]
+    fn what_lies_outside_of_the_outline_is_somebody_elses() {
+        let left_half = [(10.0, 20.0), (16.0, 20.0), (16.0, 68.0), (10.0, 68.0)];
+        let outline = left_half.map(|(x, y)| Point2f::new(x, y));
+        let mut samples = vec![255; GRID.0 * GRID.1];
+        mask(&mut samples, Rect2f::new(10.0, 20.0, 12.0, 48.0), &outline, &mut Vec::new());
+        for row in samples.chunks_exact(GRID.0) {
+            assert_eq!(*row, [255, 255, 255, 255, 255, 255, 0, 0, 0, 0, 0, 0]);
+        }
     }
 
     #[test]

@@ -224,7 +224,7 @@ impl Tracks {
     fn single_out(&mut self, seen: &Observation, bounds: Rect2f, frame: Frame) -> usize {
         let mut region = Region::new(bounds, Vec::new(), false);
         // The sides of the box may show the others.
-        region.looks = self.viewer.look(seen, scaled(bounds, 0.5, 1.0));
+        region.looks = self.viewer.look(seen, scaled(bounds, 0.5, 1.0), &[]);
         let mut track = Track::new(self.regions.len(), &region, frame);
         let others = self.seen().filter(|other| share_inside(bounds, other.seen_bounds()) > 0.5);
         track.companions = others.map(|other| other.id).filter(|id| *id > 0).collect();
@@ -297,7 +297,7 @@ impl Tracks {
             regions.truncate(MOST);
         }
         for region in &mut self.regions {
-            region.looks = self.viewer.look(seen, region.bounds);
+            region.looks = self.viewer.look(seen, region.bounds, &region.contour);
             region.restless = region.restless.max(self.places.at(region.bounds));
         }
     }
@@ -408,4 +408,4 @@ fn is_sound(bounds: Rect2f, frame: Frame) -> bool {
 #[cfg(test)]
 mod tests;
 #[cfg(test)]
-pub(super) use tests::seen_in;
+pub(super) use tests::{seen_as, seen_in};

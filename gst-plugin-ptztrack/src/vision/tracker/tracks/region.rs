@@ -3,12 +3,13 @@
 use opencv::core::{Point2f, Rect2f};
 
 use super::looks::Looks;
+use crate::vision::tracker::outline::{crossings, is_inside};
 
 /// Something that a detector saw in one picture, and whose it is. Pixels of the picture.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in super::super) struct Region {
     pub bounds: Rect2f,
-    /// Polygon around it; empty where only the box is known.
+    /// Polygon around it, and around whoever is seen with it; empty where only the box is known.
     pub contour: Vec<Point2f>,
     /// Whether it lies where nobody is to be chosen.
     pub outside: bool,
@@ -23,5 +24,10 @@ impl Region {
     /// Of which nobody is the owner yet.
     pub fn new(bounds: Rect2f, contour: Vec<Point2f>, outside: bool) -> Self {
         Self { bounds, contour, outside, ..Self::default() }
+    }
+
+    /// Whether it shows something at a place, and not only around it.
+    pub fn shows(&self, place: Point2f) -> bool {
+        self.bounds.contains(place) && is_inside(crossings(&self.contour, place.y), place.x)
     }
 }

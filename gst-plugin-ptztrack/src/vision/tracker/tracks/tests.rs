@@ -14,6 +14,11 @@ pub(in super::super) fn seen_in(tracks: &mut Tracks, regions: &[Rect2f], ego: Op
     seen_by(tracks, regions, ego, dt_s, 0.0);
 }
 
+/// The same of regions whose outlines are known.
+pub(in super::super) fn seen_as(tracks: &mut Tracks, regions: impl IntoIterator<Item = Region>, dt_s: f64) {
+    take(tracks, regions.into_iter(), STILL, dt_s, 0.0);
+}
+
 fn seen_by(
     tracks: &mut Tracks,
     regions: &[Rect2f],
@@ -21,11 +26,25 @@ fn seen_by(
     dt_s: f64,
     detector_pause_s: f64,
 ) {
-    static BLACK: [u8; 640 * 480] = [0; 640 * 480];
-    let seen = Observation::from(Luma::packed(&BLACK, 640));
     let regions = regions.iter().map(|bounds| Region::new(*bounds, Vec::new(), false));
+    take(tracks, regions, ego, dt_s, detector_pause_s);
+}
+
+fn take(
+    tracks: &mut Tracks,
+    regions: impl Iterator<Item = Region>,
+    ego: Option<EgoMotion>,
+    dt_s: f64,
+    detector_pause_s: f64,
+) {
     let rules = Rules { confirm_pictures: 3, coast_s: 3.0, memory_s: 60.0, detector_pause_s };
-    tracks.update(&seen, regions, ego, dt_s, rules);
+    tracks.update(&black(), regions, ego, dt_s, rules);
+}
+
+/// A picture of 640x480 of which nothing else is known.
+fn black() -> Observation<'static> {
+    static BLACK: [u8; 640 * 480] = [0; 640 * 480];
+    Observation::from(Luma::packed(&BLACK, 640))
 }
 
 fn at(x: f32, y: f32, width: f32, height: f32) -> Rect2f {
