@@ -130,8 +130,8 @@ impl<'a> Stage<'a> {
         let pose = self.camera.pose_at(exposure);
         let motion =
             self.looked.replace(pose).map(|before| self.camera.background_motion(&before, &pose, size));
-        let cue = Cue { phase, truth: witnessed.truth.clone(), motion, size };
-        self.tracker.next(self.pipeline.bin(), cue)?;
+        let cue = Cue { phase, truth: witnessed.truth.clone(), seen_at: None, motion, size };
+        self.tracker.next(self.pipeline.bin(), cue.with_a_click_among(&people))?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;
         self.tracker.steer(&self.camera, exposure, target.as_ref())?;

@@ -90,8 +90,9 @@ impl<'a> Screening<'a> {
     fn picture(&mut self, index: usize, picture: &RecordedPicture) -> Result<(FrameRecord, Said), RunError> {
         let (first, size) = (self.scene.first, self.experiment.size);
         let phase = Phase::of(index >= first, index > first);
-        let cue = Cue { phase, truth: picture.truth.truth.clone(), motion: picture.motion, size };
-        self.tracker.next(self.pipeline.bin(), cue)?;
+        let truth = picture.truth.truth.clone();
+        let cue = Cue { phase, truth, seen_at: None, motion: picture.motion, size };
+        self.tracker.next(self.pipeline.bin(), cue.with_a_click_among(&picture.people))?;
         self.replacement.next(picture);
         let mut buffer = gst::Buffer::from_slice(picture.encoded.clone());
         if let Some(buffer) = buffer.get_mut() {

@@ -10,7 +10,7 @@ use std::{
 use gst::prelude::*;
 use ptztrack_contract::{BufferMeta, Point, Rect, TargetMeta, Vector};
 
-use virtual_camera::{Matrix, VirtualCamera};
+use virtual_camera::{Matrix, Sighting, VirtualCamera};
 
 use crate::{
     experiment::Protocol,
@@ -53,6 +53,8 @@ impl Phase {
 pub(crate) struct Cue {
     pub phase: Phase,
     pub truth: Option<GroundTruth>,
+    /// In the picture of the first box, where its shape is known: a place, in pixels, at which the person is seen, and nobody before them.
+    pub seen_at: Option<(f64, f64)>,
     /// How the background moved since the picture before: from its pixels to those of this one.
     pub motion: Option<Matrix>,
     pub size: (u32, u32),
@@ -63,7 +65,21 @@ pub(crate) type CurrentCue = Arc<Mutex<Cue>>;
 
 impl Cue {
     pub fn new(size: (u32, u32)) -> Self {
-        Self { phase: Phase::Before, truth: None, motion: None, size }
+        Self { phase: Phase::Before, truth: None, seen_at: None, motion: None, size }
+    }
+
+    /// With where the person is seen, of the `people` in the picture.
+    pub fn with_a_click_among(self, people: &[Sighting]) -> Self {
+        let id = self.truth.as_ref().map(|truth| truth.id);
+        let person = people.iter().find(|one| Some(one.truth.id) == id);
+        let seen_at = person.filter(|_| self.phase == Phase::FirstBox).and_then(pointed_at);
+        Self { seen_at, ..self }
+    }
+
+    /// Where an operator clicks who means the person, in frame sizes: where only their box is known, into its middle.
+    fn click(&self) -> Option<Point> {
+        let (x, y) = self.seen_at.or(self.given().map(|bounds| bounds.centre()))?;
+        Some(Point { x: x / f64::from(self.size.0), y: y / f64::from(self.size.1) })
     }
 
     /// The box that trackers are given with this picture.
@@ -98,6 +114,25 @@ fn perception(name: TrackerName) -> Perception {
         | TrackerName::OracleXray
         | TrackerName::Still => Perception::Truth,
     }
+}
+
+/// Where somebody is pointed at, in pixels: in the middle of their box, or where they are not seen there, the place at which they are
+/// that is nearest to the middle of all that is seen of them. `None` where nothing is.
+fn pointed_at(person: &Sighting) -> Option<(f64, f64)> {
+    let Bounds { left, top, width, height } = person.truth.bounds;
+    let middle = person.truth.bounds.centre();
+    if person.silhouette.shows(middle) {
+        return Some(middle);
+    }
+    let places = (0..height.ceil() as u32).flat_map(|row| {
+        (0..width.ceil() as u32)
+            .map(move |column| (left + f64::from(column) + 0.5, top + f64::from(row) + 0.5))
+    });
+    let seen: Vec<_> = places.filter(|place| person.silhouette.shows(*place)).collect();
+    let sum = seen.iter().fold((0.0, 0.0), |sum, place| (sum.0 + place.0, sum.1 + place.1));
+    let middle = (sum.0 / seen.len() as f64, sum.1 / seen.len() as f64);
+    let away = |place: &(f64, f64)| (place.0 - middle.0).hypot(place.1 - middle.1);
+    seen.into_iter().min_by(|a, b| away(a).total_cmp(&away(b)))
 }
 
 /// A tracker's part in one pipeline.
@@ -219,4 +254,41 @@ fn attach_targets(
         }
         gst::PadProbeReturn::Ok
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pole, or somebody nearer, stands before the middle of them.
+    #[test]
+    fn a_click_is_where_the_person_is_seen() {
+        let bounds = Bounds { left: 100.0, top: 20.0, width: 30.0, height: 10.0 };
+        let truth = GroundTruth {
+            id: 3,
+            bounds,
+            centroid: bounds.centre(),
+            visible: 0.6,
+            unhidden: 0.6,
+            in_view: 1.0,
+            position_m: None,
+            direction_deg: None,
+        };
+        let mut person = Sighting::of_box(truth.clone(), (200, 100));
+        person.silhouette = serde_json::from_value(serde_json::json!({
+            "origin": [100.0, 20.0], "pixel": [10.0, 10.0],
+            "whole": { "width": 3, "height": 1, "lengths": [0, 3] },
+            "visible": { "width": 3, "height": 1, "lengths": [0, 1, 1, 1] },
+        }))
+        .expect("a silhouette");
+        let cue = |phase| Cue { phase, truth: Some(truth.clone()), ..Cue::new((200, 100)) };
+        let clicked =
+            |cue: Cue| cue.click().map(|place| ((200.0 * place.x).round(), (100.0 * place.y).round()));
+        assert_eq!(clicked(cue(Phase::FirstBox)), Some((115.0, 25.0)), "only the box is known");
+        let clicks = [Phase::Before, Phase::FirstBox, Phase::After]
+            .map(|phase| clicked(cue(phase).with_a_click_among(std::slice::from_ref(&person))));
+        let [None, Some((x, y)), None] = clicks else { panic!("{clicks:?}") };
+        assert!(!(111.0..120.0).contains(&x) && (24.0..=26.0).contains(&y), "{x}, {y}");
+        assert!((x - 115.0).abs() < 6.0, "{x}: as near to the middle as they are seen");
+    }
 }

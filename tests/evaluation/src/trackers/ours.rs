@@ -2,13 +2,14 @@
 
 //! Detector and feature point tracker, with their defaults or as the thesis has them.
 //!
-//! Until the first box the tracker is told to wait for an operator, while the detector learns the background. Of that box it is
-//! told the middle alone, as by a click: what is there the detector has to have seen. From the next picture on the tracker
-//! chooses for itself, so that it can find the person again after a loss.
+//! Until the first box the tracker is told to wait for an operator, while the detector learns the background. In place of that box it is
+//! told a place where the person is seen, by a click: where somebody stands before them the click would mean that one. What is there the
+//! detector has to have seen. From the next picture on the tracker chooses for itself, so that it can find the person again after a
+//! loss.
 
 use gst::prelude::*;
 
-use super::{Cue, Phase, normalised};
+use super::{Cue, Phase};
 use crate::{
     pipeline::{Elements, PipelineError},
     record::FirstBox,
@@ -36,10 +37,9 @@ pub(super) fn next(pipeline: &gst::Pipeline, first_box: FirstBox, cue: &Cue) -> 
         return Ok(());
     }
     let tracker = pipeline.element("tracker")?;
-    match (cue.phase, cue.given()) {
-        (Phase::FirstBox, Some(bounds)) => {
-            let middle = normalised(bounds, cue.size).centre();
-            tracker.emit_by_name::<()>("select-target", &[&middle.x, &middle.y]);
+    match (cue.phase, cue.click()) {
+        (Phase::FirstBox, Some(place)) => {
+            tracker.emit_by_name::<()>("select-target", &[&place.x, &place.y]);
         }
         (Phase::After, _) => tracker.set_property_from_str("selection", CHOICE),
         (Phase::Before | Phase::FirstBox, _) => {}
