@@ -593,6 +593,31 @@ fn who_has_gone_less_far_than_they_are_tall_is_not_given_up_for_who_walks_past()
     stands_while_somebody_walks_past(11);
 }
 
+/// Somebody nearer overtakes the target, and is one region with it.
+#[test]
+fn the_points_of_who_overtakes_do_not_draw_the_target_along() {
+    let mut chain = watching(Config { choice: Choice::Manual, ..config() });
+    for n in 0..24 {
+        let target = Rect2f::new(100.0 + 3.0 * n as f32, 100.0, 36.0, 90.0);
+        let other = Rect2f::new(7.0 * n as f32, 96.0, 60.0, 120.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(target, 7);
+        picture.paint(other, 99);
+        let seen =
+            if n < 9 { vec![detection(target), detection(other)] } else { vec![detection(target | other)] };
+        if n == 5 {
+            chain.tracker.request(TargetRequest::Select(detection(target).bounds.centre()));
+        }
+        let last = chain.process(&picture, DT, &seen);
+        let expected = 3.0 / DT / f64::from(picture.luma().width() as u32);
+        assert!(
+            n < 5 || (last.velocity.x - expected).abs() < 0.1 * expected,
+            "picture {n}: {:?}",
+            last.velocity
+        );
+    }
+}
+
 /// Two come in as one, side by side, and an operator clicks on the left one's middle; then the other walks ahead.
 #[test]
 fn who_was_clicked_of_two_who_came_in_as_one_is_followed_when_they_part() {

@@ -57,7 +57,8 @@ const MAX_SHARE: f32 = 0.9;
 const MOST: usize = 128;
 /// Part of the box that must be in the picture.
 const LEFT: f32 = 0.35;
-/// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second.
+/// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second since they were
+/// seen alone.
 const REACH: (f32, f32) = (0.5, 2.3);
 /// Intersection over union with somebody else from which it is they who are seen.
 const TAKEN: f32 = 0.4;
@@ -243,16 +244,16 @@ impl Tracks {
         }
     }
 
-    /// Where the target is not seen, and somebody new is near where it should be, going about where that is asked for, and looks like it,
-    /// it is they: however they sat, stooped or turned before. Who was seen beside it is somebody else.
+    /// Where the target is not seen, and somebody who has come since it was last seen alone is near where it should be, going about where
+    /// that is asked for, and looks like it, it is they: however they sat, stooped or turned before. Who was seen beside it is somebody else.
     pub fn find_again(&mut self, id: u64, must_travel: bool) {
         let Some(lost) = self.tracks.iter().position(|track| track.id == id && track.region().is_none())
         else {
             return;
         };
         let track = &self.tracks[lost];
-        let (bounds, unseen_s) = (track.bounds(), track.journey.unseen_s);
-        let reach = (REACH.0 + REACH.1 * unseen_s as f32) * bounds.height;
+        let (bounds, not_alone_s) = (track.bounds(), track.journey.not_alone_s);
+        let reach = (REACH.0 + REACH.1 * not_alone_s as f32) * bounds.height;
         let found = self.tracks.iter().position(|other| {
             let alike = || {
                 let region = self.region(other)?;
@@ -261,7 +262,7 @@ impl Tracks {
             other.is_alone()
                 && other.is_confirmed()
                 && !other.is_another()
-                && other.journey.age_s <= unseen_s
+                && other.journey.age_s <= not_alone_s
                 && other.height() >= REAPPEARED * bounds.height
                 && length(centre(other.bounds()) - centre(bounds)) <= reach
                 && (!must_travel || other.travels())

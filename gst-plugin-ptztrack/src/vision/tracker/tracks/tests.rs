@@ -101,14 +101,15 @@ fn somebody_small_is_not_lost_among_many_who_are_larger() {
     }
 }
 
-/// The numbers of those who are there after number 1, in dark clothes, was not seen for half a second, in which somebody came whose clothes
-/// are white by that share.
-fn numbers_after(white: f32) -> Vec<u64> {
+/// The numbers of those who are there after number 1, in dark clothes, was not seen alone for half a second, and not at all for `unseen_s`;
+/// in that half second somebody came whose clothes are white by that share.
+fn numbers_after(white: f32, unseen_s: f64) -> Vec<u64> {
     let mut tracks = Tracks::default();
     for regions in [[person(100.0)], [person(200.0)]] {
         (0..5).for_each(|_| seen_in(&mut tracks, &regions, STILL, DT));
     }
     tracks.tracks[0].views.learn(&Looks::of_greys(&[(40, 1.0)]), 0.0);
+    tracks.tracks[0].journey.unseen_s = unseen_s;
     tracks.regions[0].looks = Looks::of_greys(&[(40, 1.0 - white), (200, white)]);
     tracks.find_again(1, false);
     numbers(&tracks)
@@ -116,8 +117,14 @@ fn numbers_after(white: f32) -> Vec<u64> {
 
 #[test]
 fn somebody_new_is_who_is_not_seen_only_where_they_look_more_like_it_than_anybody() {
-    assert_eq!(numbers_after(0.1), [1]);
-    assert_eq!(numbers_after(0.45), [1, 2]);
+    assert_eq!(numbers_after(0.1, 0.5), [1]);
+    assert_eq!(numbers_after(0.45, 0.5), [1, 2]);
+}
+
+/// Whoever walks past carries its box along for a while.
+#[test]
+fn who_comes_out_while_it_is_seen_in_one_region_with_another_is_found_once_that_one_has_gone() {
+    assert_eq!(numbers_after(0.1, DT), [1]);
 }
 
 /// As whoever was found again behind somebody is: only one of the two knows of it.

@@ -66,6 +66,8 @@ pub(in super::super) struct Journey {
     pub age_s: f64,
     /// Since it was last seen, alone or not.
     pub unseen_s: f64,
+    /// Since it was last seen alone.
+    pub not_alone_s: f64,
     /// How long it was seen alone, and in one region with others.
     pub alone_s: f64,
     pub shared_s: f64,
@@ -127,6 +129,7 @@ impl Track {
             journey: Journey {
                 age_s: 0.0,
                 unseen_s: 0.0,
+                not_alone_s: 0.0,
                 alone_s: 0.0,
                 shared_s: 0.0,
                 pictures: 1,
@@ -241,6 +244,7 @@ impl Track {
         self.evidence = Evidence::Missed;
         self.journey.age_s += dt_s;
         self.journey.unseen_s += dt_s;
+        self.journey.not_alone_s += dt_s;
     }
 
     /// Takes the sides of a region that are its own: left, top, right, bottom.
@@ -258,6 +262,7 @@ impl Track {
     pub fn see_alone(&mut self, number: usize, bounds: Rect2f, dt_s: f64) {
         self.see(Evidence::Alone(number));
         self.journey.alone_s += dt_s;
+        self.journey.not_alone_s = 0.0;
         self.journey.pictures += 1;
         // Of whose way nothing is known it is not known how far it went either.
         if !self.journey.way.is_empty() {
