@@ -609,10 +609,33 @@ fn the_points_of_who_overtakes_do_not_draw_the_target_along() {
             chain.tracker.request(TargetRequest::Select(detection(target).bounds.centre()));
         }
         let last = chain.process(&picture, DT, &seen);
-        let expected = 3.0 / DT / f64::from(picture.luma().width() as u32);
+        let expected = 3.0 / DT / picture.luma().width() as f64;
         assert!(
             n < 5 || (last.velocity.x - expected).abs() < 0.1 * expected,
             "picture {n}: {:?}",
+            last.velocity
+        );
+    }
+}
+
+/// A detector looks at every eighth picture, and somebody walks faster in between.
+#[test]
+fn between_two_looks_of_a_detector_the_points_say_how_the_target_moves() {
+    let mut chain = watching(Config { detector_pause_s: 1.0, ..config() });
+    let mut x = 60.0;
+    for n in 0..40 {
+        let step = if n < 33 { 3.0 } else { 6.0 };
+        x += step;
+        let person = Rect2f::new(x, 100.0, 36.0, 90.0);
+        let mut picture = street((0.0, 0.0), &[]);
+        picture.paint(person, 7);
+        let seen = if n % 8 == 0 { vec![detection(person)] } else { Vec::new() };
+        let last = chain.process(&picture, DT, &seen);
+        let expected = f64::from(step) / DT / picture.luma().width() as f64;
+        let is_off = (last.velocity.x - expected).abs() > 0.2 * expected;
+        assert!(
+            !(25..33).contains(&n) && n < 36 || !is_off,
+            "picture {n}: {:?}, not {expected}",
             last.velocity
         );
     }

@@ -60,11 +60,11 @@ impl Robust {
         let bounds = self.estimate.bounds;
         let map = self.appearance.map();
         let motion = self.flow.follow(&seen.luma, bounds, (ego, expected), map, dt_s)?;
-        // What the points of a target do that is not seen by itself is what hides it does, or who is seen with it, or the wall; and what
-        // they do against a background that is but taken to have moved may be its own.
+        // What the points do of a target that was not seen is what hides it does, or the wall, and of one that is not seen by itself, who
+        // is seen with it; and what they do against a background that is but taken to have moved may be its own.
         let has_coasted = seen.scene.is_some_and(|scene| scene.coasted_motion.is_some());
         let Some(motion) = motion.filter(|_| self.unseen_s == 0.0 && !has_coasted) else { return Ok(()) };
-        if let Some(track) = tracks.get_mut(id).filter(|track| track.is_alone()) {
+        if let Some(track) = tracks.seen_by_itself(id) {
             let deviation = motion.deviation / (motion.trust * motion.trust).max(0.01);
             track.measure_velocity(motion.own / dt_s, deviation / dt_s);
         }

@@ -38,7 +38,8 @@ pub(super) struct Axis {
     pub rate: f32,
     pub size: f32,
     covariance: [[f32; 3]; 3],
-    /// How far both sides were seen from where they were expected in this picture, in their deviations; 0 where not both were.
+    /// How far both sides were seen from where they were expected in this picture, in deviations of their measurement; 0 where not both
+    /// were, or in opposite directions.
     innovation: f32,
 }
 

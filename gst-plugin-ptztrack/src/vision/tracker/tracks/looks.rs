@@ -5,7 +5,7 @@
 use opencv::core::{Point2f, Rect2f};
 
 use crate::vision::tracker::colour::Histogram;
-use crate::vision::tracker::outline::{crossings, is_inside};
+use crate::vision::tracker::outline::crossings;
 use crate::vision::tracker::sample::Sampler;
 use crate::vision::travelling::UNKNOWN;
 use crate::vision::{Luma, Observation};
@@ -42,8 +42,6 @@ impl Looks {
 pub(super) struct Viewer {
     sampler: Sampler,
     planes: [Vec<u8>; 4],
-    /// Where an outline crosses a row.
-    row: Vec<f32>,
 }
 
 impl Viewer {
@@ -51,7 +49,7 @@ impl Viewer {
     /// nobody told the foreground.
     pub fn look(&mut self, seen: &Observation, bounds: Rect2f, outline: &[Point2f]) -> Looks {
         let Some(scene) = seen.scene else { return Looks::default() };
-        let Self { sampler, planes: [foreground, luma, u, v], row } = self;
+        let Self { sampler, planes: [foreground, luma, u, v] } = self;
         let mut sample = |plane: &Luma, out: &mut Vec<u8>| {
             sampler.sample(plane, in_plane(plane, seen, bounds), GRID, out);
         };
@@ -61,8 +59,8 @@ impl Viewer {
             sample(&u_plane, u);
             sample(&v_plane, v);
         });
-        if !outline.is_empty() {
-            mask(foreground, bounds, outline, row);
+        if outline.len() >= 3 {
+            mask(foreground, bounds, outline);
         }
         let half = GRID.0 * GRID.1 / 2;
         Looks([0..half, half..2 * half].map(|samples| {
@@ -88,14 +86,18 @@ impl Viewer {
 }
 
 /// Leaves nothing of the samples of `bounds` that lie outside of an outline: they are somebody else's.
-fn mask(samples: &mut [u8], bounds: Rect2f, outline: &[Point2f], row: &mut Vec<f32>) {
+fn mask(samples: &mut [u8], bounds: Rect2f, outline: &[Point2f]) {
     let (across, down) = (bounds.width / GRID.0 as f32, bounds.height / GRID.1 as f32);
-    for (number, samples) in samples.chunks_exact_mut(GRID.0).enumerate() {
-        row.clear();
-        row.extend(crossings(outline, bounds.y + (number as f32 + 0.5) * down));
-        for (column, sample) in samples.iter_mut().enumerate() {
-            let x = bounds.x + (column as f32 + 0.5) * across;
-            *sample = if is_inside(row.iter().copied(), x) { *sample } else { 0 };
+    for (row, samples) in samples.chunks_exact_mut(GRID.0).enumerate() {
+        // Whether an odd number of crossings lies before the middle of a sample, and after that of the one before.
+        let mut turns = [false; GRID.0 + 1];
+        for crossing in crossings(outline, bounds.y + (row as f32 + 0.5) * down) {
+            turns[((crossing - bounds.x) / across + 0.5).clamp(0.0, GRID.0 as f32) as usize] ^= true;
+        }
+        let mut is_inside = false;
+        for (sample, turns) in samples.iter_mut().zip(turns) {
+            is_inside ^= turns;
+            *sample = if is_inside { *sample } else { 0 };
         }
     }
 }
@@ -185,7 +187,7 @@ mod tests {
         let left_half = [(10.0, 20.0), (16.0, 20.0), (16.0, 68.0), (10.0, 68.0)];
         let outline = left_half.map(|(x, y)| Point2f::new(x, y));
         let mut samples = vec![255; GRID.0 * GRID.1];
-        mask(&mut samples, Rect2f::new(10.0, 20.0, 12.0, 48.0), &outline, &mut Vec::new());
+        mask(&mut samples, Rect2f::new(10.0, 20.0, 12.0, 48.0), &outline);
         for row in samples.chunks_exact(GRID.0) {
             assert_eq!(*row, [255, 255, 255, 255, 255, 255, 0, 0, 0, 0, 0, 0]);
         }

@@ -39,7 +39,7 @@ use groups::Partings;
 use looks::Viewer;
 use memory::Memory;
 use places::RestlessPlaces;
-use track::Evidence;
+use track::{Evidence, Journey};
 
 pub(super) use heads::{body_at, people};
 pub(super) use region::Region;
@@ -57,8 +57,7 @@ const MAX_SHARE: f32 = 0.9;
 const MOST: usize = 128;
 /// Part of the box that must be in the picture.
 const LEFT: f32 = 0.35;
-/// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second since they were
-/// seen alone.
+/// How far, in heights, somebody who is not seen may be from where they should be: at once, and farther with every second.
 const REACH: (f32, f32) = (0.5, 2.3);
 /// Intersection over union with somebody else from which it is they who are seen.
 const TAKEN: f32 = 0.4;
@@ -100,6 +99,7 @@ pub(super) struct Tracks {
     last_id: u64,
     /// As the rules were last.
     coast_s: f64,
+    detector_pause_s: f64,
 }
 
 impl Tracks {
@@ -126,7 +126,7 @@ impl Tracks {
     ) {
         let frame = Frame { width: seen.luma.width() as f32, height: seen.luma.height() as f32 };
         self.events.clear();
-        self.coast_s = rules.coast_s;
+        (self.coast_s, self.detector_pause_s) = (rules.coast_s, rules.detector_pause_s);
         self.tracks.retain(|track| !track.is_gone());
         self.tracks.iter_mut().for_each(|track| track.predict(ego, dt_s));
         self.places.carry(ego, dt_s);
@@ -160,6 +160,16 @@ impl Tracks {
 
     pub fn get_mut(&mut self, id: u64) -> Option<&mut Track> {
         self.tracks.iter_mut().find(|track| track.id == id && track.is_confirmed() && !track.is_gone())
+    }
+
+    /// Who has that number, where nobody else is seen with them: they have a region of their own, or had one when the detector last looked,
+    /// or were never seen by it, but by an operator.
+    pub fn seen_by_itself(&mut self, id: u64) -> Option<&mut Track> {
+        let pause_s = self.detector_pause_s;
+        self.get_mut(id).filter(|track| {
+            let Journey { alone_s, not_alone_s, .. } = track.journey;
+            !track.is_shared() && (not_alone_s <= pause_s || alone_s == 0.0)
+        })
     }
 
     /// What happened in the last picture.
@@ -252,8 +262,9 @@ impl Tracks {
             return;
         };
         let track = &self.tracks[lost];
-        let (bounds, not_alone_s) = (track.bounds(), track.journey.not_alone_s);
-        let reach = (REACH.0 + REACH.1 * not_alone_s as f32) * bounds.height;
+        let Journey { unseen_s, not_alone_s, .. } = track.journey;
+        let bounds = track.bounds();
+        let reach = (REACH.0 + REACH.1 * unseen_s as f32) * bounds.height;
         let found = self.tracks.iter().position(|other| {
             let alike = || {
                 let region = self.region(other)?;

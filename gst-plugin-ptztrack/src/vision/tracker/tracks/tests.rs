@@ -105,7 +105,7 @@ fn somebody_small_is_not_lost_among_many_who_are_larger() {
 /// in that half second somebody came whose clothes are white by that share.
 fn numbers_after(white: f32, unseen_s: f64) -> Vec<u64> {
     let mut tracks = Tracks::default();
-    for regions in [[person(100.0)], [person(200.0)]] {
+    for regions in [[person(100.0)], [person(164.0)]] {
         (0..5).for_each(|_| seen_in(&mut tracks, &regions, STILL, DT));
     }
     tracks.tracks[0].views.learn(&Looks::of_greys(&[(40, 1.0)]), 0.0);
