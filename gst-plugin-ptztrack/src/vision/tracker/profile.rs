@@ -32,25 +32,26 @@ impl Profile {
     }
 
     /// Adds the regions of a detection. The thesis takes it as it is, with its contour, in which it finds corners; else it is as many as
-    /// there are heads. `memory` is for their boxes.
+    /// there are heads. `memory` is for their boxes, and `outlines` are empty ones to be used again.
     pub(super) fn read(
         self,
         detection: &Detection,
         frame: Frame,
-        memory: &mut Vec<Rect2f>,
+        (memory, outlines): (&mut Vec<Rect2f>, &mut Vec<Vec<Point2f>>),
         regions: &mut Vec<Region>,
     ) {
         let bounds = frame.rect_to_pixels(detection.bounds);
         let contour = detection.contour.iter().map(|point| frame.point_to_pixels(*point));
+        memory.clear();
         match self {
-            Self::Thesis => regions.push(Region::new(bounds, contour.collect(), detection.outside)),
-            Self::Robust => {
-                people(bounds, contour.clone(), memory);
-                let outline: Vec<_> = contour.collect();
-                let of_one = |bounds: &Rect2f| Region::new(*bounds, outline.clone(), detection.outside);
-                regions.extend(memory.iter().map(of_one));
-            }
+            Self::Thesis => memory.push(bounds),
+            Self::Robust => people(bounds, contour.clone(), memory),
         }
+        regions.extend(memory.iter().map(|bounds| {
+            let mut outline = outlines.pop().unwrap_or_default();
+            outline.extend(contour.clone());
+            Region::new(*bounds, outline, detection.outside)
+        }));
     }
 
     /// The box of whom a click at `point` means in a region, which the thesis takes as it is.

@@ -4,7 +4,7 @@
 
 use std::sync::Arc;
 
-use opencv::core::Rect2f;
+use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::{Feature, ReleaseReason, TargetChange, TargetState};
 
 use super::config::{Config, TargetRequest};
@@ -80,6 +80,7 @@ struct Memory {
     reported: Vec<ptztrack_contract::Track>,
     regions: Vec<Region>,
     people: Vec<Rect2f>,
+    outlines: Vec<Vec<Point2f>>,
 }
 
 impl Tracker {
@@ -206,10 +207,11 @@ impl Tracker {
 
     /// Keeps account of everybody, whether a target is followed or not.
     fn watch(&mut self, seen: &Observation, detections: &[Detection], frame: Frame, dt_s: f64) {
-        let Memory { regions, people, .. } = &mut self.memory;
+        let Memory { regions, people, outlines, .. } = &mut self.memory;
         regions.clear();
+        self.tracks.give_back(outlines);
         for detection in detections {
-            self.config.profile.read(detection, frame, people, regions);
+            self.config.profile.read(detection, frame, (people, outlines), regions);
         }
         let Config { confirm_frames, coast_s, memory_s, detector_pause_s, .. } = self.config;
         let coast_s = coast_s.max(DECAY_S);

@@ -30,7 +30,7 @@ mod track;
 
 use std::cmp::Reverse;
 
-use opencv::core::Rect2f;
+use opencv::core::{Point2f, Rect2f};
 use ptztrack_contract::TrackChange;
 
 use association::Association;
@@ -112,6 +112,14 @@ impl Tracks {
         self.partings.clear();
         self.memory.clear();
         self.events.clear();
+    }
+
+    /// Gives the outlines of the last picture back, as memory for those of the next.
+    pub fn give_back(&mut self, outlines: &mut Vec<Vec<Point2f>>) {
+        outlines.extend(self.regions.drain(..).map(|mut region| {
+            region.contour.clear();
+            region.contour
+        }));
     }
 
     /// Takes what a detector saw in one picture, `dt_s` after the last; `ego` is how the background moved since, where that is

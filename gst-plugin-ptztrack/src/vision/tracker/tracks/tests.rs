@@ -3,7 +3,7 @@
 use super::looks::Looks;
 use super::*;
 use crate::vision::Luma;
-use opencv::core::Point2f;
+
 use proptest::prelude::*;
 
 const DT: f64 = 0.1;
