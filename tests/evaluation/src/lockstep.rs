@@ -130,7 +130,7 @@ impl<'a> Stage<'a> {
         let pose = self.camera.pose_at(exposure);
         let motion =
             self.looked.replace(pose).map(|before| self.camera.background_motion(&before, &pose, size));
-        let cue = Cue { phase, truth: witnessed.truth.clone(), seen_at: None, motion, size };
+        let cue = Cue { phase, truth: witnessed.truth.clone(), motion, ..Cue::new(size) };
         self.tracker.next(self.pipeline.bin(), cue.with_a_click_among(&people))?;
         let picture = self.camera.picture(exposure, size)?;
         let target = self.pipeline.finish(self.buffer(&picture, arrival)?)?;

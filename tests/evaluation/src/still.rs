@@ -117,10 +117,7 @@ impl<'a> Screening<'a> {
         if phase == Phase::FirstBox {
             self.first = Some(number);
         }
-        self.tracker.next(
-            self.pipeline.bin(),
-            Cue { phase, truth: truth.clone(), seen_at: None, motion: None, size },
-        )?;
+        self.tracker.next(self.pipeline.bin(), Cue { phase, truth: truth.clone(), ..Cue::new(size) })?;
         let buffer = stamped(sample, number as f64 / self.frame_rate)?;
         let picture = Picture::from_buffer(&buffer, &self.info).ok_or(RunError::Size(size.0, size.1))?;
         let target = self.pipeline.finish(buffer)?;

@@ -91,7 +91,7 @@ impl<'a> Screening<'a> {
         let (first, size) = (self.scene.first, self.experiment.size);
         let phase = Phase::of(index >= first, index > first);
         let truth = picture.truth.truth.clone();
-        let cue = Cue { phase, truth, seen_at: None, motion: picture.motion, size };
+        let cue = Cue { phase, truth, motion: picture.motion, ..Cue::new(size) };
         self.tracker.next(self.pipeline.bin(), cue.with_a_click_among(&picture.people))?;
         self.replacement.next(picture);
         let mut buffer = gst::Buffer::from_slice(picture.encoded.clone());

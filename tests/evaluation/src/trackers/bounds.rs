@@ -128,7 +128,7 @@ mod tests {
             position_m: None,
             direction_deg: None,
         };
-        Cue { phase, truth: Some(truth), seen_at: None, motion: None, size: (200, 100) }
+        Cue { phase, truth: Some(truth), ..Cue::new((200, 100)) }
     }
 
     /// The background goes 2 pixels to the left.
