@@ -5,7 +5,6 @@
 use std::net::Ipv4Addr;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::Duration;
 
 use virtual_camera::VirtualCamera;
 
@@ -108,18 +107,13 @@ impl Following {
         let wanted = |status: &virtual_camera::Status| status.viewers > 0 && status.moving;
         let back = self.camera.wait_for(PATIENCE, wanted)
             && self.camera.wait_for(PATIENCE, |status| status.commands > before);
-        assert!(back, "{}", self.said());
+        assert!(back, "{}", self.launch.said());
     }
 
     /// The camera sends no picture to anybody.
     #[track_caller]
     pub fn is_lost(&self) {
         assert!(self.camera.wait_for(PATIENCE, |status| status.viewers == 0), "the picture stayed");
-    }
-
-    fn said(&mut self) -> String {
-        self.launch.read_for(Duration::ZERO);
-        self.launch.seen().join("\n")
     }
 
     /// After this, another gets video and follows. How many watch tells nothing of that: the next may be there before the

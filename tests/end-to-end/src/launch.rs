@@ -150,6 +150,12 @@ impl GstLaunch {
         &self.seen
     }
 
+    /// All that it has said so far, whether waited for or not.
+    pub fn said(&mut self) -> String {
+        self.read_for(Duration::ZERO);
+        self.seen.join("\n")
+    }
+
     /// Reads lines for `duration` of real time: for tests that something does *not* come.
     pub fn read_for(&mut self, duration: Duration) {
         let deadline = Instant::now() + duration;

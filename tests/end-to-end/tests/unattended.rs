@@ -328,7 +328,7 @@ fn the_page_shows_every_camera_and_steers_it() {
             + &Program::entry("hall", &hall.url(), &password)
             + &Program::entry("away", "http://127.0.0.1:1", &password)
     };
-    let program = Program::start("page", file, &[]);
+    let mut program = Program::start("page", file, &[]);
     browser.open(&program.url());
     let of = |name: &str| format!("document.querySelector('[data-name={name}]')");
     for name in ["door", "hall"] {
@@ -361,11 +361,14 @@ fn the_page_shows_every_camera_and_steers_it() {
     click(&mut browser, "take-back");
     follows(&door);
 
+    let sent = door.status().commands;
     click(&mut browser, "home");
     // Higher than anybody is, yet whoever walks by is in view from head to foot.
     let off =
         |status: &virtual_camera::Status| (status.pan_deg - 10.0).abs().max((status.tilt_deg - 4.0).abs());
-    assert!(door.wait_for(PATIENCE, |status| off(status) < 0.5), "{:?}", door.status());
+    let is_home = door.wait_for(PATIENCE, |status| off(status) < 0.5);
+    let next: Vec<_> = door.commands_after(sent).into_iter().take(20).collect();
+    assert!(is_home, "{:?}\n{next:#?}\n{}", door.status(), program.launch.said());
     assert!(door.wait_for(PATIENCE, |status| off(status) > 3.0), "it does not follow again");
 
     // A click at somebody who stands still makes him the target; a button lets him go.
