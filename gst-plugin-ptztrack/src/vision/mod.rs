@@ -11,6 +11,7 @@
 //! | paper | what is taken from it | where |
 //! |---|---|---|
 //! | Yi et al., "Detection of moving objects with non-stationary cameras in 5.8 ms", CVPRW 2013 | a background with an age that travels with the camera | `travelling` |
+//! | Benhimane and Malis, "Real-time image-based tracking of planes using efficient second-order minimization", IROS 2004 | a picture is laid on the background to parts of a pixel | `travelling/alignment` |
 //! | Bewley et al., "Simple online and realtime tracking" (SORT), ICIP 2016 | Kalman filter and Hungarian assignment | `tracker/tracks/track`, `association` |
 //! | Aharon et al., "BoT-SORT", 2022 | prediction by the camera's motion | `tracker/tracks/track` |
 //! | McKenna et al., "Tracking groups of people", CVIU 2000 | who merge keep their tracks; colours tell who is who after | `tracker/tracks/groups` |
@@ -57,6 +58,7 @@ mod observation;
 mod persistence;
 mod picture;
 mod presence;
+mod projective;
 mod reduce;
 mod reflections;
 mod scene;

@@ -6,11 +6,12 @@ use opencv::core::Point2f;
 use ptztrack_contract::{CameraMotion, Homography, Point};
 
 use super::corners::{self, Corner, Grid};
-use super::fit::{self, Agreement, Centred, Fit, Pair};
+use super::fit::{self, Agreement, Fit, Pair};
 use super::flow;
 use super::opening::Opening;
 use crate::vision::Luma;
 use crate::vision::lucas_kanade::{Pyramid, Template};
+use crate::vision::projective::Centred;
 
 /// Farther than this many pixels from the key picture, anywhere in the picture, the next picture becomes the
 /// key picture: blur and perspective change what points look like.

@@ -3,11 +3,14 @@
 //! The background travels with the camera (Yi et al., Detection of Moving Objects with Non-stationary Cameras
 //! in 5.8 ms, CVPR Workshops 2013): mean and spread (thesis 3.1, 3.2) of every pixel on a canvas somewhat larger
 //! than the picture, and a map that says where on it the picture lies. The picture is laid on the canvas, not
-//! the canvas on the picture, so that what is known is not blurred by being resampled in every picture.
+//! the canvas on the picture, so that what is known is not resampled in every picture; where the canvas has to be laid anew, that is
+//! done so that it stays sharp.
 
+mod alignment;
 mod another_view;
 mod burned_in;
 mod gain;
+mod lanczos;
 mod median;
 mod model;
 mod noise;
@@ -22,6 +25,7 @@ use std::time::Duration;
 use opencv::core::{Point as Pixel, Vector};
 use ptztrack_contract::{Homography, Point, Rect};
 
+use self::alignment::Alignment;
 use self::burned_in::BurnedIn;
 use self::median::Median;
 pub use self::model::UNKNOWN;
@@ -39,7 +43,7 @@ use super::picture::Reduced;
 /// Pixels of the canvas around the picture: what leaves the picture for a moment is still known on return.
 const MARGIN: usize = 32;
 /// When the map bends the picture by more than this many pixels beyond a displacement, the canvas is laid anew.
-const MAX_BEND: f64 = 5.0;
+const MAX_BEND: f64 = 10.0;
 /// A camera that rests as long as this is looked at without resampling.
 const REST: Duration = Duration::from_millis(300);
 /// Displacement of a picture, in pixels, below which the camera rests.
@@ -76,6 +80,7 @@ pub struct TravellingBackground {
     model: Model,
     noise: Noise,
     pooled: Pooled,
+    alignment: Alignment,
     registration: Registration,
     burned_in: BurnedIn,
     /// From the canvas to the last picture, pixels.
@@ -136,10 +141,14 @@ impl TravellingBackground {
         }
         let travel = motion.map_or(0.0, |motion| self.move_by(motion, elapsed));
         let rests = motion.is_none() || self.rested > REST;
-        self.stay_on_canvas();
+        self.stay_on_canvas()?;
         let how = comparison(rests, elapsed);
-        self.lay(picture);
+        self.lay_luma(picture);
         self.heed_light();
+        if travel >= RESTS {
+            self.align(picture);
+        }
+        self.lay_chroma(picture);
         self.compare(how);
         let stale = self.changed() > NEW_PICTURE || way != Way::Known && self.shows_another_view();
         if stale {
@@ -154,7 +163,7 @@ impl TravellingBackground {
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
-        let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
+        let held = self.held_on_canvas();
         // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned.
         if held.is_some() {
             self.pooled.mark(&mut self.model, held);
@@ -181,6 +190,15 @@ impl TravellingBackground {
         Ok(())
     }
 
+    /// Lays the luma of a picture, which is laid on the canvas already, where it fits what is known to parts of a pixel.
+    fn align(&mut self, picture: &Reduced) {
+        let held = self.held_on_canvas();
+        if let Some(step) = self.alignment.step(&self.model, &self.sampled, self.forth.spans(), held) {
+            self.to_picture = step.then(&self.to_picture);
+            self.lay_luma(picture);
+        }
+    }
+
     /// Lays the picture there on the canvas and holds it against what is known.
     fn lay_at(&mut self, to_picture: Homography, picture: &Reduced, how: Comparison) {
         self.to_picture = to_picture;
@@ -200,11 +218,16 @@ impl TravellingBackground {
     /// Makes the background within `contour` (normalised, in the last picture) as light as the last picture is there, but for what is
     /// protected.
     pub fn relight(&mut self, contour: &[Point]) -> opencv::Result<()> {
-        let held = self.held.map(|held| canvas_box(held, self.size, &self.to_picture));
+        let held = self.held_on_canvas();
         match self.on_canvas(contour) {
             Some(polygon) => self.model.relight_within(&polygon, &self.sampled, held),
             None => Ok(()),
         }
+    }
+
+    /// Where nothing is learned, pixels of the canvas.
+    fn held_on_canvas(&self) -> Option<Rect> {
+        self.held.map(|held| canvas_box(held, self.size, &self.to_picture))
     }
 
     /// A polygon of the last picture (normalised) in pixels of the canvas.
@@ -233,7 +256,7 @@ impl TravellingBackground {
     }
 
     /// Lays the canvas anew where the picture no longer fits it.
-    fn stay_on_canvas(&mut self) {
+    fn stay_on_canvas(&mut self) -> opencv::Result<()> {
         let margin = MARGIN as f64;
         let (shift, bend) = shift_and_bend(&self.to_picture, self.model.size);
         let off = (shift.0 + margin, shift.1 + margin);
@@ -241,26 +264,39 @@ impl TravellingBackground {
         let blurred = self.rested > REST && bend.max(between) > MAX_BLUR;
         if bend > MAX_BEND || blurred {
             let wanted = Homography::translation(-margin, -margin);
-            let Some(back) = self.to_picture.inverse() else { return self.start() };
-            self.lay_anew(&wanted.then(&back), wanted);
+            match self.to_picture.inverse() {
+                Some(back) => self.lay_anew(&wanted.then(&back), wanted)?,
+                None => self.start(),
+            }
         } else if off.0.abs().max(off.1.abs()) > margin - 2.0 {
             // By whole pixels: nothing is resampled.
             let to_old = Homography::translation(-off.0.round(), -off.1.round());
-            self.lay_anew(&to_old, to_old.then(&self.to_picture));
+            self.lay_anew(&to_old, to_old.then(&self.to_picture))?;
         }
+        Ok(())
     }
 
     /// Goes over to another canvas, whose pixels lie on the old one where `to_old` says.
-    fn lay_anew(&mut self, to_old: &Homography, to_picture: Homography) {
+    fn lay_anew(&mut self, to_old: &Homography, to_picture: Homography) -> opencv::Result<()> {
         self.anew.prepare(self.model.size, self.model.size, to_old);
-        self.model.carry(&self.anew);
+        self.model.carry(&self.anew)?;
         self.to_picture = to_picture;
+        Ok(())
     }
 
     /// Lays the picture on the canvas.
     fn lay(&mut self, picture: &Reduced) {
+        self.lay_luma(picture);
+        self.lay_chroma(picture);
+    }
+
+    fn lay_luma(&mut self, picture: &Reduced) {
         self.forth.prepare(self.model.size, self.size, &self.to_picture);
         self.forth.sample(picture.luma().bytes(), 0, &mut self.sampled.luma);
+    }
+
+    /// Where its luma lies.
+    fn lay_chroma(&mut self, picture: &Reduced) {
         self.sampled.chroma = picture.chroma().map(|planes| {
             let mut sampled = self.sampled.chroma.take().unwrap_or_default();
             for (plane, out) in planes.iter().zip(&mut sampled) {

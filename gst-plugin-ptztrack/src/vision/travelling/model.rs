@@ -10,6 +10,7 @@ use opencv::prelude::*;
 
 use ptztrack_contract::{Point, Rect};
 
+use super::lanczos::Lanczos;
 use super::noise::Noise;
 use super::rows::{self, MIN_PATIENCE};
 use super::warp::Warp;
@@ -91,6 +92,7 @@ pub(super) struct Model {
     /// A plane of each kind, kept as memory.
     wide: Vec<u16>,
     narrow: Vec<u8>,
+    lanczos: Lanczos,
 }
 
 impl Model {
@@ -112,6 +114,7 @@ impl Model {
             extremes: Default::default(),
             wide: Vec::new(),
             narrow: Vec::new(),
+            lanczos: Lanczos::default(),
         }
     }
 
@@ -127,12 +130,17 @@ impl Model {
     }
 
     /// Lays all planes anew as `warp` says; what was never seen has no age.
-    pub fn carry(&mut self, warp: &Warp) {
+    pub fn carry(&mut self, warp: &Warp) -> opencv::Result<()> {
         let mut wide = std::mem::take(&mut self.wide);
-        for plane in [&mut self.luma, &mut self.spread].into_iter().chain(&mut self.chroma) {
+        for plane in [&mut self.spread].into_iter().chain(&mut self.chroma) {
             warp.sample_wide(plane, 0, &mut wide);
             std::mem::swap(plane, &mut wide);
         }
+        warp.sample_wide(&self.luma, 0, &mut wide);
+        if !warp.is_copy() {
+            self.lanczos.sharpen(&mut wide, warp, (&self.luma, &self.age), self.size)?;
+        }
+        std::mem::swap(&mut self.luma, &mut wide);
         let mut narrow = std::mem::take(&mut self.narrow);
         for plane in [&mut self.waited].into_iter().chain(&mut self.candidate) {
             warp.sample_nearest(plane, 0, &mut narrow);
@@ -142,6 +150,7 @@ impl Model {
         warp.sample_least(&self.age, 0, &mut narrow);
         std::mem::swap(&mut self.age, &mut narrow);
         (self.wide, self.narrow) = (wide, narrow);
+        Ok(())
     }
 
     /// Makes everything lighter or darker by a factor. Colours fade with the light.

@@ -47,6 +47,7 @@ struct Run {
 pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
+    to_source: Homography,
     /// Of one row of blocks, kept as memory.
     shifts: Vec<Parts>,
     runs: Vec<Run>,
@@ -57,7 +58,7 @@ pub(super) struct Warp {
 impl Warp {
     /// Prepares a picture of `size` whose pixels lie in one of size `source` where `to_source` (of pixels) says.
     pub fn prepare(&mut self, size: (usize, usize), source: (usize, usize), to_source: &Homography) {
-        (self.size, self.source) = (size, source);
+        (self.size, self.source, self.to_source) = (size, source, *to_source);
         self.runs.clear();
         self.spans.clear();
         self.spans.resize(size.1, (0, 0));
@@ -75,6 +76,16 @@ impl Warp {
                 }
             }
         }
+    }
+
+    /// The map that it was prepared for.
+    pub fn to_source(&self) -> &Homography {
+        &self.to_source
+    }
+
+    /// Whether all moves by the same whole pixels, and nothing is mixed.
+    pub fn is_copy(&self) -> bool {
+        self.runs.iter().all(|run| run.shift == self.runs[0].shift && run.shift.is_whole())
     }
 
     /// For every row, from where to where the source covers it; outside, planes hold what they are filled with.

@@ -1,0 +1,271 @@
+// SPDX-License-Identifier: MPL-2.0
+
+//! By how little a picture of a turning camera lies beside what is known of the background. The camera's motion is measured from picture to
+//! picture, and its errors add up: where a tiled floor lies a pixel off, its edges differ by more than somebody does who is hardly seen.
+//! One step of Gauss and Newton over all pixels (Lucas and Kanade, IJCAI 1981; Baker and Matthews, IJCV 2004), with the mean gradient of
+//! both pictures (Benhimane and Malis, IROS 2004).
+
+use std::ops::Range;
+
+use multiversion::multiversion;
+use opencv::core::Point2f;
+use ptztrack_contract::{Homography, Rect};
+
+use super::model::{KNOWN, Model, Sampled, UNKNOWN};
+use crate::vision::projective::{Centred, Parameters, solve};
+
+/// Pixels of a side of a block, which is taken to lie off as a whole.
+const BLOCK: usize = 16;
+/// Pixels that are looked at together, and rows of which one is looked at.
+const LANES: usize = 8;
+const SAMPLING: usize = 2;
+/// Grey levels beyond which a difference counts for no more than that (Huber, 1964): it may be somebody.
+const REACH: f32 = 20.0;
+/// Deviation of what a pixel differs by, grey levels, and of where a picture lies, pixels, before it is looked at: before a plain wall it
+/// stays there.
+const NOISE: f64 = 3.0;
+const EXPECTED: f64 = 0.2;
+
+/// Sums of products of the gradient across and down, and of each with what pixels differ by.
+#[derive(Debug, Clone, Copy, Default)]
+struct Block {
+    across: f32,
+    both: f32,
+    down: f32,
+    across_off: f32,
+    down_off: f32,
+}
+
+/// Three rows of what is known and of the picture, from the one above on.
+#[derive(Debug, Clone, Copy)]
+struct Rows<'a> {
+    mean: [&'a [u16]; 3],
+    age: [&'a [u8]; 3],
+    seen: [&'a [u8]; 3],
+    /// Of foreground, in the middle row, as the picture before told.
+    likelihood: &'a [u8],
+}
+
+/// Finds it; keeps memory.
+#[derive(Debug, Default)]
+pub(super) struct Alignment {
+    blocks: Vec<Block>,
+}
+
+impl Alignment {
+    /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that. What lies in the box `held`, where
+    /// somebody is, and what was foreground in the picture before says nothing. `None` where that cannot be told.
+    pub fn step(
+        &mut self,
+        model: &Model,
+        picture: &Sampled,
+        spans: &[(usize, usize)],
+        held: Option<Rect>,
+    ) -> Option<Homography> {
+        self.gather(model, picture, spans, held);
+        let (width, height) = model.size;
+        let centred = Centred::of(width as f64, height as f64);
+        let blocks = self.blocks.iter().enumerate().map(|(index, block)| {
+            let place = |at: usize| (at * BLOCK) as f32 + (BLOCK as f32 - 1.0) / 2.0;
+            let across = width.div_ceil(BLOCK);
+            (centred.enter(Point2f::new(place(index % across), place(index / across))), block)
+        });
+        let (matrix, right) = normal_equations(blocks);
+        let [a, b, tx, ty, g, h] = solve(matrix, right)?.map(|pixels| pixels / centred.unit);
+        Some(centred.leave([1.0 + a, b, tx, ty, g, h]))
+    }
+
+    /// Sums up each block.
+    fn gather(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)], held: Option<Rect>) {
+        let (width, height) = model.size;
+        let across = width.div_ceil(BLOCK);
+        self.blocks.clear();
+        self.blocks.resize(across * height.div_ceil(BLOCK), Block::default());
+        for y in (1..height.saturating_sub(1)).step_by(SAMPLING) {
+            let around = [y - 1, y, y + 1];
+            let start = around.map(|y| spans[y].0).into_iter().max().unwrap_or(0) + 1;
+            let end = around.map(|y| spans[y].1).into_iter().min().unwrap_or(0).saturating_sub(1);
+            let rows = Rows {
+                mean: around.map(|y| &model.luma[y * width..][..width]),
+                age: around.map(|y| &model.age[y * width..][..width]),
+                seen: around.map(|y| &picture.luma[y * width..][..width]),
+                likelihood: &model.likelihood[y * width..][..width],
+            };
+            let blocks = &mut self.blocks[y / BLOCK * across..][..across];
+            for part in beside(held, y, start..end) {
+                add(blocks, rows, part);
+            }
+        }
+    }
+}
+
+/// The columns of a row to the left and to the right of a box.
+fn beside(held: Option<Rect>, y: usize, columns: Range<usize>) -> [Range<usize>; 2] {
+    let is_beside = |held: &Rect| (held.y..=held.y + held.height).contains(&(y as f64));
+    let Some(held) = held.filter(is_beside) else { return [columns, 0..0] };
+    // Casts saturate.
+    [
+        columns.start..columns.end.min(held.x as usize),
+        columns.start.max((held.x + held.width) as usize + 1)..columns.end,
+    ]
+}
+
+/// Adds what these columns of a row say to the blocks that they lie in: as many whole lanes as there are.
+#[multiversion(targets("x86_64+avx2"))]
+fn add(blocks: &mut [Block], rows: Rows, columns: Range<usize>) {
+    let first = columns.start.div_ceil(LANES);
+    for lane in first..(columns.end / LANES).max(first) {
+        add_lanes(&mut blocks[lane * LANES / BLOCK], rows, lane * LANES);
+    }
+}
+
+#[inline(always)]
+fn add_lanes(block: &mut Block, Rows { mean, age, seen, likelihood }: Rows, x: usize) {
+    let [above, here, below] = [0, 1, 2];
+    // Who was here has gone a little farther by now.
+    if likelihood[x - 1..=x + LANES].iter().fold(false, |any, likelihood| any | (*likelihood >= UNKNOWN)) {
+        return;
+    }
+    let mean = |row: usize, from: usize| -> [f32; LANES] {
+        let row = &mean[row][from..][..LANES];
+        std::array::from_fn(|i| f32::from(row[i]) * (1.0 / 256.0))
+    };
+    let seen = |row: usize, from: usize| -> [f32; LANES] {
+        let row = &seen[row][from..][..LANES];
+        std::array::from_fn(|i| f32::from(row[i]))
+    };
+    let known = |row: usize, from: usize| -> [bool; LANES] {
+        let row = &age[row][from..][..LANES];
+        std::array::from_fn(|i| row[i] >= KNOWN)
+    };
+    let known = [known(above, x), known(here, x - 1), known(here, x), known(here, x + 1), known(below, x)];
+    let (means, pictures) = ([mean(here, x - 1), mean(here, x + 1)], [seen(here, x - 1), seen(here, x + 1)]);
+    let (mean_down, seen_down) = ([mean(above, x), mean(below, x)], [seen(above, x), seen(below, x)]);
+    let (mean, seen) = (mean(here, x), seen(here, x));
+    let mut sums = [[0.0; LANES]; 5];
+    for i in 0..LANES {
+        let across = 0.25 * (means[1][i] - means[0][i] + pictures[1][i] - pictures[0][i]);
+        let down = 0.25 * (mean_down[1][i] - mean_down[0][i] + seen_down[1][i] - seen_down[0][i]);
+        let off = mean[i] - seen[i];
+        let is_known = known.iter().all(|known| known[i]);
+        let weight = if is_known { REACH / off.abs().max(REACH) } else { 0.0 };
+        let [x, y] = [weight * across, weight * down];
+        let products = [x * across, x * down, y * down, x * off, y * off];
+        sums.iter_mut().zip(products).for_each(|(sum, product)| sum[i] = product);
+    }
+    let [across, both, down, across_off, down_off] = sums.map(|sum| sum.iter().sum::<f32>());
+    block.across += across;
+    block.both += both;
+    block.down += down;
+    block.across_off += across_off;
+    block.down_off += down_off;
+}
+
+/// Of the displacement, whose derivatives are those of [`Centred::leave`] where nothing moves, in pixels; with what is known beforehand.
+fn normal_equations<'a>(
+    blocks: impl Iterator<Item = ((f64, f64), &'a Block)>,
+) -> ([[f64; 6]; 6], Parameters) {
+    let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
+    for ((x, y), block) in blocks.filter(|(_, block)| block.across + block.down > 0.0) {
+        let Block { across, both, down, across_off, down_off } = *block;
+        let [xx, xy, yy, x_off, y_off] = [across, both, down, across_off, down_off].map(f64::from);
+        let derivatives = [(x, y), (-y, x), (1.0, 0.0), (0.0, 1.0), (-x * x, -x * y), (-x * y, -y * y)];
+        for (i, (u, v)) in derivatives.into_iter().enumerate() {
+            let (ux, uy) = (u * xx + v * xy, u * xy + v * yy);
+            for (sum, (u, v)) in matrix[i].iter_mut().zip(derivatives) {
+                *sum += ux * u + uy * v;
+            }
+            right[i] += u * x_off + v * y_off;
+        }
+    }
+    (0..6).for_each(|i| matrix[i][i] += (NOISE / EXPECTED).powi(2));
+    (matrix, right)
+}
+
+#[cfg(test)]
+mod tests {
+    use ptztrack_contract::Point;
+
+    use super::*;
+    use crate::vision::synthetic::{Canvas, texture};
+
+    const SIZE: (usize, usize) = (192, 144);
+    /// Somebody of another texture: left, top, width, height in pixels.
+    const PERSON: (f64, f64, f64, f64) = (60.0, 20.0, 60.0, 100.0);
+
+    fn room(x: f64, y: f64) -> f64 {
+        60.0 + 0.5 * texture(1, x, y)
+    }
+
+    fn wall(_: f64, _: f64) -> f64 {
+        100.0
+    }
+
+    /// What is known of somebody in the picture.
+    #[derive(Clone, Copy, PartialEq)]
+    enum Known {
+        Nobody,
+        New,
+        Foreground,
+        Held,
+    }
+
+    /// How far from where it is the picture of a `world` that lies `off` from the background is laid, pixels, at the worst corner.
+    fn error(world: fn(f64, f64) -> f64, off: &Homography, known: Known) -> f64 {
+        let mut model = Model::new(SIZE);
+        model.luma = Canvas::seen(SIZE, &Homography::IDENTITY, world)
+            .pixels
+            .iter()
+            .map(|pixel| u16::from(*pixel) << 8)
+            .collect();
+        (model.age, model.likelihood) = (vec![100; model.luma.len()], vec![0; model.luma.len()]);
+        let mut picture = Canvas::seen(SIZE, off, world).noisy(2.0, 7);
+        let (x, y, width, height) = PERSON;
+        let person = Rect { x, y, width, height };
+        if known != Known::Nobody {
+            picture.paint(PERSON, |u, v| 20.0 + texture(5, u, v));
+        }
+        for (at, likelihood) in model.likelihood.iter_mut().enumerate() {
+            let place = Point { x: (at % SIZE.0) as f64, y: (at / SIZE.0) as f64 };
+            if known == Known::Foreground && person.contains(place) {
+                *likelihood = 200;
+            }
+        }
+        let picture = Sampled { luma: picture.pixels, chroma: None };
+        let held = (known == Known::Held).then_some(person);
+        let spans = [(0, SIZE.0); SIZE.1];
+        let step = Alignment::default().step(&model, &picture, &spans, held).expect("solved");
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let error = corners.map(|(x, y)| {
+            let corner = Point { x: x * SIZE.0 as f64, y: y * SIZE.1 as f64 };
+            let (there, wanted) = (step.apply(corner), off.apply(corner));
+            (there.x - wanted.x).hypot(there.y - wanted.y)
+        });
+        error.into_iter().fold(0.0, f64::max)
+    }
+
+    /// A shift, and somewhat of a turn, a zoom and perspective.
+    fn off() -> Homography {
+        Homography([[1.002, -0.001, 0.3], [0.001, 1.002, -0.4], [1e-6, -1e-6, 1.0]])
+    }
+
+    #[test]
+    fn a_picture_is_laid_where_it_fits_to_parts_of_a_pixel() {
+        let corner = off().apply(Point { x: 192.0, y: 144.0 });
+        assert!((corner.x - 192.0).hypot(corner.y - 144.0) > 0.4);
+        let errors = [off(), Homography::IDENTITY].map(|off| error(room, &off, Known::Nobody));
+        assert!(errors[0] < 0.1 && errors[1] < 0.03, "{errors:?}");
+    }
+
+    #[test]
+    fn somebody_moves_no_picture_but_for_the_first_moment() {
+        let errors = [Known::New, Known::Foreground, Known::Held].map(|known| error(room, &off(), known));
+        assert!(errors[0] < 0.5 && errors[1..].iter().all(|error| *error < 0.1), "{errors:?}");
+    }
+
+    #[test]
+    fn before_a_plain_wall_a_picture_stays_where_it_is() {
+        let error = error(wall, &Homography::IDENTITY, Known::Nobody);
+        assert!(error < 0.1, "{error}");
+    }
+}
