@@ -2,38 +2,52 @@
 
 //! By how little a picture of a turning camera lies beside what is known of the background. The camera's motion is measured from picture to
 //! picture, and its errors add up: where a tiled floor lies a pixel off, its edges differ by more than somebody does who is hardly seen.
-//! One step of Gauss and Newton over all pixels (Lucas and Kanade, IJCAI 1981; Baker and Matthews, IJCV 2004), with the mean gradient of
-//! both pictures (Benhimane and Malis, IROS 2004).
+//! One step of Gauss and Newton over the background that is known (Lucas and Kanade, IJCAI 1981; Baker and Matthews, IJCV 2004), with the
+//! mean gradient of both pictures (Benhimane and Malis, IROS 2004). Light is no motion: what a block differs by as a whole says nothing.
 
 use std::ops::Range;
 
 use multiversion::multiversion;
 use opencv::core::Point2f;
-use ptztrack_contract::{Homography, Rect};
+use ptztrack_contract::{Homography, Point, Rect};
 
 use super::model::{KNOWN, Model, Sampled, UNKNOWN};
+use crate::vision::camera_motion::displacement;
 use crate::vision::projective::{Centred, Parameters, solve};
 
 /// Pixels of a side of a block, which is taken to lie off as a whole.
 const BLOCK: usize = 16;
-/// Pixels that are looked at together, and rows of which one is looked at.
+/// Pixels that are looked at together.
 const LANES: usize = 8;
+/// One in so many rows is looked at.
 const SAMPLING: usize = 2;
 /// Grey levels beyond which a difference counts for no more than that (Huber, 1964): it may be somebody.
-const REACH: f32 = 20.0;
-/// Deviation of what a pixel differs by, grey levels, and of where a picture lies, pixels, before it is looked at: before a plain wall it
-/// stays there.
+const MOST_OFF: f32 = 20.0;
+/// Deviation of what a pixel differs by, grey levels.
 const NOISE: f64 = 3.0;
+/// Deviation of where a picture lies before it is looked at, pixels: before a plain wall it stays there.
 const EXPECTED: f64 = 0.2;
+/// Pixels that a corner of the canvas is moved by at most: what is farther off is not found by gradients.
+const MOST: f64 = 4.0;
 
-/// Sums of products of the gradient across and down, and of each with what pixels differ by.
+/// Weighted sums: of one, of the gradient across and down and of what pixels differ by, and of the products of those.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
-    across: f32,
-    both: f32,
-    down: f32,
-    across_off: f32,
-    down_off: f32,
+    weight: f32,
+    /// Across, down, off.
+    sums: [f32; 3],
+    /// Across with across, down and off, and down with down and off.
+    products: [f32; 5],
+}
+
+impl Block {
+    /// The products but for what is the same all over the block.
+    fn centred(&self) -> [f64; 5] {
+        let [across, down, off] = self.sums.map(f64::from);
+        let of_means = [across * across, across * down, across * off, down * down, down * off];
+        let weight = f64::from(self.weight).max(f64::MIN_POSITIVE);
+        std::array::from_fn(|i| f64::from(self.products[i]) - of_means[i] / weight)
+    }
 }
 
 /// Three rows of what is known and of the picture, from the one above on.
@@ -46,7 +60,7 @@ struct Rows<'a> {
     likelihood: &'a [u8],
 }
 
-/// Finds it; keeps memory.
+/// Finds by how little; keeps memory.
 #[derive(Debug, Default)]
 pub(super) struct Alignment {
     blocks: Vec<Block>,
@@ -54,7 +68,7 @@ pub(super) struct Alignment {
 
 impl Alignment {
     /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that. What lies in the box `held`, where
-    /// somebody is, and what was foreground in the picture before says nothing. `None` where that cannot be told.
+    /// somebody is, and what was foreground in the picture before says nothing. `None` where that cannot be told, or is too far.
     pub fn step(
         &mut self,
         model: &Model,
@@ -72,7 +86,14 @@ impl Alignment {
         });
         let (matrix, right) = normal_equations(blocks);
         let [a, b, tx, ty, g, h] = solve(matrix, right)?.map(|pixels| pixels / centred.unit);
-        Some(centred.leave([1.0 + a, b, tx, ty, g, h]))
+        let step = centred.leave([1.0 + a, b, tx, ty, g, h]);
+        let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
+        let is_small = corners.iter().all(|(x, y)| {
+            let corner = Point { x: x * width as f64, y: y * height as f64 };
+            // Not so of what is no number.
+            displacement(&step, corner) <= MOST
+        });
+        is_small.then_some(step)
     }
 
     /// Sums up each block.
@@ -104,10 +125,8 @@ fn beside(held: Option<Rect>, y: usize, columns: Range<usize>) -> [Range<usize>;
     let is_beside = |held: &Rect| (held.y..=held.y + held.height).contains(&(y as f64));
     let Some(held) = held.filter(is_beside) else { return [columns, 0..0] };
     // Casts saturate.
-    [
-        columns.start..columns.end.min(held.x as usize),
-        columns.start.max((held.x + held.width) as usize + 1)..columns.end,
-    ]
+    let (left, right) = (held.x as usize, ((held.x + held.width) as usize).saturating_add(1));
+    [columns.start..columns.end.min(left), columns.start.max(right).max(left)..columns.end]
 }
 
 /// Adds what these columns of a row say to the blocks that they lie in: as many whole lanes as there are.
@@ -142,23 +161,23 @@ fn add_lanes(block: &mut Block, Rows { mean, age, seen, likelihood }: Rows, x: u
     let (means, pictures) = ([mean(here, x - 1), mean(here, x + 1)], [seen(here, x - 1), seen(here, x + 1)]);
     let (mean_down, seen_down) = ([mean(above, x), mean(below, x)], [seen(above, x), seen(below, x)]);
     let (mean, seen) = (mean(here, x), seen(here, x));
-    let mut sums = [[0.0; LANES]; 5];
+    let (mut weights, mut sums, mut products) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 5]);
     for i in 0..LANES {
         let across = 0.25 * (means[1][i] - means[0][i] + pictures[1][i] - pictures[0][i]);
         let down = 0.25 * (mean_down[1][i] - mean_down[0][i] + seen_down[1][i] - seen_down[0][i]);
         let off = mean[i] - seen[i];
         let is_known = known.iter().all(|known| known[i]);
-        let weight = if is_known { REACH / off.abs().max(REACH) } else { 0.0 };
+        let weight = if is_known { MOST_OFF / off.abs().max(MOST_OFF) } else { 0.0 };
         let [x, y] = [weight * across, weight * down];
-        let products = [x * across, x * down, y * down, x * off, y * off];
-        sums.iter_mut().zip(products).for_each(|(sum, product)| sum[i] = product);
+        weights[i] = weight;
+        sums.iter_mut().zip([x, y, weight * off]).for_each(|(sum, value)| sum[i] = value);
+        let of_two = [x * across, x * down, x * off, y * down, y * off];
+        products.iter_mut().zip(of_two).for_each(|(sum, product)| sum[i] = product);
     }
-    let [across, both, down, across_off, down_off] = sums.map(|sum| sum.iter().sum::<f32>());
-    block.across += across;
-    block.both += both;
-    block.down += down;
-    block.across_off += across_off;
-    block.down_off += down_off;
+    let total = |lanes: &[f32; LANES]| lanes.iter().sum::<f32>();
+    block.weight += total(&weights);
+    block.sums.iter_mut().zip(&sums).for_each(|(sum, lanes)| *sum += total(lanes));
+    block.products.iter_mut().zip(&products).for_each(|(sum, lanes)| *sum += total(lanes));
 }
 
 /// Of the displacement, whose derivatives are those of [`Centred::leave`] where nothing moves, in pixels; with what is known beforehand.
@@ -166,9 +185,8 @@ fn normal_equations<'a>(
     blocks: impl Iterator<Item = ((f64, f64), &'a Block)>,
 ) -> ([[f64; 6]; 6], Parameters) {
     let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
-    for ((x, y), block) in blocks.filter(|(_, block)| block.across + block.down > 0.0) {
-        let Block { across, both, down, across_off, down_off } = *block;
-        let [xx, xy, yy, x_off, y_off] = [across, both, down, across_off, down_off].map(f64::from);
+    for ((x, y), block) in blocks.filter(|(_, block)| block.weight > 0.0) {
+        let [xx, xy, x_off, yy, y_off] = block.centred();
         let derivatives = [(x, y), (-y, x), (1.0, 0.0), (0.0, 1.0), (-x * x, -x * y), (-x * y, -y * y)];
         for (i, (u, v)) in derivatives.into_iter().enumerate() {
             let (ux, uy) = (u * xx + v * xy, u * xy + v * yy);
@@ -184,8 +202,6 @@ fn normal_equations<'a>(
 
 #[cfg(test)]
 mod tests {
-    use ptztrack_contract::Point;
-
     use super::*;
     use crate::vision::synthetic::{Canvas, texture};
 
@@ -197,8 +213,9 @@ mod tests {
         60.0 + 0.5 * texture(1, x, y)
     }
 
-    fn wall(_: f64, _: f64) -> f64 {
-        100.0
+    /// A plain wall, lighter towards the right.
+    fn wall(x: f64, _: f64) -> f64 {
+        100.0 + 0.1 * x
     }
 
     /// What is known of somebody in the picture.
@@ -210,8 +227,9 @@ mod tests {
         Held,
     }
 
-    /// How far from where it is the picture of a `world` that lies `off` from the background is laid, pixels, at the worst corner.
-    fn error(world: fn(f64, f64) -> f64, off: &Homography, known: Known) -> f64 {
+    /// How far from where it is the picture of a `world` that lies `off` from the background, in another `light`, is laid, pixels, at the
+    /// worst corner.
+    fn error(world: fn(f64, f64) -> f64, off: &Homography, known: Known, light: fn(f64) -> f64) -> f64 {
         let mut model = Model::new(SIZE);
         model.luma = Canvas::seen(SIZE, &Homography::IDENTITY, world)
             .pixels
@@ -219,7 +237,7 @@ mod tests {
             .map(|pixel| u16::from(*pixel) << 8)
             .collect();
         (model.age, model.likelihood) = (vec![100; model.luma.len()], vec![0; model.luma.len()]);
-        let mut picture = Canvas::seen(SIZE, off, world).noisy(2.0, 7);
+        let mut picture = Canvas::seen(SIZE, off, |x, y| world(x, y) + light(x)).noisy(2.0, 7);
         let (x, y, width, height) = PERSON;
         let person = Rect { x, y, width, height };
         if known != Known::Nobody {
@@ -234,7 +252,7 @@ mod tests {
         let picture = Sampled { luma: picture.pixels, chroma: None };
         let held = (known == Known::Held).then_some(person);
         let spans = [(0, SIZE.0); SIZE.1];
-        let step = Alignment::default().step(&model, &picture, &spans, held).expect("solved");
+        let step = Alignment::default().step(&model, &picture, &spans, held).unwrap_or(Homography::IDENTITY);
         let corners = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (1.0, 1.0)];
         let error = corners.map(|(x, y)| {
             let corner = Point { x: x * SIZE.0 as f64, y: y * SIZE.1 as f64 };
@@ -249,23 +267,40 @@ mod tests {
         Homography([[1.002, -0.001, 0.3], [0.001, 1.002, -0.4], [1e-6, -1e-6, 1.0]])
     }
 
+    /// The light in which the background was learned, and how much lighter it may be, more so in the middle.
+    fn same(_: f64) -> f64 {
+        0.0
+    }
+
+    fn lighter(x: f64) -> f64 {
+        6.0 - 4.0 * ((x - 96.0) / 96.0).powi(2)
+    }
+
     #[test]
-    fn a_picture_is_laid_where_it_fits_to_parts_of_a_pixel() {
-        let corner = off().apply(Point { x: 192.0, y: 144.0 });
-        assert!((corner.x - 192.0).hypot(corner.y - 144.0) > 0.4);
-        let errors = [off(), Homography::IDENTITY].map(|off| error(room, &off, Known::Nobody));
-        assert!(errors[0] < 0.1 && errors[1] < 0.03, "{errors:?}");
+    fn a_picture_is_laid_where_it_fits_to_parts_of_a_pixel_in_another_light_too() {
+        for light in [same, lighter] {
+            let errors = [off(), Homography::IDENTITY].map(|off| error(room, &off, Known::Nobody, light));
+            assert!(errors[0] < 0.1 && errors[1] < 0.05, "{errors:?}");
+        }
     }
 
     #[test]
     fn somebody_moves_no_picture_but_for_the_first_moment() {
-        let errors = [Known::New, Known::Foreground, Known::Held].map(|known| error(room, &off(), known));
+        let errors =
+            [Known::New, Known::Foreground, Known::Held].map(|known| error(room, &off(), known, same));
         assert!(errors[0] < 0.5 && errors[1..].iter().all(|error| *error < 0.1), "{errors:?}");
     }
 
     #[test]
-    fn before_a_plain_wall_a_picture_stays_where_it_is() {
-        let error = error(wall, &Homography::IDENTITY, Known::Nobody);
-        assert!(error < 0.1, "{error}");
+    fn before_a_plain_wall_a_picture_stays_where_it_is_in_another_light_too() {
+        let errors = [same, lighter].map(|light| error(wall, &Homography::IDENTITY, Known::Nobody, light));
+        assert!(errors.iter().all(|error| *error < 0.2), "{errors:?}");
+    }
+
+    #[test]
+    fn what_is_too_far_off_is_left_where_it_is() {
+        let far = Homography::translation(12.0, 0.0);
+        let error = error(room, &far, Known::Nobody, same);
+        assert!((error - 12.0).abs() < 4.1, "{error}");
     }
 }

@@ -16,7 +16,6 @@ const REACH: i32 = 4;
 /// Samples a plane where it is known; keeps memory.
 #[derive(Debug, Default)]
 pub(super) struct Lanczos {
-    to_source: Mat,
     element: Mat,
     least_age: Mat,
     known: Vec<u8>,
@@ -35,12 +34,12 @@ impl Lanczos {
     ) -> opencv::Result<()> {
         let (columns, rows) = (width as i32, height as i32);
         self.note_known(warp, Luma::packed(age, width))?;
-        self.to_source = Mat::from_slice_2d(&warp.to_source().0)?;
+        let to_source = Mat::from_slice_2d(&warp.to_source().0)?;
         self.sampled.resize(plane.len(), 0);
         imgproc::warp_perspective(
             &Mat::new_rows_cols_with_data(rows, columns, plane)?,
             &mut Mat::new_rows_cols_with_data_mut(rows, columns, &mut self.sampled)?,
-            &self.to_source,
+            &to_source,
             Size::new(columns, rows),
             imgproc::INTER_LANCZOS4 | imgproc::WARP_INVERSE_MAP,
             core::BORDER_REPLICATE,

@@ -145,7 +145,7 @@ impl TravellingBackground {
         let how = comparison(rests, elapsed);
         self.lay_luma(picture);
         self.heed_light();
-        if travel >= RESTS {
+        if travel >= RESTS && way != Way::Lost {
             self.align(picture);
         }
         self.lay_chroma(picture);
@@ -268,7 +268,7 @@ impl TravellingBackground {
                 Some(back) => self.lay_anew(&wanted.then(&back), wanted)?,
                 None => self.start(),
             }
-        } else if off.0.abs().max(off.1.abs()) > margin - 2.0 {
+        } else if off.0.abs().max(off.1.abs()) + bend > margin - 2.0 {
             // By whole pixels: nothing is resampled.
             let to_old = Homography::translation(-off.0.round(), -off.1.round());
             self.lay_anew(&to_old, to_old.then(&self.to_picture))?;

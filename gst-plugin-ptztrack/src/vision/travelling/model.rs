@@ -132,20 +132,22 @@ impl Model {
     /// Lays all planes anew as `warp` says; what was never seen has no age.
     pub fn carry(&mut self, warp: &Warp) -> opencv::Result<()> {
         let mut wide = std::mem::take(&mut self.wide);
-        for plane in [&mut self.spread].into_iter().chain(&mut self.chroma) {
-            warp.sample_wide(plane, 0, &mut wide);
-            std::mem::swap(plane, &mut wide);
-        }
         warp.sample_wide(&self.luma, 0, &mut wide);
         if !warp.is_copy() {
             self.lanczos.sharpen(&mut wide, warp, (&self.luma, &self.age), self.size)?;
         }
         std::mem::swap(&mut self.luma, &mut wide);
+        for plane in [&mut self.spread].into_iter().chain(&mut self.chroma) {
+            warp.sample_wide(plane, 0, &mut wide);
+            std::mem::swap(plane, &mut wide);
+        }
         let mut narrow = std::mem::take(&mut self.narrow);
         for plane in [&mut self.waited].into_iter().chain(&mut self.candidate) {
             warp.sample_nearest(plane, 0, &mut narrow);
             std::mem::swap(plane, &mut narrow);
         }
+        warp.sample_nearest(&self.likelihood, UNKNOWN, &mut narrow);
+        std::mem::swap(&mut self.likelihood, &mut narrow);
         // A mean mixed with one of which nothing is known is not known.
         warp.sample_least(&self.age, 0, &mut narrow);
         std::mem::swap(&mut self.age, &mut narrow);

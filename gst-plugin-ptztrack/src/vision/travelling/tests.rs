@@ -4,6 +4,8 @@ use std::time::Duration;
 
 use ptztrack_contract::{Homography, Point, Rect};
 
+use super::model::{Model, UNKNOWN};
+use super::warp::Warp;
 use super::{TravellingBackground, Way};
 use crate::vision::picture::{Picture, Reduced};
 use crate::vision::synthetic::{Canvas, texture};
@@ -143,6 +145,19 @@ fn a_turning_camera_tells_somebody_from_the_room() {
         let beside = foreground(&background, (0.0, 0.0, 60.0, 120.0));
         assert!(person > 0.6 && beside < 0.03, "{step}: {person} {beside}");
     }
+}
+
+#[test]
+fn who_was_foreground_is_so_on_a_canvas_that_was_laid_anew() {
+    let size = (96, 64);
+    let mut model = Model::new(size);
+    model.likelihood.fill(0);
+    model.likelihood[30 * size.0 + 50] = 200;
+    let mut warp = Warp::default();
+    warp.prepare(size, size, &Homography::translation(10.0, 0.0));
+    model.carry(&warp).expect("OpenCV");
+    let likelihood = [40, 50, 90].map(|x| model.likelihood[30 * size.0 + x]);
+    assert_eq!(likelihood, [200, 0, UNKNOWN]);
 }
 
 /// A floor of tiles, which is the hardest to lay a picture on.
