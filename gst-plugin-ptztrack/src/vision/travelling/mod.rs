@@ -48,6 +48,8 @@ const MAX_BEND: f64 = 10.0;
 const REST: Duration = Duration::from_millis(300);
 /// Displacement of a picture, in pixels, below which the camera rests.
 const RESTS: f64 = 0.05;
+/// Displacement from which it turns: less may be people who walk before one that rests.
+const TURNS: f64 = 0.5;
 /// A resting camera's picture may lie this far beside the canvas' pixels, in pixels.
 const MAX_BLUR: f64 = 0.15;
 /// Time constant of mean and spread.
@@ -145,7 +147,7 @@ impl TravellingBackground {
         let how = comparison(rests, elapsed);
         self.lay_luma(picture);
         self.heed_light();
-        if travel >= RESTS && way != Way::Lost {
+        if travel >= TURNS && way != Way::Lost {
             self.align(picture);
         }
         self.lay_chroma(picture);
