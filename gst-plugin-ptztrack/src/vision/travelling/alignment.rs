@@ -41,12 +41,11 @@ struct Block {
 }
 
 impl Block {
-    /// The products but for what is the same all over the block.
+    /// The products but for what is the same all over the block, in which something must be known.
     fn centred(&self) -> [f64; 5] {
         let [across, down, off] = self.sums.map(f64::from);
         let of_means = [across * across, across * down, across * off, down * down, down * off];
-        let weight = f64::from(self.weight).max(f64::MIN_POSITIVE);
-        std::array::from_fn(|i| f64::from(self.products[i]) - of_means[i] / weight)
+        std::array::from_fn(|i| f64::from(self.products[i]) - of_means[i] / f64::from(self.weight))
     }
 }
 

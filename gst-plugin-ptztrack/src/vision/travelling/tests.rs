@@ -167,7 +167,7 @@ fn tiles(x: f64, y: f64) -> f64 {
 }
 
 /// The tiled floor by a camera that turns for so many pictures and follows somebody as tiled, but so many grey levels lighter; it is measured
-/// wrong by a tenth of a pixel and more each time. Foreground of them and of all that is known.
+/// wrong by a tenth of a pixel and more each time. How much of them is foreground, and of the floor beside them.
 fn seen_before_tiles(levels: f64) -> (f64, f64) {
     let mut background = TravellingBackground::default();
     let seen = |at: f64, seed: u32| {
@@ -178,16 +178,16 @@ fn seen_before_tiles(levels: f64) -> (f64, f64) {
     let empty = |seed| Canvas::seen(SIZE, &Homography::IDENTITY, tiles).noisy(1.25, seed);
     (0..50).for_each(|seed| look(&mut background, &empty(seed), Some((0.0, 0.0))));
     let turn = -2.3;
-    let (mut person, mut all) = (0.0, 0.0);
+    let (mut person, mut beside) = (0.0, 0.0);
     for step in 1..=30_u32 {
         background.protect(Some(normalised(PERSON)));
         look(&mut background, &seen(turn * f64::from(step), 100 + step), Some((turn + 0.12, 0.08)));
         if step > 20 {
             person += foreground(&background, PERSON) / 10.0;
-            all += foreground(&background, (0.0, 0.0, 60.0, 120.0)) / 10.0;
+            beside += foreground(&background, (0.0, 0.0, 60.0, 120.0)) / 10.0;
         }
     }
-    (person, all)
+    (person, beside)
 }
 
 #[test]
