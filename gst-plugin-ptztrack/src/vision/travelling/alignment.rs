@@ -30,22 +30,24 @@ const EXPECTED: f64 = 0.2;
 /// Pixels that a corner of the canvas is moved by at most: what is farther off is not found by gradients.
 const MOST: f64 = 4.0;
 
-/// Weighted sums: of one, of the gradient across and down and of what pixels differ by, and of the products of those.
+/// Weighted sums, apart for every lane: of one, of the gradient across and down and of what pixels differ by, and of the products of those.
 #[derive(Debug, Clone, Copy, Default)]
 struct Block {
-    weight: f32,
+    weight: [f32; LANES],
     /// Across, down, off.
-    sums: [f32; 3],
+    sums: [[f32; LANES]; 3],
     /// Across with across, down and off, and down with down and off.
-    products: [f32; 5],
+    products: [[f32; LANES]; 5],
 }
 
 impl Block {
-    /// The products but for what is the same all over the block, in which something must be known.
-    fn centred(&self) -> [f64; 5] {
-        let [across, down, off] = self.sums.map(f64::from);
+    /// The products but for what is the same all over the block; `None` where nothing of it is known.
+    fn centred(&self) -> Option<[f64; 5]> {
+        let total = |lanes: &[f32; LANES]| f64::from(lanes.iter().sum::<f32>());
+        let weight = total(&self.weight);
+        let [across, down, off] = [0, 1, 2].map(|i| total(&self.sums[i]));
         let of_means = [across * across, across * down, across * off, down * down, down * off];
-        std::array::from_fn(|i| f64::from(self.products[i]) - of_means[i] / f64::from(self.weight))
+        (weight > 0.0).then(|| std::array::from_fn(|i| total(&self.products[i]) - of_means[i] / weight))
     }
 }
 
@@ -160,7 +162,7 @@ fn add_lanes(block: &mut Block, Rows { mean, age, seen, likelihood }: Rows, x: u
     let (means, pictures) = ([mean(here, x - 1), mean(here, x + 1)], [seen(here, x - 1), seen(here, x + 1)]);
     let (mean_down, seen_down) = ([mean(above, x), mean(below, x)], [seen(above, x), seen(below, x)]);
     let (mean, seen) = (mean(here, x), seen(here, x));
-    let (mut weights, mut sums, mut products) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 5]);
+    let Block { weight: weights, sums, products } = block;
     for i in 0..LANES {
         let across = 0.25 * (means[1][i] - means[0][i] + pictures[1][i] - pictures[0][i]);
         let down = 0.25 * (mean_down[1][i] - mean_down[0][i] + seen_down[1][i] - seen_down[0][i]);
@@ -168,15 +170,11 @@ fn add_lanes(block: &mut Block, Rows { mean, age, seen, likelihood }: Rows, x: u
         let is_known = known.iter().all(|known| known[i]);
         let weight = if is_known { MOST_OFF / off.abs().max(MOST_OFF) } else { 0.0 };
         let [x, y] = [weight * across, weight * down];
-        weights[i] = weight;
-        sums.iter_mut().zip([x, y, weight * off]).for_each(|(sum, value)| sum[i] = value);
+        weights[i] += weight;
+        sums.iter_mut().zip([x, y, weight * off]).for_each(|(sum, value)| sum[i] += value);
         let of_two = [x * across, x * down, x * off, y * down, y * off];
-        products.iter_mut().zip(of_two).for_each(|(sum, product)| sum[i] = product);
+        products.iter_mut().zip(of_two).for_each(|(sum, product)| sum[i] += product);
     }
-    let total = |lanes: &[f32; LANES]| lanes.iter().sum::<f32>();
-    block.weight += total(&weights);
-    block.sums.iter_mut().zip(&sums).for_each(|(sum, lanes)| *sum += total(lanes));
-    block.products.iter_mut().zip(&products).for_each(|(sum, lanes)| *sum += total(lanes));
 }
 
 /// Of the displacement, whose derivatives are those of [`Centred::leave`] where nothing moves, in pixels; with what is known beforehand.
@@ -184,8 +182,8 @@ fn normal_equations<'a>(
     blocks: impl Iterator<Item = ((f64, f64), &'a Block)>,
 ) -> ([[f64; 6]; 6], Parameters) {
     let (mut matrix, mut right) = ([[0.0; 6]; 6], [0.0; 6]);
-    for ((x, y), block) in blocks.filter(|(_, block)| block.weight > 0.0) {
-        let [xx, xy, x_off, yy, y_off] = block.centred();
+    for ((x, y), block) in blocks {
+        let Some([xx, xy, x_off, yy, y_off]) = block.centred() else { continue };
         let derivatives = [(x, y), (-y, x), (1.0, 0.0), (0.0, 1.0), (-x * x, -x * y), (-x * y, -y * y)];
         for (i, (u, v)) in derivatives.into_iter().enumerate() {
             let (ux, uy) = (u * xx + v * xy, u * xy + v * yy);

@@ -10,7 +10,6 @@ mod alignment;
 mod another_view;
 mod burned_in;
 mod gain;
-mod lanczos;
 mod median;
 mod model;
 mod noise;
@@ -161,11 +160,11 @@ impl TravellingBackground {
         if way == Way::Lost && !stale {
             self.register(picture, how)?;
         }
-        self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests);
+        let held = self.held_on_canvas();
+        self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests, held);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
-        let held = self.held_on_canvas();
         // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned.
         if held.is_some() {
             self.pooled.mark(&mut self.model, held);

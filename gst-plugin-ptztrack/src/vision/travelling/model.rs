@@ -10,10 +10,9 @@ use opencv::prelude::*;
 
 use ptztrack_contract::{Point, Rect};
 
-use super::lanczos::Lanczos;
 use super::noise::Noise;
 use super::rows::{self, MIN_PATIENCE};
-use super::warp::Warp;
+use super::warp::{Lanczos, Warp};
 use crate::vision::Luma;
 
 /// An apparent background that nobody has looked at yet has this age.
@@ -134,7 +133,7 @@ impl Model {
         let mut wide = std::mem::take(&mut self.wide);
         warp.sample_wide(&self.luma, 0, &mut wide);
         if !warp.is_copy() {
-            self.lanczos.sharpen(&mut wide, warp, (&self.luma, &self.age), self.size)?;
+            self.lanczos.sharpen(&mut wide, warp, &self.luma, &self.age)?;
         }
         std::mem::swap(&mut self.luma, &mut wide);
         for plane in [&mut self.spread].into_iter().chain(&mut self.chroma) {

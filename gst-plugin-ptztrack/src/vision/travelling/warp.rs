@@ -2,10 +2,14 @@
 
 //! Pictures sampled through a projective map.
 
+mod lanczos;
+
 use std::ops::Range;
 
 use multiversion::multiversion;
 use ptztrack_contract::Homography;
+
+pub(super) use self::lanczos::Lanczos;
 
 /// Side of the squares that move as a whole: within one, a camera's map is a displacement. Small enough that
 /// this holds to a third of a pixel, large enough that the compiler makes vector code of a row of it.
@@ -47,7 +51,6 @@ struct Run {
 pub(super) struct Warp {
     size: (usize, usize),
     source: (usize, usize),
-    to_source: Homography,
     /// Of one row of blocks, kept as memory.
     shifts: Vec<Parts>,
     runs: Vec<Run>,
@@ -58,7 +61,7 @@ pub(super) struct Warp {
 impl Warp {
     /// Prepares a picture of `size` whose pixels lie in one of size `source` where `to_source` (of pixels) says.
     pub fn prepare(&mut self, size: (usize, usize), source: (usize, usize), to_source: &Homography) {
-        (self.size, self.source, self.to_source) = (size, source, *to_source);
+        (self.size, self.source) = (size, source);
         self.runs.clear();
         self.spans.clear();
         self.spans.resize(size.1, (0, 0));
@@ -76,11 +79,6 @@ impl Warp {
                 }
             }
         }
-    }
-
-    /// The map that it was prepared for.
-    pub fn to_source(&self) -> &Homography {
-        &self.to_source
     }
 
     /// Whether all moves by the same whole pixels, and nothing is mixed.

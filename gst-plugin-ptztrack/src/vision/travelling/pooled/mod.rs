@@ -33,6 +33,10 @@ const SOMEBODY: f32 = 30.0;
 /// Where so many rows of the cells that hang together have some that are foreground by themselves, as a share, what is faint beside those is
 /// a shadow. It makes nobody taller: below a head that is plain there is a trunk that is not.
 const PLAIN: f32 = 0.5;
+/// A cell where somebody faint is expected says so many times as much (Senior et al., 2006).
+const EXPECTED: f32 = 1.6;
+/// They may reach beyond the box that they were seen in by this part of it.
+const BEYOND: f64 = 0.4;
 
 /// Cells of the canvas: those that hold some of the picture, and one more on each side, of which nothing is known.
 #[derive(Debug, Default)]
@@ -56,6 +60,20 @@ impl Area {
         let columns = cells(start, last, width);
         let rows = cells(covered().map(|(y, _)| y).next(), covered().map(|(y, _)| y).next_back(), height);
         Self { left: columns.start, top: rows.start, across: columns.len(), down: rows.len() }
+    }
+
+    /// Columns and rows of those cells that hold some of a box of the canvas (pixels).
+    fn cells_of(&self, bounds: Rect) -> (Range<usize>, Range<usize>) {
+        let range = |start: f64, length: f64, first: usize, count: usize| {
+            // Casts saturate.
+            let cell = |at: f64| ((at / CELL as f64).max(0.0) as usize).saturating_sub(first);
+            let end = cell(start + length).saturating_add(1).min(count);
+            cell(start).min(end)..end
+        };
+        (
+            range(bounds.x, bounds.width, self.left, self.across),
+            range(bounds.y, bounds.height, self.top, self.down),
+        )
     }
 }
 
@@ -103,15 +121,25 @@ pub(super) struct Pooled {
 }
 
 impl Pooled {
-    /// Looks where cells of the picture, which the `model` was compared with, tell of somebody; learns their noise, apart for a camera that
-    /// `rests` and one that turns.
-    pub fn look(&mut self, model: &Model, picture: &Sampled, spans: &[(usize, usize)], rests: bool) {
+    /// Looks where cells of the picture, which the `model` was compared with, tell of somebody, more so around the box `held` of the
+    /// canvas, where they are expected; learns their noise, apart for a camera that `rests` and one that turns.
+    pub fn look(
+        &mut self,
+        model: &Model,
+        picture: &Sampled,
+        spans: &[(usize, usize)],
+        rests: bool,
+        held: Option<Rect>,
+    ) {
         self.area = Area::of(spans, model.size);
         self.gather(model, picture, spans);
         self.subtract_light();
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
         noise.weigh(&mut self.cells);
         noise.weigh_together(&mut self.cells, &mut self.together, self.area.across);
+        if let Some(held) = held {
+            self.expect(held);
+        }
         for sign in [1.0, -1.0] {
             self.decide(self.area.across, sign);
         }
@@ -171,6 +199,20 @@ impl Pooled {
             for (tile, light) in self.light[(top + y) / TILE * wide..][..wide].iter().enumerate() {
                 row[cells(tile, left, across)].iter_mut().for_each(|off| *off -= light);
             }
+        }
+    }
+
+    /// Lets cells around a box say more, if who is there is not plain: beside plain foreground, what is faint is a shadow.
+    fn expect(&mut self, held: Rect) {
+        let across = self.area.across;
+        let (columns, rows) = self.area.cells_of(held);
+        let is_plain = |row: &usize| self.cells.is_plain[row * across..][columns.clone()].contains(&true);
+        if rows.clone().filter(is_plain).count() as f32 >= PLAIN * rows.len() as f32 {
+            return;
+        }
+        let (columns, rows) = self.area.cells_of(grown(held, BEYOND));
+        for row in self.cells.z.chunks_exact_mut(across.max(1)).take(rows.end).skip(rows.start) {
+            row[columns.clone()].iter_mut().for_each(|z| *z *= EXPECTED);
         }
     }
 
@@ -243,6 +285,12 @@ impl Pooled {
             }
         }
     }
+}
+
+/// A box that reaches farther by a part of itself on each side.
+fn grown(bounds: Rect, part: f64) -> Rect {
+    let (x, y) = (part * bounds.width, part * bounds.height);
+    Rect { x: bounds.x - x, y: bounds.y - y, width: bounds.width + 2.0 * x, height: bounds.height + 2.0 * y }
 }
 
 /// Whether so many deviations may tell of somebody; they do, once it is decided.
@@ -320,6 +368,35 @@ mod tests {
     fn who_is_faint_in_each_cell_is_certain_in_all_and_a_few_cells_are_nobody() {
         assert_eq!(left_of_faint(30), []);
         assert_eq!(left_of_faint(40), [CERTAIN; 40]);
+    }
+
+    /// How many are left of 36 cells of somebody too faint to be seen, six a row, so many of which are plain, where `expected` is the box
+    /// (pixels) that they are expected in.
+    fn left_of_expected(expected: Option<Rect>, plain: usize) -> usize {
+        let mut pooled =
+            Pooled { area: Area { across: ACROSS, down: 8, ..Area::default() }, ..Pooled::default() };
+        pooled.cells.resize(ACROSS * 8);
+        for cell in 0..36 {
+            pooled.cells.z[ACROSS * (1 + cell / 6) + 3 + cell % 6] = 0.8 * PART;
+        }
+        for row in 2..2 + plain {
+            (pooled.cells.is_plain[ACROSS * row + 5], pooled.cells.z[ACROSS * row + 5]) = (true, 0.0);
+        }
+        expected.into_iter().for_each(|held| pooled.expect(held));
+        pooled.decide(ACROSS, 1.0);
+        pooled.cells.z.iter().filter(|z| **z >= CERTAIN).count()
+    }
+
+    #[test]
+    fn around_the_target_less_is_enough_if_nobody_plain_is_there() {
+        let square = |x: f64, y: f64, side: f64| Some(Rect { x, y, width: side, height: side });
+        let within = square(16.0, 8.0, 16.0);
+        assert_eq!(left_of_expected(None, 0), 0, "nobody is expected");
+        assert_eq!(left_of_expected(within, 0), 36, "they reach beyond the box");
+        assert_eq!(left_of_expected(within, 1), 35, "one row of five is plain");
+        assert_eq!(left_of_expected(within, 4), 0, "a shadow");
+        assert_eq!(left_of_expected(square(40.0, 0.0, 8.0), 0), 0, "elsewhere");
+        assert_eq!(left_of_expected(square(-900.0, 900.0, 8.0), 0), 0, "beyond");
     }
 
     #[test]
