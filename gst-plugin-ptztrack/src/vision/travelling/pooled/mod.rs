@@ -122,7 +122,7 @@ pub(super) struct Pooled {
 
 impl Pooled {
     /// Looks where cells of the picture, which the `model` was compared with, tell of somebody, more so around the box `held` of the
-    /// canvas, where they are expected; learns their noise, apart for a camera that `rests` and one that turns.
+    /// canvas, where they are expected, if the camera turns; learns their noise, apart for a camera that `rests` and one that turns.
     pub fn look(
         &mut self,
         model: &Model,
@@ -137,7 +137,8 @@ impl Pooled {
         let noise = if rests { &mut self.at_rest } else { &mut self.turning };
         noise.weigh(&mut self.cells);
         noise.weigh_together(&mut self.cells, &mut self.together, self.area.across);
-        if let Some(held) = held {
+        // Before a camera at rest there is little noise, and whoever needs that help is a shadow.
+        if let Some(held) = held.filter(|_| !rests) {
             self.expect(held);
         }
         for sign in [1.0, -1.0] {
