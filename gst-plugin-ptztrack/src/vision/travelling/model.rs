@@ -246,7 +246,8 @@ impl Model {
         held: Option<Rect>,
     ) {
         let mut alphas = std::mem::take(&mut self.alphas);
-        let (around_columns, around_rows) = held.map_or((0..0, 0..0), |held| around(held, self.size));
+        let (around_columns, around_rows) =
+            held.map_or((0..0, 0..0), |held| pixels_of(around(held), self.size));
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
             alphas.resize(row.len(), 0);
@@ -374,17 +375,24 @@ impl Model {
     }
 }
 
-/// How far around somebody's box nothing is learned that is seen for the first time, in sizes of the box.
+/// How far around their box somebody may reach, in sizes of the box.
 const AROUND: f64 = 0.4;
 
-/// Columns and rows of a canvas of that size that lie there.
-fn around(held: Rect, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
-    let places = |start: f64, length: f64, size: usize| {
-        let (first, end) = (start - AROUND * length, start - AROUND * length + (1.0 + 2.0 * AROUND) * length);
+/// Where somebody may be of whom that box is known.
+pub(super) fn around(held: Rect) -> Rect {
+    let Rect { x, y, width, height } = held;
+    let times = 1.0 + 2.0 * AROUND;
+    Rect { x: x - AROUND * width, y: y - AROUND * height, width: times * width, height: times * height }
+}
+
+/// Columns and rows of a canvas of that size that lie in a box.
+fn pixels_of(bounds: Rect, (width, height): (usize, usize)) -> (Range<usize>, Range<usize>) {
+    let places = |first: f64, length: f64, size: usize| {
+        let end = ((first + length).floor() + 1.0).max(0.0) as usize;
         let first = (first.ceil().max(0.0) as usize).min(size);
-        first..((end.floor() + 1.0).max(0.0) as usize).clamp(first, size)
+        first..end.clamp(first, size)
     };
-    (places(held.x, held.width, width), places(held.y, held.height, height))
+    (places(bounds.x, bounds.width, width), places(bounds.y, bounds.height, height))
 }
 
 fn lies_in(bounds: Rect, x: usize, y: usize) -> bool {

@@ -15,7 +15,7 @@ use ptztrack_contract::{Point, Rect};
 use self::cell_noise::CellNoise;
 use self::columns::{Columns, pool};
 use super::median::Median;
-use super::model::{Model, Row, Sampled, UNKNOWN};
+use super::model::{Model, Row, Sampled, UNKNOWN, around};
 
 /// Pixels of a side of a cell: two blocks of coding side by side in a picture that was reduced by two.
 const CELL: usize = 4;
@@ -35,8 +35,6 @@ const SOMEBODY: f32 = 30.0;
 const PLAIN: f32 = 0.5;
 /// A cell where somebody faint is expected says so many times as much (Senior et al., 2006).
 const EXPECTED: f32 = 1.6;
-/// They may reach beyond the box that they were seen in by this part of it.
-const BEYOND: f64 = 0.4;
 
 /// Cells of the canvas: those that hold some of the picture, and one more on each side, of which nothing is known.
 #[derive(Debug, Default)]
@@ -211,7 +209,7 @@ impl Pooled {
         if rows.clone().filter(is_plain).count() as f32 >= PLAIN * rows.len() as f32 {
             return;
         }
-        let (columns, rows) = self.area.cells_of(grown(held, BEYOND));
+        let (columns, rows) = self.area.cells_of(around(held));
         for row in self.cells.z.chunks_exact_mut(across.max(1)).take(rows.end).skip(rows.start) {
             row[columns.clone()].iter_mut().for_each(|z| *z *= EXPECTED);
         }
@@ -286,12 +284,6 @@ impl Pooled {
             }
         }
     }
-}
-
-/// A box that reaches farther by a part of itself on each side.
-fn grown(bounds: Rect, part: f64) -> Rect {
-    let (x, y) = (part * bounds.width, part * bounds.height);
-    Rect { x: bounds.x - x, y: bounds.y - y, width: bounds.width + 2.0 * x, height: bounds.height + 2.0 * y }
 }
 
 /// Whether so many deviations may tell of somebody; they do, once it is decided.

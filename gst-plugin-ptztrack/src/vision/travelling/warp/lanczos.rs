@@ -42,8 +42,8 @@ pub(in super::super) struct Lanczos {
 }
 
 impl Lanczos {
-    /// Samples a plane through `warp` into `out`, which holds what was sampled bilinearly, wherever all is known that the kernel
-    /// reaches: where the plane's `age` is more than 0.
+    /// Samples a plane through `warp` into `out`, which holds what was sampled bilinearly, in whole blocks of `warp`, wherever all
+    /// is known that the kernel reaches: where the plane's `age` is more than 0.
     pub fn sharpen(&mut self, out: &mut [u16], warp: &Warp, plane: &[u16], age: &[u8]) -> opencv::Result<()> {
         self.note_known(warp, Luma::packed(age, warp.source.0))?;
         sharpen_runs(warp, plane, &self.known, out);
