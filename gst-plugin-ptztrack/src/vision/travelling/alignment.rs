@@ -5,24 +5,23 @@
 //! One step of Gauss and Newton over the background that is known (Lucas and Kanade, IJCAI 1981; Baker and Matthews, IJCV 2004), with the
 //! mean gradient of both pictures (Benhimane and Malis, IROS 2004). Light is no motion: what a block differs by as a whole says nothing.
 
+mod line;
+
 use std::ops::Range;
 
 use multiversion::multiversion;
 use opencv::core::Point2f;
 use ptztrack_contract::{Homography, Point, Rect};
 
-use super::model::{KNOWN, Model, Sampled, UNKNOWN};
+use self::line::{Line, Rows};
+use super::model::{Model, Sampled};
 use crate::vision::camera_motion::displacement;
 use crate::vision::projective::{Centred, Parameters, solve};
 
-/// Pixels of a side of a block, which is taken to lie off as a whole.
+/// Pixels of a side of a block, which is taken to lie off as a whole; so many of a row are looked at together.
 const BLOCK: usize = 16;
-/// Pixels that are looked at together.
-const LANES: usize = 8;
 /// One in so many rows is looked at.
 const SAMPLING: usize = 2;
-/// Grey levels beyond which a difference counts for no more than that (Huber, 1964): it may be somebody.
-const MOST_OFF: f32 = 20.0;
 /// Deviation of what a pixel differs by, grey levels.
 const NOISE: f64 = 3.0;
 /// Deviation of where a picture lies before it is looked at, pixels: before a plain wall it stays there.
@@ -30,41 +29,39 @@ const EXPECTED: f64 = 0.2;
 /// Pixels that a corner of the canvas is moved by at most: what is farther off is not found by gradients.
 const MOST: f64 = 4.0;
 
-/// Weighted sums, apart for every lane: of one, of the gradient across and down and of what pixels differ by, and of the products of those.
+/// Weighted sums over a block, apart for each of its columns: of one, of the gradient across and down and of what pixels differ by, and
+/// of the products of those: across with across, down and off, and down with down and off.
 #[derive(Debug, Clone, Copy, Default)]
-struct Block {
-    weight: [f32; LANES],
-    /// Across, down, off.
-    sums: [[f32; LANES]; 3],
-    /// Across with across, down and off, and down with down and off.
-    products: [[f32; LANES]; 5],
-}
+struct Block([[f32; BLOCK]; 9]);
 
 impl Block {
     /// The products but for what is the same all over the block; `None` where nothing of it is known.
     fn centred(&self) -> Option<[f64; 5]> {
-        let total = |lanes: &[f32; LANES]| f64::from(lanes.iter().sum::<f32>());
-        let weight = total(&self.weight);
-        let [across, down, off] = [0, 1, 2].map(|i| total(&self.sums[i]));
+        let [weight, across, down, off, products @ ..] = totals(&self.0);
         let of_means = [across * across, across * down, across * off, down * down, down * off];
-        (weight > 0.0).then(|| std::array::from_fn(|i| total(&self.products[i]) - of_means[i] / weight))
+        (weight > 0.0).then(|| std::array::from_fn(|i| products[i] - of_means[i] / weight))
     }
 }
 
-/// Three rows of what is known and of the picture, from the one above on.
-#[derive(Debug, Clone, Copy)]
-struct Rows<'a> {
-    mean: [&'a [u16]; 3],
-    age: [&'a [u8]; 3],
-    seen: [&'a [u8]; 3],
-    /// Of foreground, in the middle row, as the picture before told.
-    likelihood: &'a [u8],
+/// The sum over all columns, for each of what is summed up.
+#[multiversion(targets("x86_64+avx2"))]
+fn totals(sums: &[[f32; BLOCK]; 9]) -> [f64; 9] {
+    let mut totals = [0.0; 9];
+    for (total, columns) in totals.iter_mut().zip(sums) {
+        let mut halves = [0.0; BLOCK / 2];
+        for (half, (a, b)) in halves.iter_mut().zip(columns.iter().zip(&columns[BLOCK / 2..])) {
+            *half = a + b;
+        }
+        *total = halves.iter().map(|half| f64::from(*half)).sum();
+    }
+    totals
 }
 
 /// Finds by how little; keeps memory.
 #[derive(Debug, Default)]
 pub(super) struct Alignment {
     blocks: Vec<Block>,
+    line: Line,
 }
 
 impl Alignment {
@@ -103,77 +100,63 @@ impl Alignment {
         let across = width.div_ceil(BLOCK);
         self.blocks.clear();
         self.blocks.resize(across * height.div_ceil(BLOCK), Block::default());
+        self.line.resize(across * BLOCK);
         for y in (1..height.saturating_sub(1)).step_by(SAMPLING) {
             let around = [y - 1, y, y + 1];
             let start = around.map(|y| spans[y].0).into_iter().max().unwrap_or(0) + 1;
             let end = around.map(|y| spans[y].1).into_iter().min().unwrap_or(0).saturating_sub(1);
+            if start >= end {
+                continue;
+            }
             let rows = Rows {
                 mean: around.map(|y| &model.luma[y * width..][..width]),
                 age: around.map(|y| &model.age[y * width..][..width]),
                 seen: around.map(|y| &picture.luma[y * width..][..width]),
                 likelihood: &model.likelihood[y * width..][..width],
             };
-            let blocks = &mut self.blocks[y / BLOCK * across..][..across];
-            for part in beside(held, y, start..end) {
-                add(blocks, rows, part);
-            }
+            self.line.read(rows, start..end);
+            self.line.forget(columns_of(held, y, start..end));
+            add(&mut self.blocks[y / BLOCK * across..][..across], &self.line);
         }
     }
 }
 
-/// The columns of a row to the left and to the right of a box.
-fn beside(held: Option<Rect>, y: usize, columns: Range<usize>) -> [Range<usize>; 2] {
-    let is_beside = |held: &Rect| (held.y..=held.y + held.height).contains(&(y as f64));
-    let Some(held) = held.filter(is_beside) else { return [columns, 0..0] };
+/// Those of the columns of a row that lie in a box.
+fn columns_of(held: Option<Rect>, y: usize, columns: Range<usize>) -> Range<usize> {
+    let has_row = |held: &Rect| (held.y..=held.y + held.height).contains(&(y as f64));
+    let Some(held) = held.filter(has_row) else { return 0..0 };
     // Casts saturate.
     let (left, right) = (held.x as usize, ((held.x + held.width) as usize).saturating_add(1));
-    [columns.start..columns.end.min(left), columns.start.max(right).max(left)..columns.end]
+    left.clamp(columns.start, columns.end)..right.clamp(columns.start, columns.end)
 }
 
-/// Adds what these columns of a row say to the blocks that they lie in: as many whole lanes as there are.
+/// Adds what a row says to the blocks that it goes through.
 #[multiversion(targets("x86_64+avx2"))]
-fn add(blocks: &mut [Block], rows: Rows, columns: Range<usize>) {
-    let first = columns.start.div_ceil(LANES);
-    for lane in first..(columns.end / LANES).max(first) {
-        add_lanes(&mut blocks[lane * LANES / BLOCK], rows, lane * LANES);
+fn add(blocks: &mut [Block], line: &Line) {
+    for (column, block) in blocks.iter_mut().enumerate() {
+        if let Some(lanes) = line.lanes(column * BLOCK) {
+            add_products(block, lanes);
+        }
     }
 }
 
 #[inline(always)]
-fn add_lanes(block: &mut Block, Rows { mean, age, seen, likelihood }: Rows, x: usize) {
-    let [above, here, below] = [0, 1, 2];
-    // Who was here has gone a little farther by now.
-    if likelihood[x - 1..=x + LANES].iter().fold(false, |any, likelihood| any | (*likelihood >= UNKNOWN)) {
-        return;
-    }
-    let mean = |row: usize, from: usize| -> [f32; LANES] {
-        let row = &mean[row][from..][..LANES];
-        std::array::from_fn(|i| f32::from(row[i]) * (1.0 / 256.0))
-    };
-    let seen = |row: usize, from: usize| -> [f32; LANES] {
-        let row = &seen[row][from..][..LANES];
-        std::array::from_fn(|i| f32::from(row[i]))
-    };
-    let known = |row: usize, from: usize| -> [bool; LANES] {
-        let row = &age[row][from..][..LANES];
-        std::array::from_fn(|i| row[i] >= KNOWN)
-    };
-    let known = [known(above, x), known(here, x - 1), known(here, x), known(here, x + 1), known(below, x)];
-    let (means, pictures) = ([mean(here, x - 1), mean(here, x + 1)], [seen(here, x - 1), seen(here, x + 1)]);
-    let (mean_down, seen_down) = ([mean(above, x), mean(below, x)], [seen(above, x), seen(below, x)]);
-    let (mean, seen) = (mean(here, x), seen(here, x));
-    let Block { weight: weights, sums, products } = block;
-    for i in 0..LANES {
-        let across = 0.25 * (means[1][i] - means[0][i] + pictures[1][i] - pictures[0][i]);
-        let down = 0.25 * (mean_down[1][i] - mean_down[0][i] + seen_down[1][i] - seen_down[0][i]);
-        let off = mean[i] - seen[i];
-        let is_known = known.iter().all(|known| known[i]);
-        let weight = if is_known { MOST_OFF / off.abs().max(MOST_OFF) } else { 0.0 };
-        let [x, y] = [weight * across, weight * down];
-        weights[i] += weight;
-        sums.iter_mut().zip([x, y, weight * off]).for_each(|(sum, value)| sum[i] += value);
-        let of_two = [x * across, x * down, x * off, y * down, y * off];
-        products.iter_mut().zip(of_two).for_each(|(sum, product)| sum[i] += product);
+fn add_products(Block(sums): &mut Block, [root, across, down, off]: [&[f32; BLOCK]; 4]) {
+    let of_two = [
+        (root, root),
+        (root, across),
+        (root, down),
+        (root, off),
+        (across, across),
+        (across, down),
+        (across, off),
+        (down, down),
+        (down, off),
+    ];
+    for (sums, (a, b)) in sums.iter_mut().zip(of_two) {
+        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
+            *sum += a * b;
+        }
     }
 }
 
