@@ -281,18 +281,18 @@ fn looks_while_the_tracker_follows_and_the_camera_moves() {
 }
 
 #[test]
-fn a_target_that_stands_still_stays_foreground() {
-    let stands = |followed: bool| {
+fn a_target_that_stands_still_stays_foreground_where_it_is_seen() {
+    let stands = |followed: Option<TargetState>| {
         let mut detector = Detector::learned(&grey());
         detector.see(&[BOX], 2);
-        if followed {
+        if let Some(state) = followed {
             let bounds = Some(Rect::from_pixels((35, 25, 30, 50), 160, 120));
-            let event = TrackerEvent { state: TargetState::Tracking, bounds };
-            detector.harness.push_upstream_event(event.to_event());
+            detector.harness.push_upstream_event(TrackerEvent { state, bounds }.to_event());
         }
         detector.see(&[BOX], 100)[99]
     };
-    assert_eq!((stands(true), stands(false)), (Some(1), Some(0)));
+    let states = [Some(TargetState::Tracking), Some(TargetState::Occluded), None];
+    assert_eq!(states.map(stands), [Some(1), Some(0), Some(0)]);
 }
 
 #[test]

@@ -368,7 +368,9 @@ impl BgAvgDetect {
         let follows = matches!(tracker.state, TargetState::Tracking | TargetState::Occluded);
         gst::debug!(CAT, imp = self, "Tracker is {}", tracker.state.name());
         lock(&self.duty).sleep(follows);
-        lock(&self.heard).target = tracker.bounds.filter(|_| follows);
+        // Where the target is hidden it is not to be seen, and what is seen there is background, or hides it.
+        let is_seen = tracker.state == TargetState::Tracking;
+        lock(&self.heard).target = tracker.bounds.filter(|_| is_seen);
     }
 
     fn heed_camera(&self, camera: &CameraEvent) {

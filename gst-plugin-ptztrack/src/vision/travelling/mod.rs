@@ -165,9 +165,11 @@ impl TravellingBackground {
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
-        // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned.
-        if held.is_some() {
-            self.pooled.mark(&mut self.model, held);
+        // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned. Where more is
+        // expected of them than their box shows, that is kept out as well.
+        if let Some(held) = held {
+            let expected = if rests { held } else { model::around(held) };
+            self.pooled.mark(&mut self.model, Some(expected));
         }
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.pooled.mark(&mut self.model, None);
