@@ -296,6 +296,18 @@ fn a_target_that_stands_still_stays_foreground_where_it_is_seen() {
 }
 
 #[test]
+fn a_target_that_stands_still_and_is_not_seen_for_a_moment_stays_foreground() {
+    let mut detector = Detector::learned(&grey());
+    // Nothing becomes background there before it has been the same for six seconds.
+    detector.see(&[], 100);
+    for (state, pictures) in [(TargetState::Tracking, 80), (TargetState::Occluded, 30)] {
+        let bounds = Some(Rect::from_pixels((35, 25, 30, 50), 160, 120));
+        detector.harness.push_upstream_event(TrackerEvent { state, bounds }.to_event());
+        assert_eq!(detector.see(&[BOX], pictures).last(), Some(&Some(1)), "{state:?}");
+    }
+}
+
+#[test]
 fn the_scene_travels_with_the_picture() {
     let mut detector = Detector::learned(&info(VideoFormat::I420, 160, 120));
     detector.see(&[BOX], 1);

@@ -368,7 +368,7 @@ impl BgAvgDetect {
         let follows = matches!(tracker.state, TargetState::Tracking | TargetState::Occluded);
         gst::debug!(CAT, imp = self, "Tracker is {}", tracker.state.name());
         lock(&self.duty).sleep(follows);
-        // Where the target is hidden it is not to be seen, and what is seen there is background, or hides it.
+        // A tracker that does not see its target only guesses where it is: what is seen there is mostly background.
         let is_seen = tracker.state == TargetState::Tracking;
         lock(&self.heard).target = tracker.bounds.filter(|_| is_seen);
     }

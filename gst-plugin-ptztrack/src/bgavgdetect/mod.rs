@@ -11,8 +11,8 @@
 //! ## The background
 //! It travels with the camera: the motion of the picture is measured once a frame on the frame reduced to
 //! `analysis-width`, and the background is carried along (Yi et al., CVPR Workshops 2013). What was just turned into view
-//! is learned within four frames. What stays the same becomes background after 6 s, except where a tracker says that its
-//! target is seen; there, less difference from the background is enough for a region.
+//! is learned within four frames. What stays the same becomes background after 6 s, except where a tracker says that it
+//! sees its target; there, less difference from the background is enough for a region.
 //!
 //! Where the camera's motion cannot be seen and the picture shows another place, and after: start, new caps, a flush, a
 //! DISCONT or gap of more than `max-gap` (a leaky queue marks whatever follows a dropped frame as DISCONT, which is no

@@ -45,7 +45,7 @@ fn plane(luma: Luma) -> Plane {
 /// What tracker and servo last said.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Heard {
-    /// Where the tracker's target is seen: nothing becomes background there.
+    /// Where the tracker sees its target: nothing becomes background there.
     pub target: Option<Rect>,
     /// Where the camera looks, where it rests and that is known.
     pub view: Option<View>,

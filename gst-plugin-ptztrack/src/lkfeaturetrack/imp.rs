@@ -500,7 +500,7 @@ impl LkFeatureTrack {
             stream.since_message = gst::ClockTime::ZERO;
             self.post(tracked, TargetChange::Position, times);
         }
-        // While there is a target the detector must know where, so that it does not take it for background.
+        // While there is a target the detector must know where, so that it does not take who is seen there for background.
         if std::mem::replace(&mut stream.state, tracked.state) != tracked.state || has_target {
             let event = TrackerEvent { state: tracked.state, bounds: has_target.then_some(tracked.bounds) };
             // Nobody has to listen.

@@ -18,7 +18,7 @@ use super::model::{Model, Sampled};
 use crate::vision::camera_motion::displacement;
 use crate::vision::projective::{Centred, Parameters, solve};
 
-/// Pixels of a side of a block, which is taken to lie off as a whole; so many of a row are looked at together.
+/// Pixels of a side of a block, which is taken to lie off as a whole.
 const BLOCK: usize = 16;
 /// One in so many rows is looked at.
 const SAMPLING: usize = 2;
@@ -66,7 +66,7 @@ pub(super) struct Alignment {
 
 impl Alignment {
     /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that. What lies in the box `held`, where
-    /// somebody is, and what was foreground in the picture before says nothing. `None` where that cannot be told, or is too far.
+    /// somebody is, what was foreground in the picture before, and what lies beside that in its row says nothing. `None` where that cannot be told, or is too far.
     pub fn step(
         &mut self,
         model: &Model,
@@ -127,7 +127,9 @@ fn columns_of(held: Option<Rect>, y: usize, columns: Range<usize>) -> Range<usiz
     let Some(held) = held.filter(has_row) else { return 0..0 };
     // Casts saturate.
     let (left, right) = (held.x as usize, ((held.x + held.width) as usize).saturating_add(1));
-    left.clamp(columns.start, columns.end)..right.clamp(columns.start, columns.end)
+    let start = left.clamp(columns.start, columns.end);
+    // The box comes from whoever tracks, who may tell of one that has no width left in the picture.
+    start..right.clamp(start, columns.end)
 }
 
 /// Adds what a row says to the blocks that it goes through.
@@ -182,6 +184,8 @@ fn normal_equations<'a>(
 
 #[cfg(test)]
 mod tests {
+    use proptest::prelude::*;
+
     use super::*;
     use crate::vision::synthetic::{Canvas, texture};
 
@@ -282,5 +286,17 @@ mod tests {
         let far = Homography::translation(12.0, 0.0);
         let error = error(room, &far, Known::Nobody, same);
         assert!((error - 12.0).abs() < 4.1, "{error}");
+    }
+
+    proptest! {
+        #[test]
+        fn any_box_has_columns(
+            x in any::<f64>(), y in -9.0..9.0_f64, width in any::<f64>(), height in any::<f64>(), row in 0..9_usize,
+        ) {
+            for width in [width, x, -20.0, f64::NAN] {
+                let columns = columns_of(Some(Rect { x, y, width, height }), row, 3..50);
+                prop_assert!(columns == (0..0) || (3 <= columns.start && columns.start <= columns.end && columns.end <= 50));
+            }
+        }
     }
 }

@@ -161,15 +161,13 @@ impl TravellingBackground {
             self.register(picture, how)?;
         }
         let held = self.held_on_canvas();
-        self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests, held);
+        let expected = self.pooled.look(&self.model, &self.sampled, self.forth.spans(), rests, held);
         if self.rested > REST {
             self.model.note_noise(&self.sampled, self.forth.spans(), &mut self.noise);
         }
-        // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned. Where more is
-        // expected of them than their box shows, that is kept out as well.
-        if let Some(held) = held {
-            let expected = if rests { held } else { model::around(held) };
-            self.pooled.mark(&mut self.model, Some(expected));
+        // Only of the target it is known that they are somebody; whatever else is faint may be a shadow, and is learned.
+        if expected.is_some() {
+            self.pooled.mark(&mut self.model, expected);
         }
         self.model.learn(&self.sampled, self.forth.spans(), how, held);
         self.pooled.mark(&mut self.model, None);

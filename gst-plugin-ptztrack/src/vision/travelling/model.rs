@@ -246,8 +246,9 @@ impl Model {
         held: Option<Rect>,
     ) {
         let mut alphas = std::mem::take(&mut self.alphas);
-        let (around_columns, around_rows) =
-            held.map_or((0..0, 0..0), |held| pixels_of(around(held), self.size));
+        let pixels = |area: Option<Rect>| area.map_or((0..0, 0..0), |area| pixels_of(area, self.size));
+        let (around_columns, around_rows) = pixels(held.map(around));
+        let (held_columns, held_rows) = pixels(held);
         for (y, &(start, end)) in spans.iter().enumerate().filter(|(_, (start, end))| start < end) {
             let row = y * self.size.0 + start..y * self.size.0 + end;
             alphas.resize(row.len(), 0);
@@ -266,9 +267,10 @@ impl Model {
                 }
             }
             rows::grow_older(&mut self.age[row.clone()], &mut self.waited[row.clone()], &alphas);
+            let held = if held_rows.contains(&y) { held_columns.clone() } else { 0..0 };
             for (part, alphas) in alphas.chunks(rows::PART).enumerate() {
                 if rows::any_foreground(alphas) {
-                    self.wait(picture, (start + rows::PART * part, y), alphas, how, held);
+                    self.wait(picture, (start + rows::PART * part, y), alphas, how, &held);
                 }
             }
         }
@@ -276,14 +278,14 @@ impl Model {
     }
 
     /// What the candidates of foreground pixels, those of `alphas` that are nought, make of a part of a row of the picture, which begins
-    /// at column and row `first`.
+    /// at column `x` and row `y`. In the columns `held`, where somebody is, they only begin to wait.
     fn wait(
         &mut self,
         picture: &Sampled,
         (x, y): (usize, usize),
         alphas: &[u16],
         how: Comparison,
-        held: Option<Rect>,
+        held: &Range<usize>,
     ) {
         let first = y * self.size.0 + x;
         let part = first..first + alphas.len();
@@ -296,13 +298,18 @@ impl Model {
         let seen = [&picture.luma[part.clone()], u, v];
         let times = (how.ticks, how.patience);
         let (waited, age) = (&mut self.waited[part.clone()], &self.age[part.clone()]);
-        if !rows::wait(candidates, waited, seen, alphas, age, times) {
+        let is_any_due = rows::wait(candidates, waited, seen, alphas, age, times);
+        let [held_start, held_end] =
+            [held.start, held.end].map(|column| column.clamp(x, x + alphas.len()) - x);
+        for waited in &mut waited[held_start..held_end] {
+            *waited = (*waited).min(MIN_PATIENCE);
+        }
+        if !is_any_due {
             return;
         }
         for (at, _) in part.zip(alphas).filter(|(_, alpha)| **alpha == 0) {
-            let held = || held.is_some_and(|held| lies_in(held, x + at - first, y));
             let is_due = self.waited[at] >= rows::patience(self.age[at], times);
-            if is_due && (self.age[at] == UNSEEN || !held()) {
+            if is_due && (self.age[at] == UNSEEN || !held.contains(&(x + at - first))) {
                 self.adopt(at);
             }
         }

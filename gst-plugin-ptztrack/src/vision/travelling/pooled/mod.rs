@@ -120,7 +120,8 @@ pub(super) struct Pooled {
 
 impl Pooled {
     /// Looks where cells of the picture, which the `model` was compared with, tell of somebody, more so around the box `held` of the
-    /// canvas, where they are expected, if the camera turns; learns their noise, apart for a camera that `rests` and one that turns.
+    /// canvas, where they are, if the camera turns; learns their noise, apart for a camera that `rests` and one that turns. Returns
+    /// where they are expected.
     pub fn look(
         &mut self,
         model: &Model,
@@ -128,7 +129,7 @@ impl Pooled {
         spans: &[(usize, usize)],
         rests: bool,
         held: Option<Rect>,
-    ) {
+    ) -> Option<Rect> {
         self.area = Area::of(spans, model.size);
         self.gather(model, picture, spans);
         self.subtract_light();
@@ -136,12 +137,11 @@ impl Pooled {
         noise.weigh(&mut self.cells);
         noise.weigh_together(&mut self.cells, &mut self.together, self.area.across);
         // Before a camera at rest there is little noise, and whoever needs that help is a shadow.
-        if let Some(held) = held.filter(|_| !rests) {
-            self.expect(held);
-        }
+        let expected = held.map(|held| if rests { held } else { self.expect(held) });
         for sign in [1.0, -1.0] {
             self.decide(self.area.across, sign);
         }
+        expected
     }
 
     /// What each cell shows, where it is known and its pixels say nothing by themselves.
@@ -201,18 +201,21 @@ impl Pooled {
         }
     }
 
-    /// Lets cells around a box say more, if who is there is not plain: beside plain foreground, what is faint is a shadow.
-    fn expect(&mut self, held: Rect) {
+    /// Lets cells around a box say more, if who is there is not plain: beside plain foreground, what is faint is a shadow. Where they are
+    /// expected by that.
+    fn expect(&mut self, held: Rect) -> Rect {
         let across = self.area.across;
         let (columns, rows) = self.area.cells_of(held);
         let is_plain = |row: &usize| self.cells.is_plain[row * across..][columns.clone()].contains(&true);
         if rows.clone().filter(is_plain).count() as f32 >= PLAIN * rows.len() as f32 {
-            return;
+            return held;
         }
-        let (columns, rows) = self.area.cells_of(around(held));
+        let expected = around(held);
+        let (columns, rows) = self.area.cells_of(expected);
         for row in self.cells.z.chunks_exact_mut(across.max(1)).take(rows.end).skip(rows.start) {
             row[columns.clone()].iter_mut().for_each(|z| *z *= EXPECTED);
         }
+        expected
     }
 
     /// Decides which cells that are lighter or darker, as `sign` says, and hang together are somebody. What is lighter and what is darker
@@ -375,7 +378,9 @@ mod tests {
         for row in 2..2 + plain {
             (pooled.cells.is_plain[ACROSS * row + 5], pooled.cells.z[ACROSS * row + 5]) = (true, 0.0);
         }
-        expected.into_iter().for_each(|held| pooled.expect(held));
+        if let Some(held) = expected {
+            pooled.expect(held);
+        }
         pooled.decide(ACROSS, 1.0);
         pooled.cells.z.iter().filter(|z| **z >= CERTAIN).count()
     }
