@@ -66,7 +66,8 @@ pub(super) struct Alignment {
 
 impl Alignment {
     /// What takes a place of the canvas to where the picture, which covers `spans` of it, shows that. What lies in the box `held`, where
-    /// somebody is, what was foreground in the picture before, and what lies beside that in its row says nothing. `None` where that cannot be told, or is too far.
+    /// somebody is, what was foreground in the picture before, and what lies beside that in its row says nothing. `None` where that
+    /// cannot be told, or is too far.
     pub fn step(
         &mut self,
         model: &Model,
